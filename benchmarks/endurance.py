@@ -25,7 +25,13 @@ import numpy as np
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import EngineClient, EngineState, announced_engines, start_engine
+from vibench.acquisition.engine import (
+    CampaignRequest,
+    EngineClient,
+    EngineState,
+    announced_engines,
+    start_engine,
+)
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Rig, load_rig
 
@@ -184,7 +190,7 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
     bridge.order(lambda client: client.check(folder))
     wait(1.0)
     until(EngineState.READY)
-    bridge.arm(plan, folder)
+    bridge.arm(CampaignRequest(campaign=plan, folder=folder))
     until(EngineState.ARMED)
     bridge.order(EngineClient.start)
     try:

@@ -81,6 +81,18 @@ def recorded(window):
     return row
 
 
+def space_freezes_the_picture_and_opens_nothing(qtbot, bench):
+    """It opened the list that had the focus; the Esc that closed the list killed the run."""
+    card = bench.pages[RUN].watch_card
+    bench.tick()
+    press(qtbot, bench, Qt.Key.Key_Space)
+    assert card.freeze.isChecked()
+    card.span.setFocus()
+    press(qtbot, bench, Qt.Key.Key_Space)
+    assert QApplication.activePopupWidget() is None
+    assert not card.freeze.isChecked()
+
+
 def test_a_newcomer_measures_with_five_keys(bench, qtbot):
     """Alt+O opens, Ctrl+Return arms, F5 starts, the run ends by itself: three keys, and two to look."""
     keys = []
@@ -98,10 +110,14 @@ def test_a_newcomer_measures_with_five_keys(bench, qtbot):
     qtbot.waitUntil(lambda: "1.5 Vpp" in bench.pages[RUN].arm_card.words, timeout=PATIENCE_MS)
     key(Qt.Key.Key_F5)
     reach(qtbot, bench, EngineState.RUNNING)
+    space_freezes_the_picture_and_opens_nothing(qtbot, bench)
     qtbot.waitUntil(lambda: bench.pages[RUN].is_done, timeout=PATIENCE_MS)
     assert len(keys) <= 5
     row = recorded(bench)
     assert row.state == "recorded", row.reason
+    reach(qtbot, bench, EngineState.READY)
+    bench.tick()
+    assert "left" not in bench.pages[RUN].watch_card.progress.text()
     with open_recording(row.file) as recording:
         assert recording.samples > 51_200
 
@@ -135,6 +151,7 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
     """A second measurement is made, looked at, compared with the first one, and exported."""
     key = partial(press, qtbot, bench)
     files, compare = bench.pages[FILES], bench.pages[COMPARE]
+    reach(qtbot, bench, EngineState.READY)
     key(Qt.Key.Key_Return, CONTROL)
     reach(qtbot, bench, EngineState.ARMED)
     key(Qt.Key.Key_F5)
@@ -265,6 +282,20 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     with open_recording(recorded(bench).file) as recording:
         assert any("tapped the table" in event.text for event in recording.events)
+
+
+def test_what_is_complained_of_goes_when_it_has_come_about(bench, qtbot):
+    reach(qtbot, bench, EngineState.READY)
+    bench.user_actions.start()
+    assert "nothing is armed" in bench.strip.notices[-1].what
+    assert bench.strip.is_said
+    bench.user_actions.arm_test()
+    bench.user_actions.start()
+    assert "is still being carried out" in bench.strip.notices[-1].what
+    reach(qtbot, bench, EngineState.ARMED)
+    assert not bench.strip.is_said
+    bench.user_actions.disarm()
+    reach(qtbot, bench, EngineState.READY)
 
 
 def test_the_cancel_button_has_the_focus_when_armed_and_disarms(bench, qtbot):

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QTimer
 
-from vibench.acquisition.engine import EngineClient, EngineState
+from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.gui.page import AppContext, Settings
@@ -37,7 +37,13 @@ def main(folder: Path, config: Path) -> None:
         match done, bridge.state:
             case [], EngineState.READY:
                 done.append("armed")
-                bridge.arm(Campaign.model_validate(PLAN), folder / "recordings")
+                bridge.arm(
+                    CampaignRequest(
+                        campaign=Campaign.model_validate(PLAN),
+                        folder=folder / "recordings",
+                        longest_patience_s=window.context.patience_s,
+                    )
+                )
             case ["armed"], EngineState.ARMED:
                 done.append("started")
                 bridge.order(EngineClient.start)

@@ -16,6 +16,7 @@ import pytest
 
 from vibench.acquisition import CheckRule, LimitExceeded, RecordingError, StopLevel, open_recording
 from vibench.acquisition.engine import (
+    DRIVING,
     BenchLock,
     CampaignRequest,
     EngineClient,
@@ -75,6 +76,7 @@ class TestTheJob:
             "Limits",
             "How long",
             "Saved in",
+            "If nobody looks",
         ]
         assert until_state(client, EngineState.ARMED).armed.expires_in_s > 50
         assert not (tmp_path / "new").exists()
@@ -245,6 +247,44 @@ class TestNobodyLooks:
         told = [message for message in messages if message.what.startswith("The viewer is gone")][-1]
         assert told.kind.value == "fault"
         assert "unattended" in told.next_step
+
+    def test_a_drive_far_from_its_limits_is_given_the_patience_that_was_granted(
+        self, client, shipped_rig, tmp_path
+    ):
+        """And one at its limits half a second, whatever was granted."""
+        client.open(shipped_rig)
+        until_state(client, EngineState.READY)
+        quiet, loud = campaign("run"), campaign("run").model_dump()
+        plan = client.arm_request(CampaignRequest(campaign=quiet, folder=tmp_path, longest_patience_s=3.0))
+        assert 1.0 < plan.patience_s <= 3.0
+        loud["measurements"][0]["excitation"]["amplitude_vpp"] = 9.9
+        loud = CampaignRequest(campaign=loud, folder=tmp_path, longest_patience_s=3.0)
+        assert client.arm_request(loud).patience_s < 0.6
+        client.arm_request(CampaignRequest(campaign=quiet, folder=tmp_path, longest_patience_s=3.0))
+        client.start()
+        samples = until(client, lambda status: status.samples > 0).samples
+        Event().wait(0.9)
+        assert client.status().state in DRIVING
+        until(client, lambda status: status.samples > samples + 50_000)
+
+    def test_a_campaign_that_is_left_alone_goes_on_when_its_window_is_gone(
+        self, engine, shipped_rig, tmp_path
+    ):
+        """The engine is attended; this campaign is not, and the engine ends after it."""
+        process = engine()
+        process.client.open(shipped_rig)
+        until_state(process.client, EngineState.READY)
+        alone = campaign("run", duration_s=120.0)
+        process.client.arm_request(
+            CampaignRequest(campaign=alone, folder=tmp_path, attendance=Supervision.UNATTENDED)
+        )
+        process.client.start()
+        until(process.client, lambda status: status.samples > 0)
+        process.leave()
+        until_there(tmp_path / "run.h5")
+        with open_recording(tmp_path / "run.h5") as recording:
+            assert recording.state is RecordingState.COMPLETE
+        assert process._process.wait(20) == 0
 
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
     def test_an_engine_that_was_frozen_itself_does_not_blame_its_viewer(

@@ -1,5 +1,6 @@
 """A message says what happened, what was done and what to do, and stays until it is read."""
 
+from PySide6.QtCore import QPoint
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
 
@@ -40,7 +41,7 @@ def test_dismissed_messages_can_still_be_read_in_details(qtbot):
     qtbot.addWidget(strip)
     strip.say(Notice(NoticeKind.INFO, "first"))
     button(strip, "Dismiss").click()
-    assert strip.isHidden()
+    assert not strip.is_said
     strip.say(Notice(NoticeKind.INFO, "second"))
     button(strip, "Details").click()
     details = strip.findChild(QPlainTextEdit)
@@ -48,11 +49,34 @@ def test_dismissed_messages_can_still_be_read_in_details(qtbot):
     assert details.toPlainText() == "INFO: second\n\nINFO: first"
 
 
-def test_information_gives_way_to_what_begins_and_a_warning_does_not(qtbot):
+def test_every_message_gives_way_to_what_was_wanted_and_stays_in_details(qtbot):
     strip = MessageStrip()
     qtbot.addWidget(strip)
-    for kind, stays in ((NoticeKind.INFO, False), (NoticeKind.WARNING, True), (NoticeKind.FAULT, True)):
-        strip.say(Notice(kind, "The campaign before this one ended."))
+    for kind in NoticeKind:
+        strip.say(Notice(kind, "Nothing is armed."))
+        assert strip.is_said
         strip.give_way()
-        assert strip.isVisibleTo(None) is stays
+        assert not strip.is_said
     assert len(strip.notices) == 3
+
+
+def test_a_message_moves_nothing_that_can_be_clicked(window, qapp):
+    """A page that moved down put "Check bench" where "Find instruments" had been."""
+
+    def places():
+        qapp.processEvents()
+        return {
+            each: each.mapTo(window, QPoint(0, 0)) for each in window.page.findChildren(QPushButton)
+        }  # fmt: skip
+
+    before = places()
+    for text in ("short", "a long one, " * 60):
+        window.strip.say(Notice(NoticeKind.FAULT, text, text, text))
+        assert places() == before
+        button(window.strip, "Details").click()
+        assert places() == before
+    window.strip.dismiss()
+    assert places() == before
+    assert window.strip.isVisible()
+    window.tick()
+    assert "Alt+O" in shown(window.strip)

@@ -44,6 +44,8 @@ from ._start import (
 )
 from ._state import (
     DRIVING as DRIVING,
+    LONGEST_PATIENCE_S as LONGEST_PATIENCE_S,
+    VIEWER_PATIENCE_S as VIEWER_PATIENCE_S,
     EngineState as EngineState,
     Supervision as Supervision,
 )

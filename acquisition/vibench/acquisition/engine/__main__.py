@@ -14,6 +14,8 @@ from ._request_handler import RequestHandler
 from ._server import LOOPBACK, serving, spoken
 from ._state import Supervision
 
+PARENT_INTERVAL_S = 0.2
+"""How often an engine that was left alone sees whether it has done what it was left with [s]."""
 FORGOTTEN_S = 60.0
 """An unattended engine that was never used waits this long for somebody to ask [s]."""
 
@@ -69,10 +71,13 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
 
 
 def _follow_parent(handler: RequestHandler) -> None:
-    """End with whoever started the engine: standard input is a pipe from there."""
+    """End with whoever started the engine, or after what was left alone; its input is a pipe from there."""
     # Not through sys.stdin: a buffer that a thread waits in cannot be torn down at the process's end.
     while os.read(sys.stdin.fileno(), 4096):
         pass
+    pause = Event()
+    while handler.goes_on_alone:
+        pause.wait(PARENT_INTERVAL_S)
     handler.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
 
 

@@ -9,27 +9,28 @@ from ._verbs import VERBS
 from ._wire import send
 
 READ_BYTES = 1 << 20
-_BEAT = VERBS["beat"].message()
 
 
 class Heartbeat:
     """A connection of its own, on which nothing is wanted and every answer is thrown away.
 
-    A viewer's thread that paints can beat at any time: a beat takes some ten microseconds, takes no lock
-    and lets no other thread in between.
+    Any thread of a viewer may beat, one at a time: a beat takes tens of microseconds and waits for nobody.
     """
 
     def __init__(self, address: EngineAddress) -> None:
         self._connection = connected(address, ConnectionRole.ATTENDING)
         self._connection.settimeout(0)
 
-    def beat(self) -> None:
-        """Say that somebody is there; an engine that has gone is noticed by whoever waits for answers."""
+    def beat(self, still_s: float = 0.0) -> None:
+        """Say that somebody is there; an engine that has gone is noticed by whoever waits for answers.
+
+        ``still_s`` [s]: for how long whoever looks, a window's own thread, has stood still meanwhile.
+        """
         with suppress(OSError):  # nothing more to throw away, or the engine has gone
             while self._connection.recv(READ_BYTES):
                 continue
         with suppress(OSError):  # it does not read at the moment, or has gone
-            send(self._connection, _BEAT)
+            send(self._connection, VERBS["beat"].message(still_s=still_s))
 
     def close(self) -> None:
         """End the connection. Legal at any time."""

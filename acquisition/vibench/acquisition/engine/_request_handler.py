@@ -22,17 +22,28 @@ from ._errors import EngineError
 from ._job_queue import JobQueue
 from ._live_twin import TwinSwitch
 from ._sample_buffer import SampleSlice
-from ._state import DRIVING, SOUNDING, VIEWER_PATIENCE_S, EngineState, Supervision
+from ._state import (
+    DRIVING,
+    HUNG_FACTOR,
+    SOUNDING,
+    VIEWER_PATIENCE_S,
+    EngineState,
+    Supervision,
+    patience_s,
+)
 from ._status import ArmedPlan, EngineStatus, TwinStatus
 from ._verbs import Verb
 
 Answer = TypeVar("Answer")
 
+INTERVAL_S = 0.05
+"""How often deadlines are looked at [s]."""
+
 ARMED_S = 60.0
 """An armed engine disarms itself after this long [s]."""
 
 
-def armed_plan(bench: Bench, request: CampaignRequest) -> ArmedPlan:
+def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision) -> ArmedPlan:
     """Hold a campaign against bench and folder; nothing is played and nothing written.
 
     Raises AcquisitionError with every reason why it cannot be carried out.
@@ -57,6 +68,9 @@ def armed_plan(bench: Bench, request: CampaignRequest) -> ArmedPlan:
     length = timedelta(seconds=round(campaign.duration_s))
     bound = f"{closest.limit:.4g} {closest.unit}"
     kept = len(planned) - len(missing)
+    attendance = request.attendance or supervision
+    granted_s = patience_s(request.longest_patience_s, closest.use)
+    is_attended = attendance is Supervision.ATTENDED
     return ArmedPlan(
         campaign=campaign.name,
         folder=str(folder),
@@ -66,8 +80,12 @@ def armed_plan(bench: Bench, request: CampaignRequest) -> ArmedPlan:
             f"Limits: {closest.what} comes closest, {closest.use:.0%} of {bound} in {tightest}",
             f"How long: {length} (h:min:s), ramps and checks included",
             f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
+            "If nobody looks: "
+            + (f"aborted after {granted_s:.1f} s" if is_attended else "it goes on, unattended"),
         ),
         expires_in_s=ARMED_S,
+        attendance=attendance,
+        patience_s=granted_s,
     )
 
 
@@ -89,6 +107,10 @@ def confirmed_by(sheet: KnobSheet | None) -> Confirm:
 
 STALL_S = 0.2
 """A look after this process's own viewers that comes so late tells of a stall of this process [s]."""
+LATE_FACTOR = 4.0
+"""A viewer is given so many times what this process itself comes late: it shares the computer."""
+FORGETTING = 0.995
+"""Of the worst lateness, from one look to the next: half of it is forgotten in seven seconds."""
 
 
 class RequestHandler:
@@ -106,6 +128,8 @@ class RequestHandler:
         self._request: CampaignRequest | None = None
         self._armed_s = 0.0
         self._last_request_s = self._last_round_s = monotonic()
+        self._late_s = self._still_s = 0.0
+        self._attendance, self._patience_s = engine.supervision, VIEWER_PATIENCE_S
 
     def carry_out(self, verb: Verb[Answer], arguments: Mapping[str, object]) -> Answer:
         """Do what a verb asks for, if the engine's state permits it."""
@@ -126,8 +150,9 @@ class RequestHandler:
         """Note that somebody is there."""
         self._last_request_s = monotonic()
 
-    def beat(self) -> None:
-        """Do nothing: who asks has been noted."""
+    def beat(self, still_s: float = 0.0) -> None:
+        """Note for how long the window has stood still; who asks has been noted."""
+        self._still_s = still_s
 
     def status(self) -> EngineStatus:
         """Say where the engine stands."""
@@ -156,12 +181,14 @@ class RequestHandler:
     def check(self, folder: Path = Path()) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
         self._engine.switch = StopSwitch()
+        self._attendance, self._patience_s = self._engine.supervision, VIEWER_PATIENCE_S
         self._engine.published.enter(EngineState.CHECKING)
         self._jobs.put(lambda: self._engine.check(folder))
 
     def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
         """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be."""
-        plan = armed_plan(self._engine.bench, campaign_request)
+        plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)
+        self._attendance, self._patience_s = plan.attendance, plan.patience_s
         self._request = campaign_request
         self._armed_s = monotonic()
         self._engine.published.arm(plan, campaign_request.campaign)
@@ -224,6 +251,7 @@ class RequestHandler:
         """Do what time asks for: disarm what nobody starts, abort what nobody attends."""
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
+        self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
         if since_s > STALL_S:  # whoever asked while this process did not run is not to blame
             self._last_request_s += since_s
         engine.look_after_twin()
@@ -232,9 +260,19 @@ class RequestHandler:
             engine.published.messages.warn(
                 f"Armed for {ARMED_S:g} s and not started.", "Disarmed.", "Arm again."
             )
+        if self._attendance is Supervision.UNATTENDED:
+            return
+        granted_s = self._patience_s + LATE_FACTOR * max(0.0, self._late_s)
         alone_s = now_s - self._last_request_s
-        if engine.supervision is Supervision.ATTENDED and alone_s > VIEWER_PATIENCE_S:
+        if alone_s > granted_s:
             self._act_alone(f"nobody has looked for {alone_s:.1f} s")
+        elif self._still_s > HUNG_FACTOR * granted_s:
+            self._act_alone(f"nobody has looked for {self._still_s:.1f} s: the window stands still")
+
+    @property
+    def goes_on_alone(self) -> bool:
+        """Whether something runs that was meant to be left alone."""
+        return self._attendance is Supervision.UNATTENDED and self._engine.published.state in DRIVING
 
     def is_forgotten(self, after_s: float) -> bool:
         """Whether nobody has asked for so long, and nothing was carried out that they may come back to."""
@@ -256,7 +294,8 @@ class RequestHandler:
             engine.published.messages.alarm(
                 f"The viewer is gone: {reason}.",
                 f"Ramped down{kept}.",
-                "If the computer was too busy, end other programs; or measure from a terminal, unattended.",
+                "If the computer was too busy, end other programs, grant more patience (Settings), or arm a "
+                "campaign that is left alone, unattended (Queue page, or vibench measure).",
             )
 
     def _stop(self, request: StopRequest) -> None:

@@ -20,7 +20,7 @@ from ._address import EngineAddress
 from ._admission import Admission
 from ._announcement import announced
 from ._kept_stops import KeptStops
-from ._request_handler import RequestHandler
+from ._request_handler import INTERVAL_S, RequestHandler
 from ._state import ConnectionRole
 from ._verbs import DONE, REQUEST, VERBS
 from ._wire import REQUESTS, Message, receive, refused, send
@@ -131,10 +131,6 @@ class Server:
 def spoken(address: EngineAddress) -> str:
     """Put an address into one line of JSON, as an engine's process says it to the one that started it."""
     return json.dumps(address.model_dump())
-
-
-INTERVAL_S = 0.05
-"""How often deadlines, and stops that were put down, are looked at [s]."""
 
 
 class Watchdog:

@@ -32,6 +32,11 @@ class EngineProcess(ClosedOnLeaving):
         """Whether it still runs."""
         return self._process.poll() is None
 
+    def leave(self) -> None:
+        """Let go of an engine that was armed to be left alone; it ends when it has done its work."""
+        self.client.close()
+        self._close_pipes()
+
     def close(self) -> None:
         """Let the engine ramp down and end, and wait for that. Legal at any time."""
         if self.is_alive:
@@ -46,6 +51,9 @@ class EngineProcess(ClosedOnLeaving):
             self._process.kill()
             self._process.wait()
         # Not before: the end of its input tells an engine that it has been left alone.
+        self._close_pipes()
+
+    def _close_pipes(self) -> None:
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 pipe.close()

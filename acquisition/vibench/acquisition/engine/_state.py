@@ -36,7 +36,7 @@ class Supervision(StrEnum):
     """Whether a run needs somebody who looks."""
 
     ATTENDED = "attended"
-    """Nobody has asked for `VIEWER_PATIENCE_S`: the run is aborted."""
+    """Nobody has asked for too long (`patience_s`): the run is aborted."""
     UNATTENDED = "unattended"
     """A campaign that is left alone: viewers may come and go."""
 
@@ -51,4 +51,16 @@ class ConnectionRole(StrEnum):
 
 
 VIEWER_PATIENCE_S = 0.5
-"""How long an attended run goes on while nobody asks [s]."""
+"""How long an attended run at a limit of the rig goes on while nobody asks [s]."""
+LONGEST_PATIENCE_S = 10.0
+"""More cannot be granted to any drive [s]."""
+HUNG_FACTOR = 4.0
+"""A viewer that is there and says that its window stands still is given so many times the patience."""
+
+
+def patience_s(longest_s: float, use: float) -> float:
+    """How long a drive may go on while nobody looks: the closer to a limit, the shorter [s].
+
+    ``use`` is the share of the tightest limit; ``longest_s`` [s] is what was granted far from all of them.
+    """
+    return max(VIEWER_PATIENCE_S, min(longest_s, VIEWER_PATIENCE_S / max(use, 1e-9)))

@@ -38,6 +38,10 @@ class ArmedPlan(FrozenModel):
     """What, at which level, within which limits, how long, and where it is saved."""
     expires_in_s: float
     """The engine disarms itself after this long."""
+    attendance: Supervision
+    """Whether somebody must look while it runs."""
+    patience_s: float
+    """For how long nobody may look at it, if somebody must [s]."""
 
 
 class RunStatus(FrozenModel):

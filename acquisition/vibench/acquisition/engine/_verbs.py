@@ -17,7 +17,16 @@ from pathlib import Path
 from typing import Annotated, Any, Concatenate, Generic, Literal, ParamSpec, TypeVar, get_type_hints
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, Field, NonNegativeInt, PositiveInt, TypeAdapter, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveInt,
+    TypeAdapter,
+    create_model,
+)
 
 from ..host import FrozenModel, validated
 from ..rig import KnobSheet, Rig
@@ -205,8 +214,8 @@ class EngineVerbs:
         raise NotImplementedError
 
     @verb("beat", DONE)
-    def beat(self) -> None:
-        """Say that somebody is there, and want nothing."""
+    def beat(self, still_s: NonNegativeFloat = 0.0) -> None:
+        """Say that somebody is there, and want nothing; ``still_s``: for how long the window stood still."""
 
     @verb("look", SAMPLES)
     def look(self, since_sample: NonNegativeInt = 0, *, most: PositiveInt) -> SampleSlice:

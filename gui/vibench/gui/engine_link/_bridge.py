@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from time import monotonic
 from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
@@ -11,17 +10,18 @@ from PySide6.QtCore import QEvent, QObject, QTimer, Signal
 from PySide6.QtWidgets import QApplication
 
 from vibench.acquisition import AcquisitionError, StopLevel
-from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import (
     DRIVING,
     ArmedPlan,
     BenchFacts,
+    CampaignRequest,
     EngineClient,
     EngineGone,
     EngineMessage,
     EngineState,
     EngineStatus,
     SampleSlice,
+    Supervision,
     start_engine,
 )
 from vibench.acquisition.plan import Campaign
@@ -38,9 +38,6 @@ CATCH_UP_S = 2.0
 PIECE_S = 0.2
 """Samples that are taken in at once; a frame of a real instrument's brings a quarter of that."""
 
-BEAT_S = 0.04
-"""The engine is not told more often than this that the window lives; it waits for half a second."""
-
 P = ParamSpec("P")
 Snapshot = tuple[EngineStatus, SampleSlice | None]
 
@@ -56,6 +53,8 @@ class Bridge(QObject):
     """A `Notice` from the engine, or about it."""
     armed = Signal(object)
     """The `ArmedPlan` after `arm` was granted."""
+    advanced = Signal()
+    """What was wanted has come about: a bench is open, a plan armed, a run begun."""
     recording_ended = Signal(object)
     """Path of a recording that has just come to its end."""
 
@@ -71,7 +70,8 @@ class Bridge(QObject):
         self._last_message = 0
         self._ended: frozenset[str] = frozenset()
         self._is_looking = False
-        self._beaten_s = 0.0
+        self._orders = 0
+        self._attendance = Supervision.ATTENDED
 
     @property
     def status(self) -> EngineStatus | None:
@@ -82,6 +82,11 @@ class Bridge(QObject):
     def state(self) -> EngineState:
         """Where the engine stands; closed while there is none."""
         return EngineState.CLOSED if self._status is None else self._status.state
+
+    @property
+    def is_ordering(self) -> bool:
+        """Whether an order is on its way: a campaign may take seconds to be held against the limits."""
+        return self._orders > 0
 
     @property
     def is_driving(self) -> bool:
@@ -119,15 +124,13 @@ class Bridge(QObject):
             self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
 
     def beat(self) -> None:
-        """Tell the engine that the window is alive, when it has not been told for a while.
+        """Note that the window's own thread is alive; another one tells the engine.
 
         It may be called while something is painted: no answer is fetched, so nothing is changed.
         """
-        now_s = monotonic()
-        heartbeat = None if self._line is None else self._line.heartbeat
-        if heartbeat is not None and now_s - self._beaten_s > BEAT_S:
-            self._beaten_s = now_s
-            heartbeat.beat()
+        pulse = None if self._line is None else self._line.pulse
+        if pulse is not None:
+            pulse.live()
 
     def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
         """Open the bench of a rig, with an engine of its own if there is none yet."""
@@ -142,27 +145,30 @@ class Bridge(QObject):
         """Have the engine carry out a verb of its client, such as ``EngineClient.start``."""
         self._order(lambda client: verb(client, *args, **kwargs))
 
-    def arm(
-        self, campaign: Campaign, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
-    ) -> None:
+    def arm(self, request: CampaignRequest) -> None:
         """Get ready to carry out a campaign; `armed` or a notice follows."""
 
         def keep(plan: ArmedPlan) -> None:
-            self._campaign = campaign
+            self._campaign, self._attendance = request.campaign, plan.attendance
             self.armed.emit(plan)
 
-        self._order(lambda client: client.arm(campaign, folder, existing), keep)
+        self._order(lambda client: client.arm_request(request), keep)
 
     def stop(self, level: StopLevel, reason: str) -> None:
         """Hold or end what runs; goes before everything else that waits."""
         if self._line is not None:
             self._line.ask(Urgency.STOP, lambda client: client.stop(level, reason), _done, self._refused)
 
-    def close(self) -> None:
-        """Let the engine ramp down and end."""
+    @property
+    def may_leave(self) -> bool:
+        """Whether what runs was meant to be left alone."""
+        return self.is_driving and self._attendance is Supervision.UNATTENDED
+
+    def close(self, how: Urgency = Urgency.END) -> None:
+        """Let the engine ramp down and end; or leave it alone with what it carries out."""
         line, self._line = self._line, None
         if line is not None:
-            line.close()
+            line.close(how)
         self._status = None
 
     def _order(
@@ -175,7 +181,17 @@ class Bridge(QObject):
                 )
             )
             return
-        self._line.ask(Urgency.ORDER, question, on_answer or _done, self._refused)
+        self._orders += 1
+
+        def answered(answer: Any) -> None:
+            self._orders -= 1
+            (on_answer or _done)(answer)
+
+        def refused(error: AcquisitionError) -> None:
+            self._orders -= 1
+            self._refused(error)
+
+        self._line.ask(Urgency.ORDER, question, answered, refused)
 
     def _look_question(self) -> Callable[[EngineClient], Snapshot]:
         view, run, status = self._view, self._view_run, self._status
@@ -191,7 +207,9 @@ class Bridge(QObject):
         return look
 
     def _looked(self, snapshot: Snapshot) -> None:
-        self._status, newest_samples = snapshot
+        before, (self._status, newest_samples) = self.state, snapshot
+        if (before, self.state) in _ADVANCES:
+            self.advanced.emit()
         if newest_samples is None or self._status.bench is None or newest_samples.volts.shape[1] == 0:
             self._is_looking = False
         else:
@@ -244,8 +262,20 @@ class Bridge(QObject):
             return
         line, self._line = self._line, None
         self._status, self._last_message, self._ended = None, 0, frozenset()
+        self._orders = 0
         line.leave()
         self.noticed.emit(notice_of(error, "Look at the bench, then open it again on the Rig page."))
+
+
+_ADVANCES = frozenset(
+    {
+        (EngineState.OPENING, EngineState.READY),
+        (EngineState.CHECKING, EngineState.READY),
+        (EngineState.READY, EngineState.ARMED),
+        (EngineState.ARMED, EngineState.RUNNING),
+    }
+)
+"""Steps after which a complaint about what was before would be out of date."""
 
 
 def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from itertools import count
 from queue import Empty, PriorityQueue, SimpleQueue
+from time import monotonic
 from typing import Any
 
 from vibench.acquisition import AcquisitionError
@@ -16,6 +17,39 @@ Question = Callable[[EngineClient], Any]
 Listener = Callable[[Any], None]
 
 
+BEAT_S = 0.04
+"""How often the engine is told that the window lives [s]."""
+
+
+class Pulse:
+    """Beats from a thread of its own, and says with each beat for how long the window has stood still.
+
+    Painting, a busy computer or another thread of Python do not hold it up; a window that has frozen for good
+    is told as such, and a process that stands still as a whole falls silent.
+    """
+
+    def __init__(self, heartbeat: Heartbeat) -> None:
+        self._heartbeat = heartbeat
+        self._lived_s = monotonic()
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="pulse", daemon=True)
+        self._thread.start()
+
+    def live(self) -> None:
+        """Note that the window's own thread gets something done; only that thread may say so."""
+        self._lived_s = monotonic()
+
+    def close(self) -> None:
+        """Beat no more."""
+        self._closing.set()
+        self._thread.join()
+        self._heartbeat.close()
+
+    def _run(self) -> None:
+        while not self._closing.wait(BEAT_S):
+            self._heartbeat.beat(monotonic() - self._lived_s)
+
+
 class Urgency(IntEnum):
     """Whose turn it is when several wait."""
 
@@ -23,6 +57,7 @@ class Urgency(IntEnum):
     ORDER = 1
     LOOK = 2
     END = 3
+    LEAVE = 4
 
 
 @dataclass(order=True)
@@ -46,7 +81,7 @@ class EngineLine:
         self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._numbers = count()
         self._engine: EngineProcess | None = None
-        self._heartbeat: Heartbeat | None = None
+        self._pulse: Pulse | None = None
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -56,9 +91,9 @@ class EngineLine:
         return None if self._engine is None else self._engine.pid
 
     @property
-    def heartbeat(self) -> Heartbeat | None:
+    def pulse(self) -> Pulse | None:
         """Tells the engine that the window is alive; None before there is an engine."""
-        return self._heartbeat
+        return self._pulse
 
     def ask(
         self,
@@ -79,28 +114,32 @@ class EngineLine:
                 return
             tell()
 
-    def leave(self) -> None:
-        """Let the engine ramp down and end; nobody waits for that."""
-        self._calls.put(_Call(Urgency.END, next(self._numbers), _nothing, _nothing, _nothing))
+    def leave(self, how: Urgency = Urgency.END) -> None:
+        """Let the engine ramp down and end, or go on alone; nobody waits for that."""
+        self._calls.put(_Call(how, next(self._numbers), _nothing, _nothing, _nothing))
 
-    def close(self) -> None:
-        """Let the engine ramp down and end, and wait for that."""
-        self.leave()
+    def close(self, how: Urgency = Urgency.END) -> None:
+        """Let the engine ramp down and end, or go on alone, and wait for that."""
+        self.leave(how)
         self._thread.join()
 
     def _run(self) -> None:
-        while (call := self._calls.get()).urgency is not Urgency.END:
+        while (call := self._calls.get()).urgency not in (Urgency.END, Urgency.LEAVE):
             self._answer(call)
-        if self._heartbeat is not None:
-            self._heartbeat.close()
-        if self._engine is not None:
+        if self._pulse is not None:
+            self._pulse.close()
+        if self._engine is None:
+            return
+        if call.urgency is Urgency.LEAVE:
+            self._engine.leave()
+        else:
             self._engine.close()
 
     def _answer(self, call: _Call) -> None:
         try:
             if self._engine is None:
                 self._engine = self._start()
-                self._heartbeat = Heartbeat(self._engine.address)
+                self._pulse = Pulse(Heartbeat(self._engine.address))
             answer = call.question(self._engine.client)
         except AcquisitionError as error:
             refusal = error

@@ -7,7 +7,7 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QPaintEvent, QWheelEvent
+from PySide6.QtGui import QKeyEvent, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QWidget
 
 from ._field_edge import LineField, draw_edge
@@ -67,7 +67,17 @@ class QuantityEditor:
 
 
 class Choice(QComboBox):
-    """A choice that a turning wheel changes only while it has the focus."""
+    """A choice that a turning wheel changes only while it has the focus, and that Space leaves alone.
+
+    Space belongs to the page: the Run page freezes its picture. F4 and Alt+Down open the list.
+    """
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Hand Space on."""
+        if event.key() == Qt.Key.Key_Space:
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         """Draw the box, then its edge."""

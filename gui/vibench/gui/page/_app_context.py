@@ -4,7 +4,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
-from vibench.acquisition.engine import start_engine
+from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, start_engine
 
 from ..background import Background
 from ..engine_link import Bridge, Starter
@@ -12,6 +12,7 @@ from ..widgets import LIGHT, THEMES, Notice, Theme
 from ._selection import Selection
 from ._settings import Remembered, Settings
 
+USUAL_PATIENCE_S = 2.0
 WORKERS = 2
 """One for previews, which must be quick, and one for whatever takes long."""
 
@@ -62,6 +63,13 @@ class AppContext(QObject):
         self._theme = theme
         self.settings.keep_text(Remembered.THEME, theme.name)
         self.theme_changed.emit(theme)
+
+    @property
+    def patience_s(self) -> float:
+        """How long a drive far from every limit may go on while the window does not answer [s]."""
+        return self.settings.number(
+            Remembered.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
+        )
 
     @property
     def folder(self) -> Path:

@@ -17,6 +17,7 @@ class Remembered(StrEnum):
     TEST = "test/last"
     CAMPAIGN = "queue/last"
     FOLDER = "recordings/folder"
+    PATIENCE = "run/patience_s"
 
 
 class Settings:
@@ -29,6 +30,13 @@ class Settings:
         """Text that was kept, or ``otherwise``."""
         value = self._store.value(key.value)
         return value if isinstance(value, str) and value else otherwise
+
+    def number(self, key: Remembered, otherwise: float, low: float, high: float) -> float:
+        """Give a number that was kept, between its bounds; ``otherwise`` where it is none."""
+        try:
+            return min(max(float(self.text(key)), low), high)
+        except ValueError:
+            return otherwise
 
     def keep_text(self, key: Remembered, value: str) -> None:
         """Keep a text."""

@@ -9,9 +9,10 @@ from ..widgets import Tone, clock
 from ._banner import CLOSED, StateIndicator
 from ._status_line import StatusField
 
+OPENING = StateIndicator("◌", "OPENING", Tone.CALM, "Looking for the instruments")
 _INDICATORS = {
     EngineState.CLOSED: CLOSED,
-    EngineState.OPENING: StateIndicator("◌", "OPENING", Tone.CALM, "Looking for the instruments"),
+    EngineState.OPENING: OPENING,
     EngineState.READY: StateIndicator("●", "READY", Tone.GOOD),
     EngineState.ARMED: StateIndicator("▲", "ARMED", Tone.CAUTION),
     EngineState.RUNNING: StateIndicator("▶", "RUNNING", Tone.ACTIVE),
@@ -22,14 +23,30 @@ _INDICATORS = {
         "✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"
     ),
 }
+NEXT_STEPS = {
+    EngineState.CLOSED: "Next: Alt+O on the Rig page opens the bench chosen there. F1 lists all keys.",
+    EngineState.OPENING: "The bench is being opened.",
+    EngineState.READY: "Next: Ctrl+Return arms the test of the Test page (Ctrl+2). F6 checks the bench.",
+    EngineState.CHECKING: "The bench is being checked.",
+    EngineState.ARMED: "Next: F5 starts what the Run page says. Cancel there disarms.",
+    EngineState.RUNNING: "STOP ramps down as planned; Esc aborts, from anywhere.",
+    EngineState.HELD: "The drive is on. Go on from the Run page; STOP ramps down, Esc aborts.",
+    EngineState.RAMPING_DOWN: "Ramping down; Esc aborts.",
+    EngineState.FAULT: "Details say what happened. Open the bench again on the Rig page (Ctrl+1).",
+}
 _BYTES_PER_SAMPLE = 4
 _LITTLE_ROOM_S = 3600.0
 
 
-def indicator_of(status: EngineStatus | None) -> StateIndicator:
+ORDERED = "The last order is being carried out: limits, folder and instruments are looked at"
+
+
+def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a fact
     """Give the state a symbol, a word and what changes in it."""
     if status is None:
-        return CLOSED
+        return OPENING if is_ordering else CLOSED
+    if is_ordering and status.state in (EngineState.READY, EngineState.ARMED):
+        return replace(_INDICATORS[status.state], symbol="◌", detail=ORDERED)
     return replace(_INDICATORS[status.state], detail=_detail(status))
 
 

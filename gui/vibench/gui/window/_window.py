@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from ..engine_link import SignOfLife
+from ..engine_link import SignOfLife, Urgency
 from ..page import AppContext, Page, Remembered, UserActions
 from ..widgets import RUN, Theme, palette, style_sheet
 from ._banner import Banner
@@ -26,7 +26,7 @@ from ._menus import AbortKey, build_menus
 from ._message_strip import MessageStrip
 from ._navigation_bar import NavigationBar
 from ._page_catalogue import PageEntry
-from ._state_indicator import indicator_of, status_fields
+from ._state_indicator import NEXT_STEPS, indicator_of, status_fields
 from ._status_line import StatusField, StatusLine
 
 SPAN_S = 1.0
@@ -104,7 +104,8 @@ class Window(QMainWindow):
         """Show what is true now, and let the engine know that somebody looks."""
         self.context.bridge.tick()
         status = self.context.bridge.status
-        self.banner.show_indicator(indicator_of(status))
+        self.banner.show_indicator(indicator_of(status, self.context.bridge.is_ordering))
+        self.strip.hint(NEXT_STEPS[self.context.bridge.state])
         self.status_line.show_fields(
             *status_fields(status, self._frames.counted(), self.event_loop_monitor.longest_s)
         )
@@ -114,27 +115,36 @@ class Window(QMainWindow):
 
     def closeEvent(self, event: QCloseEvent) -> None:
         """Ask first while something runs; then let the engine end, and keep the shape of the window."""
-        if self.context.bridge.is_driving and not self._may_close():
+        how = self._how_to_close()
+        if how is None:
             event.ignore()
             return
         self._timer.stop()
         self.event_loop_monitor.stop()
-        self.context.bridge.close()
+        self.context.bridge.close(how)
         self.page.left()
         self.context.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
         self.context.background.close()
         super().closeEvent(event)
 
-    def _may_close(self) -> bool:
-        """Ask whether to stop what runs; the drive goes on meanwhile, and Esc aborts it."""
-        answer = QMessageBox.question(
-            self,
-            "A measurement is running",
-            "Ramp down, keep the recording, and close the window?",
-            QMessageBox.StandardButton.Yes | QMessageBox.StandardButton.Cancel,
-            QMessageBox.StandardButton.Cancel,
-        )
-        return answer == QMessageBox.StandardButton.Yes
+    def _how_to_close(self) -> Urgency | None:
+        """Ask what becomes of what runs; the drive goes on meanwhile, and Esc aborts it. None: stay."""
+        if not self.context.bridge.is_driving:
+            return Urgency.END
+        box = QMessageBox(QMessageBox.Icon.Question, "A measurement is running", "", parent=self)
+        box.setText("Ramp down, keep the recording, and close the window?")
+        stop = box.addButton("Ramp down and close", QMessageBox.ButtonRole.AcceptRole)
+        leave = None
+        if self.context.bridge.may_leave:
+            leave = box.addButton("Let it go on and close", QMessageBox.ButtonRole.DestructiveRole)
+            box.setInformativeText(
+                "It was armed to be left alone: 'vibench watch' shows it, 'vibench stop' ends it."
+            )
+        box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
+        box.exec()
+        if box.clickedButton() is stop:
+            return Urgency.END
+        return Urgency.LEAVE if leave is not None and box.clickedButton() is leave else None
 
     def _lay_out(self) -> None:
         body = QHBoxLayout()
@@ -164,7 +174,7 @@ class Window(QMainWindow):
         self.abort_key.pressed.connect(self.user_actions.abort)
         self.banner.stop_wanted.connect(self.user_actions.stop)
         self.context.bridge.armed.connect(lambda _plan: self.show_page(RUN))
-        self.context.bridge.armed.connect(lambda _plan: self.strip.give_way())
+        self.context.bridge.advanced.connect(self.strip.give_way)
 
     def _restore(self) -> None:
         self.resize(1280, 800)

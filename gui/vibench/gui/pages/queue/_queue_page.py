@@ -5,6 +5,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from PySide6.QtWidgets import (
+    QCheckBox,
     QFileDialog,
     QGridLayout,
     QGroupBox,
@@ -25,7 +26,7 @@ from vibench.acquisition import (
     validated,
 )
 from vibench.acquisition.campaign import ExistingRecordings
-from vibench.acquisition.engine import EngineState, EngineStatus
+from vibench.acquisition.engine import EngineState, EngineStatus, Supervision
 from vibench.acquisition.plan import Campaign, Range, SweepAxis
 
 from ...background import LatestRequest
@@ -71,6 +72,12 @@ class QueuePage(Page):
         self.resume_button = self._button(
             "Arm what is missin&g…", "Keep what is complete in its folder, make the rest", self._arm_missing
         )
+        self.left_alone = QCheckBox("Left alone: goes on when the window freezes or is closed")
+        self.left_alone.setToolTip(
+            "Limits, ramps and recordings are the engine's. 'vibench watch' and 'vibench stop' reach it "
+            "from a terminal.\nWithout the tick the drive is brought down when the window does not answer."
+        )
+        self.left_alone.setChecked(True)
         self.hold_button = self._button("Pause", "Stay where the run is; the drive stays on", self._hold)
         self._looking = LatestRequest(
             context.background, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
@@ -181,10 +188,14 @@ class QueuePage(Page):
             self.entries.setCurrentCell(number - 1, 0)
 
     def _arm(self) -> None:
-        self._actions.arm_campaign(ExistingRecordings.REFUSE)
+        self._actions.arm_campaign(ExistingRecordings.REFUSE, self._attendance)
 
     def _arm_missing(self) -> None:
-        self._actions.arm_campaign(ExistingRecordings.RESUME)
+        self._actions.arm_campaign(ExistingRecordings.RESUME, self._attendance)
+
+    @property
+    def _attendance(self) -> Supervision:
+        return Supervision.UNATTENDED if self.left_alone.isChecked() else Supervision.ATTENDED
 
     def _hold(self) -> None:
         self._actions.hold_or_resume()
@@ -270,6 +281,7 @@ class QueuePage(Page):
         for button in (self.arm_button, self.resume_button, self.hold_button):
             actions.addWidget(button)
         right.addLayout(actions)
+        right.addWidget(self.left_alone)
         right.addWidget(self.progress)
         right.addWidget(_boxed("Recordings", self.rows), 1)
         layout = QHBoxLayout(self)

@@ -43,6 +43,8 @@ class RunPage(Page):
         self._view: LiveView | None = None
         self._ended: Path | None = None
         self._drawn: tuple[int, int, int, float] | None = None
+        self._was_driving = False
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.arm_card = ArmCard()
         self.watch_card = WatchCard(theme)
         self.time_histories = TimeHistoryPlots(theme)
@@ -78,6 +80,10 @@ class RunPage(Page):
         )
         reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
         self.arm_card.show_status(status, test, reason)
+        if self.context.bridge.is_driving and not self._was_driving:
+            # The buttons that had the focus are gone; without this the next list in the row would have it.
+            self.setFocus()
+        self._was_driving = self.context.bridge.is_driving
         self.watch_card.show_status(status)
         if not self.watch_card.freeze.isChecked() and self.hidden_motion.isVisible():
             self.hidden_motion.show_status(status)

@@ -152,9 +152,11 @@ class WatchCard(QGroupBox):
         self.mark_button.setEnabled(is_running)
         self.twin.setEnabled(status is not None and status.bench is not None)
         self.twin.setChecked(status is not None and status.twin is not None)
-        if run is not None:
+        if run is not None and is_running:
             self.progress.setValue(round(1000 * min(1.0, run.elapsed_s / max(run.total_s, 1e-9))))
-            self.progress.setFormat(_progress_text(run) if is_running else "the last run has ended")
+            self.progress.setFormat(_progress_text(run))
+        elif self.progress.value():
+            self.progress.setFormat("the last run has ended")
 
     def show_view(self, view: LiveView) -> None:
         """Show impacts and levels."""
