@@ -179,7 +179,7 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
 
 
 def start_dwell(bench, qtbot, name):
-    bench.pages[TEST].form.show_measurement(dwell(name, 600.0))
+    bench.pages[TEST].form.show_value(dwell(name, 600.0))
     reach(qtbot, bench, EngineState.READY)
     bench.user_actions.arm_test()
     reach(qtbot, bench, EngineState.ARMED)

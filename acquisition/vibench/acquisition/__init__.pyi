@@ -28,6 +28,7 @@ from .errors import (
     RecordingError as RecordingError,
 )
 from .host import (
+    ChosenFrom as ChosenFrom,
     FrozenModel as FrozenModel,
     all_shipped as all_shipped,
     follow_parent as follow_parent,

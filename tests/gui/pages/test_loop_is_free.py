@@ -174,11 +174,9 @@ def of_queue(window):
 
 def of_test(window):
     test = window.pages[TEST]
-    yield Action("take over a test", lambda: test.form.show_measurement(SHOWN), lambda: test.is_done)
+    yield Action("take over a test", lambda: test.form.show_value(SHOWN), lambda: test.is_done)
     yield Action("look at Test", lambda: window.show_page(TEST))
-    yield Action(
-        "take over another test", lambda: test.form.show_measurement(SHOWN_TOO), lambda: test.is_done
-    )
+    yield Action("take over another test", lambda: test.form.show_value(SHOWN_TOO), lambda: test.is_done)
 
 
 def of_run(window):

@@ -32,7 +32,8 @@ class OddMultisine(PeriodicNoise):
     @model_validator(mode="after")
     def _lines_fit_the_band(self) -> Self:
         odd = [int(line) for line in self.candidates]
-        excited = self.excited_lines or tuple(line for line in odd if line not in self._drawn())
+        left_out = self._drawn()
+        excited = self.excited_lines or tuple(line for line in odd if line not in left_out)
         strangers = sorted(set(excited) - set(odd))
         if strangers:
             raise ValueError(

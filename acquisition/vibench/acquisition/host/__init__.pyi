@@ -1,4 +1,5 @@
 from ._chosen import (
+    ChosenFrom as ChosenFrom,
     chosen as chosen,
 )
 from ._closed_on_leaving import (

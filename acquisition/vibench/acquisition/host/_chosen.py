@@ -1,5 +1,7 @@
 """One of a few: wherever a member of an enum is asked for, its word is accepted."""
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
 
@@ -22,3 +24,10 @@ def chosen(kind: type[Choice], given: Choice | str) -> Choice:
         raise ConfigurationError(
             f"{given!r} is no {kind.__name__}; give one of {', '.join(map(repr, map(str, kind)))}"
         ) from unknown
+
+
+@dataclass(frozen=True)
+class ChosenFrom:
+    """Mark a text of a model, in its ``Annotated`` type, as one that is mostly chosen from a list."""
+
+    texts: Callable[[], Iterable[str]]

@@ -43,7 +43,9 @@ from ._recorded_level import (
     recorded_level as recorded_level,
 )
 from ._specimen_choice import (
+    ContactWord as ContactWord,
     SpecimenChoice as SpecimenChoice,
+    SpecimenName as SpecimenName,
 )
 from ._spectrum_request import (
     ExponentSpectrum as ExponentSpectrum,

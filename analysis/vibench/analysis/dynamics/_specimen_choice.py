@@ -1,20 +1,30 @@
 """Which specimen a question is about: the one place where its options become one."""
 
 from pathlib import Path
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
-from vibench.acquisition import FrozenModel
-from vibench.sim import USUAL_SPECIMEN, Specimen, SpecimenTable, load_specimen
+from vibench.acquisition import ChosenFrom, FrozenModel
+from vibench.sim import (
+    CONTACT_LAWS,
+    USUAL_SPECIMEN,
+    Specimen,
+    SpecimenTable,
+    load_specimen,
+    shipped_specimens,
+)
+
+SpecimenName = Annotated[str, ChosenFrom(shipped_specimens)]
+ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CONTACT_LAWS.values())])]
 
 
 class SpecimenChoice(FrozenModel):
     """A described specimen, with another contact, damping or gap where one is given."""
 
-    specimen: str = USUAL_SPECIMEN
+    specimen: SpecimenName = USUAL_SPECIMEN
     """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, or the path of a specimen's file."""
-    model: str = ""
+    model: ContactWord = ""
     """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...; empty for
     the specimen's own."""
     damping_time_s: NonNegativeFloat | None = None

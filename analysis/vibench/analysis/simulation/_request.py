@@ -18,7 +18,7 @@ from vibench.sim import (
 )
 from vibench.sim.study import Study, frequency_range
 
-from ..dynamics import BranchLine, ChainRun, SpecimenChoice, SpectrumPoint
+from ..dynamics import BranchLine, ChainRun, ContactWord, SpecimenChoice, SpectrumPoint
 from ..signals import Reals
 from ._map_request import MapPicture, SettledMotion
 
@@ -86,7 +86,7 @@ class Exponent(StrEnum):
 class SimulationRequest(SpecimenChoice):
     """A scene at every frequency of a range."""
 
-    compared_with: str = "linear"
+    compared_with: ContactWord = "linear"
     """A second model, for similarity with the first; empty for none."""
     amplitude_m: PositiveFloat = 5e-6
     """Of the base displacement."""

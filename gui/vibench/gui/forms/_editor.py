@@ -149,6 +149,47 @@ class TextEditor:
         self._line.setText("" if content is None else str(content))
 
 
+class SuggestionEditor:
+    """A text that is chosen from a list, or typed."""
+
+    def __init__(self, examples: tuple[str, ...], changed: Callable[..., None]) -> None:
+        self._box = Choice()
+        self._box.setEditable(True)
+        self._box.setInsertPolicy(Choice.InsertPolicy.NoInsert)
+        self._box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self._box.addItems(examples)
+        self._shown = self._box.currentText()
+        self._changed = changed
+        self._box.activated.connect(self._tell)
+        line = self._box.lineEdit()
+        if line is not None:
+            line.editingFinished.connect(self._tell)
+
+    @property
+    def widget(self) -> QWidget:
+        """The box."""
+        return self._box
+
+    @property
+    def complaint(self) -> str:
+        """The plan itself judges a text."""
+        return ""
+
+    def content(self) -> str:
+        """Give the text."""
+        return self._box.currentText()
+
+    def show_content(self, content: Any) -> None:
+        """Show a text."""
+        self._shown = "" if content is None else str(content)
+        self._box.setCurrentText(self._shown)
+
+    def _tell(self, *_: object) -> None:
+        if self._box.currentText() != self._shown:
+            self._shown = self._box.currentText()
+            self._changed()
+
+
 class ListEditor:
     """Numbers or anything else that a file would hold, as a line of text: ``95, 266, 500``."""
 
@@ -208,5 +249,5 @@ def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None
     if get_origin(plain) in (tuple, list):
         return ListEditor(changed)
     if plain is str:
-        return TextEditor(changed)
+        return SuggestionEditor(facts.examples, changed) if facts.examples else TextEditor(changed)
     raise TypeError(f"{facts.name} is a {annotation}, and no form can edit that; add an editor for it")

@@ -14,6 +14,8 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from vibench.acquisition import ChosenFrom
+
 UNITS = (
     ("_m_per_s2", "m/s²"),
     ("_m_per_s", "m/s"),
@@ -41,12 +43,19 @@ class FieldFacts:
     limits: str
     """``"above 0, at most 60 s"``; empty when anything goes."""
     explanation: str
+    examples: tuple[str, ...] = ()
+    """Texts to choose from; another one may be typed."""
 
     @property
     def tooltip(self) -> str:
         """Explanation and limits."""
         limits = f"Allowed: {self.limits}" if self.limits else ""
         return "\n".join(part for part in (self.explanation, limits) if part)
+
+    @property
+    def named(self) -> str:
+        """Label and unit, as a complaint begins."""
+        return f"{self.label} ({self.unit})" if self.unit else self.label
 
     @property
     def spoken(self) -> str:
@@ -64,6 +73,9 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
         unit=unit,
         limits=_limits(field, unit),
         explanation=_plain(_explanation(model, name)),
+        examples=tuple(
+            each for mark in field.metadata if isinstance(mark, ChosenFrom) for each in mark.texts()
+        ),
     )
 
 

@@ -17,8 +17,18 @@ Loc = tuple[int | str, ...]
 
 @dataclass(eq=False)
 class _Row:
+    facts: FieldFacts
     editor: Editor
     complaint: QLabel
+
+
+def complaints_of(error: ValidationError) -> dict[Loc, str]:
+    """Give what a model refuses, place by place, without what only follows from something else."""
+    return {
+        detail["loc"]: detail["msg"].removeprefix("Value error, ")
+        for detail in error.errors()
+        if detail["type"] != "default_factory_not_called"
+    }
 
 
 class ModelForm(QWidget):
@@ -33,6 +43,8 @@ class ModelForm(QWidget):
         self.model = model
         self._fixed: dict[str, Any] = {}
         self._rows: dict[str, _Row] = {}
+        self.edited = ""
+        """Label and unit of the field that was changed last."""
         self._layout = QFormLayout(self)
         self._layout.setContentsMargins(0, 0, 0, 0)
         self._layout.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
@@ -62,38 +74,45 @@ class ModelForm(QWidget):
         for name, row in self._rows.items():
             row.editor.show_content(content.get(name, _default(self.model.model_fields[name])))
         self.blockSignals(blocked)
+        self.edited = ""
         self.changed.emit()
 
-    def complain(self, complaints: Mapping[Loc, str]) -> None:
-        """Put complaints at their fields; those of models inside go further in."""
+    def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
+        """Put complaints at their fields, those of models inside further in; gives all, each with its field.
+
+        What belongs to no field, but to several together, is told with the field that was changed last.
+        """
+        said: list[str] = []
         for name, row in self._rows.items():
-            own = {loc: text for loc, text in complaints.items() if loc and loc[0] == name}
-            inner = {_after_kind(row.editor, loc[1:]): text for loc, text in own.items()}
-            text = row.editor.complaint or "; ".join(
-                text for loc, text in inner.items() if not _is_inside(row, loc)
-            )
+            inner = {
+                _after_kind(row.editor, loc[1:]): text
+                for loc, text in complaints.items()
+                if loc and loc[0] == name
+            }
+            if isinstance(row.editor, GroupEditor):
+                said += row.editor.complain(inner)
+                continue
+            text = row.editor.complaint or "; ".join(inner.values())
+            text = f"{row.facts.named}: {_sentence(text, row.facts)}" if text else ""
             row.complaint.setText(text)
             row.complaint.setVisible(bool(text))
-            if isinstance(row.editor, GroupEditor):
-                row.editor.complain({loc: text for loc, text in inner.items() if loc})
+            said += [text] if text else []
+        placed = {*self._rows}
+        about = f"{self.edited}: " if self.edited else ""
+        said += [about + text for loc, text in complaints.items() if not loc or loc[0] not in placed]
+        return tuple(said)
 
     @property
-    def unread(self) -> tuple[str, ...]:
-        """What was typed and cannot even be read, in this form and those inside."""
-        found: list[str] = []
-        for row in self._rows.values():
-            if isinstance(row.editor, GroupEditor):
-                found += row.editor.form.unread
-            elif row.editor.complaint:
-                found.append(row.editor.complaint)
-        return tuple(found)
-
-    def _tell(self, *_: object) -> None:
-        self.changed.emit()
+    def is_read(self) -> bool:
+        """Whether everything that was typed can at least be read, in this form and those inside."""
+        return all(
+            row.editor.form.is_read if isinstance(row.editor, GroupEditor) else not row.editor.complaint
+            for row in self._rows.values()
+        )
 
     def _add(self, name: str, field: FieldInfo) -> None:
         facts = field_facts(self.model, name, field)
-        editor = editor_for(field, facts, self._tell)
+        editor = editor_for(field, facts, lambda *_: self._changed(name))
         complaint = QLabel()
         complaint.setProperty("rank", "complaint")
         complaint.setWordWrap(True)
@@ -111,7 +130,14 @@ class ModelForm(QWidget):
             label.setToolTip(facts.tooltip)
             self._layout.addRow(label, widget)
         self._layout.addRow(complaint)
-        self._rows[name] = _Row(editor, complaint)
+        self._rows[name] = _Row(facts, editor, complaint)
+
+    def _changed(self, name: str) -> None:
+        row = self._rows.get(name)
+        if row is not None:
+            inside = row.editor.form.edited if isinstance(row.editor, GroupEditor) else ""
+            self.edited = inside or row.facts.named
+            self.changed.emit()
 
 
 class GroupEditor:
@@ -126,6 +152,7 @@ class GroupEditor:
         self._kinds = kinds
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
+        self._usual: Mapping[str, Any] = {}
         if len(kinds) > 1:
             self._kind = ChoiceEditor(tuple(_kind_of(kind) for kind in kinds), self._turn)
             self._kind.widget.setAccessibleName(f"Kind of {facts.label.lower()}")
@@ -164,14 +191,18 @@ class GroupEditor:
             self._kind.show_content(values["kind"])
         self._form.show_content(values)
 
-    def complain(self, complaints: Mapping[Loc, str]) -> None:
+    def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
         """Hand complaints on."""
-        self._form.complain(complaints)
+        return self._form.complain(complaints)
+
+    def know(self, usual: Mapping[str, Any]) -> None:
+        """Give the fields of a new kind these values, by their names, where they would be empty."""
+        self._usual = usual
 
     def _turn(self, *_: object) -> None:
         """Change the kind; fields of the same name keep their values."""
         assert self._kind is not None
-        self._memory.update(self._form.content())
+        self._memory = {**self._usual, **self._memory, **self._form.content()}
         chosen = self._kind.content()
         model = next(kind for kind in self._kinds if _kind_of(kind) == chosen)
         self._layout.removeWidget(self._form)
@@ -250,8 +281,13 @@ def _after_kind(editor: Editor, loc: Loc) -> Loc:
     return loc
 
 
-def _is_inside(row: _Row, loc: Loc) -> bool:
-    return isinstance(row.editor, GroupEditor) and bool(loc)
+def _sentence(text: str, facts: FieldFacts) -> str:
+    """Say a complaint of the model's in words of a form."""
+    unit = f" in {facts.unit}" if facts.unit else ""
+    if text == "Field required":
+        return f"nothing is given; type a value{unit}"
+    allowed = f"; allowed is {facts.limits}" if facts.limits else unit and f"; give it{unit}"
+    return text.replace("Input should be", "must be") + (allowed if text.startswith("Input should") else "")
 
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -304,12 +340,9 @@ class JudgedForm(QWidget, Generic[Model]):
         try:
             value = self._model.model_validate(self.form.content())
         except ValidationError as error:
-            complaints = {
-                detail["loc"]: detail["msg"].removeprefix("Value error, ") for detail in error.errors()
-            }
+            complaints = complaints_of(error)
         else:
-            self._value = None if self.form.unread else value
-        self.form.complain(complaints)
-        self._complaint.setText("; ".join(text for loc, text in complaints.items() if not loc))
+            self._value = value if self.form.is_read else None
+        self._complaint.setText("; ".join(self.form.complain(complaints)))
         self._complaint.setVisible(bool(self._complaint.text()))
         self.changed.emit()

@@ -1,6 +1,7 @@
 """A field for one quantity as people type it: "12,5", "5 ms", "45 µm"; its limits stand in the tooltip."""
 
 import re
+from math import isfinite
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QPaintEvent, QValidator, QWheelEvent
@@ -31,21 +32,28 @@ def quantity_text(value: float, unit: str) -> str:
     return f"{number} {unit}".strip()
 
 
-def parsed_quantity(text: str, unit: str) -> float:
+def parsed_quantity(text: str, unit: str, example: str = "") -> float:
     """Read a value in SI; a comma is a decimal point, a unit may carry a prefix.
 
     Raises ConfigurationError when it is no number, or its unit is another one.
     """
     match = _NUMBER.match(text)
     if match is None:
-        example = f"12.5 {unit}".strip()
-        raise ConfigurationError(f"{text!r} is not a number; write for example {example}")
+        example = example or f"12.5 {unit}".strip()
+        raise ConfigurationError(f"{_short(text)} is not a number; write for example {example}")
     number, given = match[1].replace(",", "."), match[2]
     if given in ("", unit):
         return float(number)
     if unit and given.endswith(unit) and given.removesuffix(unit) in PREFIXES:
         return _scaled(number, given.removesuffix(unit))
-    raise ConfigurationError(f"{given!r} is not a unit of this field; give {unit or 'a plain number'}")
+    raise ConfigurationError(
+        f"{_short(given)} is not a unit of this field; give {unit or 'a plain number'}"
+        + (f", for example {example}" if example else "")
+    )
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…")
 
 
 def _scaled(number: str, prefix: str) -> float:
@@ -55,6 +63,9 @@ def _scaled(number: str, prefix: str) -> float:
     return float(f"{mantissa}e{int(exponent or 0) + power}")
 
 
+_LONGEST_SHOWN = 40
+MOST_WHOLE = 1 << 53
+"""Larger whole numbers cannot be told from their neighbours."""
 STEP = 0.05
 """Share by which one step changes a quantity: small beside what matters, and never past zero."""
 
@@ -144,10 +155,15 @@ class QuantityEdit(QAbstractSpinBox):
     def _read(self, text: str) -> float | int | None:
         if not text.strip():
             return None
-        value = parsed_quantity(text, self._unit)
+        example = "" if self._value is None else quantity_text(self._value, self._unit)
+        value = parsed_quantity(text, self._unit, example)
+        if not isfinite(value):
+            raise ConfigurationError(
+                f"{_short(text)} is too large a number; write for example {example or 12}"
+            )
         if self._kind is int:
-            if value != int(value):
-                raise ConfigurationError(f"{text!r} is not a whole number; give one")
+            if value != int(value) or abs(value) > MOST_WHOLE:
+                raise ConfigurationError(f"{_short(text)} is not a whole number below 2^53; give one")
             return int(value)
         # What is shown is what was typed: the same text must not change a value by rounding.
         return (

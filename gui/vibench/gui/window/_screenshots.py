@@ -97,7 +97,7 @@ def _measure(window: Window, measurement: Measurement, during: Callable[[], None
     """Arm and start; ``during`` happens when so much of the run is over that the masses collide."""
     bridge, test = window.context.bridge, window.pages[TEST]
     assert isinstance(test, TestPage)
-    test.form.show_measurement(measurement)
+    test.form.show_value(measurement)
     _wait(lambda: not test.is_busy and bridge.state is EngineState.READY)
     window.user_actions.arm_test()
     _wait(lambda: bridge.state is EngineState.ARMED)

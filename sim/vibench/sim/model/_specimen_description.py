@@ -280,13 +280,17 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
     known = _shipped()
     if specimen in known:
         return _laid_over(_complete(tomllib.loads(known[specimen]), None, depth + 1), table)
-    names = ", ".join(known)
+    names, called = ", ".join(known), reprlib.repr(specimen)
     if folder is None:
-        raise ValueError(f"no specimen that comes with vibench is called {specimen!r}; there are {names}")
+        raise ValueError(f"no specimen that comes with vibench is called {called}; there are {names}")
     path = folder / specimen
-    if not path.exists():
+    try:
+        is_there = path.exists()
+    except OSError:  # no file can have such a name
+        is_there = False
+    if not is_there:
         raise ValueError(
-            f"no specimen is called {specimen!r}, and there is no such file; give the path of a TOML file, "
+            f"no specimen is called {called}, and there is no such file; give the path of a TOML file, "
             f"or one of {names}"
         )
     return _laid_over(_complete(toml_table(path), path.parent, depth + 1), table)
@@ -328,7 +332,7 @@ def _complaint(specimen: str, error: ValidationError) -> str:
         case _ if key:
             fault = f"{key} = {reprlib.repr(first['input'])}: {said}"
         case _:
-            return said if specimen in said else f"{specimen}: {said}"
+            return said if reprlib.repr(specimen) in said else f"{specimen}: {said}"
     return f"{specimen} describes no specimen: {fault}"
 
 

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QPushButton, QWidg
 
 from vibench.acquisition.plan import Range, RangeSpacing, SweepAxis
 
-from ...forms import Choice, QuantityEdit
+from ...forms import Choice, QuantityEdit, complaints_of
 
 _AXES = {
     SweepAxis.LEVEL: ("level", "Vpp", 0.05, 10.0),
@@ -58,6 +58,16 @@ class SweepForm(QGroupBox):
             edit.set_value(value)
 
     def _add(self) -> None:
+        unit = list(_AXES.values())[self.axis.currentIndex()][1]
+        fields = {
+            "start": (f"From ({unit})", self.start),
+            "stop": (f"To ({unit})", self.stop),
+            "count": ("Points", self.count),
+        }
+        unread = [f"{name}: {edit.complaint}" for name, edit in fields.values() if edit.complaint]
+        if unread:
+            self.refused.emit("; ".join(unread))
+            return
         given = {
             "start": self.start.value(),
             "stop": self.stop.value(),
@@ -67,8 +77,9 @@ class SweepForm(QGroupBox):
         try:
             values = Range.model_validate(given)
         except ValidationError as error:
+            named = {loc: fields[str(loc[0])][0] if loc else "Range" for loc in complaints_of(error)}
             self.refused.emit(
-                "; ".join(detail["msg"].removeprefix("Value error, ") for detail in error.errors())
+                "; ".join(f"{named[loc]}: {text}" for loc, text in complaints_of(error).items())
             )
         else:
             self.wanted.emit(list(_AXES)[self.axis.currentIndex()], values)

@@ -152,7 +152,7 @@ class SimulatePage(Page):
         request = self.form.value
         self._begin.setEnabled(request is not None)
         if request is None:
-            self._cost.setText("The form says what is not allowed.")
+            self._cost.setText(f"✖ {self.form.complaint}")
             return
         self._cost.setText("\n".join(cost_sentences(request, os.cpu_count() or 1)))
 

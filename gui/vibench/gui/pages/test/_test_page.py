@@ -123,12 +123,12 @@ class TestPage(Page):
 
     def left(self) -> None:
         """Keep the test for next time."""
-        measurement = self.form.measurement
+        measurement = self.form.value
         if measurement is not None:
             self.context.settings.keep_text(Remembered.TEST, toml_text(measurement))
 
     def _changed(self) -> None:
-        measurement, rig = self.form.measurement, self.context.selection.rig
+        measurement, rig = self.form.value, self.context.selection.rig
         self.context.selection.choose_measurement(measurement)
         self._preview = None
         # What stands there belongs to another test until its own has come.
@@ -193,14 +193,14 @@ class TestPage(Page):
 
     def _take(self, row: int) -> None:
         if row > 0:
-            self.form.show_measurement(self._tests[row - 1].measurement)
+            self.form.show_value(self._tests[row - 1].measurement)
 
     def _restore(self) -> None:
         kept = self.context.settings.text(Remembered.TEST)
-        self.form.show_measurement(_kept_test(kept) or self._tests[0].measurement)
+        self.form.show_value(_kept_test(kept) or self._tests[0].measurement)
 
     def _save(self) -> None:
-        measurement = self.form.measurement
+        measurement = self.form.value
         if measurement is None:
             self.context.say(
                 Notice(NoticeKind.WARNING, "The test is not complete.", next_step=self.form.complaint)
@@ -229,7 +229,7 @@ class TestPage(Page):
     def open_file(self, path: Path) -> None:
         """Take over the test of a file."""
         try:
-            self.form.show_measurement(load_test(path))
+            self.form.show_value(load_test(path))
         except ConfigurationError as error:
             self.context.say(notice_of(error))
 

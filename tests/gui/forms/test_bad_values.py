@@ -1,0 +1,94 @@
+"""Every field of every form takes twenty bad values, and answers in a sentence with its name and unit."""
+
+import pytest
+from PySide6.QtWidgets import QAbstractSpinBox, QComboBox
+
+from vibench.acquisition.plan import EXCITATION_KINDS, Measurement, SineSweep
+from vibench.analysis import AnalysisOptions
+from vibench.analysis.simulation import SimulationRequest
+from vibench.gui.forms import Choice, GroupEditor, JudgedForm
+from vibench.gui.pages.queue._sweep_form import SweepForm
+from vibench.gui.pages.simulate._dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
+from vibench.gui.pages.test._test_form import TestForm as FormOfATest
+
+BAD = (
+    *("", " ", "abc", "-1", "0", "--5", "1e99", "-1e99", "1e-99", "1e999", "nan", "inf", "-inf", "½", "0x10"),
+    *("1,2,3", "1_000", "12 apples", "5 kg", "9" * 400),
+)
+
+
+SWEEP = SineSweep(amplitude_vpp=0.5, start_hz=150.0, stop_hz=300.0, duration_s=5.0)
+
+
+def form_of_a_kind(kind):
+    form = FormOfATest()
+    form.show_value(Measurement(name="trial", excitation=SWEEP))
+    form.form.editors["excitation"].kind_choice.setCurrentText(kind.replace("_", " "))
+    assert form.form.editors["excitation"].form.model is EXCITATION_KINDS[kind].plan
+    return form
+
+
+FORMS = {
+    **{f"test {kind}": lambda kind=kind: form_of_a_kind(kind) for kind in EXCITATION_KINDS},
+    "analysis": lambda: JudgedForm(AnalysisOptions, "analysis"),
+    "simulation": lambda: JudgedForm(SimulationRequest, "simulation"),
+    **{
+        kind.name: lambda kind=kind: JudgedForm(kind.request, kind.name, kind.hidden)
+        for kind in (BRANCHES, SPECTRUM, CHAIN)
+    },
+}
+
+
+def rows(form):
+    for name, row in form._rows.items():
+        if isinstance(row.editor, GroupEditor):
+            yield from rows(row.editor.form)
+        else:
+            yield name, row
+
+
+def type_into(widget, text):
+    line = widget.lineEdit() if isinstance(widget, QAbstractSpinBox | QComboBox) else widget
+    line.setText(text)
+    (widget if isinstance(widget, QAbstractSpinBox) else line).editingFinished.emit()
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_a_bad_value_is_answered_with_the_name_and_the_unit_of_its_field(qtbot, name):
+    form = FORMS[name]()
+    qtbot.addWidget(form)
+    assert form.value is not None, form.complaint  # a kind that is chosen begins with a test that can be made
+    asked = 0
+    for field, row in rows(form.form):
+        widget = row.editor.widget
+        if isinstance(widget, Choice) and not widget.isEditable():
+            continue
+        before = row.editor.content()
+        for bad in BAD:
+            type_into(widget, bad)
+            asked += 1
+            if form.value is None:
+                assert row.facts.named in form.complaint, (field, bad, form.complaint)
+                assert len(form.complaint) < 1500
+        row.editor.show_content(before)
+        form.form.changed.emit()
+        assert form.value is not None, (field, form.complaint)
+    assert asked >= 20
+
+
+def test_a_sweep_is_refused_with_the_name_and_the_unit_of_its_field(qtbot):
+    form = SweepForm()
+    qtbot.addWidget(form)
+    refused, wanted = [], []
+    form.refused.connect(refused.append)
+    form.wanted.connect(lambda *given: wanted.append(given))
+    for label, edit in (("From (Vpp)", form.start), ("To (Vpp)", form.stop), ("Points", form.count)):
+        good = edit.value()
+        for bad in BAD:
+            refused.clear()
+            wanted.clear()
+            type_into(edit, bad)
+            form._add()
+            assert wanted or label in refused[0] or "Range" in refused[0], (bad, refused)
+            assert wanted == [] or edit.complaint == ""
+        edit.set_value(good)
