@@ -7,6 +7,15 @@ import argparse
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .window import display_trouble
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QLabel
+
+NO_WINDOW = 2
+"""Exit code where no window can be shown."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -15,13 +24,32 @@ def main(arguments: list[str] | None = None) -> int:
     # The same binding for all, and one thread for linear algebra: the matrices are small.
     os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    trouble = display_trouble()
+    if trouble:
+        sys.stderr.write(f"The window cannot be opened: {trouble}.\n")
+        return NO_WINDOW
+    starting = _sign_of_life()
     from .window import open_window  # noqa: PLC0415
 
     if options.screenshots is not None:
         from .window import make_screenshots  # noqa: PLC0415
 
         return make_screenshots(options.bench, options.screenshots)
-    return open_window(options.bench, options.settings)
+    return open_window(options.bench, options.settings, starting)
+
+
+def _sign_of_life() -> "QLabel":
+    """Say at once that the window is coming: what it is made of takes seconds to load on a busy computer."""
+    from PySide6.QtCore import Qt  # noqa: PLC0415
+    from PySide6.QtWidgets import QApplication, QLabel  # noqa: PLC0415
+
+    QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
+    application = QApplication.instance() or QApplication(sys.argv[:1])
+    label = QLabel("vibench is starting…", None, Qt.WindowType.SplashScreen)
+    label.setMargin(2 * label.fontMetrics().height())
+    label.show()
+    application.processEvents()
+    return label
 
 
 def _options(arguments: list[str] | None) -> argparse.Namespace:

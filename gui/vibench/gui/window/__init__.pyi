@@ -2,6 +2,9 @@ from ._banner import (
     CLOSED as CLOSED,
     StateIndicator as StateIndicator,
 )
+from ._display import (
+    display_trouble as display_trouble,
+)
 from ._open_window import (
     open_window as open_window,
 )

@@ -9,7 +9,7 @@ from threading import Thread
 import matplotlib as mpl
 from PySide6.QtCore import QCoreApplication, Qt, QTimer
 from PySide6.QtGui import QFont, QFontDatabase
-from PySide6.QtWidgets import QApplication, QStyleFactory
+from PySide6.QtWidgets import QApplication, QLabel, QStyleFactory
 
 from ..page import AppContext, Settings, default_settings_path
 from ._page_catalogue import PAGES
@@ -40,8 +40,8 @@ def _font() -> QFont:
     return QFont("DejaVu Sans", FONT_POINTS)
 
 
-def open_window(bench: Path | None, settings: Path | None) -> int:
-    """Show the window until it is closed; gives the exit code of the process."""
+def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
+    """Show the window, in place of what says that it is starting, until it is closed; gives the exit code."""
     app = application(sys.argv[:1])
     kept = Settings(settings or default_settings_path())
     context = AppContext(kept)
@@ -50,6 +50,8 @@ def open_window(bench: Path | None, settings: Path | None) -> int:
     # None of all this ever is garbage: a collector that looked through it would hold the window up.
     gc.freeze()
     window.show()
+    if starting is not None:
+        starting.close()
     QTimer.singleShot(0, window.context.background.prepare)
     QTimer.singleShot(0, Thread(target=load_ahead).start)
     return app.exec()
