@@ -1,10 +1,12 @@
 """A plot says what will be in it while it is empty, and names its curves above the axes."""
 
 import pytest
-from PySide6.QtGui import QColor
+from PySide6.QtCore import QEvent, QPointF, Qt
+from PySide6.QtGui import QColor, QGuiApplication
 
 from vibench.gui.plots import LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
 from vibench.gui.plots._axis import thinned
+from vibench.gui.plots._saved_plot import write_plot
 from vibench.gui.widgets import LIGHT
 
 
@@ -117,3 +119,52 @@ def test_the_axes_follow_a_curve_and_not_how_little_is_known_of_it(plot, qapp):
     qapp.processEvents()
     low, high = plot.getViewBox().viewRange()[1]
     assert 0.5 < low < high < 1.5
+
+
+def test_values_are_read_under_the_pointer_and_differences_from_a_mark(plot, qapp, qtbot):
+    plot.curve(curve_style(0), "mass").setData([0.0, 1.0, 2.0], [0.0, 0.004, 0.002])
+    plot.show()
+    qapp.processEvents()
+    box = plot.getViewBox()
+    at = plot.mapFromScene(box.mapViewToScene(QPointF(1.02, 0.001)))
+    qtbot.mouseMove(plot.viewport(), at)
+    qapp.processEvents()
+    assert "mass: 4 mm/s" in plot.reading
+    plot.setFocus()
+    qtbot.keyClick(plot, Qt.Key.Key_D)
+    plot.read_at(QPointF(1.52, 0.003))
+    assert "Δ 0.5" in plot.reading
+    assert "2.00" in plot.reading.partition("Δ")[2]
+    plot.leaveEvent(QEvent(QEvent.Type.Leave))
+    assert plot.reading == ""
+
+
+def test_picture_and_numbers_are_copied_and_saved_and_nothing_is_overwritten(plot, qapp, tmp_path):
+    plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.5, 0.25])
+    plot.show()
+    offered = dict(plot.actions_offered)
+    offered["Copy the numbers"]()
+    assert QGuiApplication.clipboard().text().splitlines() == [
+        "Curve\tTime (s)\tVelocity of the mass (mm/s)",
+        "mass\t0\t500",
+        "mass\t1\t250",
+    ]
+    offered["Copy the picture\tCtrl+C"]()
+    assert QGuiApplication.clipboard().image().width() == plot.width()
+    for ending in ("csv", "svg", "png"):
+        write_plot(plot, tmp_path / f"a.{ending}")
+        assert (tmp_path / f"a.{ending}").stat().st_size > 40
+        with pytest.raises(FileExistsError):
+            write_plot(plot, tmp_path / f"a.{ending}")
+    with pytest.raises(OSError, match="ending"):
+        write_plot(plot, tmp_path / "a.nothing")
+
+
+def test_what_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):
+    plot.curve(curve_style(0)).setData([0.0, 1.0], [0.0, 0.001])
+    plot.show()
+    qapp.processEvents()
+    before = dark_pixels(plot)
+    plot.setEnabled(False)
+    qapp.processEvents()
+    assert dark_pixels(plot) > before + 20

@@ -4,9 +4,17 @@ from collections.abc import Callable
 from math import log10
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QRectF, Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QPainter, QResizeEvent
-from PySide6.QtWidgets import QWidget
+from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
+from PySide6.QtGui import (
+    QColor,
+    QContextMenuEvent,
+    QGuiApplication,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import QMenu, QWidget
 
 from ..widgets import Theme, paint_hint
 from ._axis import AxisItem, Blankness, Grid, PlotAxis, Scale
@@ -14,6 +22,8 @@ from ._band import Band
 from ._legend import LegendEntry, LegendLine
 from ._line_style import SIGNS, LineStyle, curve_pen, shade_of, straight_pen
 from ._logical_line import LogicalLine
+from ._reading import Reading
+from ._saved_plot import save_plot
 from ._upright_marks import Rules, Stripes
 
 ROOM = 0.15
@@ -44,6 +54,8 @@ pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
 _DOT = "●"
+_VEIL = 0.65
+OUT_OF_DATE = "of earlier inputs"
 _FIRST = -1000
 _RIGHT_EM = 0.6
 """Room for half of the last number across."""
@@ -55,7 +67,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     """One pair of axes. Values are given as they are; logarithms are taken here.
 
     With the focus on it: A shows everything, L changes the upright axis between linear and logarithmic,
-    Ctrl+C copies the picture.
+    G reads values, D tells differences from there, Ctrl+C copies the picture; the context menu saves picture
+    and numbers. While it is disabled a veil says that it belongs to earlier inputs.
     """
 
     def __init__(
@@ -79,6 +92,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         # A width that followed the numbers would be known after painting, and everything painted again.
         self.up.setWidth(_UP_EM * self.fontMetrics().height())
         self.getPlotItem().hideButtons()
+        self._axes = (across, up)
         self._grid = Grid(self.across, self.up)
         self.addItem(self._grid, ignoreBounds=True)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
@@ -90,6 +104,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self._theme = theme
+        self._named: list[tuple[str, pg.PlotDataItem]] = []
+        self._reading: Reading | None = None
         self._follows = False
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
         self.retheme(theme)
@@ -116,7 +132,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Add a line; ``setData(x, y)`` draws it."""
         item = LogicalLine()
         item.setSkipFiniteCheck(False)
-        self._add(item)
+        self._add(item, name)
         if name:
             self._legend_entries.append((line_style, SIGNS[line_style.dash], name))
         self._line_style(
@@ -128,7 +144,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     def dots(self, line_style: LineStyle, name: str = "", size: int = 4) -> pg.PlotDataItem:
         """Add points without a line."""
         item = pg.PlotDataItem(pen=None, symbol="o", symbolSize=size, symbolPen=None)
-        self._add(item)
+        self._add(item, name)
         if name:
             self._legend_entries.append((line_style, _DOT, name))
         self._line_style(line_style, lambda theme: item.setSymbolBrush(pg.mkBrush(line_style.colour(theme))))
@@ -174,6 +190,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.getPlotItem().clear()
         self.addItem(self._grid, ignoreBounds=True)
         self._inked.clear()
+        self._named.clear()
+        self._reading = None
         self._legend_entries.clear()
         self._curves.clear()
         self._look_for_points()
@@ -184,6 +202,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._theme = theme
         self.setBackground(theme.base)
         self._grid.dress(theme)
+        if self._reading is not None:
+            self._reading.dress(theme)
         for axis in (self.across, self.up):
             axis.setPen(pg.mkPen(theme.line, width=self.devicePixelRatioF()))
             axis.setTextPen(pg.mkPen(theme.text))
@@ -231,10 +251,22 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         super().drawForeground(painter, rect)
         # A curve that is cleared says nothing.
         self._look_for_points()
-        if self._is_empty:
+        if self._is_empty or not self.isEnabled():
             painter.resetTransform()
             inside = self.mapFromScene(self.getViewBox().sceneBoundingRect()).boundingRect()
+        if self._is_empty:
             paint_hint(painter, inside, self._hint, self._theme.muted)
+        elif not self.isEnabled():
+            veil = QColor(self._theme.base)
+            veil.setAlphaF(_VEIL)
+            painter.fillRect(inside, veil)
+            paint_hint(painter, inside, OUT_OF_DATE, self._theme.text)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Lay a veil over what belongs to other inputs, or take it away."""
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.EnabledChange:
+            self.viewport().update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Act on A, L and Ctrl+C, while the plot has the focus."""
@@ -243,6 +275,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
                 self.show_everything()
             case Qt.Key.Key_L, Qt.KeyboardModifier.NoModifier:
                 self._turn_scale()
+            case Qt.Key.Key_G, Qt.KeyboardModifier.NoModifier:
+                self.read_on_or_off()
+            case Qt.Key.Key_D, Qt.KeyboardModifier.NoModifier:
+                self.mark_or_unmark()
             case Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier:
                 QGuiApplication.clipboard().setPixmap(self.grab())
             case _:
@@ -250,6 +286,91 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
                 event.ignore()
                 return
         event.accept()
+
+    @property
+    def reading(self) -> str:
+        """What is read under the pointer; empty while nothing is."""
+        return "" if self._reading is None else self._reading.text
+
+    def read_at(self, drawn: QPointF) -> None:
+        """Tell the place, and the nearest curve there, in the coordinates that are drawn."""
+        if self._reading is None:
+            self._reading = Reading(
+                self, lambda line: self.addItem(line, ignoreBounds=True), lambda: self._named
+            )
+            self._reading.dress(self._theme)
+        self._reading.show_at(drawn, self._axes, self._scales)
+
+    def read_on_or_off(self) -> None:
+        """Read in the middle of the picture, where no pointer is; or no more."""
+        if self._reading is not None and self._reading.place is not None:
+            self._reading.hide()
+        else:
+            self.read_at(self.getViewBox().viewRect().center())
+
+    def mark_or_unmark(self) -> None:
+        """Tell differences from the place that is read, or from none."""
+        if self._reading is None or self._reading.place is None:
+            self.read_on_or_off()
+        if self._reading is not None:
+            self._reading.mark(self._scales)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        """Read under the pointer."""
+        super().mouseMoveEvent(event)
+        place = self.mapToScene(event.position().toPoint())
+        if event.buttons() == Qt.MouseButton.NoButton and self.getViewBox().sceneBoundingRect().contains(
+            place
+        ):
+            self.read_at(self.getViewBox().mapSceneToView(place))
+        elif self._reading is not None:
+            self._reading.hide()
+
+    def leaveEvent(self, event: QEvent) -> None:
+        """Read no more."""
+        super().leaveEvent(event)
+        if self._reading is not None:
+            self._reading.hide()
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
+        """Offer what can be done with the picture and its numbers."""
+        menu = QMenu(self)
+        place = self.getViewBox().mapSceneToView(self.mapToScene(event.pos()))
+
+        def mark_here() -> None:
+            self.read_at(place)
+            self.mark_or_unmark()
+
+        for text, act in (*self.actions_offered, ("Differences from here\tD", mark_here)):
+            menu.addAction(text).triggered.connect(lambda _checked=False, act=act: act())
+        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        menu.popup(event.globalPos())
+        event.accept()
+
+    @property
+    def actions_offered(self) -> tuple[tuple[str, Callable[[], object]], ...]:
+        """What the context menu holds."""
+        return (
+            ("Show everything\tA", self.show_everything),
+            ("Linear or logarithmic\tL", self._turn_scale),
+            ("Read values\tG", self.read_on_or_off),
+            ("Copy the picture\tCtrl+C", lambda: QGuiApplication.clipboard().setPixmap(self.grab())),
+            ("Copy the numbers", lambda: QGuiApplication.clipboard().setText(self.numbers("\t"))),
+            ("Save picture or numbers…", lambda: save_plot(self)),
+        )
+
+    def numbers(self, separator: str = ",") -> str:
+        """Give what is drawn as rows of curve, place across and value, in the units of the axes."""
+        across, up = self._axes
+        rows = [separator.join(("Curve", across.text, up.text))]
+        for number, (name, item) in enumerate(self._named):
+            if item.xData is not None and item.yData is not None:
+                called = (name or f"{self.accessibleName()} {number + 1}").replace(separator, ";")
+                rows += [
+                    f"{called}{separator}{x * across.factor:.9g}{separator}{y * up.factor:.9g}"
+                    for x, y in zip(item.xData.tolist(), item.yData.tolist(), strict=True)
+                ]
+        return "\n".join(rows) + "\n"
 
     def _let_be(self, *_: object) -> None:
         """Follow the data no more: somebody looks at a part of the picture."""
@@ -284,8 +405,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._inked.append((line_style, paint))
         paint(self._theme)
 
-    def _add(self, item: pg.PlotDataItem) -> None:
+    def _add(self, item: pg.PlotDataItem, name: str) -> None:
         self._curves.append(item)
+        self._named.append((name, item))
         self.addItem(item)
         item.sigPlotChanged.connect(self._look_for_points)
         self._look_for_points()
