@@ -1,6 +1,13 @@
 from ._app_context import (
     AppContext as AppContext,
 )
+from ._file_kind import (
+    FileKind as FileKind,
+    file_kind as file_kind,
+)
+from ._history import (
+    History as History,
+)
 from ._kind_views import (
     KIND_VIEWS as KIND_VIEWS,
     OF_A_BAND as OF_A_BAND,
@@ -9,6 +16,7 @@ from ._kind_views import (
 )
 from ._page import (
     Page as Page,
+    Shown as Shown,
     SideAndPicture as SideAndPicture,
 )
 from ._settings import (

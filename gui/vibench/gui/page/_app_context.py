@@ -13,6 +13,7 @@ from ._selection import Selection
 from ._settings import Remembered, Settings
 
 USUAL_PATIENCE_S = 2.0
+MOST_RECENT = 12
 WORKERS = 2
 """One for previews, which must be quick, and one for whatever takes long."""
 
@@ -80,6 +81,16 @@ class AppContext(QObject):
         """Put recordings elsewhere from now on."""
         self.settings.keep_text(Remembered.FOLDER, str(folder))
         self.folder_chosen.emit(folder)
+
+    @property
+    def recent_files(self) -> tuple[Path, ...]:
+        """What was opened or saved last, the newest first."""
+        return tuple(Path(each) for each in self.settings.text(Remembered.RECENT).split("\n") if each)
+
+    def note_file(self, path: Path) -> None:
+        """Remember a file that somebody opened or saved."""
+        known = [str(each) for each in self.recent_files if each != path]
+        self.settings.keep_text(Remembered.RECENT, "\n".join([str(path), *known][:MOST_RECENT]))
 
     def say(self, notice: Notice) -> None:
         """Put a message on the strip."""

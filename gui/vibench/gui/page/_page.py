@@ -1,11 +1,34 @@
 """What a page of the window is: a widget that follows the engine and the theme, whole or in two parts."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel, QScrollArea, QSplitter, QVBoxLayout, QWidget
 
 from ..widgets import Theme
 from ._app_context import AppContext
+from ._file_kind import FileKind
 from ._settings import Remembered
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Numbers or a picture, and what they were computed from.
+
+    While ``inputs`` are not ``wanted``, the widget is disabled, hidden or says that it waits: a stale number
+    must never look like a true one.
+    """
+
+    widget: QWidget
+    inputs: object
+    wanted: object
+
+    @property
+    def is_true(self) -> bool:
+        """Whether it belongs to what is asked for now, or does not look as if it did."""
+        return self.inputs == self.wanted or not self.widget.isEnabled()
 
 
 class Page(QWidget):
@@ -22,6 +45,22 @@ class Page(QWidget):
 
     def refresh(self) -> None:
         """Show what is true now; called some twenty times a second while the page is in sight."""
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """What this page does with files of which kind."""
+        return {}
+
+    def undo(self) -> None:
+        """Take back the last edit of the plan; pages without one have none."""
+
+    def redo(self) -> None:
+        """Make it again."""
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """What the page shows that was computed, with what it was computed from."""
+        return ()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours; widgets follow the palette by themselves, plots do not."""

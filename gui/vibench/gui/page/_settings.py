@@ -18,6 +18,9 @@ class Remembered(StrEnum):
     CAMPAIGN = "queue/last"
     FOLDER = "recordings/folder"
     PATIENCE = "run/patience_s"
+    FONT = "window/font_points"
+    RECENT = "files/recent"
+    SCENES = "simulate/scene"
 
 
 class Settings:

@@ -1,14 +1,19 @@
 """The menus, and the keys as F1 lists them; Esc and Pause abort from dialogs and open menus too."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Protocol
 
 from PySide6.QtCore import QEvent, QObject, Qt, Signal
-from PySide6.QtGui import QAction, QKeyEvent, QKeySequence
-from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMessageBox
+from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMenu, QMessageBox
 
 from ..page import AppContext, UserActions
 from ..widgets import DARK, LIGHT, Theme
+from ._manual import show_about, show_manual
+from ._settings_dialog import SettingsDialog
 
 ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
 
@@ -45,60 +50,127 @@ class AbortKey(QObject):
         return is_new
 
 
-KEYS: tuple[tuple[str, str], ...] = (
+@dataclass(frozen=True)
+class MenuAction:
+    """A row of the table of actions: where it stands, its key, and what F1 says of it."""
+
+    menu: str
+    text: str
+    act: Callable[[], object]
+    key: str = ""
+    about: str = ""
+
+
+class MenuTarget(Protocol):
+    """What the window does for its menus."""
+
+    def close(self) -> bool:
+        """End."""
+
+    def reset_layout(self) -> None:
+        """Come up as new."""
+
+    def undo(self) -> None:
+        """Take back the last edit of the plan in sight."""
+
+    def redo(self) -> None:
+        """Make it again."""
+
+    def open_path(self, path: Path) -> None:
+        """Open whatever lies there."""
+
+
+OTHER_KEYS: tuple[tuple[str, str], ...] = (
     ("Esc, Pause", "abort: ramp down as fast as the shaker bears, from anywhere"),
-    ("Ctrl+1 … Ctrl+7", "show a page"),
-    ("F1", "this list"),
-    ("F5", "start what is armed"),
-    ("F6", "check the bench"),
-    ("Ctrl+Return", "arm"),
     ("Space", "freeze the picture (Run page); the recording goes on"),
     ("M", "mark an event in the recording (Run page)"),
-    ("A, L", "autoscale, logarithmic axis (in a plot)"),
-    ("Ctrl+T", "light or dark"),
-    ("Ctrl+C", "copy the message, or the picture of a plot"),
-    ("Ctrl+Q", "quit"),
+    ("A, L", "in a plot: show everything, logarithmic axis"),
+    ("G, D", "in a plot: read values, tell differences from there"),
+    ("Ctrl+C", "copy the picture of a plot, or the chosen cells of a table"),
+    ("Menu key", "what can be done with the plot or table that has the focus"),
+    ("F4, Alt+Down", "open the list of a choice"),
 )
-"""No bare letter ever starts an output."""
-
-
-def key_text() -> str:
-    """Lay the keys out as rows of a table, for rich text."""
-    rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, what in KEYS)
-    return f"<table>{rows}</table>"
-
-
+"""Keys that no menu holds. No bare letter ever starts an output."""
 EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
 
 
+def key_text(actions: tuple[MenuAction, ...]) -> str:
+    """Lay the keys out as rows of a table, for rich text."""
+    keys = (
+        *OTHER_KEYS,
+        *((each.key, each.about or each.text.replace("&", "")) for each in actions if each.key),
+    )
+    rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, what in keys)
+    return f"<table>{rows}</table>"
+
+
+def menu_actions(
+    window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
+) -> tuple[MenuAction, ...]:
+    """Give every action, menu by menu."""
+    return (
+        MenuAction("&File", "&Open…", lambda: _open(window, target, context), "Ctrl+O", "open any file"),
+        MenuAction("&File", "Recordings &folder…", lambda: choose_folder(window, context)),
+        MenuAction(
+            "&File", "&Settings…", lambda: SettingsDialog(context, window).open(), "Ctrl+,", "settings"
+        ),
+        MenuAction("&File", "&Quit", target.close, "Ctrl+Q"),
+        MenuAction("Ed&it", "&Undo", target.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
+        MenuAction("Ed&it", "&Redo", target.redo, "Ctrl+Shift+Z", "make it again"),
+        MenuAction("&Test", "&Check the bench", actions.check, "F6"),
+        MenuAction("&Test", "&Arm the test", actions.arm_test, "Ctrl+Return", "arm"),
+        MenuAction("&Test", "S&tart", actions.start, "F5", "start what is armed"),
+        MenuAction("&Test", "&Hold or go on", actions.hold_or_resume),
+        MenuAction("&Test", "&Stop (ramp down)", actions.stop),
+        MenuAction("&Test", "A&bort (Esc)", actions.abort),
+        *(
+            MenuAction(
+                "&View", f"&{number}  {name}", partial(context.page_wanted.emit, name), f"Ctrl+{number}"
+            )
+            for number, name in enumerate(pages, start=1)
+        ),
+        MenuAction("&View", "&Light or dark", lambda: context.choose_theme(_other(context)), "Ctrl+T"),
+        MenuAction("&View", "&Reset layout", target.reset_layout),
+        MenuAction("Hel&p", "&Manual", lambda: show_manual(window), "Shift+F1", "the manual, offline"),
+        MenuAction("Hel&p", "&About…", lambda: show_about(window, context), "", ""),
+    )
+
+
 def build_menus(
-    window: QMainWindow,
-    context: AppContext,
-    actions: UserActions,
-    pages: tuple[str, ...],
-    reset_layout: Callable[[], None],
+    window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
 ) -> None:
     """Put the menus on a window."""
     bar = window.menuBar()
     bar.setAccessibleName("Menus")
-    file = bar.addMenu("&File")
-    _add(file.addAction("Recordings &folder…"), "", lambda: choose_folder(window, context))
-    _add(file.addAction("&Quit"), "Ctrl+Q", window.close)
-    test = bar.addMenu("&Test")
-    _add(test.addAction("&Check the bench"), "F6", actions.check)
-    _add(test.addAction("&Arm the test"), "Ctrl+Return", actions.arm_test)
-    _add(test.addAction("S&tart"), "F5", actions.start)
-    _add(test.addAction("&Hold or go on"), "", actions.hold_or_resume)
-    _add(test.addAction("&Stop (ramp down)"), "", actions.stop)
-    _add(test.addAction("A&bort (Esc)"), "", actions.abort)
-    view = bar.addMenu("&View")
-    for number, name in enumerate(pages, start=1):
-        _add(view.addAction(f"&{number}  {name}"), f"Ctrl+{number}", _showing(context, name))
-    view.addSeparator()
-    _add(view.addAction("&Light or dark"), "Ctrl+T", lambda: context.choose_theme(_other(context)))
-    _add(view.addAction("&Reset layout"), "", reset_layout)
-    help_menu = bar.addMenu("Hel&p")
-    _add(help_menu.addAction("&Keys"), "F1", lambda: show_keys(window))
+    table = menu_actions(window, target, context, actions, pages)
+    keys = MenuAction("Hel&p", "&Keys", lambda: show_keys(window, (*table, keys)), "F1", "this list")
+    menus = {name: bar.addMenu(name) for name in dict.fromkeys(each.menu for each in table)}
+    for row in (*table, keys):
+        action = menus[row.menu].addAction(row.text)
+        action.setShortcut(QKeySequence(row.key))
+        action.triggered.connect(lambda _checked=False, row=row: row.act())
+    recent = QMenu("Open &recent", menus["&File"])
+    menus["&File"].insertMenu(menus["&File"].actions()[1], recent)
+    recent.aboutToShow.connect(lambda: _list_recent(recent, target, context))
+
+
+def _list_recent(menu: QMenu, target: MenuTarget, context: AppContext) -> None:
+    menu.clear()
+    for path in context.recent_files:
+        menu.addAction(str(path)).triggered.connect(lambda _checked=False, path=path: target.open_path(path))
+    if not context.recent_files:
+        menu.addAction("nothing yet").setEnabled(False)
+
+
+def _open(window: QMainWindow, target: MenuTarget, context: AppContext) -> None:
+    given, _ = QFileDialog.getOpenFileName(
+        window,
+        "Open",
+        str(context.folder),
+        "Recordings, tests, campaigns, configurations (*.h5 *.part *.toml)",
+    )
+    if given:
+        target.open_path(Path(given))
 
 
 def choose_folder(window: QMainWindow, context: AppContext) -> None:
@@ -108,21 +180,12 @@ def choose_folder(window: QMainWindow, context: AppContext) -> None:
         context.choose_folder(Path(chosen))
 
 
-def show_keys(window: QMainWindow) -> None:
+def show_keys(window: QMainWindow, actions: tuple[MenuAction, ...]) -> None:
     """List the keys beside the window, which goes on meanwhile."""
-    box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", f"{key_text()}<p>{EMERGENCY}</p>", parent=window)
+    text = f"{key_text(actions)}<p>{EMERGENCY}</p>"
+    box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", text, parent=window)
     box.setModal(False)
     box.show()
-
-
-def _add(action: QAction, key: str, act: Callable[[], object]) -> None:
-    if key:
-        action.setShortcut(QKeySequence(key))
-    action.triggered.connect(lambda _checked=False: act())
-
-
-def _showing(context: AppContext, name: str) -> Callable[[], None]:
-    return lambda: context.page_wanted.emit(name)
 
 
 def _other(context: AppContext) -> Theme:

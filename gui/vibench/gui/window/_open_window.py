@@ -11,12 +11,13 @@ from PySide6.QtCore import QCoreApplication, Qt, QTimer
 from PySide6.QtGui import QFont, QFontDatabase
 from PySide6.QtWidgets import QApplication, QLabel, QStyleFactory
 
-from ..page import AppContext, Settings, default_settings_path
+from ..page import AppContext, Remembered, Settings, default_settings_path
 from ._page_catalogue import PAGES
 from ._window import Window
 
 FONT_FILES = ("DejaVuSans.ttf", "DejaVuSans-Bold.ttf", "DejaVuSansMono.ttf")
 FONT_POINTS = 10
+SMALLEST_POINTS, LARGEST_POINTS = 7, 24
 
 
 def application(arguments: list[str]) -> QApplication:
@@ -46,6 +47,9 @@ def open_window(bench: Path | None, settings: Path | None, starting: QLabel | No
     kept = Settings(settings or default_settings_path())
     context = AppContext(kept)
     context.first_bench = None if bench is None else bench.resolve()
+    font = app.font()
+    font.setPointSize(int(kept.number(Remembered.FONT, FONT_POINTS, SMALLEST_POINTS, LARGEST_POINTS)))
+    app.setFont(font)
     window = Window(context, PAGES)
     # None of all this ever is garbage: a collector that looked through it would hold the window up.
     gc.freeze()

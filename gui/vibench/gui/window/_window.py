@@ -3,10 +3,11 @@
 from collections import deque
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from time import monotonic
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCloseEvent
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QApplication,
     QHBoxLayout,
@@ -17,9 +18,11 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from vibench.acquisition import ConfigurationError
+
 from ..engine_link import SignOfLife, Urgency
-from ..page import AppContext, Page, Remembered, UserActions
-from ..widgets import RUN, Theme, palette, style_sheet
+from ..page import AppContext, Page, Remembered, UserActions, file_kind
+from ..widgets import RUN, Theme, notice_of, palette, style_sheet
 from ._banner import Banner
 from ._event_loop_monitor import EventLoopMonitor
 from ._menus import AbortKey, build_menus
@@ -30,6 +33,8 @@ from ._state_indicator import NEXT_STEPS, indicator_of, status_fields
 from ._status_line import StatusField, StatusLine
 
 SPAN_S = 1.0
+MOST_DROPPED = 20
+"""Files that are opened at once."""
 
 
 class FrameCount:
@@ -72,7 +77,8 @@ class Window(QMainWindow):
             self._stack.addWidget(page)
         self._lay_out()
         self.user_actions = UserActions(context, self)
-        build_menus(self, context, self.user_actions, tuple(self.pages), self._reset_layout)
+        self.setAcceptDrops(True)
+        build_menus(self, self, context, self.user_actions, tuple(self.pages))
         self._connect()
         self._restore()
         self._timer = QTimer(self, interval=TICK_MS)
@@ -221,7 +227,40 @@ class Window(QMainWindow):
             self.context.bridge.beat()
             QTimer.singleShot(0, self, self._theme_next)
 
-    def _reset_layout(self) -> None:
+    def undo(self) -> None:
+        """Take back the last edit of the plan in sight."""
+        self.page.undo()
+
+    def redo(self) -> None:
+        """Make it again."""
+        self.page.redo()
+
+    def open_path(self, path: Path) -> None:
+        """Open whatever lies there, on the page that takes it."""
+        try:
+            kind = file_kind(path)
+        except ConfigurationError as error:
+            self.context.say(notice_of(error))
+            return
+        name, act = next((name, page.opens[kind]) for name, page in self.pages.items() if kind in page.opens)
+        self.show_page(name)
+        self.context.note_file(path)
+        act(path)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Take files."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open what was dropped."""
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        for path in paths[:MOST_DROPPED]:
+            self.open_path(path)
+        event.acceptProposedAction()
+
+    def reset_layout(self) -> None:
+        """Come up as new."""
         self.context.settings.forget_layout()
         self.showNormal()
         self.resize(1280, 800)

@@ -1,5 +1,6 @@
 """Compare: recordings and predictions laid over one another, with peaks, differences and exports."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -16,7 +17,7 @@ from vibench.analysis import ComparedRecording, Curve, compare_recording
 from vibench.analysis.dynamics import branch_curves
 
 from ...background import Job
-from ...page import AppContext, Page, SideAndPicture
+from ...page import AppContext, FileKind, Page, SideAndPicture
 from ...widgets import COMPARE, Notice, NoticeKind, Theme, notice_of, push_button
 from ._analysis_panel import AnalysisPanel
 from ._curve_list import CurveList, PairBox
@@ -61,6 +62,11 @@ class ComparePage(Page):
     def is_busy(self) -> bool:
         """Whether recordings are being analysed."""
         return bool(self._jobs)
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Branches."""
+        return {FileKind.BRANCHES: lambda path: self.add_branches((path,))}
 
     def left(self) -> None:
         """Keep how the page is divided."""

@@ -1,5 +1,6 @@
 """Files: recordings of a folder, listed with state and picture, and opened at any zoom."""
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import Qt, QTimer
@@ -18,7 +19,7 @@ from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, ke
 
 from ...background import Job
 from ...forms import LineField
-from ...page import AppContext, Page, Remembered
+from ...page import AppContext, FileKind, Page, Remembered
 from ...widgets import COMPARE, FILES, Notice, NoticeKind, Theme, notice_of, push_button
 from ._file_words import facts_text
 from ._listing import Levels, Listing, listed, made_levels, thumbnails
@@ -51,6 +52,11 @@ class FilesPage(Page):
     def is_done(self) -> bool:
         """Ticked once a recording is open."""
         return self._opened is not None
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Recordings, and folders of them."""
+        return {FileKind.RECORDING: self.open_path, FileKind.FOLDER: self._go_to}
 
     def entered(self) -> None:
         """List the folder anew, for files may have come; arrows choose among them."""

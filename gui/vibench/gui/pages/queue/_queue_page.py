@@ -1,6 +1,7 @@
 """The Queue page: a campaign as a table, its estimated end, and how each of its recordings stands."""
 
 import tomllib
+from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -31,7 +32,7 @@ from vibench.acquisition.plan import Campaign, Range, SweepAxis
 
 from ...background import LatestRequest
 from ...forms import Choice
-from ...page import AppContext, Page, Remembered, UserActions
+from ...page import AppContext, FileKind, History, Page, Remembered, UserActions
 from ...widgets import Notice, NoticeKind, ReadTable, clock, notice_of
 from ._draft import moved_up, with_measurement, with_sweep, without
 from ._row_words import CampaignPreview, point_rows, preview_campaign
@@ -47,6 +48,7 @@ class QueuePage(Page):
     def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
         super().__init__(context, parent)
         self._actions = UserActions(context, self)
+        self._history: History[Campaign] = History()
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
@@ -105,6 +107,23 @@ class QueuePage(Page):
         self.rows.show_rows(point_rows(campaign, () if status is None else status.rows, state))
         self._show_progress(status)
 
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Campaigns."""
+        return {FileKind.CAMPAIGN: self.open_file}
+
+    def undo(self) -> None:
+        """Take back an edit of the campaign."""
+        self._show_again(self._history.undo())
+
+    def redo(self) -> None:
+        """Make it again."""
+        self._show_again(self._history.redo())
+
+    def _show_again(self, campaign: Campaign | None) -> None:
+        if campaign is not None:
+            self.context.selection.choose_campaign(campaign)
+
     def left(self) -> None:
         """Keep the campaign for next time."""
         campaign = self.context.selection.campaign
@@ -114,6 +133,7 @@ class QueuePage(Page):
         """Take over the campaign of a file."""
         try:
             self.context.selection.choose_campaign(load_campaign(path))
+            self.context.note_file(path)
         except ConfigurationError as error:
             self.context.say(notice_of(error))
 
@@ -135,6 +155,7 @@ class QueuePage(Page):
             self.entries.show_rows(())
             self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
             return
+        self._history.note(campaign)
         self.summary.setText(f"{campaign.name}: …")
         self._looking.ask((campaign, rig))
 

@@ -1,5 +1,6 @@
 """The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check."""
 
+from collections.abc import Callable, Mapping
 from math import floor, isfinite, log10
 from pathlib import Path
 
@@ -17,8 +18,8 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, list_rig_instruments, shipped
 from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
 
-from ...page import AppContext, Page, Remembered, UserActions
-from ...widgets import ReadTable, moment_text, notice_of
+from ...page import AppContext, FileKind, Page, Remembered, UserActions
+from ...widgets import Notice, NoticeKind, ReadTable, moment_text, notice_of
 from ._knob_sheet import KnobSheetForm
 from ._rig_choice import RigChoice
 
@@ -124,6 +125,21 @@ class RigPage(Page):
         """Put the focus where the next step is."""
         if self.open_button.isEnabled():
             self.open_button.setFocus()
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Hardware configurations; while a bench is open, none."""
+        return {FileKind.RIG: self._choose}
+
+    def _choose(self, path: Path) -> None:
+        if self.choice.isEnabled():
+            self.choice.choose(path.resolve())
+        else:
+            self.context.say(
+                Notice(
+                    NoticeKind.WARNING, "A bench is open.", "It was kept.", "Close it, then choose another."
+                )
+            )
 
     def open_bench(self) -> None:
         """Open the chosen bench."""

@@ -1,6 +1,7 @@
 """The Test page: a form of what will be played, and beside it exactly what that is and does."""
 
 import tomllib
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,7 @@ from vibench.acquisition.rig import BaseQuantity, Rig
 
 from ...background import LatestRequest
 from ...forms import Choice
-from ...page import AppContext, Page, Remembered, UserActions
+from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
 from ...widgets import Notice, NoticeKind, Theme, clock, notice_of
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
@@ -66,6 +67,7 @@ def _load(check: LimitCheck, name: str) -> str:
     return f"{name} {check.value * factor:.3g} of {check.limit * factor:.3g} {unit}"
 
 
+Asked = tuple[Measurement | None, Rig | None]
 LOOK_MS, PREDICT_MS = 200, 900
 """How long a test stands unchanged before it is previewed, and before it is simulated."""
 
@@ -77,6 +79,10 @@ class TestPage(Page):
         super().__init__(context, parent)
         self._actions = UserActions(context, self)
         self._preview: MeasurementPreview | None = None
+        self._history: History[Measurement] = History()
+        self._of: Asked = (None, None)
+        self._summary_of: Asked = self._of
+        self._predicted_of: Asked = self._of
         self._tests: tuple[NamedTest, ...] = ()
         self.choice = Choice()
         self.form = TestForm()
@@ -116,6 +122,34 @@ class TestPage(Page):
         """Whether a preview or a prediction is still to come."""
         return self._looking.is_busy or self._predicting.is_busy
 
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Tests."""
+        return {FileKind.TEST: self.open_file}
+
+    def undo(self) -> None:
+        """Take back an edit of the test."""
+        self._show_again(self._history.undo())
+
+    def redo(self) -> None:
+        """Make it again."""
+        self._show_again(self._history.redo())
+
+    def _show_again(self, measurement: Measurement | None) -> None:
+        if measurement is not None:
+            self.form.show_value(measurement)
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """Loads, pictures and prediction, each of the test and rig it was worked out for."""
+        wanted = (self.form.value, self.context.selection.rig)
+        return (
+            Shown(self.summary, self._summary_of, wanted),
+            *(Shown(each, self._of, wanted) for each in (self.plots, self.limits)),
+            Shown(self.prediction, self._predicted_of, wanted),
+            Shown(self.prediction_note, self._predicted_of, wanted),
+        )
+
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self.plots.retheme(theme)
@@ -131,9 +165,12 @@ class TestPage(Page):
         measurement, rig = self.form.value, self.context.selection.rig
         self.context.selection.choose_measurement(measurement)
         self._preview = None
+        if measurement is not None:
+            self._history.note(measurement)
         # What stands there belongs to another test until its own has come.
-        self.limits.setEnabled(False)
-        self.plots.setEnabled(False)
+        self._summary_of = (measurement, rig)
+        for each in (self.limits, self.plots, self.prediction, self.prediction_note):
+            each.setEnabled(False)
         if measurement is None or rig is None:
             self._looking.drop()
             self._predicting.drop()
@@ -150,9 +187,10 @@ class TestPage(Page):
 
     def _looked(self, seen: MeasurementPreview) -> None:
         self._preview = seen
+        self._of = self._summary_of = (seen.measurement, self.context.selection.rig)
         self.summary.setText(summary_text(seen))
-        self.limits.setEnabled(True)
-        self.plots.setEnabled(True)
+        for each in (self.limits, self.plots):
+            each.setEnabled(True)
         self.plots.show_preview(seen)
         self.limits.show_checks(seen.checks)
 
@@ -162,6 +200,9 @@ class TestPage(Page):
     def _predicted(self, prediction: TestPrediction) -> None:
         seen = prediction.motion
         self.context.selection.keep_prediction(seen)
+        self._predicted_of = (seen.measurement, self.context.selection.rig)
+        self.prediction.setEnabled(True)
+        self.prediction_note.setEnabled(True)
         self.prediction.show_prediction(seen)
         bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
         collides = f"Collides at {bands}." if bands else "No collision is predicted."
@@ -175,6 +216,8 @@ class TestPage(Page):
 
     def _prediction_failed(self, error: BaseException) -> None:
         self.prediction.show_prediction(None)
+        self.prediction_note.setEnabled(True)
+        self._predicted_of = (self.form.value, self.context.selection.rig)
         self.prediction_note.setText(f"No prediction: {error}")
         self.expectation.setText("")
 
@@ -218,6 +261,7 @@ class TestPage(Page):
         except ConfigurationError as error:
             self.context.say(notice_of(error))
         else:
+            self.context.note_file(path)
             self.context.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
             self._list_tests()
 
@@ -230,6 +274,7 @@ class TestPage(Page):
         """Take over the test of a file."""
         try:
             self.form.show_value(load_test(path))
+            self.context.note_file(path)
         except ConfigurationError as error:
             self.context.say(notice_of(error))
 

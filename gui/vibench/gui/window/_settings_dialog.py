@@ -1,0 +1,76 @@
+"""Settings: all that the window remembers because somebody wants it so, in one form."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+from PySide6.QtGui import QFont
+from PySide6.QtWidgets import QApplication, QDialog, QDialogButtonBox, QVBoxLayout, QWidget
+
+from vibench.acquisition import FrozenModel
+from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S
+
+from ..forms import JudgedForm
+from ..page import AppContext, Remembered
+from ..widgets import THEMES
+
+
+class Preferences(FrozenModel):
+    """What somebody wants to have otherwise."""
+
+    theme: Literal["light", "dark"]
+    """Colours of the window; figures of exports are light."""
+    font_points: Annotated[int, Field(ge=7, le=24)]
+    """Height of the letters; what is open already takes it as far as it goes, all of it the next start."""
+    patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)]
+    """How long a test far from every limit may go on while the window does not answer."""
+    recordings_folder: Annotated[str, Field(min_length=1)]
+    """Where new recordings go."""
+
+
+class SettingsDialog(QDialog):
+    """Takes the settings over when they are allowed; Cancel leaves them."""
+
+    def __init__(self, context: AppContext, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Settings")
+        self._context = context
+        self.form: JudgedForm[Preferences] = JudgedForm(Preferences, "settings")
+        self.buttons = QDialogButtonBox(
+            QDialogButtonBox.StandardButton.Ok | QDialogButtonBox.StandardButton.Cancel
+        )
+        self.buttons.accepted.connect(self.accept)
+        self.buttons.rejected.connect(self.reject)
+        layout = QVBoxLayout(self)
+        layout.addWidget(self.form)
+        layout.addWidget(self.buttons)
+        self.setMinimumWidth(30 * self.fontMetrics().height())
+        self.form.changed.connect(self._judge)
+        self.form.show_value(
+            Preferences(
+                theme=context.theme.name,
+                font_points=QApplication.font().pointSize(),
+                patience_s=context.patience_s,
+                recordings_folder=str(context.folder),
+            )
+        )
+
+    def accept(self) -> None:
+        """Take the settings over, and keep them."""
+        wanted = self.form.value
+        if wanted is None:
+            return
+        if wanted.theme != self._context.theme.name:
+            self._context.choose_theme(THEMES[wanted.theme])
+        self._context.settings.keep_text(Remembered.PATIENCE, f"{wanted.patience_s:g}")
+        self._context.settings.keep_text(Remembered.FONT, str(wanted.font_points))
+        font = QFont(QApplication.font())
+        font.setPointSize(wanted.font_points)
+        QApplication.setFont(font)
+        folder = Path(wanted.recordings_folder).expanduser()
+        if folder != self._context.folder:
+            self._context.choose_folder(folder)
+        super().accept()
+
+    def _judge(self) -> None:
+        self.buttons.button(QDialogButtonBox.StandardButton.Ok).setEnabled(self.form.value is not None)

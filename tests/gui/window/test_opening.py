@@ -1,0 +1,142 @@
+"""Files that are dropped or opened come up on the page that takes them; edits are taken back; help."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent, QTextDocument
+from PySide6.QtWidgets import QApplication, QDialogButtonBox, QLabel, QMenu
+
+from vibench.acquisition import save_toml, shipped
+from vibench.gui.widgets import COMPARE, DARK, FILES, QUEUE, RIG, TEST
+from vibench.gui.window._manual import show_about, show_manual
+from vibench.gui.window._settings_dialog import SettingsDialog
+
+
+def dropped(window, *paths):
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
+    window.dropEvent(
+        QDropEvent(
+            QPointF(5, 5),
+            Qt.DropAction.CopyAction,
+            data,
+            Qt.MouseButton.LeftButton,
+            Qt.KeyboardModifier.NoModifier,
+        )
+    )
+
+
+def test_what_is_dropped_comes_up_on_its_page_and_is_listed_as_recent(window, tmp_path):
+    test = tmp_path / "mine.toml"
+    measurement = window.context.selection.measurement.model_copy(update={"name": "mine"})
+    save_toml(measurement, test)
+    dropped(window, test)
+    assert window.page is window.pages[TEST]
+    assert window.context.selection.measurement.name == "mine"
+    campaign, rig = shipped("campaigns/quick.toml"), shipped("hardware_configs/lab_rig.toml")
+    dropped(window, campaign)
+    assert window.page is window.pages[QUEUE]
+    assert window.context.selection.campaign.name == "quick"
+    dropped(window, rig)
+    assert window.page is window.pages[RIG]
+    assert window.context.selection.rig.virtual is None
+    assert window.context.recent_files == (rig, campaign, test)
+    menu = next(each for each in window.menuBar().findChildren(QMenu) if "recent" in each.title())
+    menu.aboutToShow.emit()
+    assert [each.text() for each in menu.actions()] == [str(rig), str(campaign), str(test)]
+    menu.actions()[2].trigger()
+    assert window.page is window.pages[TEST]
+    dropped(window, tmp_path)
+    assert window.page is window.pages[FILES]
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("a.txt", b"x"), ("a.toml", b"\xff"), ("b.toml", b"a = 1"), ("c.toml", b"["), ("gone.toml", None)],
+)
+def test_what_cannot_be_opened_is_told_and_nothing_changes(window, tmp_path, name, content):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    before = window.page
+    dropped(window, tmp_path / name)
+    assert window.page is before
+    assert name in window.strip.notices[-1].what
+    assert window.context.recent_files == ()
+
+
+def test_what_is_no_recording_is_told_by_the_page_that_would_show_it(window, qtbot, tmp_path):
+    (tmp_path / "broken.h5").write_bytes(b"no file of that kind")
+    dropped(window, tmp_path / "broken.h5")
+    assert window.page is window.pages[COMPARE]
+    qtbot.waitUntil(lambda: bool(window.strip.notices), timeout=60_000)
+    assert "broken.h5" in window.strip.notices[-1].what
+
+
+def test_edits_of_test_and_campaign_are_taken_back(window, qtbot):
+    selection, key = window.context.selection, Qt.KeyboardModifier.ControlModifier
+    window.show_page(TEST)
+    first = selection.measurement
+    form = window.pages[TEST].form
+    form.show_value(first.model_copy(update={"ramp_s": 1.25}))
+    form.show_value(first.model_copy(update={"ramp_s": 1.5}))
+    qtbot.keyClick(window, Qt.Key.Key_Z, key)
+    assert selection.measurement.ramp_s == 1.25
+    window.undo()
+    assert selection.measurement == first
+    window.undo()
+    assert selection.measurement == first
+    qtbot.keyClick(window, Qt.Key.Key_Z, key | Qt.KeyboardModifier.ShiftModifier)
+    assert selection.measurement.ramp_s == 1.25
+    window.show_page(QUEUE)
+    queue = window.pages[QUEUE]
+    queue.open_file(shipped("campaigns/quick.toml"))
+    before = selection.campaign
+    queue._add_test()
+    assert selection.campaign != before
+    window.undo()
+    assert selection.campaign == before
+
+
+def test_settings_are_one_form_and_are_kept(window, qapp, tmp_path):
+    dialog = SettingsDialog(window.context, window)
+    points = qapp.font().pointSize()
+    dialog.form.form.show_content(
+        {
+            "theme": "dark",
+            "font_points": 12,
+            "patience_s": 4.0,
+            "recordings_folder": str(tmp_path / "elsewhere"),
+        }
+    )
+    try:
+        dialog.accept()
+        assert window.context.theme is DARK
+        assert qapp.font().pointSize() == 12
+        assert window.context.patience_s == 4.0
+        assert window.context.folder == tmp_path / "elsewhere"
+    finally:
+        font = QApplication.font()
+        font.setPointSize(points)
+        QApplication.setFont(font)
+    dialog.form.form.show_content({**dialog.form.form.content(), "patience_s": 99.0})
+    assert not dialog.buttons.button(QDialogButtonBox.StandardButton.Ok).isEnabled()
+    assert "Patience (s)" in dialog.form.complaint
+    assert "at most 10 s" in dialog.form.complaint
+
+
+def test_help_is_offline_and_says_what_is_installed(window, qtbot):
+    manual = show_manual(window)
+    assert manual.browser.sourceType() is QTextDocument.ResourceType.MarkdownResource
+    assert "A first measurement" in manual.browser.toPlainText()
+    about = show_about(window, window.context)
+    qtbot.waitUntil(lambda: "version" in about.browser.toPlainText(), timeout=100_000)
+    next(each for each in about.buttons.buttons() if "Copy" in each.text()).click()
+    assert "python" in QApplication.clipboard().text()
+    qtbot.keyClick(window, Qt.Key.Key_F1)
+    keys = next(each for each in window.findChildren(QLabel) if "<table>" in each.text())
+    assert all(word in keys.text() for word in ("F5", "F6", "Ctrl+7", "Ctrl+Z", "Shift+F1", "Esc, Pause"))
+    assert Path(manual.browser.source().toLocalFile()).name == "gui.md"
+    keys.window().close()
+    manual.close()
+    about.close()
