@@ -54,11 +54,14 @@ class Curve:
     """Of the magnitude; NaN where nothing is known of it."""
     note: str = ""
     """What else is to be known: averages, window, accuracy."""
+    level_m: float | None = None
+    """Amplitude of the base for which a simulated curve holds [m]; None where none was asked for."""
 
     @property
     def name(self) -> str:
         """``"sweep_weak, Response II, measured"``."""
-        return f"{self.source}, {self.response.value}, {self.origin.value}"
+        level = "" if self.level_m is None else f" at {1e6 * self.level_m:.4g} µm"
+        return f"{self.source}{level}, {self.response.value}, {self.origin.value}"
 
     @property
     def is_single_valued(self) -> bool:

@@ -14,6 +14,8 @@ from ..spectra import Spectrogram, SpectrogramSums
 
 _PIECE_SAMPLES = 2**18
 _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25
+_HANN_WIDTH = 1.44
+"""Of a line under a Hann window, at half power, times the length of the window."""
 _SEGMENTS_IN_SIGHT = 250
 """A segment is so much shorter than what is in sight, within the limits above."""
 _LOG_ROWS = 300
@@ -39,6 +41,8 @@ class SpectrogramRequest:
     stop: int
     highest_hz: float
     spacing: RowSpacing
+    resolution_hz: float | None = None
+    """Wished width of a line [Hz]; chosen by the stretch if absent, which shows events best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +76,10 @@ def recording_spectrogram(request: SpectrogramRequest) -> DensityPicture:
         rate_hz = recording.sample_rate_hz
         stop = min(request.stop, recording.samples)
         samples = max(0, stop - request.start)
-        segment_s = float(np.clip(samples / rate_hz / _SEGMENTS_IN_SIGHT, _LEAST_SEGMENT_S, _MOST_SEGMENT_S))
+        seen_s = samples / rate_hz
+        segment_s = float(np.clip(seen_s / _SEGMENTS_IN_SIGHT, _LEAST_SEGMENT_S, _MOST_SEGMENT_S))
+        if request.resolution_hz is not None:
+            segment_s = min(_HANN_WIDTH / request.resolution_hz, 0.5 * seen_s)
         highest_hz = min(request.highest_hz, 0.5 * rate_hz)
         sums = SpectrogramSums(rate_hz, samples, highest_hz=highest_hz, segment_s=segment_s)
         for first in range(request.start, stop, _PIECE_SAMPLES):

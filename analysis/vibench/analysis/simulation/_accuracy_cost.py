@@ -45,7 +45,7 @@ def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
     powers = [isinstance(law, PowerLaw) for law in laws]
     shortest_s = sum(each_s / (level.power if is_power else level.free) for is_power in powers)
     longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
-    on_top = "; the exponent comes on top" if request.exponent is Exponent.COMPUTED else ""
+    on_top = "; the exponent about doubles that" if request.exponent is Exponent.COMPUTED else ""
     if request.budget_s > 0.0:
         on_top += f"; a point whose start is forgotten takes {request.budget_s:g} s of a core more, at most"
     error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"

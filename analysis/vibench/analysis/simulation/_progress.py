@@ -138,6 +138,7 @@ class SimulationProgress:
                 *self.column(model, name),
                 np.full(len(self._found[model]), np.nan),
                 self._note,
+                self._amplitude_m,
             )
             for model in self.models
             if model in self._found

@@ -36,3 +36,6 @@ from ._theme import (
     palette as palette,
     style_sheet as style_sheet,
 )
+from ._timed_bar import (
+    TimedBar as TimedBar,
+)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAccessible, QAccessibleEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
@@ -18,8 +18,11 @@ class StateIndicator:
     tone: Tone
     detail: str = ""
     """What changes while the state stays: a clock, a level."""
+    is_ramping: bool = False
+    """The drive goes down already: STOP can only make it faster."""
 
 
+STOP_TEXT, AT_ONCE_TEXT = "■ STOP: ramp down   (Esc: abort)", "■ STOP: at once   (Esc: abort)"
 CLOSED = StateIndicator("○", "NO BENCH", Tone.CALM, "Open one on the Rig page")
 
 
@@ -39,13 +42,17 @@ class Banner(QFrame):
         self._detail = QLabel()
         self._detail.setAccessibleName("Details of the state")
         self._detail.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
-        self._stop = QPushButton("■ STOP  (Esc)")
+        self._stop = QPushButton(STOP_TEXT)
         self._stop.setObjectName("stop")
         self._stop.setAccessibleName("Stop")
         self._stop.setToolTip(
             "A click ramps the drive down as the plan says; Esc, as fast as the shaker bears.\n"
             "This is not an emergency stop: in an emergency, switch the amplifier off."
         )
+        self._stop.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        # As wide as it ever gets: it must not move under the hand.
+        widest = max((STOP_TEXT, AT_ONCE_TEXT), key=self._stop.fontMetrics().horizontalAdvance)
+        self._stop.setMinimumWidth(round(1.4 * self._stop.fontMetrics().horizontalAdvance(widest)))
         self._stop.clicked.connect(self.stop_wanted)
         layout = QHBoxLayout(self)
         layout.setContentsMargins(10, 6, 10, 6)
@@ -74,6 +81,7 @@ class Banner(QFrame):
         self._label.setText(f"{indicator.symbol}  {indicator.word}")
         self._label.setAccessibleName(f"State: {indicator.word}")
         self._detail.setText(indicator.detail)
+        self._stop.setText(AT_ONCE_TEXT if indicator.is_ramping else STOP_TEXT)
         if self._label.property("tone") != indicator.tone.value:
             self._label.setProperty("tone", indicator.tone.value)
             self._label.style().polish(self._label)

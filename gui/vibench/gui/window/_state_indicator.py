@@ -17,7 +17,7 @@ _INDICATORS = {
     EngineState.ARMED: StateIndicator("▲", "ARMED", Tone.CAUTION),
     EngineState.RUNNING: StateIndicator("▶", "RUNNING", Tone.ACTIVE),
     EngineState.HELD: StateIndicator("❚❚", "HELD", Tone.CAUTION),
-    EngineState.RAMPING_DOWN: StateIndicator("▼", "RAMPING DOWN", Tone.CAUTION),
+    EngineState.RAMPING_DOWN: StateIndicator("▼", "RAMPING DOWN", Tone.CAUTION, is_ramping=True),
     EngineState.CHECKING: StateIndicator("◍", "CHECKING", Tone.ACTIVE, "A small sine plays for some seconds"),
     EngineState.FAULT: StateIndicator(
         "✖", "FAULT", Tone.DANGER, "Silent; open the bench again on the Rig page"

@@ -7,7 +7,7 @@ from pathlib import Path
 from time import monotonic
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
     QHBoxLayout,
@@ -226,6 +226,12 @@ class Window(QMainWindow):
             self._unthemed.pop(0)()
             self.context.bridge.beat()
             QTimer.singleShot(0, self, self._theme_next)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Begin with the focus where the next step is, and not on STOP."""
+        super().showEvent(event)
+        self.navigation.setFocus()
+        self.page.entered()
 
     def undo(self) -> None:
         """Take back the last edit of the plan in sight."""

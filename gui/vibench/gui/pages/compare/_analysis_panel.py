@@ -1,11 +1,12 @@
 """How recordings are analysed, next to the picture that it makes, and how far the analysis is."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QProgressBar, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from vibench.analysis import AnalysisOptions
 
 from ...forms import JudgedForm
+from ...widgets import TimedBar
 
 
 class AnalysisPanel(QGroupBox):
@@ -22,9 +23,7 @@ class AnalysisPanel(QGroupBox):
         self._again.setAccessibleName("Analyse again")
         self._again.setToolTip("Analyse all recordings with these options")
         self._again.clicked.connect(lambda _checked=False: self.wanted.emit())
-        self._bar = QProgressBar()
-        self._bar.setAccessibleName("Recordings analysed")
-        self._bar.setFormat("%v of %m analysed")
+        self._bar = TimedBar("Recordings analysed", "analysed")
         self._cancel = QPushButton("Cance&l")
         self._cancel.setAccessibleName("Cancel the analysis")
         self._cancel.setToolTip("Forget what has not been analysed yet")
@@ -36,6 +35,11 @@ class AnalysisPanel(QGroupBox):
         layout = QVBoxLayout(self)
         layout.addWidget(self.form)
         layout.addLayout(row)
+        for widget in (self._bar, self._cancel):
+            # Their place is kept: what begins or ends must move nothing.
+            policy = widget.sizePolicy()
+            policy.setRetainSizeWhenHidden(True)
+            widget.setSizePolicy(policy)
         self.form.changed.connect(self._judge)
         self.show_progress(0, 0)
 
@@ -45,8 +49,7 @@ class AnalysisPanel(QGroupBox):
 
     def show_progress(self, done: int, asked: int) -> None:
         """Say how many recordings are analysed; the bar is there only while some are not."""
-        self._bar.setMaximum(max(asked, 1))
-        self._bar.setValue(done)
+        self._bar.show_done(done, asked)
         for widget in (self._bar, self._cancel):
             widget.setVisible(done < asked)
 

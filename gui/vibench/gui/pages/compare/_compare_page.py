@@ -1,6 +1,7 @@
 """Compare: recordings and predictions laid over one another, with peaks, differences and exports."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -25,7 +26,8 @@ from ._curve_plots import CurvePlots
 from ._export_elsewhere import exported_elsewhere
 from ._number_tables import PEAK_HEADINGS, NumberTable, marker_headings, marker_rows, peak_rows
 
-FILTERS = "SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;Report (*.html)"
+REPORT = "Report (*.html)"
+FILTERS = f"SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;{REPORT}"
 
 
 class ComparePage(Page):
@@ -159,6 +161,7 @@ class ComparePage(Page):
         self.plots.show_curves(shown, self.pair_box.difference())
         self.peaks.show_rows(PEAK_HEADINGS, peak_rows(tuple(each for each, _ in shown)))
         self._export.setEnabled(bool(shown))
+        self._report.setEnabled(bool(shown))
         self._read()
 
     def _read(self) -> None:
@@ -190,10 +193,10 @@ class ComparePage(Page):
             path: each for path, each in self._recordings.items() if each is None or each.name not in gone
         }
 
-    def _choose_export(self) -> None:
-        start = str(self.context.folder / "comparison.svg")
+    def _choose_export(self, filters: str = FILTERS) -> None:
+        start = str(self.context.folder / ("comparison.html" if filters == REPORT else "comparison.svg"))
         options = QFileDialog.Option.DontConfirmOverwrite
-        chosen, kind = QFileDialog.getSaveFileName(self, "Export", start, FILTERS, options=options)
+        chosen, kind = QFileDialog.getSaveFileName(self, "Export", start, filters, options=options)
         if chosen:
             suffix = kind[kind.index("*") + 1 : kind.index(")")]
             path = Path(chosen)
@@ -243,10 +246,16 @@ class ComparePage(Page):
             "Sho&w all", "Let the axes follow the curves", self.plots.magnitudes.show_everything
         )
         self._export = push_button("E&xport…", "Write picture, numbers or report", self._choose_export)
+        self._report = push_button(
+            "Repor&t…",
+            "Write one page with curves, peaks and recordings",
+            partial(self._choose_export, REPORT),
+        )
         self._export.setEnabled(False)
+        self._report.setEnabled(False)
         row = QHBoxLayout()
         row.addStretch(1)
-        for each in (self._markers, show_all, self._export):
+        for each in (self._markers, show_all, self._report, self._export):
             row.addWidget(each)
         picture = QWidget()
         layout = QVBoxLayout(picture)

@@ -25,7 +25,7 @@ _SWATCH = (28, 12)
 
 
 class CurveList(QListWidget):
-    """Curves with a tick for those in the picture; colours follow the source, dashes the origin."""
+    """Curves with a tick for those in the picture; colours follow source and origin, dashes the origin."""
 
     changed = Signal()
 
@@ -60,8 +60,8 @@ class CurveList(QListWidget):
 
     def line_style(self, curve: Curve) -> LineStyle:
         """Colour of its source, dash of its origin."""
-        sources = list(dict.fromkeys(each.source for each in self._curves))
-        return curve_style(sources.index(curve.source), _DASHES[curve.origin])
+        inks = list(dict.fromkeys(_ink(each) for each in self._curves))
+        return curve_style(inks.index(_ink(curve)), _DASHES[curve.origin])
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
         """Put curves of a source in the place of those it had."""
@@ -111,6 +111,11 @@ class CurveList(QListWidget):
         self.changed.emit()
 
 
+def _ink(each: Curve) -> tuple[str, bool]:
+    """Name the colour of a curve: what a recording measured and what a model says to it have two."""
+    return each.source, each.origin is CurveOrigin.MEASURED
+
+
 def _is_of(each: Curve, source: str) -> bool:
     """Tell whether a curve is a recording's; steps up and down of one are two sources with one beginning."""
     return each.source == source or each.source in (f"{source} up", f"{source} down")
@@ -130,6 +135,15 @@ def _swatch(line_style: LineStyle, theme: Theme) -> QPixmap:
     painter.drawLine(1, _SWATCH[1] // 2, _SWATCH[0] - 1, _SWATCH[1] // 2)
     painter.end()
     return picture
+
+
+def _caution(curve: Curve, reference: Curve) -> str:
+    """Say that two curves may hold for two levels: of what collides, that alone is a difference."""
+    levels = (curve.level_m, reference.level_m)
+    if levels[0] == levels[1]:
+        return ""
+    said = ["as driven" if each is None else f"{1e6 * each:.4g} µm" for each in levels]
+    return f". ⚠ Levels of the base: {said[0]} and {said[1]}; what collides differs by that alone"
 
 
 _NOBODY = "– nothing –"
@@ -194,5 +208,7 @@ class PairBox(QGroupBox):
         except AnalysisError as error:
             self._said.setText(str(error))
             return None
-        self._said.setText(f"Median {found.median_abs_db:.2g} dB, root mean square {found.rms_db:.2g} dB")
+        self._said.setText(
+            f"Median {found.median_abs_db:.2g} dB, root mean square {found.rms_db:.2g} dB{_caution(*pair)}"
+        )
         return found

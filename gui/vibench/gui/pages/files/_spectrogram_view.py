@@ -31,6 +31,8 @@ _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
 _HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
 _USUAL = 2
+_WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Of the spectrogram's lines; None lets the stretch in sight choose."""
 _BAR_EM = 4
 """Room for the numbers and the label of the scale of colours."""
 _SHOWN_DB = 80.0
@@ -49,6 +51,9 @@ class SpectrogramView(QWidget):
         for highest_hz in _HIGHEST_HZ:
             self.highest.addItem(f"{highest_hz:g} Hz")
         self.highest.setCurrentIndex(_USUAL)
+        self.line_width = Choice()
+        for width_hz in _WIDTHS_HZ:
+            self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
         self.said = QLabel("")
         self.said.setProperty("rank", "second")
         self._theme = theme
@@ -64,7 +69,7 @@ class SpectrogramView(QWidget):
         }
         self._images = {spacing: _Image(plot) for spacing, plot in self._plots.items()}
         self._lay_out()
-        for choice in (self.channel, self.spacing, self.highest):
+        for choice in (self.channel, self.spacing, self.highest, self.line_width):
             choice.currentIndexChanged.connect(lambda _index: self._ask())
 
     @property
@@ -133,6 +138,7 @@ class SpectrogramView(QWidget):
             stop=int(np.ceil(high_s * rate_hz)),
             highest_hz=_HIGHEST_HZ[self.highest.currentIndex()],
             spacing=self._spacing,
+            resolution_hz=self.line_width.currentData(),
         )
         self.said.setText("working it out…")
         self._latest_request.ask(asked)
@@ -154,6 +160,7 @@ class SpectrogramView(QWidget):
             ("Channel", self.channel, "The channel whose frequencies are shown"),
             ("Frequencies", self.spacing, "How the upright axis is laid out"),
             ("up to", self.highest, "Where the upright axis ends"),
+            ("lines", self.line_width, "Width of a line: narrow ones tell tones apart, wide ones moments"),
         ):
             label = QLabel(text)
             label.setBuddy(choice)

@@ -49,6 +49,7 @@ class QueuePage(Page):
         super().__init__(context, parent)
         self._actions = UserActions(context, self)
         self._history: History[Campaign] = History()
+        self._seen: CampaignPreview | None = None
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
@@ -58,7 +59,7 @@ class QueuePage(Page):
         )
         self.rows = ReadTable(
             "Recordings of the campaign",
-            ("", "recording", "how it stands"),
+            ("", "recording", "level", "how it stands"),
             "Each recording of the campaign is listed here, with how it stands.",
         )
         self.sweep = SweepForm()
@@ -72,7 +73,9 @@ class QueuePage(Page):
         self.arm_button = self._button("Arm the ca&mpaign…", "Say in words what will happen", self._arm)
         self.arm_button.setProperty("rank", "first")
         self.resume_button = self._button(
-            "Arm what is missin&g…", "Keep what is complete in its folder, make the rest", self._arm_missing
+            "Resume: arm what is missin&g…",
+            "Keep what is complete in its folder, make the rest",
+            self._arm_missing,
         )
         self.left_alone = QCheckBox("Left alone: goes on when the window freezes or is closed")
         self.left_alone.setToolTip(
@@ -80,7 +83,9 @@ class QueuePage(Page):
             "from a terminal.\nWithout the tick the drive is brought down when the window does not answer."
         )
         self.left_alone.setChecked(True)
-        self.hold_button = self._button("Pause", "Stay where the run is; the drive stays on", self._hold)
+        self.hold_button = self._button(
+            "Hold (drive on)", "Stay where the run is; the drive stays on", self._hold
+        )
         self._looking = LatestRequest(
             context.background, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
         )
@@ -103,8 +108,8 @@ class QueuePage(Page):
         for button in (self.arm_button, self.resume_button):
             button.setEnabled(state is EngineState.READY and campaign is not None)
         self.hold_button.setEnabled(state in (EngineState.RUNNING, EngineState.HELD))
-        self.hold_button.setText("Go on" if state is EngineState.HELD else "Pause")
-        self.rows.show_rows(point_rows(campaign, () if status is None else status.rows, state))
+        self.hold_button.setText("Go on" if state is EngineState.HELD else "Hold (drive on)")
+        self.rows.show_rows(point_rows(self._seen, () if status is None else status.rows, state))
         self._show_progress(status)
 
     @property
@@ -152,24 +157,27 @@ class QueuePage(Page):
         campaign, rig = self.context.selection.campaign, self.context.selection.rig
         if campaign is None:
             self._looking.drop()
+            self._seen = None
             self.entries.show_rows(())
             self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
             return
         self._history.note(campaign)
         self.summary.setText(f"{campaign.name}: …")
-        self._looking.ask((campaign, rig))
+        self._seen = None
+        self._looking.ask((campaign, rig, self.context.folder / campaign.name))
 
     def _looked(self, seen: CampaignPreview) -> None:
         campaign = self.context.selection.campaign
         if campaign is None:
             return
+        self._seen = seen
         row = self.entries.currentRow()
         self.entries.show_rows(seen.rows)
         self.entries.selectRow(min(row, len(seen.rows) - 1))
         size = "" if seen.size_bytes is None else f"   ·   {seen.size_bytes / 1e9:.2f} GB"
         end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
         self.summary.setText(
-            f"{campaign.name}: {len(seen.names)} recordings   ·   takes {clock(seen.duration_s)}   ·   "
+            f"{campaign.name}: {len(seen.levels)} recordings   ·   takes {clock(seen.duration_s)}   ·   "
             f"started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
         )
 
@@ -262,6 +270,8 @@ class QueuePage(Page):
     def _connect(self) -> None:
         self.context.selection.campaign_changed.connect(self._show_campaign)
         self.context.selection.rig_changed.connect(self._show_campaign)
+        self.context.folder_chosen.connect(lambda _folder: self._show_campaign())
+        self.context.recording_made.connect(lambda _path: self._show_campaign())
         self.choice.activated.connect(self._take)
         self.sweep.wanted.connect(self._add_sweep)
         self.sweep.refused.connect(lambda text: self._warn(text, "Correct the sweep."))

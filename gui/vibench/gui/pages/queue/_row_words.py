@@ -1,8 +1,11 @@
 """Campaigns in rows of words, and what they come to: rows, time, size."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from vibench.acquisition import AcquisitionError
+from vibench.acquisition.campaign import ExistingRecordings, planned_recordings
 from vibench.acquisition.engine import DRIVING, EngineState, RowStatus
 from vibench.acquisition.plan import EXCITATION_KINDS, Campaign, duration_s, excitation_text
 from vibench.acquisition.rig import Rig
@@ -40,14 +43,26 @@ def entry_rows(campaign: Campaign) -> list[tuple[str, str, str, str]]:
 
 
 def point_rows(
-    campaign: Campaign | None, rows: Sequence[RowStatus], state: EngineState
-) -> list[tuple[str, str, str]]:
-    """How each recording stands: the engine's rows where it has them, else what is planned."""
-    names = () if campaign is None else campaign.recording_names()
-    known = {row.name: row for row in rows}
-    if state in DRIVING or state is EngineState.ARMED or (names and set(names) == set(known)):
-        return [(SYMBOLS.get(row.state, "·"), row.name, f"{row.state}  {row.reason}".strip()) for row in rows]
-    return [("○", name, "planned") for name in names]
+    seen: "CampaignPreview | None", rows: Sequence[RowStatus], state: EngineState
+) -> list[tuple[str, str, str, str]]:
+    """How each recording stands: the engine's rows where it has them, else what its folder holds."""
+    levels: Mapping[str, str] = {} if seen is None else seen.levels
+    known = {row.name for row in rows}
+    if state in DRIVING or state is EngineState.ARMED or (levels and set(levels) == known):
+        return [
+            (
+                SYMBOLS.get(row.state, "·"),
+                row.name,
+                levels.get(row.name, ""),
+                f"{row.state}  {row.reason}".strip(),
+            )
+            for row in rows
+        ]
+    complete = frozenset() if seen is None else seen.complete
+    return [
+        ("✔", name, level, "recorded before") if name in complete else ("○", name, level, "planned")
+        for name, level in levels.items()
+    ]
 
 
 @dataclass(frozen=True)
@@ -56,16 +71,26 @@ class CampaignPreview:
 
     rows: tuple[tuple[str, str, str, str], ...]
     """As `row_words.entry_rows` gives them."""
-    names: tuple[str, ...]
-    """Of its recordings."""
+    levels: Mapping[str, str]
+    """Of each recording, its level in words."""
+    complete: frozenset[str]
+    """Recordings that its folder holds already."""
     duration_s: float
     size_bytes: float | None
     """None without a rig, which says how many samples a second there will be."""
 
 
-def preview_campaign(asked: tuple[Campaign, Rig | None]) -> CampaignPreview:
-    """Look ahead."""
-    campaign, rig = asked
+def preview_campaign(asked: tuple[Campaign, Rig | None, Path]) -> CampaignPreview:
+    """Look ahead, and into the folder where the recordings go."""
+    campaign, rig, folder = asked
     size = None if rig is None else campaign.size_bytes(rig.daq.sample_rate_hz, len(rig.daq.channels))
     rows = tuple(entry_rows(campaign))
-    return CampaignPreview(rows, tuple(campaign.recording_names()), campaign.duration_s, size)
+    levels = {
+        name: f"{each.excitation.highest_amplitude_vpp:.4g} Vpp" for name, each in campaign.recordings()
+    }
+    try:
+        planned = planned_recordings(campaign, folder, ExistingRecordings.RESUME)
+        complete = frozenset(each.name for each in planned if each.is_complete)
+    except AcquisitionError:  # made by another plan: arming it says so
+        complete = frozenset()
+    return CampaignPreview(rows, levels, complete, campaign.duration_s, size)

@@ -1,13 +1,14 @@
 """Simulate: a scene as a form, its cost beside it, and curves that grow while they are computed."""
 
+import json
 import os
 from collections.abc import Callable
+from contextlib import suppress
 
 from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QLabel,
-    QProgressBar,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -22,8 +23,8 @@ from vibench.analysis.simulation import (
 )
 
 from ...forms import JudgedForm
-from ...page import AppContext, Page, SideAndPicture, Simulator
-from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, push_button
+from ...page import AppContext, Page, Remembered, SideAndPicture, Simulator
+from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, TimedBar, push_button
 from ._answer_plots import AnswerPlots
 from ._chain_picture import ChainPicture
 from ._dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
@@ -58,6 +59,10 @@ class SimulatePage(Page):
         self.simulator.died.connect(self._die)
         self.destroyed.connect(self.simulator.close)
         context.scene_wanted.connect(self.show_scene)
+        with suppress(ValueError):  # of another version, or written by somebody
+            self.form.form.show_content(dict(json.loads(context.settings.text(Remembered.SCENES))))
+        if self.form.value is None:
+            self.form.form.show_content({})
         self._say_cost()
         self._say_progress("Nothing has been simulated yet.")
 
@@ -85,6 +90,8 @@ class SimulatePage(Page):
     def left(self) -> None:
         """Keep how the page is divided."""
         self._parts.keep()
+        kept = self.form.form.content()
+        self.context.settings.keep_text(Remembered.SCENES, json.dumps(kept))
         for view in self._views:
             view.left()
 
@@ -105,6 +112,7 @@ class SimulatePage(Page):
         )
         self._progress = SimulationProgress(request.amplitude_m, request.points, note)
         self._is_stale = True
+        self._bar.begin()
         self.simulator.begin(request)
         self._say_progress("Simulating; the first answer waits for the program to be made ready…")
 
@@ -158,10 +166,8 @@ class SimulatePage(Page):
 
     def _say_progress(self, text: str) -> None:
         is_busy = self.simulator.is_busy
-        done, asked = (0, 1) if self._progress is None else (self._progress.done, self._progress.asked)
-        self._bar.setMaximum(asked)
-        self._bar.setValue(done)
-        self._bar.setFormat("no points yet" if self._progress is None else "%v of %m points")
+        done, asked = (0, 0) if self._progress is None else (self._progress.done, self._progress.asked)
+        self._bar.show_done(done, asked)
         self._state.setText(text)
         self._cancel.setEnabled(is_busy)
         self._compare.setEnabled(self._progress is not None and bool(self._progress.curves()))
@@ -207,10 +213,9 @@ class SimulatePage(Page):
         return side
 
     def _answer(self) -> QWidget:
-        self._bar = QProgressBar()
-        self._bar.setAccessibleName("Points simulated")
-        self._bar.setFormat("%v of %m points")
-        self._bar.setMinimumWidth(self._bar.fontMetrics().horizontalAdvance("20000 of 20000 points  "))
+        self._bar = TimedBar("Points simulated", "points")
+        letters = "20000 of 20000 points, 0:00:00 left  "
+        self._bar.setMinimumWidth(self._bar.fontMetrics().horizontalAdvance(letters))
         self._state = QLabel("")
         self._compare = push_button(
             "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
