@@ -256,7 +256,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             inside = self.mapFromScene(self.getViewBox().sceneBoundingRect()).boundingRect()
         if self._is_empty:
             paint_hint(painter, inside, self._hint, self._theme.muted)
-        elif not self.isEnabled():
+        elif not self.isEnabled() and any(_has_points(each) for each in self._curves):
             veil = QColor(self._theme.base)
             veil.setAlphaF(_VEIL)
             painter.fillRect(inside, veil)

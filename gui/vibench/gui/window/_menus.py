@@ -115,8 +115,8 @@ def menu_actions(
             "&File", "&Settings…", lambda: SettingsDialog(context, window).open(), "Ctrl+,", "settings"
         ),
         MenuAction("&File", "&Quit", target.close, "Ctrl+Q"),
-        MenuAction("Ed&it", "&Undo", target.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
-        MenuAction("Ed&it", "&Redo", target.redo, "Ctrl+Shift+Z", "make it again"),
+        MenuAction("Edit", "&Undo", target.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
+        MenuAction("Edit", "&Redo", target.redo, "Ctrl+Shift+Z", "make it again"),
         MenuAction("&Test", "&Check the bench", actions.check, "F6"),
         MenuAction("&Test", "&Arm the test", actions.arm_test, "Ctrl+Return", "arm"),
         MenuAction("&Test", "S&tart", actions.start, "F5", "start what is armed"),

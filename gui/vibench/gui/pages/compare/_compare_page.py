@@ -247,7 +247,7 @@ class ComparePage(Page):
         )
         self._export = push_button("E&xport…", "Write picture, numbers or report", self._choose_export)
         self._report = push_button(
-            "Repor&t…",
+            "Report…",
             "Write one page with curves, peaks and recordings",
             partial(self._choose_export, REPORT),
         )
