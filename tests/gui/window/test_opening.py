@@ -126,6 +126,10 @@ def test_settings_are_one_form_and_are_kept(window, qapp, tmp_path):
 
 
 def test_help_is_offline_and_says_what_is_installed(window, qtbot):
+    qtbot.keyClick(window, Qt.Key.Key_F1)
+    keys = next(each for each in window.findChildren(QLabel) if "<table>" in each.text())
+    assert all(word in keys.text() for word in ("F5", "F6", "Ctrl+7", "Ctrl+Z", "Shift+F1", "Esc, Pause"))
+    keys.window().close()
     manual = show_manual(window)
     assert manual.browser.sourceType() is QTextDocument.ResourceType.MarkdownResource
     assert "A first measurement" in manual.browser.toPlainText()
@@ -133,10 +137,6 @@ def test_help_is_offline_and_says_what_is_installed(window, qtbot):
     qtbot.waitUntil(lambda: "version" in about.browser.toPlainText(), timeout=100_000)
     next(each for each in about.buttons.buttons() if "Copy" in each.text()).click()
     assert "python" in QApplication.clipboard().text()
-    qtbot.keyClick(window, Qt.Key.Key_F1)
-    keys = next(each for each in window.findChildren(QLabel) if "<table>" in each.text())
-    assert all(word in keys.text() for word in ("F5", "F6", "Ctrl+7", "Ctrl+Z", "Shift+F1", "Esc, Pause"))
     assert Path(manual.browser.source().toLocalFile()).name == "gui.md"
-    keys.window().close()
     manual.close()
     about.close()
