@@ -31,7 +31,7 @@ def form_of_a_kind(kind):
 FORMS = {
     **{f"test {kind}": lambda kind=kind: form_of_a_kind(kind) for kind in EXCITATION_KINDS},
     "analysis": lambda: JudgedForm(AnalysisOptions, "analysis"),
-    "simulation": lambda: JudgedForm(SimulationRequest, "simulation"),
+    "simulation": lambda: JudgedForm(SimulationRequest, "simulation", frozenset({"described"})),
     **{
         kind.name: lambda kind=kind: JudgedForm(kind.request, kind.name, kind.hidden)
         for kind in (BRANCHES, SPECTRUM, CHAIN)
