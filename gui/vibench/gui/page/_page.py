@@ -17,8 +17,8 @@ from ._settings import Remembered
 class Shown:
     """Numbers or a picture, and what they were computed from.
 
-    While ``inputs`` are not ``wanted``, the widget is disabled, hidden or says that it waits: a stale number
-    must never look like a true one.
+    ``inputs`` are None while nothing is shown. While they are not ``wanted``, the widget is disabled: a stale
+    number must never look like a true one.
     """
 
     widget: QWidget
@@ -28,7 +28,7 @@ class Shown:
     @property
     def is_true(self) -> bool:
         """Whether it belongs to what is asked for now, or does not look as if it did."""
-        return self.inputs == self.wanted or not self.widget.isEnabled()
+        return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
 
 
 class Page(QWidget):

@@ -54,7 +54,7 @@ pg.setConfigOptions(antialias=False, useOpenGL=False)
 
 
 _DOT = "●"
-_VEIL = 0.65
+_VEIL = 0.5
 OUT_OF_DATE = "of earlier inputs"
 _FIRST = -1000
 _RIGHT_EM = 0.6

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QApplication, QDialog, QDialogButtonBox, QVBoxLayout, QWidget
 
@@ -15,6 +15,13 @@ from ..page import AppContext, Remembered
 from ..widgets import THEMES
 
 
+def whole_path(folder: str) -> str:
+    """Take a path that means the same wherever the window was started."""
+    if not Path(folder).expanduser().is_absolute():
+        raise ValueError(f"{folder!r} is no whole path; give one such as {Path.home() / 'vibench'}")
+    return folder
+
+
 class Preferences(FrozenModel):
     """What somebody wants to have otherwise."""
 
@@ -24,7 +31,7 @@ class Preferences(FrozenModel):
     """Height of the letters; what is open already takes it as far as it goes, all of it the next start."""
     patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)]
     """How long a test far from every limit may go on while the window does not answer."""
-    recordings_folder: Annotated[str, Field(min_length=1)]
+    recordings_folder: Annotated[str, AfterValidator(whole_path)]
     """Where new recordings go."""
 
 

@@ -19,7 +19,7 @@ from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, ke
 
 from ...background import Job
 from ...forms import LineField
-from ...page import AppContext, FileKind, Page, Remembered
+from ...page import AppContext, FileKind, Page, Remembered, Shown
 from ...widgets import COMPARE, FILES, Notice, NoticeKind, Theme, notice_of, push_button
 from ._file_words import facts_text
 from ._listing import Levels, Listing, listed, made_levels, thumbnails
@@ -38,6 +38,8 @@ class FilesPage(Page):
         self.campaigns = CampaignChoice()
         self.campaigns.chosen.connect(self.table.show_only)
         self._opened: Recording | None = None
+        self._pictured_path: Path | None = None
+        """Of the recording that the pictures show."""
         self._listing: Job | None = None
         self._making: Job | None = None
         self._wanted: Path | None = None
@@ -52,6 +54,12 @@ class FilesPage(Page):
     def is_done(self) -> bool:
         """Ticked once a recording is open."""
         return self._opened is not None
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The pictures, of the recording that is named above them."""
+        wanted = None if self._opened is None else self._opened.path
+        return (Shown(self.pictures, self._pictured_path, wanted),)
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
@@ -166,10 +174,12 @@ class FilesPage(Page):
             return
         self._facts.setText(facts_text(self._opened))
         self.pictures.show_recording(RecordingOverview(self._opened, levels))
+        self._pictured_path = self._opened.path
         self._say_view()
 
     def _close(self) -> None:
         self.pictures.show_recording(None)
+        self._pictured_path = None
         if self._opened is not None:
             self._opened.close()
             self._opened = None

@@ -29,10 +29,11 @@ from vibench.acquisition import (
 from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import EngineState, EngineStatus, Supervision
 from vibench.acquisition.plan import Campaign, Range, SweepAxis
+from vibench.acquisition.rig import Rig
 
 from ...background import LatestRequest
 from ...forms import Choice
-from ...page import AppContext, FileKind, History, Page, Remembered, UserActions
+from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
 from ...widgets import Notice, NoticeKind, ReadTable, clock, notice_of
 from ._draft import moved_up, with_measurement, with_sweep, without
 from ._row_words import CampaignPreview, point_rows, preview_campaign
@@ -50,6 +51,8 @@ class QueuePage(Page):
         self._actions = UserActions(context, self)
         self._history: History[Campaign] = History()
         self._seen: CampaignPreview | None = None
+        self._of: tuple[Campaign, Rig | None] | None = None
+        """Campaign and rig that the summary is of; None while it is none."""
         self.choice = Choice()
         self.entries = ReadTable(
             "Entries of the campaign",
@@ -129,6 +132,12 @@ class QueuePage(Page):
         if campaign is not None:
             self.context.selection.choose_campaign(campaign)
 
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The summary and the rows, of the campaign that they name."""
+        wanted = (self.context.selection.campaign, self.context.selection.rig)
+        return tuple(Shown(each, self._of, wanted) for each in (self.summary, self.entries))
+
     def left(self) -> None:
         """Keep the campaign for next time."""
         campaign = self.context.selection.campaign
@@ -157,20 +166,22 @@ class QueuePage(Page):
         campaign, rig = self.context.selection.campaign, self.context.selection.rig
         if campaign is None:
             self._looking.drop()
-            self._seen = None
+            self._seen = self._of = None
             self.entries.show_rows(())
             self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
             return
         self._history.note(campaign)
         self.summary.setText(f"{campaign.name}: …")
-        self._seen = None
+        self._seen = self._of = None
+        self.entries.setEnabled(False)
         self._looking.ask((campaign, rig, self.context.folder / campaign.name))
 
     def _looked(self, seen: CampaignPreview) -> None:
         campaign = self.context.selection.campaign
         if campaign is None:
             return
-        self._seen = seen
+        self._seen, self._of = seen, (campaign, self.context.selection.rig)
+        self.entries.setEnabled(True)
         row = self.entries.currentRow()
         self.entries.show_rows(seen.rows)
         self.entries.selectRow(min(row, len(seen.rows) - 1))

@@ -12,7 +12,7 @@ from vibench.analysis.dynamics import SpecimenChoice
 from vibench.analysis.simulation import Asked, PartialResult, Trouble
 
 from ...forms import JudgedForm
-from ...page import AppContext, SideAndPicture, Simulator
+from ...page import AppContext, Shown, SideAndPicture, Simulator
 from ...widgets import COMPARE, Notice, NoticeKind, Theme, push_button
 
 Request = TypeVar("Request", bound=SpecimenChoice)
@@ -87,6 +87,12 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         """What stands below the picture."""
         return self._state.text()
 
+    @property
+    def shown(self) -> Shown:
+        """The picture, of what was asked."""
+        asked = None if self._course is None else self._course.request
+        return Shown(self.picture.widget, asked, self.form.value)
+
     def refresh(self) -> None:
         """Draw what has come since the last time."""
         if self._is_stale and self.answer is not None:
@@ -107,6 +113,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         if request is None:
             return
         self._course = _Course(request, time.perf_counter())  # type: ignore[arg-type]
+        self._judge()
         self._take(())
         self.simulator.begin(request)  # type: ignore[arg-type]
         self._say("Looking; the first answer waits for the program to be made ready…")
@@ -154,6 +161,8 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
 
     def _judge(self) -> None:
         self._begin.setEnabled(self.form.value is not None)
+        asked = None if self._course is None else self._course.request
+        self.picture.widget.setEnabled(self.form.value is not None and asked in (None, self.form.value))
 
     def _hand_to_compare(self) -> None:
         if self.answer is not None:

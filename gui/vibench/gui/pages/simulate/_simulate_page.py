@@ -23,7 +23,7 @@ from vibench.analysis.simulation import (
 )
 
 from ...forms import JudgedForm
-from ...page import AppContext, Page, Remembered, SideAndPicture, Simulator
+from ...page import AppContext, Page, Remembered, Shown, SideAndPicture, Simulator
 from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, TimedBar, push_button
 from ._answer_plots import AnswerPlots
 from ._chain_picture import ChainPicture
@@ -46,6 +46,8 @@ class SimulatePage(Page):
         self.plots = AnswerPlots(context.theme)
         self.simulator = Simulator(self)
         self._progress: SimulationProgress | None = None
+        self._request: SimulationRequest | None = None
+        """What the curves are of."""
         self._is_stale = False
         self._undrawn: list[Callable[[], None]] = []
         self.branches = DynamicsView(context, BRANCHES, BranchPicture(context.theme))
@@ -95,6 +97,11 @@ class SimulatePage(Page):
         for view in self._views:
             view.left()
 
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The curves, of the scene that was asked for."""
+        return (Shown(self.plots, self._request, self.form.value), *(view.shown for view in self._views))
+
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self.plots.retheme(theme)
@@ -112,6 +119,8 @@ class SimulatePage(Page):
         )
         self._progress = SimulationProgress(request.amplitude_m, request.points, note)
         self._is_stale = True
+        self._request = request
+        self.plots.setEnabled(True)
         self._bar.begin()
         self.simulator.begin(request)
         self._say_progress("Simulating; the first answer waits for the program to be made ready…")
@@ -159,6 +168,7 @@ class SimulatePage(Page):
     def _say_cost(self) -> None:
         request = self.form.value
         self._begin.setEnabled(request is not None)
+        self.plots.setEnabled(request is not None and self._request in (None, request))
         if request is None:
             self._cost.setText(f"✖ {self.form.complaint}")
             return

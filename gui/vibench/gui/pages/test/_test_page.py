@@ -67,7 +67,7 @@ def _load(check: LimitCheck, name: str) -> str:
     return f"{name} {check.value * factor:.3g} of {check.limit * factor:.3g} {unit}"
 
 
-Asked = tuple[Measurement | None, Rig | None]
+Asked = tuple[Measurement | None, Rig | None] | None
 LOOK_MS, PREDICT_MS = 200, 900
 """How long a test stands unchanged before it is previewed, and before it is simulated."""
 
@@ -80,7 +80,7 @@ class TestPage(Page):
         self._actions = UserActions(context, self)
         self._preview: MeasurementPreview | None = None
         self._history: History[Measurement] = History()
-        self._of: Asked = (None, None)
+        self._of: Asked = None
         self._summary_of: Asked = self._of
         self._predicted_of: Asked = self._of
         self._tests: tuple[NamedTest, ...] = ()
