@@ -1,0 +1,50 @@
+"""``python -m tests.robot --seed N --minutes M``: a robot that does random things to the whole window.
+
+Keys, clicks, nasty values, files deleted and written meanwhile, engines killed and stopped. It looks for
+exceptions, pages that stay dead, a number that belongs to other inputs, a STOP later than its bound.
+The same seed does the same things as far as the clock lets it; ``--beside-work`` keeps every core busy.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from .robot import Robot
+
+SPIN = "while True: pass"
+
+
+def main() -> int:
+    """Let it work; the exit code is 1 when it found something."""
+    options = _options()
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    with tempfile.TemporaryDirectory(prefix="vibench_robot_") as folder:
+        os.environ["VIBENCH_STATE_DIR"] = str(Path(folder, "state"))
+        os.chdir(folder)
+        count = os.cpu_count() or 1 if options.beside_work else 0
+        others = [subprocess.Popen([sys.executable, "-c", SPIN]) for _ in range(count)]
+        try:
+            robot = Robot(options.seed, Path(folder))
+            robot.work(60.0 * options.minutes)
+            told = robot.close()
+        finally:
+            for each in others:
+                each.kill()
+                each.wait()
+    print(told)
+    return int(bool(robot.findings))
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m tests.robot", description=__doc__)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--minutes", type=float, default=2.0)
+    parser.add_argument("--beside-work", action="store_true", help="keep every core busy meanwhile")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":  # the window's own workers import this file
+    sys.exit(main())

@@ -1,0 +1,14 @@
+"""Two minutes of the robot, the same each time; hours are ``python -m tests.robot``."""
+
+import subprocess
+import sys
+
+import pytest
+
+pytestmark = [pytest.mark.attack, pytest.mark.timeout(900)]
+
+
+def test_two_minutes_of_random_deeds_find_nothing():
+    asked = [sys.executable, "-m", "tests.robot", "--seed", "19", "--minutes", "2"]
+    told = subprocess.run(asked, capture_output=True, text=True, check=False, timeout=850)
+    assert told.returncode == 0, told.stdout + told.stderr
