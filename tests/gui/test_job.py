@@ -178,6 +178,39 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
     qtbot.waitUntil(lambda: bench.strip.notices[-1].what.startswith("Written"), timeout=PATIENCE_MS)
 
 
+def test_the_whole_job_is_done_by_mouse_alone(bench, qtbot, tmp_path):
+    """But for the name of the file, which nobody can point at."""
+
+    def point_at(widget, place=None):
+        qtbot.waitUntil(lambda: widget.isVisible() and widget.isEnabled(), timeout=PATIENCE_MS)
+        target = widget.viewport() if hasattr(widget, "viewport") else widget
+        qtbot.mouseClick(target, Qt.MouseButton.LeftButton, pos=place or target.rect().center())
+
+    def turn_to(name):
+        row = list(bench.pages).index(name)
+        point_at(bench.navigation, bench.navigation.visualItemRect(bench.navigation.item(row)).center())
+        assert bench.page is bench.pages[name]
+
+    reach(qtbot, bench, EngineState.READY)
+    turn_to(TEST)
+    point_at(bench.pages[TEST].arm_button)
+    reach(qtbot, bench, EngineState.ARMED)
+    bench.tick()
+    run, files, compare = bench.pages[RUN], bench.pages[FILES], bench.pages[COMPARE]
+    point_at(run.arm_card.start_button)
+    reach(qtbot, bench, EngineState.RUNNING)
+    reach(qtbot, bench, EngineState.READY)
+    point_at(run.look_button)
+    qtbot.waitUntil(lambda: bench.page is files and bool(files.time_histories.plots), timeout=PATIENCE_MS)
+    point_at(files._compare)
+    qtbot.waitUntil(lambda: bench.page is compare and not compare.is_busy, timeout=PATIENCE_MS)
+    timer = type_into_dialog(qtbot, str(tmp_path / "by_mouse.csv"))
+    point_at(compare._export)
+    qtbot.waitUntil((tmp_path / "by_mouse.csv").exists, timeout=PATIENCE_MS)
+    assert not timer.isActive()
+    turn_to("Rig")
+
+
 def start_dwell(bench, qtbot, name):
     bench.pages[TEST].form.show_value(dwell(name, 600.0))
     reach(qtbot, bench, EngineState.READY)

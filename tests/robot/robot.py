@@ -180,6 +180,7 @@ class Robot:
         """Note something that must not be."""
         if not any(what.partition(" shows ")[0] in each for each in self.findings):
             self.findings.append(f"{what}\n    after {', '.join(self.recent)}")
+            print(f"FOUND: {self.findings[-1]}", file=sys.stderr, flush=True)
 
     def close(self):
         """End the window; gives what was found."""
