@@ -73,3 +73,9 @@ def test_white_noise_has_its_density_whatever_the_length_of_the_windows(request_
 def test_a_stretch_shorter_than_a_window_is_refused_in_a_sentence(request_):
     with pytest.raises(NotEnoughData, match="10 samples"):
         recording_spectrogram(replace(request_, stop=10))
+
+
+@pytest.mark.parametrize("width_hz", [1.0, 5.0, 50.0])
+def test_lines_are_as_wide_as_was_wished(request_, width_hz):
+    found = recording_spectrogram(replace(request_, resolution_hz=width_hz))
+    assert found.resolution_hz == pytest.approx(width_hz, rel=0.3)

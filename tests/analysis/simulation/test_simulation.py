@@ -58,7 +58,7 @@ def test_the_answer_grows_to_the_linear_transmission():
     assert np.allclose(found, exact, rtol=1e-6)
     trace = progress.curves()[1]
     assert np.array_equal(trace.magnitude, found)
-    assert trace.name == "model linear, Response II, predicted"
+    assert trace.name == "model linear, 5 µm, Response II, predicted"
 
 
 def test_the_answer_is_that_of_the_specimen_that_is_named(tmp_path):

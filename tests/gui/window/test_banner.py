@@ -40,3 +40,22 @@ def test_text_and_accents_can_be_read_on_every_ground(theme, contrast):
         for letters in (theme.text, theme.muted):
             assert contrast(letters, ground) >= READABLE, (letters, ground)
     assert contrast(theme.base, theme.accent) >= READABLE
+
+
+def test_the_button_says_which_ramp_it_asks_for_and_keeps_its_place(qtbot):
+    banner = Banner()
+    qtbot.addWidget(banner)
+    banner.resize(1000, 60)
+    banner.show()
+    button = banner.findChild(QPushButton, "stop")
+    assert "ramp down" in button.text()
+    before = button.geometry()
+    banner.show_indicator(StateIndicator("▼", "RAMPING DOWN", Tone.CAUTION, is_ramping=True))
+    assert "at once" in button.text()
+    qtbot.wait(20)
+    assert button.geometry() == before
+
+
+def test_the_window_begins_with_the_focus_on_the_next_step(window, qtbot):
+    qtbot.waitUntil(lambda: window.focusWidget() is not None)
+    assert window.focusWidget().objectName() != "stop"

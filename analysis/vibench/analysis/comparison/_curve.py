@@ -60,8 +60,7 @@ class Curve:
     @property
     def name(self) -> str:
         """``"sweep_weak, Response II, measured"``."""
-        level = "" if self.level_m is None else f" at {1e6 * self.level_m:.4g} µm"
-        return f"{self.source}{level}, {self.response.value}, {self.origin.value}"
+        return f"{self.source}, {self.response.value}, {self.origin.value}"
 
     @property
     def is_single_valued(self) -> bool:

@@ -132,7 +132,7 @@ class SimulationProgress:
         """Give Responses I and II of every model, to be laid over recordings."""
         return tuple(
             Curve(
-                f"model {model}",
+                f"model {model}, {1e6 * self._amplitude_m:.4g} µm",
                 CurveOrigin.PREDICTED,
                 response,
                 *self.column(model, name),

@@ -5,8 +5,11 @@ import re
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
+from vibench.analysis.simulation import SimulationProgress
+from vibench.analysis.simulation._request import SimulatedPoint
 from vibench.gui.pages.compare import ComparePage
 from vibench.gui.widgets import DARK
 
@@ -156,3 +159,34 @@ def test_what_cannot_be_analysed_or_written_says_so_and_spoils_nothing(working, 
     assert "missing.h5 does not exist" in said
     assert ".png, .svg" in said
     assert len(working.curves.curves) == known
+
+
+def test_measured_and_simulated_differ_in_colour_and_levels_are_told(page):
+    frequency_hz = np.arange(100.0, 300.0)
+    ones, none = np.ones_like(frequency_hz), np.full_like(frequency_hz, np.nan)
+    measured = Curve("sweep", CurveOrigin.MEASURED, CurveKind.RESPONSE_I, frequency_hz, ones, none)
+    twin = Curve("sweep", CurveOrigin.SIMULATED, CurveKind.RESPONSE_I, frequency_hz, ones, none)
+    page.add_prediction((measured, twin))
+    progress = SimulationProgress(5e-6, 2, "a scene")
+    progress.add((SimulatedPoint("hertz", 150.0, 2.0, 1.0, 0, "periodic", None, 1e-6),))
+    progress.add((SimulatedPoint("hertz", 250.0, 2.0, 1.0, 0, "periodic", None, 1e-6),))
+    page.add_prediction(progress.curves())
+    colours = {name: page.curves.line_style(name).colour(DARK) for name in (measured, twin)}
+    assert len(set(colours.values())) == 2
+    assert any("5 µm" in each.name for each in page.curves.curves)
+    page.pair_box._curve.setCurrentText(progress.curves()[0].name)
+    page.pair_box._reference.setCurrentText(measured.name)
+    assert "5 µm and as driven" in page.pair_box.said
+
+
+def test_what_begins_or_ends_moves_nothing_on_the_left(page, qapp):
+    def places():
+        qapp.processEvents()
+        return [each.geometry().getRect() for each in page.panel.findChildren(QWidget) if each.isVisible()]
+
+    before = places()
+    page.panel.show_progress(0, 5)
+    assert places()[: len(before)][0] == before[0]
+    height = page.panel.sizeHint().height()
+    page.panel.show_progress(5, 5)
+    assert page.panel.sizeHint().height() == height

@@ -1,9 +1,11 @@
 """Rows of a campaign say what is held where something is held."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from vibench.acquisition import load_campaign
-from vibench.gui.pages.queue._row_words import entry_rows
+from vibench.acquisition.engine import EngineState
+from vibench.gui.pages.queue._row_words import entry_rows, point_rows, preview_campaign
 
 CAMPAIGNS = Path(__file__).resolve().parents[4] / "campaigns"
 
@@ -14,3 +16,17 @@ def test_a_row_names_the_level_of_the_base_and_a_sweep_its_kind():
     assert what["mode_1"] == "resonance tracking, base held at 0.05 m/s², 0.1 m/s², at most 0.05 Vpp"
     what = {name: said for name, said, *_ in entry_rows(load_campaign(CAMPAIGNS / "quick.toml"))}
     assert (what["sweep"], what["branch"]) == ("sine sweep, 1.5 Vpp", "sweep of dwell")
+
+
+def test_rows_say_levels_and_what_the_folder_holds_already(tmp_path):
+    """After the window was opened again everything was said to be planned."""
+    campaign = load_campaign(CAMPAIGNS / "quick.toml")
+    seen = replace(preview_campaign((campaign, None, tmp_path)), complete=frozenset({"dwell"}))
+    rows = {name: (sign, level, said) for sign, name, level, said in point_rows(seen, (), EngineState.READY)}
+    assert set(rows) == set(campaign.recording_names())
+    assert rows["sweep"] == ("○", "1.5 Vpp", "planned")
+    assert all(level.endswith("Vpp") for _, level, _ in rows.values())
+    done = [said for name, (_, _, said) in rows.items() if name == "dwell"]
+    assert done in ([], ["recorded before"])
+    whole = replace(seen, complete=frozenset(rows))
+    assert {said for *_, said in point_rows(whole, (), EngineState.CLOSED)} == {"recorded before"}

@@ -167,7 +167,7 @@ def test_the_curves_go_to_compare(page, qtbot):
     page._grow((point("a", 100.0), point("a", 200.0)))
     with qtbot.waitSignal(page.context.prediction_made) as made:
         page._compare.click()
-    assert {each.name for each in made.args[0]} >= {"model a, Response I, predicted"}
+    assert {each.name for each in made.args[0]} >= {"model a, 5 µm, Response I, predicted"}
 
 
 def test_plots_follow_the_theme_and_carry_units(page):
@@ -176,3 +176,20 @@ def test_plots_follow_the_theme_and_carry_units(page):
     assert all(plot.accessibleName() for plot in page.plots.plots)
     assert "1/s" in page.plots.exponents.up.labelText
     assert "µm" in page.plots.motion.up.labelText
+
+
+def test_curves_of_another_scene_than_the_form_says_lie_under_a_veil_and_the_scene_is_kept(page):
+    page._request = SimulationRequest(**LINEAR)
+    page.form.show_value(SimulationRequest(**LINEAR))
+    assert page.plots.isEnabled()
+    page.form.show_value(SimulationRequest(**{**LINEAR, "amplitude_m": 9e-6}))
+    assert not page.plots.isEnabled()
+    assert all(each.is_true for each in page.shown)
+    page.left()
+    again = SimulatePage(page.context)
+    assert again.form.value.amplitude_m == 9e-6
+    again.form.form.show_content({"model": "continuous n=5"})
+    assert "continuous n=5" in again._cost.text()
+    assert "hertz" in [again.form.form.editors["model"].widget.itemText(row) for row in range(9)]
+    again.simulator.close()
+    again.deleteLater()
