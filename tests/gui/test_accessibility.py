@@ -121,7 +121,7 @@ def scrolled_sideways(page):
 def test_every_field_has_an_edge_that_is_seen(window, qapp, qtbot, contrast, theme):
     """WCAG 2.1, section 1.4.11: at least 3, against what is inside and what is outside."""
     window.context.choose_theme(theme)
-    qtbot.waitUntil(lambda: window.is_themed)
+    qtbot.waitUntil(lambda: window.is_themed, timeout=60_000)
     faint, looked_at = [], 0
     for name in window.pages:
         window.show_page(name)
@@ -146,7 +146,7 @@ def test_every_field_has_an_edge_that_is_seen(window, qapp, qtbot, contrast, the
 )
 def test_no_text_is_cut_off(window, qapp, qtbot, theme, size):
     window.context.choose_theme(theme)
-    qtbot.waitUntil(lambda: window.is_themed)
+    qtbot.waitUntil(lambda: window.is_themed, timeout=60_000)
     window.resize(*size)
     for name in window.pages:
         window.show_page(name)

@@ -69,7 +69,7 @@ def test_what_is_no_recording_is_told_by_the_page_that_would_show_it(window, qtb
     (tmp_path / "broken.h5").write_bytes(b"no file of that kind")
     dropped(window, tmp_path / "broken.h5")
     assert window.page is window.pages[COMPARE]
-    qtbot.waitUntil(lambda: bool(window.strip.notices), timeout=60_000)
+    qtbot.waitUntil(lambda: bool(window.strip.notices), timeout=100_000)
     assert "broken.h5" in window.strip.notices[-1].what
 
 
