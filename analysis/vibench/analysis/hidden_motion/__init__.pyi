@@ -27,7 +27,6 @@ from ._found_parameters import (
 )
 from ._hidden_motion import (
     HiddenMotion as HiddenMotion,
-    Numbers as Numbers,
     TrackedMotion as TrackedMotion,
     hidden_motion as hidden_motion,
     hidden_motion_in_samples as hidden_motion_in_samples,
@@ -46,6 +45,9 @@ from ._live_twin import (
     LiveMotion as LiveMotion,
     LiveState as LiveState,
     LiveTwin as LiveTwin,
+)
+from ._numbers import (
+    Numbers as Numbers,
 )
 from ._parameters import (
     Hidden as Hidden,

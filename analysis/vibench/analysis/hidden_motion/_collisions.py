@@ -57,7 +57,7 @@ def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiec
     count = _follow_contacts(
         smoothed.states,
         smoothed.touched,
-        motion.acceleration[smoothed.first :],
+        motion.accelerations(smoothed.first, smoothed.first + smoothed.states.shape[0] + _MOST_STEPS + 1),
         tables.small_flow,
         tables.stop,
         tables.step_s,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import NotEnoughData
-from ..signals import Flags, Reals
+from ..signals import Flags, Reals, Samples
 from ._filtering import MotionModel, motion_model, run_filter
 from ._latent_force import LatentMotion, latent_motion, latent_start
 from ._parameters import PRIOR_SD, Hidden, value_of, with_values
@@ -67,9 +67,9 @@ class FreeImpacts:
 class FreeMotion:
     """A whole motion without a contact model."""
 
-    p: Reals
+    p: Samples
     """[m], NaN where it could not be told; shape (samples,)."""
-    p_sd: Reals
+    p_sd: Samples
     impacts: FreeImpacts
     share_told: float
 
@@ -78,7 +78,7 @@ def free_motion(
     model: MotionModel, motion: PreparedMotion, on_sample: Callable[[int], None] = lambda _sample: None
 ) -> FreeMotion:
     """Tell the motion of m1 against m2 from the channels and the specimen's linear numbers alone."""
-    p, sd = np.full(motion.samples, np.nan), np.full(motion.samples, np.nan)
+    p, sd = (np.full(motion.samples, np.nan, dtype=np.float32) for _ in range(2))
     found: list[Reals] = []
     for first, begin, end in _blocks(motion):
         latent = latent_motion(model, motion, first, end - first - 1)
@@ -137,7 +137,7 @@ def _runs(marks: Flags) -> Iterator[tuple[int, int]]:
 def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
     """Give an impact for every window whose impulse is told from nothing, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
-    force = smoothed.forces[:, 0]
+    force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
     # Held over the step that ends at a sample: its middle lies half a sample earlier.
     place = np.arange(force.size) - 0.5
     for begin, end in _runs(latent.is_open):
@@ -150,7 +150,8 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
         weight = np.clip(force[part] * np.sign(impulse), 0.0, None)
         middle = float(np.sum(weight * place[part]) / weight.sum())
         sample = int(np.clip(np.floor(middle), 0, force.size - 2))
-        p = _between(smoothed.p, smoothed.rate / sample_rate_hz, sample, middle - sample)
+        nearest = slice(sample, sample + 2)
+        p = _between(moved[nearest], rate[nearest] / sample_rate_hz, middle - sample)
         side = -np.sign(impulse)
         rows.append(
             (
@@ -159,8 +160,8 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
                 abs(impulse),
                 p,
                 float(np.sqrt(smoothed.variances[sample, 0])),
-                side * _extrapolated(smoothed.rate, begin - 2, begin - 1, middle),
-                -side * _extrapolated(smoothed.rate, end + 1, end, middle),
+                side * _extrapolated(rate, begin - 2, begin - 1, middle),
+                -side * _extrapolated(rate, end + 1, end, middle),
             )
         )
     return np.array(rows).reshape(-1, 7)
@@ -171,11 +172,9 @@ def _extrapolated(values: Reals, far: int, near: int, place: float) -> float:
     return float(values[near] + (values[near] - values[far]) * (place - near) / (near - far))
 
 
-def _between(values: Reals, slopes: Reals, sample: int, part: float) -> float:
+def _between(values: Reals, slopes: Reals, t: float) -> float:
     """Interpolate between two samples by the cubic with their slopes (per sample)."""
-    a, b = values[sample], values[sample + 1]
-    da, db = slopes[sample], slopes[sample + 1]
-    t = part
+    (a, b), (da, db) = values, slopes
     return float(
         a * (1 + 2 * t) * (1 - t) ** 2 + da * t * (1 - t) ** 2 + b * t**2 * (3 - 2 * t) + db * t**2 * (t - 1)
     )

@@ -167,8 +167,8 @@ class _Search:
         inflation = self._inflation()
         level = np.array([1.0, tables[0].step_s / SMOOTHING_S])
         done = forward(
-            self._motion.acceleration[at.sample : at.sample + count + 1],
-            self._motion.velocity[at.sample + 1 : at.sample + count + 1],
+            self._motion.accelerations(at.sample, at.sample + count + 1),
+            self._motion.velocities(at.sample + 1, at.sample + count + 1),
             np.stack([each.flow for each in tables]),
             np.stack([each.small_flow for each in tables]),
             np.stack([each.stop for each in tables]),

@@ -136,8 +136,8 @@ def run_filter(
 
     ``force_variance`` is that of a contact force held over each sample [N^2], where no law tells it.
     """
-    a = motion.acceleration[at.sample : at.sample + count + 1]
-    v = motion.velocity[at.sample + 1 : at.sample + count + 1]
+    a = motion.accelerations(at.sample, at.sample + count + 1)
+    v = motion.velocities(at.sample + 1, at.sample + count + 1)
     kept = _room(v.size)
     latent = force_variance if force_variance.size else np.zeros(v.size)
     level = np.array([at.innovation_level, min(1.0, model.tables.step_s / SMOOTHING_S)])

@@ -65,7 +65,7 @@ class Forecaster:
         matrix = np.column_stack([*_tones(turned * numbers), states[:, _YIELDING]])
         scale = np.sqrt(np.mean(matrix**2, axis=0)) + np.finfo(float).tiny
         stop = at.sample + 1
-        told = motion.acceleration[stop - len(matrix) : stop]
+        told = motion.accelerations(stop - len(matrix), stop)
         weights = np.linalg.lstsq(matrix / scale, told, rcond=1e-9)[0] / scale
         ahead = numbers[-1] + np.arange(self._count + 1)
         tone = _tones(turned * ahead).T @ weights[: 2 * _HARMONICS]

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,11 +11,12 @@ from vibench.sim import Specimen
 
 from ..errors import InvalidRequest
 from ..recordings import ProgressObserver, Unobserved, specimen_of
-from ..signals import Reals
+from ..signals import Reals, Samples
 from ._collisions import Collisions, collisions_of, joined_collisions
 from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
 from ._filtering import motion_model
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, with_unit
+from ._numbers import Numbers
 from ._parameters import Hidden
 from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion
 from ._tracking import NotFollowed, TrackedPiece, follow
@@ -25,23 +25,15 @@ from ._tracking_model import TrackedSpecimen, tracked_specimen
 MICRO = 1e6
 
 
-class Numbers(Enum):
-    """Which gaps, m1, springs, dampers and contact law the motion is tracked with."""
-
-    FOUND = auto()
-    """Those that the collisions tell, where they tell them."""
-    AS_DESCRIBED = auto()
-
-
 @dataclass(frozen=True, eq=False)
 class TrackedMotion:
     """p as the extended Kalman filter followed and smoothed it; NaN where it was not followed."""
 
-    p: Reals
+    p: Samples
     """Relative displacement y - z, shape (samples,) [m]."""
-    rate: Reals
+    rate: Samples
     """Its rate [m/s]."""
-    p_sd: Reals
+    p_sd: Samples
     """Standard deviation of p [m]."""
     collisions: Collisions
     not_followed: tuple[NotFollowed, ...]
@@ -271,7 +263,8 @@ def _tracked(
     motion: PreparedMotion, tracked: TrackedSpecimen, found: FoundSpecimen | None, told: Callable[[int], None]
 ) -> TrackedMotion:
     model = motion_model(tracked, motion)
-    p, rate, sd = (np.full(motion.samples, np.nan, dtype=np.float64) for _ in range(3))
+    # Seven digits: more than is known of any of them, and half of the memory.
+    p, rate, sd = (np.full(motion.samples, np.nan, dtype=np.float32) for _ in range(3))
     collisions: list[Collisions] = []
     lost: list[NotFollowed] = []
     squared, used = 0.0, 0
@@ -288,11 +281,12 @@ def _tracked(
             case NotFollowed():
                 lost.append(part)
     level = squared / used if used else float("nan")
-    gap_sd = _gap_sd(found)
+    sd *= np.float32(np.sqrt(max(1.0, level if used else 1.0)))
+    np.hypot(sd, np.float32(_gap_sd(found)), out=sd)
     return TrackedMotion(
         p,
         rate,
-        np.sqrt(sd**2 * max(1.0, level if used else 1.0) + gap_sd**2),
+        sd,
         joined_collisions(collisions),
         tuple(lost),
         level,

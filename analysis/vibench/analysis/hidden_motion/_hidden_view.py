@@ -6,11 +6,16 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition.recording import open_recording
+from vibench.sim import UnknownSpecimenError, load_specimen
 
-from ..signals import Reals
+from ..errors import InvalidRequest
+from ..signals import Reals, Samples
+from ._numbers import Numbers
 
 LONGEST_VIEW_S = 2.0
 """Of a picture: worked out in about a second."""
+_NUMBERS_SHOWN = 3
+"""Gaps and m1."""
 _LEAD_S = 0.15
 """Before and behind what is shown, so that a track has begun and its end is smoothed."""
 
@@ -22,6 +27,9 @@ class HiddenViewRequest:
     path: Path
     low_s: float
     high_s: float
+    specimen: str = ""
+    """A shipped specimen's name, or the path of one's file; as the recording describes it when empty."""
+    numbers: Numbers = Numbers.AS_DESCRIBED
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,9 +38,9 @@ class HiddenView:
 
     request: HiddenViewRequest
     time_s: Reals
-    p: Reals
+    p: Samples
     """Tracked, NaN where it was not followed [m]."""
-    free_p: Reals
+    free_p: Samples
     """Without a contact model [m]."""
     stops_m: tuple[float, float]
     """Places of the lower and the upper stop."""
@@ -40,7 +48,7 @@ class HiddenView:
 
 
 def hidden_view(request: HiddenViewRequest) -> HiddenView:
-    """Tell the hidden motion of a stretch with the specimen as the recording describes it.
+    """Tell the hidden motion of a stretch.
 
     Raises
     ------
@@ -49,15 +57,20 @@ def hidden_view(request: HiddenViewRequest) -> HiddenView:
 
     """
     # The window takes the words above when it begins, and what works them out loads scipy.stats.
-    from ._hidden_motion import Numbers, hidden_motion  # noqa: PLC0415
+    from ._hidden_motion import hidden_motion, parameter_rows  # noqa: PLC0415
 
+    try:
+        specimen = load_specimen(request.specimen).specimen() if request.specimen else None
+    except UnknownSpecimenError as error:
+        raise InvalidRequest(str(error)) from error
     with open_recording(request.path) as recording:
         end_s = recording.samples / recording.sample_rate_hz
         motion = hidden_motion(
             recording,
+            specimen,
             start_s=max(0.0, request.low_s - _LEAD_S),
             stop_s=min(end_s, request.high_s + _LEAD_S),
-            numbers=Numbers.AS_DESCRIBED,
+            numbers=request.numbers,
         )
     time_s = motion.time_s
     shown = (time_s >= request.low_s) & (time_s <= request.high_s)
@@ -70,6 +83,7 @@ def hidden_view(request: HiddenViewRequest) -> HiddenView:
         motion.tracked.p[shown],
         motion.free.p[shown],
         (-lower, upper),
-        f"p tracked in {100 * followed:.3g} % of this stretch, with the specimen as described"
+        f"p tracked in {100 * followed:.3g} % of this stretch, with the specimen's numbers {request.numbers}"
+        + "".join(f"; {name} {value}" for name, value, _ in parameter_rows(motion)[:_NUMBERS_SHOWN])
         + (f"; elsewhere {why}" if followed < 1.0 and why else ""),
     )

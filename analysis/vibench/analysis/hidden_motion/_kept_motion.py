@@ -5,7 +5,7 @@ import numpy as np
 from vibench.acquisition.recording import Recording, ResultArray
 
 from ..recordings import BASE, RESPONSE
-from ..signals import Reals
+from ..signals import Samples
 from ._hidden_motion import HiddenMotion
 
 RESULT = "hidden_motion"
@@ -29,9 +29,8 @@ def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
 
 
 def _channels(motion: HiddenMotion) -> dict[str, ResultArray]:
-    def along(values: Reals, unit: str) -> ResultArray:
-        # Seven digits: more than is known of any of them.
-        return ResultArray(values.astype(np.float32), unit, (_TIME,))
+    def along(values: Samples, unit: str) -> ResultArray:
+        return ResultArray(values.astype(np.float32, copy=False), unit, (_TIME,))
 
     return {
         _TIME: ResultArray(motion.time_s, "s"),

@@ -80,7 +80,7 @@ def latent_motion(
 
 def _force_guess(model: MotionModel, motion: PreparedMotion, first: int, count: int) -> float:
     """Guess the size of the force: m1 times the rms acceleration of m0."""
-    velocity = motion.velocity[first : first + count + 1]
+    velocity = motion.velocities(first, first + count + 1)
     smooth_v = gaussian_filter1d(velocity, motion.sample_rate_hz / (2 * np.pi * _PEAK_BAND_HZ))
     rms = float(np.std(np.diff(smooth_v))) * motion.sample_rate_hz
     return max(model.specimen.masses[1] * 3.0 * rms, _LEAST_GUESS_N)
@@ -133,8 +133,9 @@ def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tup
 def _learnt(windows: Flags, forces: Reals, guess_n: float, closed: float) -> Reals:
     """Give each window the mean square of the force found in it, as expectation maximisation does."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], windows.astype(np.int8), [0]))))
+    begins, ends = edges[::2], edges[1::2]
+    squares = np.concatenate(([0.0], np.cumsum(forces[:, 0] ** 2 + forces[:, 1])))
+    found = np.maximum((squares[ends] - squares[begins]) / (ends - begins), guess_n**2)
     variance = np.full(windows.size, closed)
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        found = float(np.mean(forces[begin:end, 0] ** 2 + forces[begin:end, 1]))
-        variance[begin:end] = max(found, guess_n**2)
+    variance[windows] = np.repeat(found, ends - begins)
     return variance

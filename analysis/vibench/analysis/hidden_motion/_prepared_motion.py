@@ -9,12 +9,16 @@ from vibench.acquisition.recording import Recording
 
 from ..errors import NotEnoughData, UnusableData
 from ..recordings import BASE, RESPONSE
-from ..signals import Reals
+from ..signals import Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 
 _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
 """Parts of the sample rate where specimen and shaker hardly move and the converter still passes."""
 _SEGMENT = 1024
+_MOST_SEGMENTS = 4096
+"""Spread over a long motion: 80 s at 51.2 kS/s."""
+_PIECE = 1 << 19
+"""Samples that are corrected at a time."""
 _LEAST_NOISE = 1e-6
 """Of the signal: a channel without noise has rounding, and a filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
@@ -35,11 +39,15 @@ class ChannelNoise:
 
 @dataclass(frozen=True, eq=False)
 class PreparedMotion:
-    """A stretch of a recording without holes, sensors' dynamics and delays taken out."""
+    """A stretch of a recording without holes, sensors' dynamics and delays taken out.
 
-    acceleration: Reals
+    A long one is held in single precision, far below any sensor's noise; `accelerations` and `velocities`
+    give what is computed with.
+    """
+
+    acceleration: Samples
     """Of the base, shape (samples,) [m/s2]; its AC coupling is left to the tracker."""
-    velocity: Reals
+    velocity: Samples
     """Of m0, shape (samples,) [m/s]."""
     sample_rate_hz: float
     coupling_rad_per_s: float
@@ -51,6 +59,14 @@ class PreparedMotion:
     def samples(self) -> int:
         """How many."""
         return self.velocity.size
+
+    def accelerations(self, start: int, stop: int) -> Reals:
+        """Give those of a short stretch."""
+        return self.acceleration[start:stop].astype(np.float64, copy=False)
+
+    def velocities(self, start: int, stop: int) -> Reals:
+        """Give those of a short stretch."""
+        return self.velocity[start:stop].astype(np.float64, copy=False)
 
     def part(self, start: int, stop: int) -> "PreparedMotion":
         """Give a stretch of it, noise as found in the whole."""
@@ -73,35 +89,28 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
     _require_rate(rate)
     # A corrected sample is made of its neighbours, so the recording's first and last few have none.
     start, stop = max(start, HALF_LENGTH), min(stop, recording.samples - HALF_LENGTH)
-    before, behind = start - HALF_LENGTH, stop + HALF_LENGTH
     _require_length(stop - start, rate)
-    acceleration, velocity = (recording.read(role, before, behind) for role in (BASE, RESPONSE))
-    _require_finite(acceleration, velocity)
     correction = sensor_correction(
         recording.bench, recording.channel(BASE), recording.channel(RESPONSE), rate
     )
-    return motion_from(acceleration, velocity, rate, correction, before, start - before, stop - before)
+    kept = np.empty((2, stop - start), dtype=np.float32)
+    lost = 0
+    for begin in range(start, stop, _PIECE):
+        end = min(begin + _PIECE, stop)
+        raw = [recording.read(role, begin - HALF_LENGTH, end + HALF_LENGTH) for role in (BASE, RESPONSE)]
+        lost += _lost(*raw)
+        for row, values in zip(kept, correction.corrected(*raw), strict=True):
+            row[begin - start : end - start] = values[HALF_LENGTH:-HALF_LENGTH]
+    _require_finite(lost)
+    return _motion(kept, rate, correction, start)
 
 
-def motion_from(
-    acceleration: Reals,
-    velocity: Reals,
-    sample_rate_hz: float,
-    correction: SensorCorrection,
-    first_sample: int,
-    start: int,
-    stop: int,
+def _motion(
+    corrected: Samples, sample_rate_hz: float, correction: SensorCorrection, first_sample: int
 ) -> PreparedMotion:
-    """Correct samples as they were recorded, and keep those from ``start`` to ``stop``."""
-    corrected = [each[start:stop] for each in correction.corrected(acceleration, velocity)]
     noise = ChannelNoise(*(white_noise(each) for each in corrected))
     return PreparedMotion(
-        corrected[0],
-        corrected[1],
-        sample_rate_hz,
-        correction.coupling_rad_per_s,
-        first_sample + start,
-        noise,
+        corrected[0], corrected[1], sample_rate_hz, correction.coupling_rad_per_s, first_sample, noise
     )
 
 
@@ -109,10 +118,10 @@ def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: floa
     """Take samples whose sensors are taken out already; raises as `prepared_motion` does."""
     _require_rate(sample_rate_hz)
     _require_length(velocity.size - 2 * HALF_LENGTH, sample_rate_hz)
-    _require_finite(acceleration, velocity)
-    stop = velocity.size - HALF_LENGTH
+    _require_finite(_lost(acceleration, velocity))
     correction = ideal_sensors(sample_rate_hz)
-    return motion_from(acceleration, velocity, sample_rate_hz, correction, 0, HALF_LENGTH, stop)
+    corrected = np.array(correction.corrected(acceleration, velocity))[:, HALF_LENGTH:-HALF_LENGTH]
+    return _motion(corrected, sample_rate_hz, correction, HALF_LENGTH)
 
 
 def _require_rate(sample_rate_hz: float) -> None:
@@ -131,8 +140,11 @@ def _require_length(samples: int, sample_rate_hz: float) -> None:
         )
 
 
-def _require_finite(acceleration: Reals, velocity: Reals) -> None:
-    lost = int(np.count_nonzero(~np.isfinite(acceleration) | ~np.isfinite(velocity)))
+def _lost(acceleration: Reals, velocity: Reals) -> int:
+    return int(np.count_nonzero(~np.isfinite(acceleration) | ~np.isfinite(velocity)))
+
+
+def _require_finite(lost: int) -> None:
     if lost:
         raise UnusableData(
             f"{lost} samples were lost or are not finite, and a motion cannot be followed across a hole; "
@@ -150,16 +162,15 @@ def require_channels(name: str, roles: Collection[str]) -> None:
         )
 
 
-def white_noise(samples: Reals) -> float:
+def white_noise(samples: Samples) -> float:
     """Estimate the rms of white noise from the quietest band near the top; a median outvotes impacts."""
     count = samples.size // _SEGMENT
-    pieces = samples[: count * _SEGMENT].reshape(count, _SEGMENT) * np.hanning(_SEGMENT)
+    every = -(-count // _MOST_SEGMENTS)
+    pieces = samples[: count * _SEGMENT].reshape(count, _SEGMENT)[::every] * np.hanning(_SEGMENT)
     power = np.abs(np.fft.rfft(pieces, axis=1)) ** 2 / np.sum(np.hanning(_SEGMENT) ** 2)
     cycles = np.fft.rfftfreq(_SEGMENT)
     levels = [
         np.median(power[:, (cycles >= low) & (cycles < high)]) / _MEDIAN_OF_SQUARE
         for low, high in _QUIET_BANDS
     ]
-    return float(
-        np.sqrt(max(min(levels), _LEAST_NOISE**2 * float(np.mean(samples**2)), np.finfo(float).tiny))
-    )
+    return float(np.sqrt(max(min(levels), _LEAST_NOISE**2 * float(np.mean(pieces**2)), np.finfo(float).tiny)))

@@ -3,6 +3,7 @@ from ._arrays import (
     Flags as Flags,
     Integers as Integers,
     Reals as Reals,
+    Samples as Samples,
 )
 from ._confidence import (
     DEFAULT_CONFIDENCE as DEFAULT_CONFIDENCE,

@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Reals = NDArray[np.float64]
+Samples = NDArray[np.floating]
+"""In double or in single precision."""
 Complexes = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]

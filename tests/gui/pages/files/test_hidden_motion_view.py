@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtWidgets import QFileDialog
 
 from vibench.acquisition import open_recording
 from vibench.analysis.live import RecordingOverview, kept_levels
@@ -41,5 +42,34 @@ def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shak
         true = np.interp(time_s, np.arange(shaken.p.size) / 51_200, shaken.p)
         assert np.sqrt(np.mean((p - true) ** 2)) < 0.5e-6
         assert sorted(line.value() for line in view._stops) == pytest.approx([-45e-6, 45e-6])
+        pictures.show_recording(None)
+    pictures.close()
+
+
+def test_another_specimen_is_chosen_and_its_numbers_are_found(
+    shared_context, shaken, waited, tmp_path, monkeypatch
+):
+    """A file whose gaps are 1 um too small: as described the track is lost, and collisions tell the gaps."""
+    described = tmp_path / "tight.toml"
+    described.write_text('name = "tight"\nabout = "1 um less"\nmodel = "gong2025"\ngap_m = 44e-6\n')
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(described), ""))
+    pictures = Pictures(DARK, shared_context.background)
+    pictures.resize(900, 600)
+    pictures.setCurrentWidget(pictures.hidden_motion)
+    pictures.show()
+    view = pictures.hidden_motion
+    with open_recording(shaken.path) as recording:
+        levels = {role: kept_levels(recording, role) for role in recording.roles}
+        pictures.show_recording(RecordingOverview(recording, levels))
+        pictures.time_histories.show_range(0.6, 2.2)
+        waited(lambda: "tracked in 100 %" in view.said.text())
+        last = view.specimen.count() - 1
+        view.specimen.setCurrentIndex(last)
+        view.specimen.activated.emit(last)
+        assert view.specimen.currentText() == "tight.toml"
+        waited(lambda: "elsewhere" in view.said.text())
+        view.find_numbers.click()
+        waited(lambda: "upper gap (45.0" in view.said.text() or "upper gap (44.99" in view.said.text())
+        assert "tracked in 100 %" in view.said.text()
         pictures.show_recording(None)
     pictures.close()

@@ -3,18 +3,27 @@
 from pathlib import Path
 
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import Recording
-from vibench.analysis.hidden_motion import LONGEST_VIEW_S, HiddenView, HiddenViewRequest, hidden_view
+from vibench.analysis.hidden_motion import (
+    LONGEST_VIEW_S,
+    HiddenView,
+    HiddenViewRequest,
+    Numbers,
+    hidden_view,
+)
+from vibench.sim import shipped_specimens
 
 from ...background import Background, LatestRequest
+from ...forms import Choice
 from ...plots import LIMIT, TIME, Dash, Plot, PlotAxis, curve_style
 from ...widgets import Theme
 
 _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
 _RELATIVE = PlotAxis("p = y - z", "µm", factor=1e6, short="p")
+_ANOTHER = "another file…"
 _CHOOSE = "Choose a recording in the list above."
 
 
@@ -31,11 +40,27 @@ class HiddenMotionView(QWidget):
         self.said = QLabel("")
         self.said.setProperty("rank", "second")
         self.said.setWordWrap(True)
+        self.specimen = Choice()
+        self.specimen.setAccessibleName("Specimen of the hidden motion")
+        self.specimen.setToolTip("Whose springs, masses and stops the motion is told with")
+        self.specimen.addItem("as the recording describes it", "")
+        for name in shipped_specimens():
+            self.specimen.addItem(name, name)
+        self.specimen.addItem(_ANOTHER, "")
+        self.specimen.activated.connect(self._choose_specimen)
+        self.find_numbers = QCheckBox("Find its numbers")
+        self.find_numbers.setToolTip("Gaps, m1, springs, dampers and law from the collisions in sight")
+        self.find_numbers.toggled.connect(self._ask_otherwise)
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
         self._latest_request = LatestRequest(background, hidden_view, self._show, self._fail, _WAIT_MS, self)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 4, 0, 0)
+        chosen = QHBoxLayout()
+        for widget in (QLabel("Specimen"), self.specimen, self.find_numbers):
+            chosen.addWidget(widget)
+        chosen.addStretch(1)
+        layout.addLayout(chosen)
         layout.addWidget(self.said)
         layout.addWidget(self.plot, 1)
         self._clear(_CHOOSE)
@@ -74,7 +99,23 @@ class HiddenMotionView(QWidget):
             self._clear(f"Zoom in to {LONGEST_VIEW_S:g} s or less: p swings a thousand times a second.")
             return
         self.said.setText("working it out…")
-        self._latest_request.ask(HiddenViewRequest(Path(self._recording.path), low_s, high_s))
+        numbers = Numbers.FOUND if self.find_numbers.isChecked() else Numbers.AS_DESCRIBED
+        specimen = self.specimen.currentData()
+        self._latest_request.ask(
+            HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
+        )
+
+    def _ask_otherwise(self, _is_on: bool) -> None:  # noqa: FBT001 - a signal's
+        self._ask()
+
+    def _choose_specimen(self, place: int) -> None:
+        """Take another specimen; the last entry asks for a file, and becomes it."""
+        if self.specimen.itemText(place) == _ANOTHER:
+            given, _ = QFileDialog.getOpenFileName(self, "Specimen", "", "Specimens (*.toml)")
+            if given:
+                self.specimen.insertItem(place, Path(given).name, given)
+            self.specimen.setCurrentIndex(place if given else 0)
+        self._ask()
 
     def _show(self, found: HiddenView) -> None:
         self.plot.with_hint("")
