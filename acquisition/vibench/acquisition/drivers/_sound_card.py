@@ -39,7 +39,7 @@ def _sounddevice() -> Any:
         return import_module("sounddevice")
     except OSError as error:
         raise MissingLibrary(
-            f"{error}; nothing was opened: install PortAudio on this system (Debian: apt install libportaudio2)"
+            f"{error}; nothing was opened: install PortAudio on this system (Debian: libportaudio2)"
         ) from error
 
 

@@ -1,6 +1,7 @@
 """Playing phases while every block is read, kept and held to the limits."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from enum import Enum, auto
 
 from ..errors import DriveLate
@@ -28,6 +29,12 @@ LEARNT = 0.05
 ones it is more, so that the mean is learnt."""
 LONGEST_LEAD = 0.25
 """Of a step."""
+TOLD_CYCLES = 0.1
+"""Behind its plan by more than this at its end, a glide is noted."""
+MOST_MADE_UP = 3.0
+"""Largest change of a frequency that makes up for lost cycles, over the step between two frequencies."""
+LEAST_LEFT = 0.2
+"""Share of a step in which cycles are made up at least."""
 _RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
 
 
@@ -81,6 +88,8 @@ class PhaseRunner:
         self._lead_s = 0.0
         self._glides = 0
         self._late_steps = 0
+        self._lost_cycles = 0.0
+        self._glided_hz = 0.0
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
         """Play a phase; its samples go ``into`` a list as well, if one is given.
@@ -89,14 +98,16 @@ class PhaseRunner:
         from step to step of one segment keeps to the time of its plan instead, and fails when it cannot.
         """
         self._enter(phase.state)
-        pace = self._pace_of(phase)
+        pace, commanded = self._pace_of(phase), phase
         if pace is _Pace.OF_THE_PLAN:
-            self._require_pace(phase)
+            commanded = self._made_up(phase, self._require_pace(phase))
         else:
+            self._tell_lost_cycles()
             yield from self._read(0.0)
+            self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
         if phase.segment != self.loop.segment:
             self.loop.enter(None)  # a segment holds nothing of the time in which its successor is commanded
-        waits = self._drive.perform(phase)
+        waits = self._drive.perform(commanded)
         wait_s = next(waits, None)
         if pace is _Pace.AFTER_THE_COMMAND:
             yield from self._catch_up()
@@ -119,8 +130,32 @@ class PhaseRunner:
             return _Pace.OF_THE_PLAN
         return _Pace.AFTER_THE_COMMAND
 
-    def _require_pace(self, phase: Phase) -> None:
+    def _made_up(self, phase: Phase, late_s: float) -> Phase:
+        """Give the phase with the frequency that makes up, within its step, for the cycles lost before it.
+
+        While a command is late the former tone plays on: the drive falls behind its plan by the difference
+        of the two frequencies times that. What a step cannot make up is left to the next.
+        """
+        if not isinstance(phase.play, Tone):
+            return phase
+        planned_hz, left_s = phase.play.frequency_hz, phase.duration_s - late_s
+        self._lost_cycles += (planned_hz - self._glided_hz) * late_s
+        most_hz = MOST_MADE_UP * abs(planned_hz - self._glided_hz)
+        more_hz = min(max(self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s), -most_hz), most_hz)
+        self._lost_cycles -= more_hz * left_s
+        self._glided_hz = planned_hz + more_hz
+        return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
+
+    def _tell_lost_cycles(self) -> None:
+        """Note what a glide that has ended could not make up."""
+        lost, self._lost_cycles = self._lost_cycles, 0.0
+        if abs(lost) > TOLD_CYCLES:
+            self.loop.log(EventKind.LATE, f"the drive ended {lost:.2g} cycles behind its plan")
+
+    def _require_pace(self, phase: Phase) -> float:
         """Learn how late commands are given; note what is beyond half of a step, raise DriveLate in a row.
+
+        Gives how late this one is [s].
 
         Samples are handed over some milliseconds after they are converted, so that a command that waits for
         them is late; over a sweep of 200 Hz that would be a cycle or two. The next ones are given earlier.
@@ -131,7 +166,7 @@ class PhaseRunner:
         self._lead_s = min(max(0.0, learnt_s), LONGEST_LEAD * phase.duration_s)
         if late_s <= LATEST * phase.duration_s:
             self._late_steps = 0
-            return
+            return late_s
         self._late_steps += 1
         at = f"{phase.play.frequency_hz:.6g} Hz" if isinstance(phase.play, Tone) else "one of its steps"
         text = (
@@ -143,6 +178,7 @@ class PhaseRunner:
                 f"{text}, {LATE_STEPS} times in a row. The run was ended, and what was played is kept; "
                 "give a longer step_s, or shorten generator.settle_s if the instrument allows it"
             )
+        return late_s
 
     def _catch_up(self, into: list[Block] | None = None) -> Iterator[Progress]:
         for block in self.loop.catch_up():
