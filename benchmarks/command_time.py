@@ -68,7 +68,9 @@ def told(settle_s: float, step_s: float) -> str:
                 path = run_measurement(opened, plan, Path(folder) / "sweep.h5").path
         except AcquisitionError as error:
             return str(error)[:LONGEST_SENTENCE]
-        return f"{excess_cycles(path, plan.excitation):+.2f}"
+        with open_recording(path) as recording:
+            noted = any(event.kind == "late" for event in recording.events)
+        return f"{excess_cycles(path, plan.excitation):+.2f}{' noted' if noted else ''}"
 
 
 def main() -> None:

@@ -13,6 +13,7 @@ from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import BLOCK_S, AcquisitionLoop
 from ._drive import Drive
 from ._ending import Progress
+from ._glide_watch import GlideWatch
 from ._limit_monitor import LimitMonitor
 from ._silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
 
@@ -72,6 +73,7 @@ class PhaseRunner:
         loop: AcquisitionLoop,
         limit_monitor: LimitMonitor,
         silence: SilenceWatch,
+        glide: GlideWatch,
         switch: StopSwitch,
         total_s: float,
     ) -> None:
@@ -80,6 +82,7 @@ class PhaseRunner:
         self._drive = drive
         self._limit_monitor = limit_monitor
         self._silence = silence
+        self._glide = glide
         self._switch = switch
         self._total_s = total_s
         self._look: Callable[[Block], None] = self._go_on
@@ -113,11 +116,18 @@ class PhaseRunner:
             yield from self._catch_up()
         self.loop.enter(phase.segment)
         self._play = phase.play
+        heard = [] if into is None and self._may_glide(phase) else into
         while wait_s is not None:
-            yield from self._read(wait_s, into, self._lead_s if phase.state is RunState.RECORDING else 0.0)
+            yield from self._read(wait_s, heard, self._lead_s if phase.state is RunState.RECORDING else 0.0)
             if pace is _Pace.OF_THE_COMMANDS:
                 yield from self._catch_up(into)
             wait_s = next(waits, None)
+        if heard is not None and isinstance(phase.play, Tone) and self._may_glide(phase):
+            self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
+
+    def _may_glide(self, phase: Phase) -> bool:
+        """Whether a phase may be a tone of a sweep that is recorded, command by command."""
+        return self._drive.is_commanded and phase.state is RunState.RECORDING
 
     def _pace_of(self, phase: Phase) -> "_Pace":
         if not self._drive.is_commanded:
@@ -147,10 +157,12 @@ class PhaseRunner:
         return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
 
     def _tell_lost_cycles(self) -> None:
-        """Note what a glide that has ended could not make up."""
-        lost, self._lost_cycles = self._lost_cycles, 0.0
-        if abs(lost) > TOLD_CYCLES:
-            self.loop.log(EventKind.LATE, f"the drive ended {lost:.2g} cycles behind its plan")
+        """Note how far the recorded drive is from its plan at the end of a glide, if it is."""
+        more, self._lost_cycles = self._glide.more_cycles, 0.0
+        self._glide.begin()
+        if abs(more) > TOLD_CYCLES:
+            text = f"the recorded drive ended {more:+.2g} cycles from its plan, whole ones not counted"
+            self.loop.log(EventKind.LATE, text)
 
     def _require_pace(self, phase: Phase) -> float:
         """Learn how late commands are given; note what is beyond half of a step, raise DriveLate in a row.

@@ -31,6 +31,7 @@ from ._acquisition_loop import AcquisitionLoop, SampleSink
 from ._command_time import require_time_for_commands
 from ._drive import Drive, drive_for
 from ._ending import Ending, Outcome, Progress
+from ._glide_watch import GlideWatch
 from ._limit_monitor import LimitMonitor
 from ._low_level_check import LowLevelCheck, judged, require_checkable
 from ._phase_runner import PhaseRunner, Stopped
@@ -186,7 +187,13 @@ class Run(ClosedOnLeaving):
         loop = AcquisitionLoop(self._bench.digitizer, sink)
         self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
         self._runner = PhaseRunner(
-            self._drive, loop, self._limit_monitor, self._silence, self._switch, self._total_s
+            self._drive,
+            loop,
+            self._limit_monitor,
+            self._silence,
+            GlideWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz),
+            self._switch,
+            self._total_s,
         )
         try:
             yield from self._played_or_stopped(self._runner)
