@@ -10,7 +10,7 @@ from .command_runner import CommandRunner
 from .limits import HANGS_S, LONGEST_COMPLAINT, LONGEST_S, MOST_BYTES, Case, Ending
 from .tally import Finding, Shard, Tally, saved_tally
 from .text_mutants import mutated_toml
-from .toml_files import CAMPAIGNS, reading
+from .toml_files import CAMPAIGNS, ROOT, reading
 
 GOOD = Ending(code=0, out="{}", err="", took_s=1.0, clock_s=1.0, peak_bytes=200_000_000)
 REFUSED = replace(GOOD, code=1, err="error: what was given is not allowed; give another\n")
@@ -74,7 +74,7 @@ def test_mutants_of_nothing_are_mutants_too():
 
 def test_a_command_runs_in_a_process_of_its_own():
     with CommandRunner() as runner:
-        good = runner.run(reading("campaign", CAMPAIGNS[0].encode()))
+        good = runner.run(reading("campaign", (ROOT / "campaigns" / "paper.toml").read_bytes()))
         bad = runner.run(reading("campaign", b"name = 3"))
         none = runner.run(Case(("measure", "no.toml", "--out", "x")))
     assert (good.code, good.faults, good.made) == (0, (), ())
