@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+pytest.importorskip("PySide6.QtWidgets", exc_type=ImportError)
+
 pytestmark = [pytest.mark.attack, pytest.mark.timeout(900)]
 
 

@@ -1,0 +1,45 @@
+"""The robot finds what it is there for: a number of other inputs, and an exception in a slot."""
+
+from collections import deque
+from types import SimpleNamespace
+
+import pytest
+
+QtWidgets = pytest.importorskip("PySide6.QtWidgets", exc_type=ImportError)
+
+
+@pytest.fixture
+def robot(qtbot):
+    from vibench.gui.page import Shown
+
+    from .robot import Robot
+
+    label = QtWidgets.QLabel("24 of 60 m/s²")
+    qtbot.addWidget(label)
+    made = object.__new__(Robot)
+    made.findings, made.recent = [], deque(["type_value"])
+    made.page = SimpleNamespace(shown=(Shown(label, "amplitude 2", "amplitude 1"),))
+    made.window = SimpleNamespace(pages={"Test": made.page})
+    made.label = label
+    return made
+
+
+def test_a_number_of_other_inputs_is_found_unless_it_looks_like_one(robot):
+    robot.label.setEnabled(False)
+    robot.look()
+    assert robot.findings == []
+    robot.label.setEnabled(True)
+    robot.look()
+    robot.look()
+    (found,) = robot.findings
+    assert "amplitude 2" in found
+    assert "amplitude 1" in found
+    assert "type_value" in found
+
+
+def test_an_exception_is_found_with_its_place(robot):
+    try:
+        robot.nothing  # noqa: B018
+    except AttributeError as error:
+        robot._raised(AttributeError, error, error.__traceback__)
+    assert "test_harness.py" in robot.findings[0]
