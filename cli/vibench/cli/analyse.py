@@ -36,6 +36,7 @@ from vibench.analysis.dynamics import BranchDiagram, read_diagram
 from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion
 from vibench.analysis.report import write_report
 from vibench.sim import Specimen
+from vibench.sim.maps import MapResults, open_map
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
@@ -128,6 +129,14 @@ def analyse(
             help="Lay what vibench branches found over stepped sines and sweeps; several times for several.",
         ),
     ] = None,
+    maps: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--map",
+            metavar="MAP.h5",
+            help="Lay levels of stepped sines and sweeps over what vibench map made.",
+        ),
+    ] = None,
     estimator: Annotated[
         Estimator,
         typer.Option(
@@ -211,14 +220,14 @@ def analyse(
         raise InvalidRequest(
             "--keep was given without --hidden, and only a hidden motion is kept; give both or neither"
         )
-    diagrams = [read_diagram(each) for each in branches or ()]
+    overlays = [read_diagram(each) for each in branches or ()], [open_map(each) for each in maps or ()]
     simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
     with external_data(allow_external):
         _analyse(
             recording,
             out,
             request,
-            diagrams,
+            overlays,
             (simulation, draws),
             fit=tuple(free or ()) if fit else None,
             hidden=_Hidden.KEPT if keep else _Hidden.TOLD if hidden else _Hidden.LEFT_OUT,
@@ -231,7 +240,7 @@ def _analyse(
     recording: Path,
     out: Path | None,
     request: FrequencyResponseRequest,
-    diagrams: Sequence[BranchDiagram],
+    overlays: tuple[Sequence[BranchDiagram], Sequence[MapResults]],
     simulated: tuple[Simulation, int],
     *,
     fit: Sequence[Parameter] | None,
@@ -276,7 +285,9 @@ def _analyse(
     ):
         console.print(sentence)
     if results.results and has_report:
-        report = write_report(results, unused(folder / "report.html"), folder / "figures", diagrams, motions)
+        diagrams, maps = overlays
+        place = unused(folder / "report.html")
+        report = write_report(results, place, folder / "figures", diagrams, motions, maps)
         if not as_json:
             console.print("The report:", bold(report.resolve()))
         if updated is not None and updated.fitted:

@@ -85,6 +85,10 @@ def map_motions(
         raise InvalidRequest(
             "--kicks needs a map in which only the start varies; give ranges for two coordinates"
         )
+    if like and not asked.is_over_drive:
+        raise InvalidRequest(
+            "--like needs a map over frequency_hz and amplitude_m; give ranges for these two"
+        )
     diagram = None if branches is None else read_diagram(branches)
     levels = [recorded_response(path) for path in like or ()]
     room_for_folder(out)

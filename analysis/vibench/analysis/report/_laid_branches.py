@@ -1,4 +1,4 @@
-"""Branches laid over the stepped sines and sweeps of a campaign, with how far their levels agree."""
+"""Branches laid over the stepped sines and sweeps of a campaign, and their levels laid over maps."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -6,13 +6,33 @@ from dataclasses import replace
 import numpy as np
 
 from vibench.sim import Parameter
+from vibench.sim.maps import MapResults
 
-from ..comparison import CurveOrigin
-from ..dynamics import BranchDiagram
-from ..figures import DrawnFigure, branches_figure
+from ..comparison import Curve, CurveKind, CurveOrigin
+from ..dynamics import BranchDiagram, RecordedLevel
+from ..figures import DrawnFigure, branches_figure, map_figure
 from ..kinds import ANALYSES, AnyResult
 from ..results import CampaignResults, drive_level
 from ..sine import lost_levels, tracked_resonances
+
+
+def laid_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
+    """Draw each map, with the levels and Responses I of everything that was measured under many sines."""
+    levels = [
+        RecordedLevel(each.analysis.facts.name, level, tuple(_measured(each, CurveKind.RESPONSE_I)))
+        for each in results.in_order
+        if len(level := drive_level(each)) > 1
+    ]
+    for number, found in enumerate(maps, start=1):
+        drawn = map_figure(found, levels=levels if found.plan.is_over_drive else ())
+        yield replace(drawn, name=f"map_{number}")
+
+
+def _measured(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
+    measured = ANALYSES[result.kind].curves(
+        result.analysis.facts.name, CurveOrigin.MEASURED, result.analysis.response
+    )
+    return (curve for curve in measured if not kinds or curve.response in kinds)
 
 
 def laid_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
@@ -25,13 +45,7 @@ def laid_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -
         if diagram.request.along is not Parameter.FREQUENCY or not levels:
             yield replace(branches_figure(diagram), name=f"branches_{number}")
             continue
-        curves = [
-            curve
-            for result, _ in levels
-            for curve in ANALYSES[result.kind].curves(
-                result.analysis.facts.name, CurveOrigin.MEASURED, result.analysis.response
-            )
-        ]
+        curves = [curve for result, _ in levels for curve in _measured(result)]
         drawn = branches_figure(diagram, curves)
         said = " ".join(_level_sentence(diagram, result, level) for result, level in levels)
         yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {said}")

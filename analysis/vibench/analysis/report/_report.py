@@ -10,6 +10,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from vibench.acquisition.plan import excitation_text
+from vibench.sim.maps import MapResults
 
 from ..dynamics import BranchDiagram
 from ..errors import NotEnoughData
@@ -20,7 +21,7 @@ from ..recordings import Verdict
 from ..results import AnalysisFailure, CampaignResults
 from ._drawings import findings, recording_figures, result_figures, result_tables
 from ._findings import limits
-from ._laid_branches import laid_branches
+from ._laid_branches import laid_branches, laid_maps
 from ._recording_section import (
     CHANNEL_HEADINGS,
     Rows,
@@ -73,6 +74,7 @@ def write_report(
     figures_folder: Path | None = None,
     diagrams: Sequence[BranchDiagram] = (),
     hidden: Sequence[HiddenMotion] = (),
+    maps: Sequence[MapResults] = (),
 ) -> Path:
     """Write one HTML file with all figures inside; an older report of that name is replaced.
 
@@ -88,6 +90,8 @@ def write_report(
         Branches that are laid over the stepped sines and sweeps.
     hidden
         Hidden motions; each stands with the recording whose name it has.
+    maps
+        Maps on which the levels of stepped sines and sweeps are laid.
 
     Raises
     ------
@@ -100,6 +104,7 @@ def write_report(
     numbers = iter(range(1, 1000))
     found = [_embedded(next(numbers), each, figures_folder) for each in result_figures(results)]
     found += [_embedded(next(numbers), each, figures_folder) for each in laid_branches(results, diagrams)]
+    found += [_embedded(next(numbers), each, figures_folder) for each in laid_maps(results, maps)]
     motions = {each.name: each for each in hidden}
     sections = [_section(each, motions, numbers, figures_folder) for each in results.results]
     page = _environment().get_template("report.html.j2")

@@ -9,7 +9,7 @@ import numpy as np
 from ._expansion import MapPoints
 from ._map import Map
 
-POINT_S = 4e-4
+POINT_S = 2e-4
 """Time that the process that asks spends on each point [s]: its scene, and its answer's way into the file."""
 
 

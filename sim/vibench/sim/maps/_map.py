@@ -1,6 +1,7 @@
 """A map as it is asked for: numbers that are fixed, and one or two that vary."""
 
 import math
+from collections.abc import Mapping
 from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, Self
@@ -173,6 +174,11 @@ class Map(GridPlan):
         return all(each in START for each in self.varied)
 
     @property
+    def is_over_drive(self) -> bool:
+        """Whether it goes over drive frequency and amplitude, so that levels of recordings lie on it."""
+        return [each.axis for each in self.varied] == ["frequency", "amplitude"]
+
+    @property
     def is_adaptive(self) -> bool:
         """Whether points may be left out: of two quantities, where none waits for its neighbour."""
         return self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
@@ -180,7 +186,9 @@ class Map(GridPlan):
     @property
     def start_labels(self) -> tuple[str, ...]:
         """Names of the starts of every point."""
-        own = tuple(str(each) for each in self.chain) or ("given" if any(self._own_state(())) else "rest",)
+        own = tuple(str(each) for each in self.chain) or (
+            "given" if any(getattr(self, each.field) for each in START) else "rest",
+        )
         return (*own, *(f"{RANDOM} {k + 1}" for k in range(self.random_starts)))
 
     @property
@@ -224,7 +232,7 @@ class Map(GridPlan):
             observe=observe,
             accuracy=self.accuracy,
             duration=AutomaticDuration(self.window_periods / frequency_hz, self.periods / frequency_hz),
-            start=start or self._start(place, specimen, drive),
+            start=start or self._start(place, said, specimen, drive),
             budget_s=0.0,
         )
 
@@ -232,27 +240,23 @@ class Map(GridPlan):
         """Drive frequency at a place of the grid."""
         return float(self._numbers(place)["frequency_hz"])
 
-    def _start(self, place: tuple[int, ...], specimen: Specimen, drive: Harmonic) -> Given | Rest:
-        label = self.start_labels[place[-2]]
-        if label.startswith(RANDOM):
+    def _start(
+        self, place: tuple[int, ...], said: Mapping[str, float], specimen: Specimen, drive: Harmonic
+    ) -> Given | Rest:
+        """Give the start of a point that continues no other."""
+        if place[-2] >= max(1, len(self.chain)):
             drawn = np.random.default_rng([self.seed, place[-2]])
             x, y, z, vx, vy, vz = (float(each) for each in random_state(specimen, drive, drawn))
-            return Given((x, y, z, vx, vy, vz), label)
+            return Given((x, y, z, vx, vy, vz), RANDOM)
         if self.chain:
             return Rest()
-        x, y, z, vx, vy, vz = self._own_state(place)
-        return Given((x, y, z, vx, vy, vz), label)
-
-    def _own_state(self, place: tuple[int, ...]) -> tuple[float, ...]:
-        """State that the fields say; of what varies the end of its range where no place is given."""
-        said = self._numbers(place)
-        return tuple(said[each.field] for each in START)
+        x, y, z, vx, vy, vz = (said[each.field] for each in START)
+        return Given((x, y, z, vx, vy, vz))
 
     def _numbers(self, place: tuple[int, ...]) -> dict[str, float]:
-        """Value of every quantity at a place; the last of a range where the place is empty."""
+        """Value of every quantity at a place."""
         said = {each.field: getattr(self, each.field) for each in QUANTITIES}
-        indices = (-1, -1) if not place else (place[-1], place[0])
-        for quantity, index in zip(self.varied, indices, strict=False):
+        for quantity, index in zip(self.varied, (place[-1], place[0]), strict=False):
             said[quantity.field] = _values(self.range_of(quantity))[index]
         return said
 
