@@ -31,6 +31,8 @@ from .host import (
     ChosenFrom as ChosenFrom,
     FrozenModel as FrozenModel,
     all_shipped as all_shipped,
+    built_site as built_site,
+    documentation_page as documentation_page,
     follow_parent as follow_parent,
     json_schema as json_schema,
     load_toml as load_toml,

@@ -156,6 +156,11 @@ COMMANDS = {
         "export",
         "Write a recording's samples, with units and times, as a file that other programs read.",
     ),
+    "pack": Place(
+        "pack",
+        "pack",
+        "Pack a folder of recordings as a Research Object Crate, described for a repository.",
+    ),
     "import": Place(
         "import_recording", "import_file", "Make a recording of another program's file, or say what is in it."
     ),
@@ -177,6 +182,11 @@ COMMANDS = {
         "examples",
         "examples",
         "List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them.",
+    ),
+    "docs": Place(
+        "docs",
+        "docs",
+        "Build the documentation site from what is installed, if it is not there, and say where it lies.",
     ),
     "schema": Place(
         "schema",

@@ -5,6 +5,10 @@ from ._chosen import (
 from ._closed_on_leaving import (
     ClosedOnLeaving as ClosedOnLeaving,
 )
+from ._documentation import (
+    built_site as built_site,
+    documentation_page as documentation_page,
+)
 from ._extras import (
     naming_its_extra as naming_its_extra,
     need_extra as need_extra,

@@ -19,6 +19,11 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def need_extra(extra: str) -> None:
     """Make sure that the libraries of an extra can be imported; imports none of them.
 
+    Parameters
+    ----------
+    extra
+        Its word in `pyproject.toml`.
+
     Raises
     ------
     MissingLibrary
@@ -32,7 +37,21 @@ def need_extra(extra: str) -> None:
 
 
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
-    """Wrap the ``__getattr__`` of a face whose names need an extra: what is missing is told with its name."""
+    """Wrap the ``__getattr__`` of a face whose names need an extra: what is missing is told with its name.
+
+    Parameters
+    ----------
+    found
+        The ``__getattr__`` that lazy_loader made.
+    extra
+        Its word in `pyproject.toml`.
+
+    Raises
+    ------
+    MissingLibrary
+        By what is returned, when a library of the extra is not installed.
+
+    """
 
     def told(name: str) -> object:
         try:

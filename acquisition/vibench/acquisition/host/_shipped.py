@@ -14,6 +14,11 @@ SUFFIX = ".toml"
 def shipped(name: str) -> Path:
     """Path of a file that comes with vibench, ``"hardware_configs/virtual_rig.toml"`` for example.
 
+    Parameters
+    ----------
+    name
+        Its folder and its name.
+
     Raises
     ------
     ConfigurationError
@@ -30,6 +35,11 @@ def shipped(name: str) -> Path:
 def shipped_folder(folder: str) -> Path:
     """Path of a folder that comes with vibench: campaigns, hardware_configs, studies, examples.
 
+    Parameters
+    ----------
+    folder
+        Its name.
+
     Raises
     ------
     ConfigurationError
@@ -43,7 +53,14 @@ def shipped_folder(folder: str) -> Path:
 
 
 def all_shipped(folder: str) -> tuple[Path, ...]:
-    """Every TOML file that comes with vibench in a folder, ``"campaigns"`` for example, by name."""
+    """Every TOML file that comes with vibench in a folder, ``"campaigns"`` for example, by name.
+
+    Parameters
+    ----------
+    folder
+        Its name.
+
+    """
     return tuple(sorted(shipped_folder(folder).glob(f"*{SUFFIX}")))
 
 

@@ -65,7 +65,25 @@ def migrated(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]
 
 
 def validated(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
-    """Validate ``content`` as ``model``; errors name ``origin`` and the key."""
+    """Validate ``content`` as ``model``; errors name ``origin`` and the key.
+
+    Parameters
+    ----------
+    content
+        As TOML or JSON was read.
+    model
+        What it must be.
+    origin
+        How errors call it.
+    folder
+        What paths in it are relative to.
+
+    Raises
+    ------
+    ConfigurationError
+        When the model does not allow it.
+
+    """
     try:
         return model.model_validate(content, context={"folder": folder})
     except ValidationError as error:
@@ -89,6 +107,14 @@ def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
 
     >>> shortened("0123456789", 7)
     '01...89'
+
+    Parameters
+    ----------
+    text
+        Of any length.
+    longest
+        Letters that are kept, three dots among them.
+
     """
     if len(text) <= longest:
         return text

@@ -1,3 +1,7 @@
+from ._crate import (
+    CrateFacts as CrateFacts,
+    pack_folder as pack_folder,
+)
 from ._excerpt import (
     excerpt as excerpt,
 )
@@ -14,6 +18,9 @@ from ._mapping import (
 )
 from ._new_file import (
     new_file as new_file,
+)
+from ._sep005 import (
+    sep005 as sep005,
 )
 from ._source import (
     opened_source as opened_source,

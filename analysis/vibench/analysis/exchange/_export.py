@@ -13,6 +13,7 @@ from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_path, write_facts
 from ._mat import require_small, write_mat
 from ._new_file import new_file, require_unused
+from ._nexus import write_nexus
 from ._result_export import matlab_results, result_paths, write_result_tables
 from ._uff import write_uff
 from ._wav import require_sound, write_wav
@@ -27,6 +28,8 @@ class Format(StrEnum):
     """Universal file, dataset 58, binary."""
     MAT = "mat"
     """MATLAB 5: a struct for each channel."""
+    NEXUS = "nxs"
+    """HDF5 after the NeXus standard: silx and others plot it with labels."""
     WAV = "wav"
     """Sound: 32 bits, full scale is 1."""
 
@@ -49,6 +52,19 @@ def export_samples(
 
     Results become structs in a MATLAB file, and beside the others ``NAME.RESULT.AXIS.csv``. Gives the
     files that were written. Nothing is ever overwritten.
+
+    Parameters
+    ----------
+    excerpt
+        As `excerpt` gives it.
+    to
+        The format.
+    path
+        The new file.
+    results
+        Whether saved results go out too.
+    observer
+        Told how many values were written since it was last called.
 
     Raises
     ------
@@ -126,6 +142,7 @@ EXPORTERS: Mapping[Format, Exporter] = MappingProxyType(
         Format.CSV: SamplesFile(write_csv_samples),
         Format.UFF: SamplesFile(write_uff),
         Format.MAT: WholeFile(write_mat, require_small),
+        Format.NEXUS: SamplesFile(write_nexus),
         Format.WAV: SamplesFile(write_wav, require_sound),
     }
 )

@@ -1,0 +1,148 @@
+"""A folder of recordings as a Research Object Crate: a zip that a repository takes as it is.
+
+RO-Crate 1.1: ``ro-crate-metadata.json`` says of every file what it is; of recordings what was played, how
+they ended, which channels in which units, and with which software.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from mimetypes import guess_type
+from pathlib import Path
+from typing import Any
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
+
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.recording import Recording
+
+from ..errors import InvalidRequest, NotEnoughData
+from ._excerpt import TransferObserver, unobserved
+from ._new_file import new_file
+
+METADATA = "ro-crate-metadata.json"
+CONTEXT = "https://w3id.org/ro/crate/1.1"
+HDF5_TYPE = "application/x-hdf5"
+Entity = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class CrateFacts:
+    """What a folder does not say of itself."""
+
+    licence: str
+    """Address of the licence: ``https://creativecommons.org/licenses/by/4.0/``."""
+    authors: tuple[str, ...] = ()
+    title: str = ""
+    """The folder's name if empty."""
+    description: str = ""
+
+
+def pack_folder(
+    folder: Path, crate: Path, facts: CrateFacts, observer: TransferObserver = unobserved
+) -> tuple[Path, ...]:
+    """Pack everything in a folder, and its description, into a zip; give the files that were packed.
+
+    Parameters
+    ----------
+    folder
+        Recordings and whatever lies beside them: journals, reports, tables. It is left as it is.
+    crate
+        The new zip; nothing is overwritten.
+    facts
+        Licence, authors, title.
+    observer
+        Told how many bytes were packed since it was last called.
+
+    Raises
+    ------
+    NotEnoughData
+        When the folder holds no recording.
+    InvalidRequest
+        When the licence is no address, or the zip exists or cannot be written.
+
+    """
+    if not facts.licence.startswith(("https://", "http://")):
+        raise InvalidRequest(
+            f"{facts.licence!r} is no address of a licence; nothing was packed, give one like "
+            "https://creativecommons.org/licenses/by/4.0/"
+        )
+    paths = tuple(path for path in sorted(folder.rglob("*")) if _belongs(path) and path != crate)
+    entities = [_file_entity(path, folder) for path in paths]
+    if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):
+        raise NotEnoughData(f"{folder} holds no recording; give the folder of a campaign")
+    document = {"@context": f"{CONTEXT}/context", "@graph": [*_about(folder, facts, entities), *entities]}
+    with new_file(crate) as unfinished, ZipFile(unfinished, "x", ZIP_DEFLATED) as archive:
+        archive.writestr(METADATA, json.dumps(document, indent=2, ensure_ascii=False))
+        for path in paths:
+            # A finished recording is compressed already.
+            kind = ZIP_STORED if path.suffix == ".h5" else ZIP_DEFLATED
+            archive.write(path, path.relative_to(folder).as_posix(), compress_type=kind)
+            observer(path.stat().st_size)
+    return paths
+
+
+def _belongs(path: Path) -> bool:
+    return path.is_file() and path.name != METADATA and path.suffix not in {".tmp", ".part"}
+
+
+def _about(folder: Path, facts: CrateFacts, entities: Sequence[Entity]) -> Iterator[Entity]:
+    """Describe the description, the crate, its licence, its authors, and the software."""
+    people = [{"@id": f"#author-{number}"} for number, _ in enumerate(facts.authors, 1)]
+    yield {
+        "@id": METADATA,
+        "@type": "CreativeWork",
+        "conformsTo": {"@id": CONTEXT},
+        "about": {"@id": "./"},
+    }
+    yield {
+        "@id": "./",
+        "@type": "Dataset",
+        "name": facts.title or folder.resolve().name,
+        "description": facts.description or "Recordings of vibro-impact shaker tests, made with vibench",
+        "datePublished": datetime.now(UTC).date().isoformat(),
+        "license": {"@id": facts.licence},
+        **({"author": people} if people else {}),
+        "hasPart": [{"@id": each["@id"]} for each in entities],
+    }
+    yield {
+        "@id": facts.licence,
+        "@type": "CreativeWork",
+        "name": facts.licence.rstrip("/").rpartition("licenses/")[2],
+        "description": "The licence of this dataset",
+    }
+    for person, name in zip(people, facts.authors, strict=True):
+        yield {**person, "@type": "Person", "name": name}
+
+
+def _file_entity(path: Path, folder: Path) -> Entity:
+    with path.open("rb") as file:
+        checksum = hashlib.file_digest(file, "sha256").hexdigest()
+    entity = {
+        "@id": path.relative_to(folder).as_posix(),
+        "@type": "File",
+        "name": path.name,
+        "contentSize": str(path.stat().st_size),
+        "sha256": checksum,
+        "encodingFormat": guess_type(path.name)[0] or "application/octet-stream",
+    }
+    if path.suffix != ".h5":
+        return entity
+    try:
+        with open_recording(path) as recording:
+            return {**entity, **_recording_facts(recording)}
+    except RecordingError as error:
+        return {**entity, "description": f"Cannot be read as a recording: {error}"}
+
+
+def _recording_facts(recording: Recording) -> Entity:
+    kind = recording.plan.get("excitation", {}).get("kind", "recording")
+    measured = "; ".join(f"{each.role} [{each.unit}]" for each in recording.channels)
+    return {
+        "encodingFormat": HDF5_TYPE,
+        "identifier": recording.recording_id,
+        "dateCreated": recording.started_utc,
+        "description": f"{kind}, {recording.origin.value}, {recording.duration_s:.6g} s at "
+        f"{recording.sample_rate_hz:.6g} Hz; {recording.state.value}: {recording.reason}; {measured}",
+    }

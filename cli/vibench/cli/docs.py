@@ -1,0 +1,73 @@
+"""`vibench docs`: the documentation site on this computer."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import webbrowser
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vibench.acquisition import MissingLibrary, built_site, documentation_page, shipped_folder
+
+from .exit_code import ExitCode
+from .output import console
+from .paths import room_for_folder
+
+NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")
+
+
+def docs(
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="Build it there; the user's own folder if absent."),
+    ] = None,
+    rebuild: Annotated[bool, typer.Option("--rebuild", help="Build it although it is there.")] = False,
+    notebooks: Annotated[
+        bool, typer.Option("--notebooks", help="Run the tutorials for their figures.")
+    ] = False,
+    show: Annotated[bool, typer.Option("--open", help="Open its first page in the browser.")] = False,
+) -> None:
+    """Build the documentation site from what is installed, if it is not there, and say where it lies."""
+    target = built_site() if out is None else out
+    if rebuild or notebooks or not (target / "index.html").is_file():
+        build(target, "notebooks" if notebooks else "pages")
+    first = documentation_page() if out is None else target / "index.html"
+    console.print(str(first))
+    if show:
+        webbrowser.open(first.resolve().as_uri())
+
+
+def build(target: Path, extent: str) -> None:
+    """Build the site with Sphinx, warnings as errors.
+
+    Raises
+    ------
+    MissingLibrary
+        When Sphinx and its extensions are not installed.
+
+    """
+    for library in ("sphinx", "myst_nb", "furo"):
+        if find_spec(library) is None:
+            raise MissingLibrary(
+                f"{library} is not installed, which builds the site: pip install 'vibench[docs]'; the pages "
+                f"lie as text in {shipped_folder('docs')}"
+            )
+    room_for_folder(target)
+    with tempfile.TemporaryDirectory() as scratch:
+        root = Path(scratch)
+        # Pages link to what stands beside their folder; a shipped folder may not be written to.
+        for folder in ("docs", "examples", "campaigns", "studies", "hardware_configs"):
+            shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)
+        command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
+        ended = subprocess.run(  # noqa: S603 - this interpreter, and Sphinx
+            [*command, str(root / "docs"), str(target)],
+            env={**os.environ, "VIBENCH_DOCS": extent},
+            check=False,
+        )
+    if ended.returncode != 0:
+        raise typer.Exit(ExitCode.FAILED)

@@ -1,0 +1,65 @@
+"""Packed folders pass a validator of others, hold every byte, and leave the folder as it was."""
+
+import hashlib
+import json
+import shutil
+from zipfile import ZipFile
+
+import pytest
+
+from vibench.analysis import InvalidRequest, NotEnoughData
+from vibench.analysis.exchange import CrateFacts, pack_folder
+
+LICENCE = "https://creativecommons.org/licenses/by/4.0/"
+
+
+@pytest.fixture
+def folder(known_file, tmp_path):
+    made = tmp_path / "campaign"
+    (made / "report").mkdir(parents=True)
+    shutil.copy(known_file, made / "known.h5")
+    (made / "report" / "table.csv").write_text("a,b\n1,2\n", encoding="utf-8")
+    (made / "broken.h5").write_bytes(b"no recording")
+    (made / "unfinished.h5.part").write_bytes(b"left out")
+    return made
+
+
+@pytest.fixture
+def crate(folder, tmp_path):
+    pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE, ("Ada L.",), "Known"))
+    return tmp_path / "crate.zip"
+
+
+def test_every_byte_is_packed_and_described(folder, crate):
+    with ZipFile(crate) as archive:
+        graph = {each["@id"]: each for each in json.loads(archive.read("ro-crate-metadata.json"))["@graph"]}
+        for name in ("known.h5", "report/table.csv", "broken.h5"):
+            assert archive.read(name) == (folder / name).read_bytes()
+            assert graph[name]["sha256"] == hashlib.sha256((folder / name).read_bytes()).hexdigest()
+        assert "unfinished.h5.part" not in archive.namelist()
+    assert "m0_velocity [m s-1]" in graph["known.h5"]["description"]
+    assert graph["broken.h5"]["description"].startswith("Cannot be read as a recording")
+    assert graph["./"]["author"] == [{"@id": "#author-1"}]
+    assert not (folder / "ro-crate-metadata.json").exists()
+
+
+def test_a_crate_is_never_overwritten(folder, crate):
+    with pytest.raises(InvalidRequest, match="exists"):
+        pack_folder(folder, crate, CrateFacts(LICENCE))
+
+
+def test_what_cannot_be_deposited_is_refused(folder, tmp_path):
+    with pytest.raises(InvalidRequest, match="no address of a licence"):
+        pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"))
+    with pytest.raises(NotEnoughData, match="no recording"):
+        pack_folder(folder / "report", tmp_path / "x.zip", CrateFacts(LICENCE))
+    assert not (tmp_path / "x.zip").exists()
+
+
+def test_a_reader_of_crates_finds_every_file(crate, tmp_path):
+    rocrate = pytest.importorskip("rocrate.rocrate", reason="pip install vibench[test] brings rocrate")
+    with ZipFile(crate) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    read = rocrate.ROCrate(tmp_path / "unpacked")
+    assert read.name == "Known"
+    assert {each.id for each in read.data_entities} == {"known.h5", "report/table.csv", "broken.h5"}
