@@ -1,15 +1,21 @@
 """Columns of numbers beside a figure, and as a CSV file that any program reads; fields by their names."""
 
 import csv
+import inspect
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+
+from .errors import InvalidRequest
+
+if TYPE_CHECKING:
+    import xarray
 
 _DIGITS = 10
 _PLAIN = (1e-5, 1e7)
@@ -101,3 +107,102 @@ def _text(cell: float | str) -> str:
 def write_tables(tables: Sequence[Table], folder: Path) -> tuple[Path, ...]:
     """Write each table as ``NAME.csv``."""
     return tuple(write_csv(each, folder / f"{each.name}.csv") for each in tables)
+
+
+UNITS = {
+    "_hz": "Hz",
+    "_s": "s",
+    "_m": "m",
+    "_rad": "rad",
+    "_j": "J",
+    "_v": "V",
+    "_vpp": "V",
+    "_decibel": "dB",
+    "_kg": "kg",
+    "_per_s": "s-1",
+    "_m_per_s": "m s-1",
+    "_m_per_s2": "m s-2",
+    "_n_per_m": "N m-1",
+    "_ns_per_m": "N s m-1",
+}
+"""Unit of a value by the end of its name; the longest that fits."""
+COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")
+"""What values are given over, the first that a result has."""
+
+
+class Labelled:
+    """A result that becomes a labelled Dataset: fields and bounds by their names, with units."""
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Give all numbers of the result as an `xarray.Dataset`.
+
+        Arrays lie over the result's frequencies or times where they have as many values; bounds
+        (``magnitude_lower``) and deviations (``sd_...``) stand beside their values; what is inside of a part
+        has the part's name before its own (``response_frequency_hz``). Each variable has the attribute
+        ``units`` where its name says one; texts and settings that are words are attributes.
+
+        Raises
+        ------
+        InvalidRequest
+            When xarray is not installed.
+
+        """
+        try:
+            import xarray  # noqa: PLC0415 - optional, and slow to load
+        except ImportError as error:
+            raise InvalidRequest("xarray is not installed; pip install 'vibench[exchange]'") from error
+        variables: dict[str, Any] = {}
+        attributes: dict[str, Any] = {"result": type(self).__name__}
+        _collect(self, "", variables, attributes)
+        made = xarray.Dataset(variables, attrs=attributes)
+        return made.set_coords([name for name in made.variables if _is_coordinate(str(name))])
+
+
+def unit_of(name: str) -> str:
+    """Give the unit that the end of a name says, in UDUNITS text; empty where it says none.
+
+    >>> unit_of("damping_ns_per_m"), unit_of("frequency_hz"), unit_of("response_i")
+    ('N s m-1', 'Hz', '')
+    """
+    ends = [end for end in UNITS if f"_{name}".endswith(end)]
+    return UNITS[max(ends, key=len)] if ends else ""
+
+
+def _is_coordinate(name: str) -> bool:
+    return any(name == each or name.endswith(f"_{each}") for each in COORDINATES)
+
+
+def _collect(part: Any, prefix: str, variables: dict[str, Any], attributes: dict[str, Any]) -> None:
+    values = dict(_numbers_of(part))
+    over = next((name for name in COORDINATES if np.ndim(values.get(name, 0)) == 1), None)
+    length = None if over is None else len(values[over])
+    for key, value in values.items():
+        name = f"{prefix}{key}"
+        match value:
+            case np.ndarray() if value.dtype != object:
+                first = f"{prefix}{over}" if value.ndim and len(value) == length else f"{name}_number"
+                dimensions = (first, *(f"{name}_{number}" for number in range(2, value.ndim + 1)))[
+                    : value.ndim
+                ]
+                variables[name] = (dimensions, value, {"units": unit_of(key)} if unit_of(key) else {})
+            case bool() | str():
+                attributes[name] = str(value)
+            case int() | float() | complex():
+                variables[name] = ((), value, {"units": unit_of(key)} if unit_of(key) else {})
+            case tuple() if value and all(is_dataclass(each) for each in value):
+                for row, each in enumerate(value, 1):
+                    _collect(each, f"{name}_{row}_", variables, attributes)
+            case tuple() if value and all(isinstance(each, int | float) for each in value):
+                variables[name] = ((f"{name}_number",), np.asarray(value), {"units": unit_of(key)})
+            case _ if is_dataclass(value):
+                _collect(value, f"{name}_", variables, attributes)
+
+
+def _numbers_of(part: Any) -> Iterator[tuple[str, Any]]:
+    """Go through the fields of a result, then the arrays that it computes from them."""
+    for each in fields(part):
+        yield each.name, getattr(part, each.name)
+    for name, found in inspect.getmembers(type(part), lambda member: isinstance(member, property)):
+        given = str(found.fget.__annotations__.get("return", ""))
+        if not name.startswith("_") and "ndarray" in given:
+            yield name, getattr(part, name)

@@ -14,6 +14,7 @@ from ..errors import NotEnoughData
 from ..live import column_starts, envelope
 from ..model import CurveDifference, logarithmic_difference
 from ..signals import Reals
+from ..tables import Labelled
 
 
 class CurveOrigin(StrEnum):
@@ -40,7 +41,7 @@ class CurveKind(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class Curve(Labelled):
     """One curve; arrays of shape (points,), frequencies ascending but on branches."""
 
     source: str

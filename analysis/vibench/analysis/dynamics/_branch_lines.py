@@ -12,7 +12,7 @@ from vibench.sim.branches import FoundBranch, growth_time_s, least_growth_time_s
 
 from ..comparison import Curve, CurveKind, CurveOrigin
 from ..signals import Reals
-from ..tables import named, plain
+from ..tables import Labelled, named, plain
 from ._branch_request import BranchRequest
 
 
@@ -31,7 +31,7 @@ class LineEvent:
 
 
 @dataclass(frozen=True, eq=False)
-class BranchLine:
+class BranchLine(Labelled):
     """One branch; n points in the order in which it runs."""
 
     frequency_hz: Reals

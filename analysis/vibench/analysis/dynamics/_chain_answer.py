@@ -17,7 +17,7 @@ from vibench.sim.chain import (
 )
 
 from ..signals import Reals
-from ..tables import named, plain
+from ..tables import Labelled, named, plain
 from ._chain_request import ChainRequest
 
 WAVES = 61
@@ -33,7 +33,7 @@ DECIBELS = 20.0 / math.log(10.0)
 
 
 @dataclass(frozen=True, eq=False)
-class ChainRun:
+class ChainRun(Labelled):
     """One chain under one drive; arrays by cell, counted from the base."""
 
     cells: int

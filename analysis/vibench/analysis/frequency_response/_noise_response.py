@@ -11,6 +11,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..recordings import AbstractAnalysis, Channels, Stretch, only_stretch
 from ..signals import Complexes, Flags, Quantity, Reals, relative_sd, student_half_width
 from ..spectra import DensitySums
+from ..tables import Labelled
 from ..tones import NoiseDriveLevel, noise_drive_level
 from ._estimators import coherence, least_squares
 from ._mode import Resonance
@@ -30,7 +31,7 @@ _LEAST_PERIODS = 2
 
 
 @dataclass(frozen=True)
-class NoiseResponse:
+class NoiseResponse(Labelled):
     """Transmission of base displacement to m0's displacement, and what was found in it."""
 
     frequency_response: FrequencyResponse

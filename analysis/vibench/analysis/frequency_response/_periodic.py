@@ -15,6 +15,7 @@ import scipy
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import DEFAULT_CONFIDENCE, Complexes, Flags, Integers, Reals, Window, coherence_significance
+from ..tables import Labelled
 from ._estimators import coherence
 from ._repetition import Repetition, driven_lines, measured_repetition, period_spectra
 from ._results import Estimator, FrequencyResponse, FrequencyResponseSettings
@@ -121,7 +122,7 @@ class DetectionLines:
 
 
 @dataclass(frozen=True)
-class PeriodicFrequencyResponse:
+class PeriodicFrequencyResponse(Labelled):
     """Best linear approximation of response over drive, and where its scatter comes from."""
 
     frequency_response: FrequencyResponse

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import InvalidRequest
 from ..signals import Complexes, Flags, Quantity, Reals, derivative_factor, magnitude_bounds, phase_half_width
+from ..tables import Labelled
 
 LEAST_COHERENCE = 0.1
 """Below it no line is significant."""
@@ -44,7 +45,7 @@ class FrequencyResponseSettings:
 
 
 @dataclass(frozen=True)
-class FrequencyResponse:
+class FrequencyResponse(Labelled):
     """Response over drive against frequency, with bounds; all arrays have the shape (lines,)."""
 
     frequency_hz: Reals

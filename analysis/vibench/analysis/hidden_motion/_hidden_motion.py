@@ -12,6 +12,7 @@ from vibench.sim import Specimen
 from ..errors import InvalidRequest
 from ..recordings import ProgressObserver, Unobserved, specimen_of
 from ..signals import Reals, Samples
+from ..tables import Labelled
 from ._collisions import Collisions, collisions_of, joined_collisions
 from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
 from ._filtering import motion_model
@@ -47,7 +48,7 @@ class TrackedMotion:
 
 
 @dataclass(frozen=True, eq=False)
-class HiddenMotion:
+class HiddenMotion(Labelled):
     """What base acceleration and m0's velocity tell of the motion that nobody measured."""
 
     name: str

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..signals import Flags, Reals
+from ..tables import Labelled
 
 _PER_NEPER_DB = 20 / np.log(10)
 
 
 @dataclass(frozen=True)
-class CurveDifference:
+class CurveDifference(Labelled):
     """Measured over simulated magnitude; arrays of shape (points,)."""
 
     frequency_hz: Reals

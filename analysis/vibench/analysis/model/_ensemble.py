@@ -12,6 +12,7 @@ import numpy as np
 import scipy
 
 from ..signals import Integers, Reals
+from ..tables import Labelled
 
 AGREEMENT = 0.99
 """Share of agreeing twins that the limit lets pass, whatever the number of values compared."""
@@ -36,7 +37,7 @@ class Quantity:
 
 
 @dataclass(frozen=True, eq=False)
-class EnsembleCurve:
+class EnsembleCurve(Labelled):
     """One quantity, measured and in every draw.
 
     Square roots are compared: they are near to normal for magnitudes that are known well, as logarithms are,

@@ -19,6 +19,7 @@ from vibench.sim import (
 )
 
 from ..signals import Flags, Integers, Reals
+from ..tables import Labelled
 
 PAPER_AMPLITUDES_M = {0.05: 1e-6, 1.5: 5e-6, 10.0: 50e-6}
 """Base amplitude A0 that the paper simulates for each of its voltages V0 (Gong et al. 2025, Fig. 13)."""
@@ -36,7 +37,7 @@ Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, eq=False)
-class ResponsePrediction:
+class ResponsePrediction(Labelled):
     """Responses of m0 under sines; arrays of shape (points,)."""
 
     specimen: Specimen

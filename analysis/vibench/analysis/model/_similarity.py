@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import Flags, Reals
+from ..tables import Labelled
 
 SIMILARITY_THRESHOLD = 0.1
 """Points that differ by at most so much are similar (Gong et al. 2025, section 4)."""
@@ -77,7 +78,7 @@ class SimilarityCurve:
 
 
 @dataclass(frozen=True, eq=False)
-class Similarity:
+class Similarity(Labelled):
     """How alike a model is to the reference; arrays of shape (points,)."""
 
     frequency_hz: Reals

@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 
 from vibench.acquisition.recording import RecordingState, SealState
 
+from ..tables import Labelled
 from ._channels import DRIVE
 from ._facts import RecordingFacts
 
@@ -43,7 +44,7 @@ R = TypeVar("R")
 
 
 @dataclass(frozen=True, eq=False)
-class AbstractAnalysis(Generic[P, R]):
+class AbstractAnalysis(Labelled, Generic[P, R]):
     """What was found in a recording: of a plan, a response."""
 
     facts: RecordingFacts

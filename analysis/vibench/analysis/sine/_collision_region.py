@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import InvalidRequest
 from ..signals import Flags, Reals
+from ..tables import Labelled
 from ._sweep import SweepResponse
 
 _NOISE_FACTOR = 4.0
@@ -58,7 +59,7 @@ class CollisionRegion:
 
 
 @dataclass(frozen=True)
-class Collisions:
+class Collisions(Labelled):
     """All collision regions of a sweep, in the order of time, and what they were judged by."""
 
     regions: tuple[CollisionRegion, ...]

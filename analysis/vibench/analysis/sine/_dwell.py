@@ -7,6 +7,7 @@ import numpy as np
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import Complexes, ConvertedSignal, Quantity, Reals, converted_signal
 from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
+from ..tables import Labelled
 from ..tones import (
     ALL_ORDERS,
     DriveLevel,
@@ -47,7 +48,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class DwellResponse:
+class DwellResponse(Labelled):
     """One dwell, analysed over its window."""
 
     drive: DriveLevel

@@ -7,6 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from ..errors import InvalidRequest
 from ..signals import Flags, Reals
+from ..tables import Labelled
 from ._jumps import Jump
 from ._sweep import SweepResponse
 
@@ -18,7 +19,7 @@ _PER_BEL_DB = 20.0
 
 
 @dataclass(frozen=True, eq=False)
-class Hysteresis:
+class Hysteresis(Labelled):
     """What depends on the direction of a sweep; arrays of shape (points,)."""
 
     frequency_hz: Reals

@@ -15,6 +15,7 @@ from ..recordings import (
     Stretch,
 )
 from ..signals import Reals
+from ..tables import Labelled
 from ._dwell import DwellResponse, dwell_response
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking
@@ -24,7 +25,7 @@ _EDGE_PERIODS = 60.0
 
 
 @dataclass(frozen=True)
-class SteppedResponse:
+class SteppedResponse(Labelled):
     """One value for each step, in the order played; arrays of shape (steps,)."""
 
     frequency_hz: Reals

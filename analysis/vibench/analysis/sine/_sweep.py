@@ -12,6 +12,7 @@ from scipy import fft
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..signals import Decimator, Quantity, Reals, converted_signal, decimation_factor
+from ..tables import Labelled
 from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_bias, tracked_orders
 
 _MARGIN = 0.5
@@ -108,7 +109,7 @@ _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqr
 
 
 @dataclass(frozen=True)
-class SweepResponse:
+class SweepResponse(Labelled):
     """A sweep, interval by interval; arrays of shape (intervals,) unless said otherwise."""
 
     time_s: Reals

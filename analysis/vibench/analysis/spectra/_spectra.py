@@ -18,11 +18,12 @@ from ..signals import (
     named_window,
     taper,
 )
+from ..tables import Labelled
 from ._segment_spectra import SegmentSpectra, pieces
 
 
 @dataclass(frozen=True)
-class SpectralDensity:
+class SpectralDensity(Labelled):
     """One-sided spectral density with bounds; arrays of shape (lines,)."""
 
     frequency_hz: Reals
@@ -124,7 +125,7 @@ def spectral_density(
 
 
 @dataclass(frozen=True)
-class AmplitudeSpectrum:
+class AmplitudeSpectrum(Labelled):
     """Spectrum of one stretch of signal, scaled so that a sine of amplitude 1 reads 1."""
 
     frequency_hz: Reals

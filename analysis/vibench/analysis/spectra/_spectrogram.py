@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import Reals, Window, taper
+from ..tables import Labelled
 
 MOST_COLUMNS = 600
 """A figure has no more pixels to show."""
@@ -13,7 +14,7 @@ _TAPER = Window.HANN
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrogram:
+class Spectrogram(Labelled):
     """Root mean square amplitude of each frequency in each stretch of time."""
 
     time_s: Reals

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals import Complexes, Reals
+from ..tables import Labelled
 
 ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
 """Impacting systems answer at half orders as well as at whole ones."""
@@ -27,7 +28,7 @@ def cycles_needed(orders: tuple[float, ...]) -> float:
 
 
 @dataclass(frozen=True)
-class TrackedOrders:
+class TrackedOrders(Labelled):
     """Components of a signal at orders of the drive; signal = Re(sum value_k exp(i k phase)) + residual."""
 
     orders: tuple[float, ...]

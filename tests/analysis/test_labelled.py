@@ -1,0 +1,95 @@
+"""Results as labelled Datasets: units from names, bounds beside values, one mechanism for all of them."""
+
+import dataclasses
+import importlib
+import inspect
+
+import numpy as np
+import pytest
+
+from vibench.analysis import transmissibility
+from vibench.analysis.tables import Labelled, unit_of
+
+xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
+ROOMS = ("frequency_response", "sine", "spectra", "model", "comparison", "tones", "recordings", "dynamics")
+NOT_RESULTS = {"SpectralAverages", "FittedShaker", "SimulatedChannels", "Quantity", "SimilarityCurve"}
+"""Working values behind a result, which holds what they say."""
+
+
+@pytest.fixture(scope="module")
+def response():
+    base = np.random.default_rng(3).standard_normal(40 * 1024)
+    return transmissibility(base, 2.0 * base, 1024.0, segment_samples=1024)
+
+
+def test_a_response_lies_over_its_frequencies_with_its_bounds(response):
+    data = response.to_xarray()
+    assert dict(data.sizes) == {"frequency_hz": response.frequency_hz.size}
+    assert data["frequency_hz"].attrs["units"] == "Hz"
+    assert data["sd_phase_rad"].attrs["units"] == "rad"
+    np.testing.assert_array_equal(data["magnitude_upper"], response.magnitude_upper)
+    assert float(data["magnitude"].sel(frequency_hz=100.0, method="nearest")) == pytest.approx(2.0)
+    assert float(data["settings_sample_rate_hz"]) == 1024.0
+    assert data.attrs["settings_estimator"] == response.settings.estimator.value
+
+
+def test_a_dataset_survives_a_file(response, tmp_path):
+    pytest.importorskip("h5netcdf", reason="pip install vibench[exchange] brings h5netcdf")
+    data = response.to_xarray().drop_vars("value")  # netCDF has no complex numbers
+    data.to_netcdf(tmp_path / "response.nc", engine="h5netcdf")
+    with xarray.open_dataset(tmp_path / "response.nc", engine="h5netcdf") as kept:
+        xarray.testing.assert_identical(kept.load(), data)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Part(Labelled):
+    time_s: np.ndarray
+    force_n_per_m: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Whole(Labelled):
+    frequency_hz: np.ndarray
+    states: np.ndarray
+    part: Part
+    parts: tuple[Part, ...]
+    label: str
+    gap_m: float
+    nothing: None = None
+
+
+def test_parts_keep_their_names_axes_and_units():
+    part = Part(np.arange(2.0), np.ones(2))
+    data = Whole(np.arange(3.0), np.zeros((3, 6)), part, (part, part), "word", 45e-6).to_xarray()
+    assert data["states"].dims == ("frequency_hz", "states_2")
+    assert data["part_force_n_per_m"].dims == ("part_time_s",)
+    assert data["parts_2_force_n_per_m"].attrs["units"] == "N m-1"
+    assert (float(data["gap_m"]), data["gap_m"].attrs["units"]) == (45e-6, "m")
+    assert data.attrs["label"] == "word"
+    assert "part_time_s" in data.coords
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("x_m_per_s", "m s-1"), ("rate_per_s", "s-1"), ("time_s", "s"), ("n_eff", ""), ("relative_i", "")],
+)
+def test_a_unit_is_the_longest_end_of_a_name(name, unit):
+    assert unit_of(name) == unit
+
+
+def results():
+    """Every dataclass on a face of the analysis that has arrays."""
+    for room in ROOMS:
+        face = importlib.import_module(f"vibench.analysis.{room}")
+        for name in face.__all__:
+            found = getattr(face, name)
+            if inspect.isclass(found) and dataclasses.is_dataclass(found) and name not in NOT_RESULTS:
+                types = " ".join(str(each.type) for each in dataclasses.fields(found))
+                if "ndarray" in types:
+                    yield found
+
+
+def test_every_result_with_arrays_has_the_method():
+    found = set(results())
+    assert len(found) > 12
+    assert sorted(each.__name__ for each in found if not issubclass(each, Labelled)) == []
