@@ -1,5 +1,6 @@
 from .chaos import (
     MotionVerdict as MotionVerdict,
+    Points as Points,
     motion_verdict as motion_verdict,
 )
 from .comparison import (

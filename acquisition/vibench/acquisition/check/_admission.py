@@ -49,7 +49,14 @@ def archive_path(rig_name: str) -> Path:
 
 
 def last_check(rig_name: str) -> CheckResult | None:
-    """Give the last check of a rig; None when there is none, or none that this version can read."""
+    """Give the last check of a rig; None when there is none, or none that this version can read.
+
+    Parameters
+    ----------
+    rig_name
+        As the hardware configuration says it.
+
+    """
     try:
         return CheckResult.model_validate_json(archive_path(rig_name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, ValidationError):
@@ -137,7 +144,20 @@ def utc_now() -> datetime:
 def check_bench(
     bench: Bench, folder: Path, clock: Clock = utc_now, switch: StopSwitch | None = None
 ) -> CheckResult:
-    """Check a bench, compare with the last time, and keep the result for later; see `bench_report`."""
+    """Check a bench, compare with the last time, and keep the result for later; see `bench_report`.
+
+    Parameters
+    ----------
+    bench
+        Open.
+    folder
+        Where recordings would go: its disk is looked at.
+    clock
+        What time it is.
+    switch
+        Ends the check from another thread.
+
+    """
     report, at = bench_report(bench, folder, switch), clock()
     last = last_check(bench.rig.name)
     if last is not None and last.rig_digest == rig_digest(bench.rig):

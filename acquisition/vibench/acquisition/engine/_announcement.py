@@ -103,6 +103,11 @@ def announced_engines() -> tuple[Announcement, ...]:
 def the_engine(pid: int | None) -> Announcement:
     """Choose the engine that is meant: the one of that process, or the only one.
 
+    Parameters
+    ----------
+    pid
+        Number of its process; None: the only one.
+
     Raises
     ------
     EngineError

@@ -157,7 +157,7 @@ LEFT_ALONE_S = 1.0
 
 @contextmanager
 def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
-    """Serve a request handler; ``what`` is shown to those who look for an engine.
+    """Serve a request handler at ``host``; ``what`` is shown to those who look for an engine.
 
     Raises
     ------

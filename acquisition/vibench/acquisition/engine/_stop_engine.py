@@ -39,6 +39,15 @@ def stop_engine(
     twentieth of a second even where no connection comes about, and later where the process stands still.
     A hold is only told: nobody wants one to begin unexpectedly.
 
+    Parameters
+    ----------
+    engine
+        As it announced itself.
+    level
+        How hard it stops.
+    reason
+        What the recording will say.
+
     Raises
     ------
     EngineGone

@@ -75,6 +75,13 @@ EXCITATION_KINDS: Mapping[str, ExcitationKind] = MappingProxyType(
 def rows_by_kind(of_family: Mapping[Family, Row], of_kind: Mapping[str, Row]) -> Mapping[str, Row]:
     """Give every kind the row of its family, or its own where it has one.
 
+    Parameters
+    ----------
+    of_family
+        Row of each family of excitations.
+    of_kind
+        Rows of single kinds, by their words.
+
     Raises
     ------
     KeyError

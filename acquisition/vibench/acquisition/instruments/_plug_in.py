@@ -40,12 +40,26 @@ OURS = tuple(
 
 
 def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
-    """Names that a hardware configuration may give, ours and those of installed packages."""
+    """Names that a hardware configuration may give, ours and those of installed packages.
+
+    Parameters
+    ----------
+    kind
+        Group of entry points.
+
+    """
     return tuple(sorted({row.name for row in _rows(kind)}))
 
 
 def plug_in(kind: PlugInKind, name: str) -> Any:
     """Load what an entry point names.
+
+    Parameters
+    ----------
+    kind
+        Group of entry points.
+    name
+        Word of the hardware configuration.
 
     Raises
     ------

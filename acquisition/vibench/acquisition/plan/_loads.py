@@ -118,6 +118,16 @@ def needed_vpp(rig: Rig, acceleration: float, frequency_hz: float) -> float:
     """Give the setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
 
     The specimen is not in the model: where it pushes back, more or less is needed.
+
+    Parameters
+    ----------
+    rig
+        Its linear model is asked.
+    acceleration
+        Amplitude of the base [m/s2].
+    frequency_hz
+        Of the sine.
+
     """
     per_volt = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, frequency_hz)))
     return 2 * acceleration / (per_volt * rig.generator.terminal_factor())

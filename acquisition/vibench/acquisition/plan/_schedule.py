@@ -92,7 +92,18 @@ def _follows_without_a_jump(before: Play, after: Play) -> bool:
 
 
 def ramp(state: RunState, play: Play, measurement: Measurement) -> Phase:
-    """Lay out one ramp up to, or down from, what is played."""
+    """Lay out one ramp up to, or down from, what is played.
+
+    Parameters
+    ----------
+    state
+        Whether it goes up or down.
+    play
+        What is played at its end.
+    measurement
+        Says how long a ramp takes, and in what steps.
+
+    """
     return Phase(state, play, measurement.ramp_s, Segment(_RAMP_LABELS[state]))
 
 
@@ -138,7 +149,19 @@ def stairs(measurement: Measurement) -> int:
 
 
 def half_cosine(progress: float) -> float:
-    """Level of a ramp from 0 to 1, with no kink at either end."""
+    """Level of a ramp from 0 to 1, with no kink at either end.
+
+    Parameters
+    ----------
+    progress
+        0 at the beginning of the ramp, 1 at its end.
+
+    Returns
+    -------
+    float
+        0 to 1.
+
+    """
     return 0.5 * (1 - cos(pi * progress))
 
 

@@ -37,7 +37,16 @@ class Calibration:
 
 
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
-    """Every calibration of a rig: its sensors', and each input's."""
+    """Every calibration of a rig: its sensors', and each input's.
+
+    Parameters
+    ----------
+    rig
+        Whose sheets are read.
+    today
+        Their ages are counted to it.
+
+    """
     dates = [
         (rig.vibrometer.model, rig.vibrometer.calibrated),
         (rig.accelerometer.model, rig.accelerometer.calibrated),
@@ -53,7 +62,21 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
 
 
 def check_calibrations(rig: Rig, today: date) -> None:
-    """Raise CheckFailed when a calibration has run out, naming each."""
+    """Refuse a rig of which a calibration has run out.
+
+    Parameters
+    ----------
+    rig
+        Whose sheets are read.
+    today
+        Their ages are counted to it.
+
+    Raises
+    ------
+    CheckFailed
+        When one has run out; it names each.
+
+    """
     stale = [str(calibration) for calibration in calibrations(rig, today) if not calibration.is_valid]
     if stale:
         raise CheckFailed(

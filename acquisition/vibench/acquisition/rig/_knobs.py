@@ -75,7 +75,21 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
 
 
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
-    """Take an earlier confirmation for granted, as long as it is recent and about the same settings."""
+    """Take an earlier confirmation for granted, as long as it is recent and about the same settings.
+
+    Parameters
+    ----------
+    path
+        The sheet, as `save_knob_sheet` wrote it.
+    valid
+        How long a confirmation holds.
+
+    Raises
+    ------
+    CheckFailed
+        When it is asked, and the sheet is older or about other settings.
+
+    """
 
     def confirm(knobs: tuple[Knob, ...]) -> KnobSheet:
         sheet = load_knob_sheet(path)

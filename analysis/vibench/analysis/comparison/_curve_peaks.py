@@ -63,7 +63,16 @@ class CurvePeak:
 
 
 def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
-    """Find the highest peaks, in the order of frequency; none of branches, which fold there."""
+    """Find the highest peaks, in the order of frequency; none of branches, which fold there.
+
+    Parameters
+    ----------
+    curve
+        Measured or predicted.
+    most
+        How many are given.
+
+    """
     known = np.isfinite(curve.magnitude) & (curve.magnitude > 0)
     frequency_hz, height = curve.frequency_hz[known], np.log(curve.magnitude[known])
     if height.size < 3 or not curve.is_single_valued:

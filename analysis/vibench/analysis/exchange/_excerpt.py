@@ -67,6 +67,15 @@ def excerpt(
 ) -> Excerpt:
     """Choose channels (all when none is named) and a stretch of time since the first sample.
 
+    Parameters
+    ----------
+    recording
+        Open.
+    roles
+        Names of channels.
+    from_s, to_s
+        Seconds since the first sample; to the end if absent.
+
     Raises
     ------
     RecordingError

@@ -136,6 +136,11 @@ def import_recording(
     numbers of the file: integers of up to 31 bits are kept exactly, others to 2^-30 of the next power of
     two above their largest.
 
+    Parameters
+    ----------
+    observer
+        Told how many values were written since it was last called.
+
     Raises
     ------
     InvalidRequest

@@ -93,6 +93,13 @@ class FrequencyResponseView:
 def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
     """Read ``"velocity/acceleration"``; a single word stands for both.
 
+    Parameters
+    ----------
+    text
+        What m0 and the base are taken as, with a slash between them.
+    scale
+        Of the magnitude in figures.
+
     Raises
     ------
     InvalidRequest

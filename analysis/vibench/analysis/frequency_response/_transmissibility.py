@@ -129,6 +129,8 @@ def transmissibility(
         Noise density of y over that of x [(unit of y / unit of x)^2].
     valid
         Which samples may be used; segments that touch others are left out and counted.
+    confidence
+        Probability that a pair of bounds holds the truth, one line at a time.
 
     Raises
     ------

@@ -28,6 +28,11 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     Smallest and largest value of each column, shape (..., columns). Column c holds the samples from
     ``c * n // columns`` on, which `column_starts` names.
 
+    Raises
+    ------
+    InvalidRequest
+        When there is no column.
+
     """
     if columns < 1:
         raise InvalidRequest(f"{columns} columns were asked for; a picture has 1 or more")
@@ -43,11 +48,37 @@ def envelope(samples: Samples, columns: int) -> tuple[Samples, Samples]:
 
 
 def column_starts(samples: int, columns: int) -> NDArray[np.int64]:
-    """First sample of each column of `envelope`."""
+    """First sample of each column of `envelope`.
+
+    Parameters
+    ----------
+    samples
+        How many a signal has.
+    columns
+        How many the picture has.
+
+    Returns
+    -------
+    ndarray
+        Shape (columns,).
+
+    """
     shown = min(samples, columns)
     return np.arange(shown, dtype=np.int64) * samples // max(shown, 1)
 
 
 def zigzag(low: Reals, high: Reals) -> Reals:
-    """Lay both edges of an envelope into one line, low and high in turn, shape (..., 2 columns)."""
+    """Lay both edges of an envelope into one line, low and high in turn, shape (..., 2 columns).
+
+    Parameters
+    ----------
+    low, high
+        Edges, shape (..., columns).
+
+    Returns
+    -------
+    ndarray
+        Shape (..., 2 columns).
+
+    """
     return np.stack((low, high), axis=-1).reshape(*low.shape[:-1], -1)

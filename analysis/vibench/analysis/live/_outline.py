@@ -24,7 +24,21 @@ _BLOCKS, _EVERY = 32, 4
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
-    """Reduce signals to their edges, column by column; shapes and columns are those of `envelope`."""
+    """Reduce signals to their edges, column by column; shapes and columns are those of `envelope`.
+
+    Parameters
+    ----------
+    samples
+        Shape (..., samples).
+    columns
+        Of the picture.
+
+    Returns
+    -------
+    tuple of ndarray
+        Lower and upper edge, shape (..., columns).
+
+    """
     low, high = envelope(samples, columns)
     if samples.shape[-1] <= columns:
         return low, high

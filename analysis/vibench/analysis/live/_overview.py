@@ -137,7 +137,16 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
 def overview_levels(
     recording: Recording, on_read: OnRead = ignore_reading
 ) -> dict[str, tuple[OverviewLevel, ...]]:
-    """Give the extremes of every channel, fine to coarse: what crosses from a process that made them."""
+    """Give the extremes of every channel, fine to coarse: what crosses from a process that made them.
+
+    Parameters
+    ----------
+    recording
+        Open.
+    on_read
+        Told how many samples were read, and of how many.
+
+    """
     levels: dict[str, tuple[OverviewLevel, ...]] = {}
     values = recording.samples * len(recording.channels)
     for number, channel in enumerate(recording.channels):
@@ -150,6 +159,13 @@ def overview_levels(
 
 def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
     """Give the extremes of one channel, fine to coarse, as the file keeps them; see `has_overview`.
+
+    Parameters
+    ----------
+    recording
+        Open.
+    role
+        Name of the channel.
 
     Raises
     ------

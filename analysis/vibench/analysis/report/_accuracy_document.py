@@ -188,7 +188,21 @@ def _without_gain(benchmark: AccuracyBenchmark) -> Iterator[str]:
 
 
 def worst_error(benchmark: AccuracyBenchmark, accuracy: Accuracy) -> float:
-    """Give the largest error of the state that a level made on any motion that is not chaotic."""
+    """Give the largest error of the state that a level made on any motion that is not chaotic.
+
+    Parameters
+    ----------
+    benchmark
+        As it was measured.
+    accuracy
+        The level.
+
+    Returns
+    -------
+    float
+        Relative to the largest displacement.
+
+    """
     return max(
         (
             level.state_error

@@ -186,6 +186,23 @@ def analyse_files(
     The model is the ``specimen`` given; by default what each recording's bench configuration says. Where one
     describes no shaker, the shaker fitted to the weakest noise among the recordings takes its place.
 
+    Parameters
+    ----------
+    paths
+        Recordings.
+    name
+        What results and report are called.
+    simulation
+        What is laid over each, if anything.
+    request
+        Estimator, lines and quantities of noise.
+    observer
+        Told how far it is.
+    specimen
+        In place of the described one.
+    draws
+        Simulated runs of each test.
+
     Raises
     ------
     NotEnoughData
@@ -237,7 +254,16 @@ def _shared_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedSh
 
 
 def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
-    """Put results that were made one by one together as one campaign's."""
+    """Put results that were made one by one together as one campaign's.
+
+    Parameters
+    ----------
+    name
+        Of the whole.
+    parts
+        Results of one recording or more each.
+
+    """
     return CampaignResults(
         name,
         tuple(result for part in parts for result in part.results),

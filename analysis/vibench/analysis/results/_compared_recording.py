@@ -41,6 +41,11 @@ def compare_recording(
 ) -> ComparedRecording:
     """Analyse a recording for a comparison.
 
+    Parameters
+    ----------
+    simulation
+        What is laid over it, if anything.
+
     Raises
     ------
     AnalysisError, RecordingError

@@ -108,7 +108,7 @@ def _starts(specimen: Specimen, drive: Harmonic, search: MotionSearch) -> Iterat
 
 
 def random_state(specimen: Specimen, drive: Harmonic, rng: np.random.Generator) -> Vector:
-    """Draw a state between the stops, shape (6,), that may lead to any motion.
+    """Draw a state between the stops by ``rng``, shape (6,) [m, m/s], that may lead to any motion.
 
     m0 and m2 lie within three times the gap, or the motion without stops where that is larger; velocities
     spread as far, times 2 pi f.

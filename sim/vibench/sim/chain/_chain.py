@@ -83,6 +83,11 @@ def chain_of(specimen: Specimen, cells: int) -> Chain:
     cells
         One or more; one cell is the specimen itself.
 
+    Raises
+    ------
+    ValueError
+        When there is no cell.
+
     """
     if not 1 <= cells <= MOST_CELLS:
         msg = f"A chain of {cells} cells is not allowed: give 1 to {MOST_CELLS}."

@@ -37,6 +37,11 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
     -------
     exp(i mu), shape (n,): magnitude 1 within a band without damping, below 1 in a gap or with damping.
 
+    Raises
+    ------
+    ValueError
+        When a frequency is not positive.
+
     """
     omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if not bool(np.all(np.isfinite(omega) & (omega > 0.0))):

@@ -50,7 +50,18 @@ class MeanEnergies(NamedTuple):
 
 
 def mean_energies(chain: Chain, states: ArrayLike, base_m: ArrayLike = 0.0) -> MeanEnergies:
-    """Average `chain_energies` over evenly spaced instants, states of shape (n, cells, 6)."""
+    """Average `chain_energies` over evenly spaced instants, states of shape (n, cells, 6).
+
+    Parameters
+    ----------
+    chain
+        What moved.
+    states
+        Shape (n, cells, 6) [m, m/s].
+    base_m
+        Displacement of the base, shape (n,) or one number [m].
+
+    """
     found = [blocked_mean(row) for row in chain_energies(chain, states, base_m).T]
     return MeanEnergies(
         np.array([each.mean for each in found]), np.array([each.standard_error for each in found])

@@ -138,6 +138,11 @@ def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:
     -------
     Complex, shape (n, cells, 4): x, y, z and p = y - z of each cell over U; time goes as exp(+i w t).
 
+    Raises
+    ------
+    ValueError
+        When a frequency is negative.
+
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):

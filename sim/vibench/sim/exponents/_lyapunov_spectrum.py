@@ -91,8 +91,8 @@ def lyapunov_spectrum(
 ) -> LyapunovSpectrum:
     """Tell how fast neighbouring motions part or come together, in every direction.
 
-    Arguments as in `vibench.sim.lyapunov_exponent`; the errors need blocks as long as the motion's
-    memory too.
+    Arguments as in `vibench.sim.lyapunov_exponent`, ``initial_state`` of shape (6,) [m, m/s]; the
+    errors need blocks as long as the motion's memory too.
     """
     accuracy = chosen(Accuracy, accuracy)
     interval = interval_for(specimen, drive, interval_s)

@@ -68,7 +68,7 @@ class MapEstimate:
 
 
 def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
-    """Say what a map will take, by what such points took lately on this machine; none is run.
+    """Say what a map will take of ``workers`` threads, by what such points took here lately; none is run.
 
     How many points refinement will ask for is not known before: the estimate says the least and the most.
     """

@@ -48,6 +48,11 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     -------
     Complex, shape (n, 4): x, y, z and p = y - z over U; time goes as exp(+i w t).
 
+    Raises
+    ------
+    ValueError
+        When a frequency is negative or not finite.
+
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):

@@ -105,7 +105,14 @@ JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
-    """Give M, C and K of the two bodies, x and z, that are left while m1 sticks to m2; shapes (2, 2)."""
+    """Give M, C and K of the two bodies, x and z, that are left while m1 sticks to m2.
+
+    Returns
+    -------
+    tuple of ndarray
+        M [kg], C [N s/m] and K [N/m], each of shape (2, 2).
+
+    """
     whole = specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix
     mass, damping, stiffness = (JOIN.T @ matrix @ JOIN for matrix in whole)
     return mass, damping, stiffness
@@ -140,6 +147,11 @@ def gong2025(
     contact
         ``"hertz"``: the paper's stops; ``"linear"``: none; ``"power:5"`` and others as
         `vibench.sim.model` says.
+
+    Raises
+    ------
+    ValueError
+        When damping time, gap or contact law is not allowed.
 
     """
     if not 0.0 <= damping_time_s < math.inf:

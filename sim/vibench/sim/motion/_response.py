@@ -89,7 +89,8 @@ def steady_response(
 
     The defaults are those of Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed. In
     chaos Response I is one draw from a scatter of a few per cent, whatever the accuracy; the state
-    that is reached may depend on the initial state, which therefore belongs to the record.
+    that is reached may depend on the ``initial_state``, shape (6,) [m, m/s], which therefore belongs to
+    the record.
 
     Raises ValueError when the drive has no amplitude, or the window is longer than the run or shorter
     than one drive period.

@@ -248,6 +248,12 @@ def balance_specimen(
     A motion that meets stops starts from the exact orbit that shooting finds behind a run from rest; a
     smooth spring from its first-order motion, and if that fails from the branch from a weak drive upwards.
     The drive's phase must be zero. Look at ``outcome`` first: in chaos the motion found, if any, is unstable.
+
+    Raises
+    ------
+    ValueError
+        When the drive has a phase, or the stops are rigid.
+
     """
     if drive.phase_rad != 0.0:
         msg = f"Drive phase {drive.phase_rad} rad is not allowed: harmonic balance takes phase zero."

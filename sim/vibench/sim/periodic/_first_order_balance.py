@@ -182,6 +182,23 @@ def jump_frequencies(
 
     The fold amplitude is a function of frequency known in closed form; its crossings with the amplitude
     given are bracketed on a grid and then solved for. Two folds closer than a grid step can hide.
+
+    Parameters
+    ----------
+    structure, spring
+        The specimen without its stops, and what stands for them.
+    amplitude_m
+        Of the base [m].
+    start_hz, stop_hz
+        Range that is searched [Hz].
+    grid_points
+        Of the grid that brackets crossings.
+
+    Raises
+    ------
+    ValueError
+        When the range is not positive and ascending.
+
     """
     if not 0.0 < start_hz < stop_hz < math.inf:
         msg = f"Frequencies {start_hz} to {stop_hz} Hz are not allowed: positive and ascending."

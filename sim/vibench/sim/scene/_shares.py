@@ -24,6 +24,14 @@ def wilson_share(count: int, trials: int, unsure: float = UNSURE) -> Share:
 
     It holds for few trials, and for none and all of them too (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
     Brown, Cai and DasGupta, Stat. Sci. 16 (2001) 101).
+
+    Parameters
+    ----------
+    count, trials
+        How many of how many.
+    unsure
+        Probability that the interval misses the share.
+
     """
     deviations = float(ndtri(1.0 - 0.5 * unsure))
     share, weight = count / trials, deviations**2 / trials

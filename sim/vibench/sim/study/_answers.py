@@ -101,7 +101,18 @@ def prediction_at(
     accuracy: Accuracy | AccuracyWord,
     start: str,
 ) -> ScenePrediction:
-    """Make the prediction of a point from its cells and from what the study says of it."""
+    """Make the prediction of a point from its cells and from what the study says of it.
+
+    Parameters
+    ----------
+    arrays
+        Columns of a study, each of shape (points,).
+    number
+        Which point.
+    frequency_hz, amplitude_m, accuracy, start
+        What the study asked there.
+
+    """
     numbers = {field: _number(arrays[column.name][number]) for field, column in NUMBERS.items()}
     x, y, z, vx, vy, vz = (float(value) for value in arrays[FINAL_STATE][number].astype(np.float64))
     return ScenePrediction(

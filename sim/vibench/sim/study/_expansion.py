@@ -56,7 +56,7 @@ PLANNED = 2000
 
 
 def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
-    """Give the point that each one continues, or NOBODY; starts are the last axis but one of the grid."""
+    """Give whom each point continues, or NOBODY, shape (points,); ``starts`` are the last axis but one."""
     blocks = np.full(grid.shape, NOBODY)
     numbers = np.arange(grid.size).reshape(grid.shape)
     for index, start in enumerate(starts):
@@ -71,27 +71,27 @@ def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
 
 
 def planned_times(grid: Grid, planned: Callable[[int], float]) -> Floats:
-    """Give the time that each point is planned to take, shape (points,)."""
+    """Give the time that each point is ``planned`` to take [s], shape (points,)."""
     every = max(1, math.ceil(grid.size / PLANNED))
     some = [planned(number) for number in range(0, grid.size, every)]
     return np.repeat(some, every)[: grid.size]
 
 
 def continued_point(before: int, arrays: Arrays) -> int:
-    """Give a point's predecessor; NOBODY where that ended in no finite state."""
+    """Give a point's predecessor, ``before``; NOBODY where ``arrays`` have no finite end of it."""
     if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
         return NOBODY
     return before
 
 
 def end_phase(frequency_hz: float, before: int, arrays: Arrays) -> float:
-    """Phase at which a point's drive stopped: the base of the one that continues it goes on from there."""
+    """Phase [rad] at which the drive of ``before`` stopped, by ``arrays``: the next one goes on there."""
     turns = math.fmod(frequency_hz * float(arrays[DURATION][before]), 1.0)
     return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][before]), 2.0 * math.pi)
 
 
 def failed_point(number: int, error: BaseException) -> PointAnswer:
-    """Say what is kept of a scene that could not be computed: a refusal is a sentence by itself."""
+    """Say what is kept of scene ``number`` that ended in ``error``: a refusal is a sentence by itself."""
     match error:
         case ValueError():
             said = str(error)

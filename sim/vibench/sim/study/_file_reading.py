@@ -41,13 +41,13 @@ class Session:
 
 
 def read_plan(path: Path, kind: type[Plan]) -> Plan:
-    """Read what was asked for; raises StudyError when the file is none of such a plan."""
+    """Read what was asked for; raises StudyError when the file is none of a plan of this ``kind``."""
     with _opened(path, kind) as file:
         return _plan(path, file, kind)
 
 
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
-    """Read every answer, one row a point; a point that is under way counts as missing."""
+    """Read every answer, each of shape (points, ...); a point that is under way counts as missing."""
     with _opened(path, type(plan)) as file:
         return _arrays(file, plan)
 

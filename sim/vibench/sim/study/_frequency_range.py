@@ -12,6 +12,17 @@ def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]
     """List start, start + step, ... up to stop, which is included when it is hit.
 
     Raises ValueError when nothing, or too much, would be listed.
+
+    Parameters
+    ----------
+    start, stop, step
+        All in the same unit, Hz by habit.
+
+    Returns
+    -------
+    tuple of float
+        Ascending.
+
     """
     if not (0.0 < step < math.inf and math.isfinite(start) and math.isfinite(stop) and start <= stop):
         raise ValueError(

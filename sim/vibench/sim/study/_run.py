@@ -81,6 +81,15 @@ def run_study(
     The answers do not depend on the executor or on the order: each scene is computed alone, and a point
     that continues another waits for it. An error in one scene is that point's answer.
 
+    Parameters
+    ----------
+    study, executor, store
+        What is asked, who computes, and where it is kept.
+    observer
+        Told of every answer.
+    cancelled
+        Asked between answers whether to end.
+
     Raises
     ------
     StudyError
@@ -97,7 +106,7 @@ def run_points(
     observer: StudyObserver | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute all points that are wanted and that the store misses; as `run_study`."""
+    """Compute all points that are wanted and that the store misses, until ``cancelled``; as `run_study`."""
     session = _Session(points, executor, store)
     if session.is_unfinished:
         store.begin(executor.description)

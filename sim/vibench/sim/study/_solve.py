@@ -87,7 +87,7 @@ def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | Existin
 
 @contextmanager
 def executor_of(workers: int | None, cluster: str | None, solver: Solver = solve_scene) -> Iterator[Executor]:
-    """Open what computes: threads of this process, or the workers of a Dask scheduler."""
+    """Open what computes: ``workers`` threads, or the workers of the Dask scheduler at ``cluster``."""
     executor = ThreadExecutor(workers, solver) if cluster is None else _cluster_executor(cluster, solver)
     with closing(executor):
         yield executor

@@ -1,0 +1,103 @@
+"""Every public function says what its parameters are, what it gives in which unit, and what it raises.
+
+A parameter is documented by its section, by being named in the text, by a unit at the end of its name, or by
+a type of ours, which has a page of its own. Numbers and arrays that are given back have a unit or a shape; a
+function that raises says when.
+"""
+
+import ast
+import importlib
+import inspect
+import re
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from tests.test_faces import FOR_PEOPLE
+
+ROOT = Path(__file__).resolve().parent.parent
+UNIT = re.compile(r"_(hz|s|m|rad|j|v|vpp|kg|a|ohm|n|db|decibel|bytes|samples|pa|m2)$")
+SECTIONS = re.compile(r"\n(Parameters|Returns|Yields|Raises)\n-+\n")
+
+
+def public():
+    """Give every name of every face for people that has something to document."""
+    for face in FOR_PEOPLE:
+        module = importlib.import_module(face)
+        for name in module.__all__:
+            found = getattr(module, name)
+            found = getattr(found, "py_func", found)
+            if inspect.isfunction(found) or inspect.isclass(found):
+                yield f"{face}.{name}", found
+
+
+def sections(told):
+    parts = SECTIONS.split(told)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def undocumented_parameters(function, told):
+    parameters = sections(told).get("Parameters", "")
+    listed = re.findall(r"^([\w, *]+)(?: :.*)?$", parameters, flags=re.MULTILINE)
+    named = {name.strip(" *") for line in listed for name in line.split(",")}
+    named |= set(re.findall(r"`+(\w+)`+", told))
+    for each in inspect.signature(function).parameters.values():
+        kind = str(each.annotation) + str(getattr(each.annotation, "__module__", ""))
+        if each.name not in named and not UNIT.search(each.name) and not re.search(r"vibench|Path", kind):
+            yield f"parameter {each.name}"
+
+
+def shortcomings(function):
+    """Say what the docstring of a function leaves open."""
+    told = inspect.getdoc(function) or ""
+    if not told:
+        yield "no docstring"
+    yield from undocumented_parameters(function, told)
+    given = str(inspect.signature(function).return_annotation)
+    is_number = "ndarray" in given or given == "<class 'float'>" or given.startswith("tuple[float")
+    if is_number and not (
+        "Returns" in sections(told) or re.search(r"\[|shape \(", told) or UNIT.search(function.__name__)
+    ):
+        yield "unit or shape of what it gives"
+    source = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    raises = any(isinstance(node, ast.Raise) for node in ast.walk(source))
+    if raises and "Raises" not in sections(told) and "raises" not in told.lower():
+        yield "what it raises"
+
+
+def test_every_public_function_is_documented():
+    functions = {name: found for name, found in public() if inspect.isfunction(found)}
+    assert len(functions) > 200
+    short = {name: list(shortcomings(found)) for name, found in functions.items()}
+    assert {name: found for name, found in short.items() if found} == {}
+
+
+def test_every_public_class_says_what_it_is():
+    classes = {name: found for name, found in public() if inspect.isclass(found)}
+    assert [name for name, found in classes.items() if not found.__dict__.get("__doc__")] == []
+
+
+def left_open(angle, mass_kg, limit=1.0):
+    """Turn something."""
+    if angle > limit:
+        raise ValueError(mass_kg)
+
+
+def test_a_planted_omission_is_found():
+    assert list(shortcomings(left_open)) == ["parameter angle", "parameter limit", "what it raises"]
+
+
+@pytest.mark.parametrize("folder", ["docs", "docs/decisions", "docs/tutorials"])
+def test_every_page_is_in_the_index_of_the_site(folder):
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    decisions = (ROOT / "docs" / "decisions" / "index.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^([\w/-]+)$", index, flags=re.MULTILINE))
+    for page in (ROOT / folder).glob("*.md"):
+        match folder:
+            case "docs":
+                assert page.stem in listed | {"index"}, f"{page.name} stands in no list of docs/index.md"
+            case "docs/decisions":
+                assert page.stem == "index" or (page.stem.startswith("0") and "\n0*\n" in decisions)
+            case "docs/tutorials":
+                assert "\ntutorials/*\n" in index
