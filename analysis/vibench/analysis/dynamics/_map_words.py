@@ -37,7 +37,14 @@ class RecordedLevel:
 
 
 def motion_classes(results: MapResults, start: int = 0) -> Reals:
-    """Give the place in `MOTION_CLASSES` of each point over what varies, from one start; NaN: not known."""
+    """Give the place in `MOTION_CLASSES` of each point, from the start of number ``start``; NaN: not known.
+
+    Returns
+    -------
+    ndarray
+        Of the shape of what varies.
+
+    """
     motion, period, impacts = (results.shown(name, start) for name in ("motion", "period", "impact_rate"))
     kinds = list(MotionKind)
     found = np.full(motion.shape, np.nan)
