@@ -11,6 +11,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
         "sound": ("sounddevice",),
         "gui": ("PySide6", "pyqtgraph"),
+        "sound": ("sounddevice",),
     }
 )
 """Extra of `pyproject.toml`: what it brings, by the names that are imported."""
@@ -37,7 +38,7 @@ def need_extra(extra: str) -> None:
 
 
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
-    """Wrap the ``__getattr__`` of a face whose names need an extra: what is missing is told with its name.
+    """Wrap the ``__getattr__`` of a face whose names need an extra: what is missing is told with its extra.
 
     Parameters
     ----------
@@ -59,7 +60,8 @@ def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[st
         except ModuleNotFoundError as error:
             if error.name is None or error.name.partition(".")[0] in {"vibench", name}:
                 raise
-            raise _missing(error.name, extra) from error
+            own = (each for each, libraries in EXTRAS.items() if error.name in libraries)
+            raise _missing(error.name, next(own, extra)) from error
 
     return told
 

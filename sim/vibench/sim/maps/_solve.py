@@ -90,7 +90,10 @@ def compute_map(
     observer: StudyObserver | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
-    """Compute what a store misses of a map, until ``cancelled``, and fill in the rest; the solver is `settle_scene`."""
+    """Compute what a store misses of a map, until ``cancelled``, and fill in the rest.
+
+    The solver is `settle_scene`.
+    """
     end = run_points(MapPoints(plan), executor, store, observer, cancelled)
     if end is StudyEnd.COMPLETE:
         fill_in(plan, store)
