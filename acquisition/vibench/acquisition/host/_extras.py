@@ -11,7 +11,6 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
         "sound": ("sounddevice",),
         "gui": ("PySide6", "pyqtgraph"),
-        "sound": ("sounddevice",),
     }
 )
 """Extra of `pyproject.toml`: what it brings, by the names that are imported."""
