@@ -40,10 +40,10 @@ def test_the_version_is_that_of_the_package(vibench_here, tmp_path):
     assert vibench_here("--version", cwd=tmp_path).stdout == f"vibench {version('vibench')}\n"
 
 
-def test_a_shipped_campaign_is_estimated_by_name_from_an_empty_folder(vibench_here, tmp_path):
-    told = vibench_here("measure", "quick", "--out", "out", "--estimate", "--json", cwd=tmp_path)
-    assert json.loads(told.stdout)["recordings"] == 15
-    assert not (tmp_path / "out").exists()
+def test_a_shipped_study_is_planned_by_name_from_an_empty_folder(vibench_here, tmp_path):
+    told = vibench_here("study", "paper", "--out", "out.h5", "--estimate", "--json", cwd=tmp_path)
+    assert json.loads(told.stdout)["points"] == 17730
+    assert not (tmp_path / "out.h5").exists()
 
 
 def test_copies_of_what_is_shipped_are_whole_and_never_overwrite(vibench_here, tmp_path):
