@@ -17,6 +17,7 @@ from ._noise_response import (
 )
 from ._periodic import (
     PeriodicFrequencyResponse as PeriodicFrequencyResponse,
+    PeriodicSums as PeriodicSums,
 )
 from ._request import (
     FrequencyResponseRequest as FrequencyResponseRequest,

@@ -1,0 +1,51 @@
+"""The table's mass is told by how the specimen's resonances pull at the base."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from vibench.acquisition import open_bench, run_measurement
+from vibench.acquisition.plan import Measurement, MultisineNoise
+from vibench.acquisition.rig import load_rig
+from vibench.analysis import Simulation, analyse_files, update_model
+from vibench.analysis.model_updating import Assumption
+
+RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+TRUE_KG = RIG.shaker.moving_mass_kg + RIG.shaker.fixture_mass_kg
+
+
+@pytest.fixture(scope="module")
+def updated(tmp_path_factory):
+    """Fit what the virtual rig, whose configuration is right, shows of weak noise."""
+    plan = MultisineNoise(
+        amplitude_vpp=0.05,
+        band_start_hz=50,
+        band_stop_hz=600,
+        repetition_hz=2,
+        realisations=6,
+        periods=2,
+        settle_s=1.5,
+    )
+    path = tmp_path_factory.mktemp("table") / "weak.h5"
+    with open_bench(RIG) as bench:
+        run_measurement(bench, Measurement(name="weak", excitation=plan, ramp_s=0.3), path)
+    return update_model(analyse_files([path], "weak", Simulation.LEFT_OUT))
+
+
+def test_a_right_description_of_a_whole_rig_is_not_refused(updated):
+    assert updated.fits
+    assert updated.linear.reduced_chi_square < updated.linear.limit
+    assert updated.table.mass_kg == pytest.approx(TRUE_KG, abs=3.3 * updated.table.sd_kg)
+    assert updated.table.sd_kg < 0.01 * TRUE_KG
+    assert updated.table.suspects == ()
+
+
+def test_a_table_that_is_a_tenth_heavier_than_described_is_named(updated):
+    heavier = replace(updated, table=replace(updated.table, described_kg=TRUE_KG / 1.1))
+    assert not heavier.fits
+    (suspect,) = heavier.suspects
+    assert suspect.assumption is Assumption.TABLE_MASS
+    assert "all three masses of the specimen" in suspect.sentence
+    assert [each for each in heavier.sentences if each.startswith("The table does not fit")]
+    assert heavier.values == updated.values
