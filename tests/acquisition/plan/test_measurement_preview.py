@@ -57,3 +57,13 @@ def test_a_long_sweep_is_shown_from_a_bounded_number_of_samples(rig):
 )
 def test_the_band_is_what_is_excited(name, band_hz):
     assert QUICK[name].excitation.band_hz == band_hz
+
+
+def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_said_without_it(rig):
+    assert preview_measurement(QUICK["dwell"], rig).least_growth_time_s is None
+    smart = load_campaign(ROOT / "campaigns" / "smart.toml").measurements
+    (dwell,) = (each for each in smart if each.name == "dwell_260")
+    prompt = preview_measurement(dwell, rig).least_growth_time_s
+    assert prompt == pytest.approx(2.0)
+    slow = rig.model_copy(update={"generator": rig.generator.model_copy(update={"settle_s": 0.1})})
+    assert preview_measurement(dwell, slow).least_growth_time_s == pytest.approx(2.0 + 10 * 2 * 0.1)

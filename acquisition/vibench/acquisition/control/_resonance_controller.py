@@ -19,7 +19,7 @@ from ._sine_loop import SineLoop
 from ._start import moved, started
 from ._stroboscope import Periods
 
-_LOOP_GAIN = 0.5
+_LOOP_GAIN = 0.3
 """Part of the error of the phase that the phase-locked loop takes out at each look."""
 _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
 """An error that keeps more than this of itself in a look makes the gain grow by this factor, up to this."""
@@ -29,6 +29,8 @@ _CORRECTED = 0.5
 """Standard uncertainty of the correction for the phase that is left, as a share."""
 _LEFT = 2.0
 """How far the motion may have to go still, over the tolerance of the phase in radians."""
+_TOLD = 0.02
+"""Spread of frequencies, over the half-width, from which on their errors tell another half-width."""
 _AHEAD = 0.5
 """Part of the way from the level before that is gone ahead."""
 _LOOKS_LOCKED = 3
@@ -132,13 +134,17 @@ class PhaseLaw:
 
     @property
     def seen_half_width_hz(self) -> float:
-        """Half-width by the line through the newer half of frequencies and errors, or the one given [Hz]."""
+        """Half-width by the line through the newer half of frequencies and errors, or the one given [Hz].
+
+        Where the frequency hardly moved the line tells nothing: the given one counts as points of its own.
+        """
         frequency_hz, rested_rad = np.array(self._rested[len(self._rested) // 2 :]).T
         away_hz = frequency_hz - frequency_hz.mean()
-        fallen = -float(away_hz @ rested_rad)
+        given = len(away_hz) * (_TOLD * self._half_width_hz) ** 2
+        fallen = given / self._half_width_hz - float(away_hz @ rested_rad)
         if fallen <= 0.0:
             return self._half_width_hz * _LARGEST_GAIN / _LOOP_GAIN
-        return max(self._half_width_hz, float(away_hz @ away_hz) / fallen)
+        return max(self._half_width_hz, (given + float(away_hz @ away_hz)) / fallen)
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
         """Take in a look; gives the error of the phase [rad] and what the motion has still to go, a share."""

@@ -14,6 +14,8 @@ from ._sine_loop import SineLoop
 from ._steadiness import Judgement, judged
 
 _SURE = 2.0
+_PROMPT = 0.7
+"""Part of a correction that is made at once where the specimen still answers the one before."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,9 @@ class SettlingController:
         assert self.level is not None
         control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         seen = MeasuredLevel(measured.amplitude, 0.0)
-        return control.next_vpp(self.loop.setting.setting_vpp, seen, self.level.acceleration_at(frequency_hz))
+        now_vpp = self.loop.setting.setting_vpp
+        next_vpp = control.next_vpp(now_vpp, seen, self.level.acceleration_at(frequency_hz))
+        return float(now_vpp * (next_vpp / now_vpp) ** _PROMPT)
 
     def held(self, measured: MeasuredLevel) -> Held:
         """Say whether a measured level is the one to be held."""

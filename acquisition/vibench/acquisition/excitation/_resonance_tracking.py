@@ -12,6 +12,9 @@ from ._feedback import MOST_PERIODS, BaseLevel, Settling, Share
 from ._plan import AbstractFeedback, Family, FrequencyHz
 from ._steps import Segment, Step, Tone
 
+_MOST_CHANGE = 1.6
+"""Of the setting at once: levels are close together, and a loop of 150 periods has none to spare."""
+
 
 class ResonanceTracking(AbstractFeedback):
     """Phase resonance of one mode at rising (or falling) levels of the base: its backbone.
@@ -88,7 +91,7 @@ class ResonanceTracking(AbstractFeedback):
     def held_levels(self) -> tuple[BaseLevel, ...]:
         """All levels, in the order played."""
         return tuple(
-            BaseLevel(acceleration_m_per_s2=each, tolerance=self.level_tolerance)
+            BaseLevel(acceleration_m_per_s2=each, tolerance=self.level_tolerance, most_change=_MOST_CHANGE)
             for each in self.accelerations_m_per_s2
         )
 

@@ -4,10 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..excitation import Samples, SignalPreview
+from vibench.sim.branches import least_growth_time_s
+
+from ..excitation import EXCITATION_KINDS, Samples, SignalPreview
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._limits import LimitCheck, limit_checks
+from ._loop_time import loop_time_s
 from ._measurement import Measurement
 from ._schedule import duration_s
 
@@ -38,6 +41,8 @@ class MeasurementPreview:
     """From the first ramp to the last [s]."""
     size_bytes: int
     """Of the recording while it is made."""
+    least_growth_time_s: float | None
+    """What grows by e in this time or longer, feedback on this rig can hold; None without feedback [s]."""
 
     @property
     def is_allowed(self) -> bool:
@@ -68,8 +73,16 @@ def preview_measurement(measurement: Measurement, rig: Rig) -> MeasurementPrevie
         peak_v=preview.peak_v,
         checks=tuple(checks),
         duration_s=length_s,
+        least_growth_time_s=_least_growth_time_s(measurement, rig),
         size_bytes=round(length_s * rig.daq.sample_rate_hz) * len(rig.daq.channels) * BYTES_PER_SAMPLE,
     )
+
+
+def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
+    excitation = measurement.excitation
+    if not EXCITATION_KINDS[excitation.kind].is_feedback:
+        return None
+    return least_growth_time_s(loop_time_s(rig, excitation.band_hz[0]))
 
 
 def _shown_rate_hz(playing_s: float, highest_hz: float, converter_hz: float) -> float:

@@ -3,15 +3,13 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
-
-from ..kernels import Floats
+from numpy.typing import ArrayLike, NDArray
 
 UPDATES_TO_HOLD = 10.0
 """A loop holds what takes this many of its updates to grow by e: it must see a departure and answer it."""
 
 
-def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> Floats:
+def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
     """Give the time in which a small distance from a motion grows by e; infinite where it does not grow.
 
     It is T / ln|mu| with T the period of the motion, and holds where the base moves as prescribed.

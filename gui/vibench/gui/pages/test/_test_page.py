@@ -53,6 +53,8 @@ def summary_text(seen: MeasurementPreview) -> str:
     parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
     parts.append(f"takes {clock(seen.duration_s)}")
     parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
+    if seen.least_growth_time_s is not None:
+        parts.append(f"holds motions that take {seen.least_growth_time_s:.3g} s or more to grow by e")
     passed = [check for check in seen.checks if not check.is_kept]
     broken = sorted(passed, key=lambda check: not check.forbids)
     said = "   ·   ".join(parts)
