@@ -8,8 +8,9 @@ import numpy as np
 from ..instruments import Block
 from ..rig import Channel, Role
 
-DELAY_S = 1e-3
-"""A converter's filter delays every channel by up to so much [s]: cycles, over a span of frequencies."""
+DELAY_SAMPLES = 40
+"""A delta-sigma converter's filter delays every channel by about so much (NI 9234: 38.4): cycles, over a span
+of frequencies."""
 
 
 class GlideWatch:
@@ -58,5 +59,5 @@ class GlideWatch:
         """
         if self._began is None:
             return 0.0
-        delayed = DELAY_S * abs(self._last_hz - self._began[1])
+        delayed = DELAY_SAMPLES / self._rate_hz * abs(self._last_hz - self._began[1])
         return float(np.sign(self._more) * max(0.0, abs(self._more) - delayed))
