@@ -36,7 +36,7 @@ def test_a_window_that_is_busy_for_a_second_stops_nothing_and_a_campaign_is_left
     reach(EngineState.ARMED)
     window.user_actions.start()
     reach(EngineState.RUNNING)
-    qtbot.waitUntil(lambda: bridge.status.samples > 0)
+    qtbot.waitUntil(lambda: bridge.status.samples > 0, timeout=PATIENCE_MS)
     assert seen[-1].attendance.value == "attended"
     sleep(1.5)  # a picture that takes so long, or a computer with other things to do
     qtbot.wait(300)

@@ -7,6 +7,7 @@ import sys
 from concurrent.futures.process import BrokenProcessPool
 from math import factorial
 from pathlib import Path
+from time import sleep
 
 import pytest
 
@@ -124,3 +125,14 @@ def test_a_job_is_over_when_its_answer_was_handed_over_and_not_before(background
     qtbot.waitUntil(lambda: jobs[1].future is not None and jobs[1].future.done(), timeout=20_000)
     qtbot.waitUntil(lambda: answers == [6, 24], timeout=20_000)
     assert seen == [[True, False], [True, True]]
+
+
+def test_a_preview_comes_while_long_work_keeps_every_other_process(context, qtbot):
+    """Analyses that took minutes had the Test page wait behind them."""
+    for _ in range(4):
+        context.background.ask(sleep, lambda _: None, lambda _: None, 3600.0)
+    answers = []
+    context.looks.ask(abs, answers.append, answers.append, -2)
+    qtbot.waitUntil(lambda: answers == [2], timeout=100_000)
+    context.background.close()
+    assert not context.looks.is_busy

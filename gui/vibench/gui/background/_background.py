@@ -94,6 +94,8 @@ class Background(QObject):
         pool = self._started()
         for _ in range(self._workers):
             pool.submit(os.getpid)
+        for beside in self.findChildren(Background):
+            beside.prepare()
 
     def ask(
         self,
@@ -132,7 +134,9 @@ class Background(QObject):
         return self._pool
 
     def close(self) -> None:
-        """End the processes; what has not been answered is dropped."""
+        """End the processes, those of its children too; what has not been answered is dropped."""
+        for beside in self.findChildren(Background):
+            beside.close()
         self._is_closed = True
         self._timer.stop()
         self._jobs.clear()

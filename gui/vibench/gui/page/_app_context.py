@@ -15,7 +15,7 @@ from ._settings import Remembered, Settings
 USUAL_PATIENCE_S = 2.0
 MOST_RECENT = 12
 WORKERS = 2
-"""One for previews, which must be quick, and one for whatever takes long."""
+"""For whatever takes long: predictions, analyses, overviews, exports."""
 
 
 class AppContext(QObject):
@@ -52,6 +52,8 @@ class AppContext(QObject):
         self.bridge.noticed.connect(self.noticed)
         self.bridge.recording_ended.connect(self.recording_made)
         self.background = Background(WORKERS, self)
+        self.looks = Background(1, self.background)
+        """For what must come at once, whatever takes long beside it: previews."""
         self._theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
 
     @property

@@ -90,7 +90,7 @@ class QueuePage(Page):
             "Hold (drive on)", "Stay where the run is; the drive stays on", self._hold
         )
         self._looking = LatestRequest(
-            context.background, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
+            context.looks, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
         )
         self._lay_out()
         self._connect()

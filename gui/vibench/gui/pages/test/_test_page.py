@@ -104,7 +104,7 @@ class TestPage(Page):
         self.arm_button.setProperty("rank", "first")
         self.arm_button.setToolTip("Show in words what will happen; nothing plays before Start")
         self._looking = LatestRequest(
-            context.background, preview_test, self._looked, self._look_failed, LOOK_MS, self
+            context.looks, preview_test, self._looked, self._look_failed, LOOK_MS, self
         )
         self._predicting = LatestRequest(
             context.background, predict_test, self._predicted, self._prediction_failed, PREDICT_MS, self
