@@ -73,10 +73,10 @@ def seeded(rig: Rig, seed: int) -> Rig:
     return rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"seed": seed})})
 
 
-def same_dwell(seeds: int) -> Iterator[Compared]:
+def same_dwell(first_seed: int, seeds: int) -> Iterator[Compared]:
     """Repeat one chaotic dwell."""
     plan = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.5, duration_s=4.0)
-    for seed in range(1000, 1000 + seeds):
+    for seed in range(first_seed, first_seed + seeds):
         yield from compared(seeded(RIG, seed), plan, f"seed {seed}")
 
 
@@ -144,12 +144,13 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--ranks", type=int, default=0, metavar="SEEDS")
+    parser.add_argument("--first-seed", type=int, default=1000, help="of the ranks")
     parser.add_argument("--rigs", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true")
     asked = parser.parse_args()
     found = []
-    for scenes in (same_dwell(asked.ranks), random_scenes(asked.rigs, asked.seed)):
+    for scenes in (same_dwell(asked.first_seed, asked.ranks), random_scenes(asked.rigs, asked.seed)):
         for each in scenes:
             found.append(each)
             place = "" if each.rank is None else f", rank {each.rank} of {each.draws}"

@@ -50,7 +50,7 @@ def described_wrong(rng, true):
 @pytest.mark.slow
 def test_random_specimens_described_wrong_are_followed_and_bounds_cover(world_recording):
     rng = np.random.default_rng(SEED)
-    covered, bounds = 0, 0
+    parts = []
     for number in range(RIGS):
         true = true_specimen(rng)
         wrong = described_wrong(rng, true)
@@ -70,8 +70,9 @@ def test_random_specimens_described_wrong_are_followed_and_bounds_cover(world_re
         told = tracked_specimen(true)
         for each in motion.parameters:
             if each.is_determined:
-                bounds += 1
-                covered += each.low < value_of(told, each.what) < each.high
-    # Three standard deviations of a binomial of 95 % below its mean.
+                parts.append(abs(value_of(told, each.what) - each.value) / each.half_width)
+    bounds, covered = len(parts), sum(part < 1.0 for part in parts)
+    # Three standard deviations of a binomial of 95 % below its mean; and no wider by far than that asks.
     assert covered > 0.95 * bounds - 3 * np.sqrt(0.95 * 0.05 * bounds)
+    assert np.median(parts) > 0.1
     assert bounds > 8 * RIGS

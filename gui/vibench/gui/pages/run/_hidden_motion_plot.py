@@ -45,7 +45,7 @@ class HiddenMotionPlot(QWidget):
         self._end = (0, -1)
         self.plot.setXRange(-_BACK_S, _AHEAD_S, padding=0)
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setContentsMargins(8, 4, 0, 0)
         layout.addWidget(self.said)
         layout.addWidget(self.plot, 1)
         self.clear()
