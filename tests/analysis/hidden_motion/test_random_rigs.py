@@ -68,9 +68,11 @@ def test_random_specimens_described_wrong_are_followed_and_bounds_cover(world_re
         assert np.mean(followed) > 0.98, (number, kind, level)
         assert np.sqrt(np.mean(error[followed] ** 2)) < 0.1e-6, (number, kind, level)
         told = tracked_specimen(true)
-        for each in motion.parameters:
-            if each.is_determined:
-                parts.append(abs(value_of(told, each.what) - each.value) / each.half_width)
+        parts += [
+            abs(value_of(told, each.what) - each.value) / each.half_width
+            for each in motion.parameters
+            if each.is_determined
+        ]
     bounds, covered = len(parts), sum(part < 1.0 for part in parts)
     # Three standard deviations of a binomial of 95 % below its mean; and no wider by far than that asks.
     assert covered > 0.95 * bounds - 3 * np.sqrt(0.95 * 0.05 * bounds)
