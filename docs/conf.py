@@ -32,6 +32,8 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 python_maximum_signature_line_length = 90
 napoleon_use_rtype = False
+# napoleon takes what stands before the first colon of a field's text for a type, and finds several of that name.
+suppress_warnings = ["ref.python"]
 
 HERE = Path(__file__).parent
 FACES = re.findall(
@@ -72,15 +74,6 @@ def _as_code_or_link(
         )
 
 
-def _no_type_before_a_colon(
-    _app: object, what: str, _name: str, _object: object, _options: object, lines: list[str]
-) -> None:
-    """Keep napoleon from taking what stands before the first colon of a field's text for the field's type."""
-    if what in {"attribute", "property"}:
-        lines.insert(0, "")
-
-
 def setup(app: object) -> None:
     """Register with Sphinx."""
-    app.connect("autodoc-process-docstring", _no_type_before_a_colon, priority=100)  # type: ignore[attr-defined]
     app.connect("autodoc-process-docstring", _as_code_or_link, priority=900)  # type: ignore[attr-defined]
