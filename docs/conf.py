@@ -32,7 +32,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 python_maximum_signature_line_length = 90
 napoleon_use_rtype = False
-# napoleon takes what stands before the first colon of a field's text for a type, and finds several of that name.
+# napoleon takes what stands before the first colon of a field's text for a type, and finds several.
 suppress_warnings = ["ref.python"]
 
 HERE = Path(__file__).parent
