@@ -151,14 +151,15 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
     per_volt = np.abs(RigModel(rig).transfer(BaseQuantity.ACCELERATION, own_hz))
     base = (rms_v * per_volt) ** 2 / (high_hz - low_hz)
     response = base * (moved / (2 * np.pi * own_hz)) ** 2
-    collides = _fills_gap(specimen, rig, rms_v, low_hz, high_hz)
-    cause = Cause.CHANCE if collides else Cause.NOISE
+    if _fills_gap(specimen, rig, rms_v, low_hz, high_hz):
+        yield Expected("resonances and transmissibility", time_s, None, Cause.CHANCE, 0.0, ())
+        return
     for hz, damping, x, u in zip(own_hz, specimen.damping_ratios, response, base, strict=True):
         if not low_hz <= hz <= high_hz:
             continue
         half_hz = float(damping * hz)
         pole = None
-        if noise is not None and not collides:
+        if noise is not None:
             # Relative variance of a line times its width and the recording time.
             line = (noise[0] / x + noise[1] / u) / 2.0
             pole = float(np.sqrt(line / time_s / half_hz / (np.pi / 4)))
@@ -167,13 +168,15 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
         lasting = float(stated.clock.relative or 0.0)
         where = f"{hz:.0f} Hz"
         scaled = None if pole is None else pole * float(damping)
-        yield Expected(f"resonance at {where}, frequency", time_s, scaled, cause, lasting, _missing(clock))
-        yield Expected(f"resonance at {where}, damping ratio", time_s, pole, cause, 0.0, ())
+        yield Expected(
+            f"resonance at {where}, frequency", time_s, scaled, Cause.NOISE, lasting, _missing(clock)
+        )
+        yield Expected(f"resonance at {where}, damping ratio", time_s, pole, Cause.NOISE, 0.0, ())
         yield Expected(
             f"transmissibility at {where}",
             time_s,
             ratio,
-            cause,
+            Cause.NOISE,
             float(np.hypot(stated.scale_sd, lasting)),
             _missing(stated.response, stated.base, clock),
         )
