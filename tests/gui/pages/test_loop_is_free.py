@@ -161,7 +161,7 @@ def of_simulate(window):
 
 def of_queue(window):
     queue, entries, rows = window.pages[QUEUE], window.pages[QUEUE].entries, window.pages[QUEUE].rows
-    night = with_sweep(None, SHOWN_TOO, SweepAxis.LEVEL, Range(start=0.5, stop=1.5, count=MANY))
+    night = with_sweep(None, SHOWN_TOO, SweepAxis.LEVEL, Range(start=0.5, stop=1.5, count=MANY), None)
     paper = shipped("campaigns/paper.toml")
     yield Action("look at Queue", lambda: window.show_page(QUEUE))
     yield Action("open a campaign", lambda: queue.open_file(paper), lambda: entries.rowCount() > 1)

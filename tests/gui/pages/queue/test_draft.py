@@ -2,8 +2,9 @@
 
 import pytest
 
-from vibench.acquisition import ConfigurationError, load_campaign, save_toml
+from vibench.acquisition import ConfigurationError, load_campaign, save_toml, shipped
 from vibench.acquisition.plan import Measurement, Range, SweepAxis
+from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.queue._draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(
@@ -12,6 +13,7 @@ DWELL = Measurement.model_validate(
         "excitation": {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "duration_s": 2},
     }
 )
+RIG = load_rig(shipped("hardware_configs/virtual_rig.toml"))
 LEVELS = Range(start=0.5, stop=2.5, count=5)
 
 
@@ -25,14 +27,14 @@ def test_the_same_test_twice_gets_two_names():
 
 
 def test_a_sweep_over_the_level_makes_a_recording_a_level():
-    campaign = with_sweep(with_measurement(None, DWELL), DWELL, SweepAxis.LEVEL, LEVELS)
+    campaign = with_sweep(with_measurement(None, DWELL), DWELL, SweepAxis.LEVEL, LEVELS, RIG)
     levels = [each.excitation.amplitude_vpp for _, each in campaign.recordings()]
     assert levels == [1.5, 0.5, 1.0, 1.5, 2.0, 2.5]
 
 
 def test_a_sweep_past_what_the_generator_can_play_is_refused():
     with pytest.raises(ConfigurationError, match=r"amplitude_vpp"):
-        with_sweep(None, DWELL, SweepAxis.LEVEL, Range(start=1, stop=100, count=2))
+        with_sweep(None, DWELL, SweepAxis.LEVEL, Range(start=1, stop=100, count=2), RIG)
 
 
 def test_entries_change_places_and_go_away():
@@ -45,7 +47,7 @@ def test_entries_change_places_and_go_away():
 
 def test_a_saved_campaign_reads_back_as_the_same_one(tmp_path):
     campaign = with_sweep(
-        with_measurement(None, DWELL), DWELL, SweepAxis.FREQUENCY, Range(start=200, stop=300, step=50)
+        with_measurement(None, DWELL), DWELL, SweepAxis.FREQUENCY, Range(start=200, stop=300, step=50), None
     )
     save_toml(campaign, tmp_path / "sub" / "queue.toml")
     assert load_campaign(tmp_path / "sub" / "queue.toml") == campaign

@@ -4,8 +4,9 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel
 
-from vibench.acquisition import validated
+from vibench.acquisition import ConfigurationError, validated
 from vibench.acquisition.plan import Campaign, Measurement, Range, SweepAxis
+from vibench.acquisition.rig import Rig
 
 USUAL_NAME = "queue"
 
@@ -20,9 +21,12 @@ def with_measurement(campaign: Campaign | None, measurement: Measurement) -> Cam
 
 
 def with_sweep(
-    campaign: Campaign | None, measurement: Measurement, axis: SweepAxis, values: Range
+    campaign: Campaign | None, measurement: Measurement, axis: SweepAxis, values: Range, rig: Rig | None
 ) -> Campaign:
-    """Add a sweep of a test along an axis; raises ConfigurationError when a point of it is not allowed."""
+    """Add a sweep of a test along an axis; raises ConfigurationError when a point of it is not allowed.
+
+    What only a simulation foretells (loads of shaker and specimen) is checked when the campaign is armed.
+    """
     taken = set() if campaign is None else {sweep.name.lower() for sweep in campaign.sweeps}
     template = _dump(measurement)
     del template["name"]
@@ -31,8 +35,11 @@ def with_sweep(
         "measurement": template,
         axis.value: values.model_dump(mode="json", exclude_none=True),
     }
+    alone = validated({"name": USUAL_NAME, "sweeps": [sweep]}, Campaign, "the sweep")
+    if rig is not None:
+        _require_playable(alone, rig)
     if campaign is None:
-        return validated({"name": USUAL_NAME, "sweeps": [sweep]}, Campaign, "the sweep")
+        return alone
     return _changed(campaign, sweeps=[*_dumped(campaign.sweeps), sweep])
 
 
@@ -57,6 +64,16 @@ def moved_up(campaign: Campaign, number: int) -> Campaign:
         return campaign
     kind[place - 1], kind[place] = kind[place], kind[place - 1]
     return _changed(campaign, measurements=measurements, sweeps=sweeps)
+
+
+def _require_playable(campaign: Campaign, rig: Rig) -> None:
+    asked = max(each.excitation.highest_amplitude_vpp for _, each in campaign.recordings())
+    allowed = rig.generator.amplitude_limit_vpp
+    if asked > allowed:
+        raise ConfigurationError(
+            f"The sweep asks for up to {asked:g} Vpp; amplitude_vpp may be {allowed:g} Vpp at most on this "
+            "bench (amplitude_limit_vpp of the hardware configuration): lower its levels."
+        )
 
 
 def _changed(campaign: Campaign, **parts: object) -> Campaign:

@@ -210,7 +210,8 @@ class QueuePage(Page):
             self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
             return
         try:
-            campaign = with_sweep(self.context.selection.campaign, measurement, axis, values)
+            chosen = self.context.selection
+            campaign = with_sweep(chosen.campaign, measurement, axis, values, chosen.rig)
         except ConfigurationError as error:
             self.context.say(notice_of(error))
         else:
