@@ -59,6 +59,9 @@ CALLS = {
     ),
     sim.periodic_orbit: lambda **words: sim.periodic_orbit(SMOOTH, DRIVE, start=np.zeros(6), **words),
     sim.periodic_branch: lambda **words: sim.periodic_branch(orbit(), stop=130.01, **words),
+    sim.phase_resonance_branch: lambda **words: sim.phase_resonance_branch(
+        SMOOTH, (490.0, 510.0), (1e-8, 1.1e-8), **words
+    ),
     sim.harmonic_balance_branch: balanced_branch,
     sim.check_balance: lambda **words: sim.check_balance(SMOOTH, balance(), duration_s=0.1, **words),
     chain.integrate_chain: lambda **words: chain.integrate_chain(

@@ -22,6 +22,7 @@ HELD_UM = {
     "smart-mode_1": 0.287,
     "smart-mode_2": 0.221,
     "smart-mode_3": 0.0633,
+    "smart-backbone_1": 1.872,
     "smart-steps_there_and_back": 5.0,
     "smart-period_2": 30.0,
     "smart-period_3": 40.0,

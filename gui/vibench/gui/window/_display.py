@@ -30,7 +30,9 @@ def display_trouble() -> str:
         import PySide6.QtWidgets  # noqa: F401, PLC0415 - whether it loads is the question
     except ImportError as error:
         return f"Qt cannot be loaded ({error}); on Debian: apt-get install {LINKED}"
-    if sys.platform != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
+    # As a variable: a checker of types for another system would find the rest unreachable.
+    system: str = sys.platform
+    if system != "linux" or os.environ.get("QT_QPA_PLATFORM", "xcb").partition(":")[0] != "xcb":
         return ""
     if os.environ.get("WAYLAND_DISPLAY"):
         return ""

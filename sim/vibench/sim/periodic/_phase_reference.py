@@ -1,6 +1,7 @@
 """Which motion has the phase of a resonance: apart, as plans name it, which load no compiled code."""
 
 from enum import StrEnum
+from typing import Literal
 
 
 class PhaseReference(StrEnum):
@@ -14,3 +15,6 @@ class PhaseReference(StrEnum):
     def motion(self, transmissibility: complex) -> complex:
         """Give the motion whose phase counts, over that of the base, from m0's displacement over it."""
         return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
+
+
+PhaseReferenceWord = Literal["relative", "absolute"]

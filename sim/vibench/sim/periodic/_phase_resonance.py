@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..kernels import Table, Vector
-from ..model import Harmonic, Specimen, base_transmissibility
+from ..model import Harmonic, Specimen, base_transmissibility, chosen
 from ..motion import state_scales
 from ._branch import Branch
 from ._branch_following import Family, OrbitReport, follow
@@ -23,7 +23,7 @@ from ._drive_path import AmplitudePath, DrivePath
 from ._frequency_time import phasors_of
 from ._orbit_branch import OrbitFamily
 from ._period_map import OrbitShape, PeriodMap
-from ._phase_reference import PhaseReference
+from ._phase_reference import PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
@@ -114,7 +114,7 @@ def phase_resonance_branch(
     specimen: Specimen,
     band_hz: tuple[float, float],
     levels_m: tuple[float, float],
-    of: PhaseReference = PhaseReference.RELATIVE,
+    of: PhaseReference | PhaseReferenceWord = PhaseReference.RELATIVE,
     phase_rad: float = QUARTER_BEHIND,
     steps: ArcSteps = STEPS,
 ) -> Branch:
@@ -140,10 +140,11 @@ def phase_resonance_branch(
     Raises
     ------
     ValueError
-        When no mode in the band has this phase, or the lower level already reaches the stops.
+        When no mode in the band has this phase, the lower level already reaches the stops, or `of` is no
+        word of `PhaseReference`.
 
     """
-    low_m, high_m = levels_m
+    (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
     frequency_hz = linear_phase_resonance_hz(specimen, band_hz, of, phase_rad)
     drive = Harmonic(frequency_hz, low_m)
     answer = base_transmissibility(specimen, frequency_hz)[0]
