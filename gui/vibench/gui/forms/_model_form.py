@@ -64,9 +64,14 @@ class ModelForm(QWidget):
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
-        """Say what a file would say; values that are not given are left out."""
+        """Say what a file would say; what is not given is left out, or None where that has a meaning."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
-        return {**self._fixed, **{name: value for name, value in given.items() if value is not None}}
+        said = {
+            name: value
+            for name, value in given.items()
+            if value is not None or _may_be_emptied(self.model.model_fields[name])
+        }
+        return {**self._fixed, **said}
 
     def show_content(self, content: Mapping[str, Any]) -> None:
         """Show what a file says; what it does not say is shown as the plan's own default."""
@@ -264,6 +269,11 @@ def _kind_of(model: type[BaseModel]) -> str:
     return str(model.model_fields["kind"].default)
 
 
+def _may_be_emptied(field: FieldInfo) -> bool:
+    """Say whether an empty field means something else than the default."""
+    return unwrapped(field.annotation)[1] and not field.is_required() and _default(field) is not None
+
+
 def _default(field: FieldInfo) -> Any:
     if field.is_required():
         return None
@@ -332,7 +342,7 @@ class JudgedForm(QWidget, Generic[Model]):
 
     def show_value(self, value: Model) -> None:
         """Show other content."""
-        self.form.show_content(value.model_dump(mode="json", exclude_none=True))
+        self.form.show_content(value.model_dump(mode="json"))
 
     def _judge(self) -> None:
         complaints: dict[Loc, str] = {}

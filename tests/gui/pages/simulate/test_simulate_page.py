@@ -178,6 +178,15 @@ def test_plots_follow_the_theme_and_carry_units(page):
     assert "µm" in page.plots.motion.up.labelText
 
 
+def test_a_signal_is_left_out_by_emptying_its_field(page):
+    page.form.form.show_content({})
+    editor = page.form.form.editors["signal_hz"]
+    assert page.form.value.signal_hz == 260.0
+    editor.show_content(None)
+    page.form.form.changed.emit()
+    assert page.form.value.signal_hz is None
+
+
 def test_curves_of_another_scene_than_the_form_says_lie_under_a_veil_and_the_scene_is_kept(page):
     page._request = SimulationRequest(**LINEAR)
     page.form.show_value(SimulationRequest(**LINEAR))
