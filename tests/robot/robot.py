@@ -127,7 +127,8 @@ class Robot:
         self.window.close = lambda: False
         self.window.show()
         self._modals = QTimer(interval=300)
-        self._modals.timeout.connect(self._close_modal)
+        # Apart from the timer, which would wait for a slot that itself opens a dialog ("no such folder").
+        self._modals.timeout.connect(lambda: QTimer.singleShot(0, self._close_modal))
         self._modals.start()
         self.deeds = {
             self.press_key: 8, self.press_chord: 4, self.click: 8, self.type_value: 6, self.choose: 3,

@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication
 
-from vibench.gui.plots import LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
+from vibench.gui.plots import LIMIT, LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
 from vibench.gui.plots._axis import thinned
 from vibench.gui.plots._saved_plot import write_plot
 from vibench.gui.widgets import LIGHT
@@ -168,3 +168,17 @@ def test_what_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):
     plot.setEnabled(False)
     qapp.processEvents()
     assert dark_pixels(plot) > before + 20
+
+
+def test_a_level_stays_at_its_value_when_the_scale_turns_and_hides_where_there_is_no_place_for_it(plot):
+    zero, high = plot.level(LIMIT, 0.0), plot.level(LIMIT, 100.0)
+    plot._turn_scale()
+    assert (zero.isVisible(), high.value()) == (False, 2.0)
+    below = plot.level(LIMIT, -1.0)
+    plot._turn_scale()
+    assert (zero.value(), high.value(), below.value()) == (0.0, 100.0, -1.0)
+    assert zero.isVisible()
+    assert below.isVisible()
+    plot.wipe()
+    plot._turn_scale()
+    assert plot.level(LIMIT, 10.0).value() == 1.0

@@ -1,7 +1,7 @@
 """A plot as all pages draw it: labelled axes that follow the data without trembling, and a legend."""
 
 from collections.abc import Callable
-from math import log10
+from math import isfinite, log10
 
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
@@ -105,6 +105,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self._theme = theme
         self._named: list[tuple[str, pg.PlotDataItem]] = []
+        self._levels: dict[pg.InfiniteLine, float] = {}
         self._reading: Reading | None = None
         self._follows = False
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
@@ -181,9 +182,15 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         return self._line(line_style, self._across(value), 90, label, label_at)
 
     def level(self, line_style: LineStyle, value: float, label: str = "") -> pg.InfiniteLine:
-        """Add a level line at a value."""
-        shown = log10(value) if self._scales[1] is Scale.LOGARITHMIC else value
-        return self._line(line_style, shown, 0, label, 0.92)
+        """Add a level line at a value; a logarithmic scale has no place for one of zero or below."""
+        item = self._line(line_style, value, 0, label, 0.92)
+        self.move_level(item, value)
+        return item
+
+    def move_level(self, item: pg.InfiniteLine, value: float) -> None:
+        """Put a level line at another value; NaN hides it."""
+        self._levels[item] = value
+        self._place_levels()
 
     def wipe(self) -> None:
         """Take every curve, band and line away, for others."""
@@ -191,6 +198,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(self._grid, ignoreBounds=True)
         self._inked.clear()
         self._named.clear()
+        self._levels.clear()
         self._reading = None
         self._legend_entries.clear()
         self._curves.clear()
@@ -380,7 +388,15 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         up = Scale.LINEAR if self._scales[1] is Scale.LOGARITHMIC else Scale.LOGARITHMIC
         self._scales[1] = up
         self.getPlotItem().setLogMode(y=up is Scale.LOGARITHMIC)
+        self._place_levels()
         self.show_everything()
+
+    def _place_levels(self) -> None:
+        is_logarithmic = self._scales[1] is Scale.LOGARITHMIC
+        for item, value in self._levels.items():
+            item.setVisible(isfinite(value) and (value > 0 or not is_logarithmic))
+            if item.isVisible():
+                item.setValue(log10(value) if is_logarithmic else value)
 
     def _across(self, value: float) -> float:
         return log10(value) if self._scales[0] is Scale.LOGARITHMIC else value

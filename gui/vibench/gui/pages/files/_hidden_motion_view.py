@@ -1,5 +1,6 @@
 """p of m1 between its stops in the stretch in sight, told from base acceleration and m0's velocity."""
 
+from math import nan
 from pathlib import Path
 
 from PySide6.QtGui import QShowEvent
@@ -36,7 +37,7 @@ class HiddenMotionView(QWidget):
         self.plot = Plot("Hidden motion", TIME, _RELATIVE, theme).with_legend()
         self.tracked = self.plot.curve(curve_style(0), "tracked")
         self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
-        self._stops = [self.plot.level(LIMIT, 0.0, "stop") for _ in range(2)]
+        self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
         self.said = QLabel("")
         self.said.setProperty("rank", "second")
         self.said.setWordWrap(True)
@@ -122,8 +123,7 @@ class HiddenMotionView(QWidget):
         self.tracked.setData(found.time_s, found.p, connect="finite")
         self.free.setData(found.time_s, found.free_p, connect="finite")
         for line, place in zip(self._stops, found.stops_m, strict=True):
-            line.setValue(place)
-            line.show()
+            self.plot.move_level(line, place)
         self.said.setText(found.sentence)
         self.plot.setXRange(found.request.low_s, found.request.high_s, padding=0.0)
 
@@ -134,7 +134,7 @@ class HiddenMotionView(QWidget):
         for curve in (self.tracked, self.free):
             curve.setData([], [])
         for line in self._stops:
-            line.hide()
+            self.plot.move_level(line, nan)
         self.said.setText("")
         self.plot.with_hint(hint)
         self.plot.viewport().update()

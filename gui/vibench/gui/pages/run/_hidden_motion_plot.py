@@ -1,6 +1,7 @@
 """p of m1 between its stops as the live twin tells it, and a forecast that fades as its error grows."""
 
 from functools import partial
+from math import nan
 
 import numpy as np
 from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
@@ -37,7 +38,7 @@ class HiddenMotionPlot(QWidget):
         self.forecast = [
             self.plot.curve(LineStyle(partial(_faded, number), Dash.SOLID)) for number in range(_SHADES)
         ]
-        self._stops = [self.plot.level(LIMIT, 0.0, "stop") for _ in range(2)]
+        self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
         self.said = QLabel("")
         self.said.setProperty("rank", "second")
         self.said.setWordWrap(True)
@@ -64,8 +65,7 @@ class HiddenMotionPlot(QWidget):
         self.told.setData((np.arange(p.size) - p.size + 1) * twin.step_s, p, connect="finite")
         self._draw_forecast(twin)
         for line, place in zip(self._stops, twin.stops_m, strict=True):
-            line.setValue(place)
-            line.show()
+            self.plot.move_level(line, place)
         reach = 1.15 * max(map(abs, twin.stops_m))
         self.plot.keep_in_view(up=(-reach, reach))
 
@@ -74,7 +74,7 @@ class HiddenMotionPlot(QWidget):
         for curve in (self.told, *self.forecast):
             curve.setData([], [])
         for line in self._stops:
-            line.hide()
+            self.plot.move_level(line, nan)
         self.said.setText("The live twin is off.")
         self._end = (0, -1)
 
