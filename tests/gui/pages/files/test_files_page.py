@@ -283,3 +283,10 @@ def test_to_look_into_a_folder_does_not_redirect_recordings(page, folder, tmp_pa
     page._typed_folder()
     waited(lambda: len(shown.entries) >= 4)
     assert page._goes_to.text() == ""
+
+
+@pytest.mark.parametrize("typed", ["9" * 300, "a\0b", "~nobody of that name/x"])
+def test_a_name_that_no_system_allows_is_no_folder(page, typed):
+    page._folder_line.setText(typed)
+    page._typed_folder()
+    assert page._folder_line.text() == str(page._folder)

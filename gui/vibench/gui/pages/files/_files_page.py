@@ -1,5 +1,6 @@
 """Files: recordings of a folder, listed with state and picture, and opened at any zoom."""
 
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -202,10 +203,11 @@ class FilesPage(Page):
             self._go_to(Path(chosen))
 
     def _typed_folder(self) -> None:
-        folder = Path(self._folder_line.text()).expanduser()
+        # Of os.path: those of pathlib raise on names that no system allows.
+        folder = Path(os.path.expanduser(self._folder_line.text()))  # noqa: PTH111
         if folder == self._folder:
             return
-        if folder.is_dir():
+        if os.path.isdir(folder):  # noqa: PTH112
             self._go_to(folder)
         else:
             self.context.say(
