@@ -69,6 +69,7 @@ def test_the_usb_4431_has_one_output_and_triggers(system):
     assert device.ai_max_multi_chan_rate == 102.4e3
     assert device.dig_trig_supported
     assert "/Dev1/PFI7" in device.terminals
+    assert system.devices["Dev1/ao0"].ao_voltage_rngs == [-3.5, 3.5], "by the name of what is on it"
     assert set(device.ai_samp_modes) == {AcquisitionType.FINITE, AcquisitionType.CONTINUOUS}
 
 

@@ -1,5 +1,7 @@
 """Samples that a program reads from the simulated DAQ."""
 
+from datetime import UTC, datetime
+
 import numpy as np
 import pytest
 from nidaqmx import DaqError
@@ -11,6 +13,7 @@ from nidaqmx.constants import (
     ReadRelativeTo,
     SampleTimingType,
     TaskMode,
+    WaveformAttributeMode,
 )
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogUnscaledReader
@@ -154,9 +157,24 @@ def test_raw_counts_scale_back_to_volts(daq):
         AnalogUnscaledReader(task.in_stream).read_int16(np.empty((1, 5), dtype=np.int16), 5)
 
 
-def test_waveforms_carry_samples_and_period(task):
+def test_waveforms_carry_samples_times_names_and_units(task):
     waveforms = task.read_waveform(64)
     np.testing.assert_allclose([w.scaled_data for w in waveforms], expected((1, 2, 3), 0, 64), atol=1e-9)
+    later = task.read_waveform(10)[0].timing
+    timing = waveforms[0].timing
+    assert timing.sample_interval.total_seconds() == pytest.approx(1 / RATE_HZ)
+    assert (later.start_time - timing.start_time).total_seconds() == pytest.approx(64 / RATE_HZ, abs=1e-5)
+    assert abs((timing.start_time - datetime.now(UTC)).total_seconds()) < 60
+    assert [(w.channel_name, w.units) for w in waveforms] == [
+        (f"cDAQ1Mod1/ai{n}", "Volts") for n in (1, 2, 3)
+    ]
+
+
+def test_a_waveform_has_no_more_than_was_asked_for(task):
+    task.in_stream.waveform_attribute_mode = WaveformAttributeMode.NONE
+    waveform = task.read_waveform(8)[0]
+    assert not waveform.timing.has_start_time
+    assert not waveform.extended_properties
 
 
 def test_a_part_of_the_channels_can_be_read(task):

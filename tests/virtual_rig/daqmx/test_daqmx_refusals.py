@@ -172,7 +172,7 @@ def test_every_call_of_the_protocol_is_answered_and_what_is_not_simulated_is_nam
     for name, request in [
         ("CreateDIChan", nidaqmx_pb2.CreateDIChanRequest()),
         ("ReadCounterF64", nidaqmx_pb2.ReadCounterF64Request()),
-        ("CfgAnlgEdgeRefTrig", nidaqmx_pb2.CfgAnlgEdgeRefTrigRequest(task=Session(name="x"))),
+        ("CfgAnlgWindowRefTrig", nidaqmx_pb2.CfgAnlgWindowRefTrigRequest(task=Session(name="x"))),
     ]:
         with pytest.raises(grpc.RpcError, match=name) as caught:
             getattr(stub, name)(request)

@@ -64,6 +64,24 @@ def test_blocks_written_in_time_are_played_without_a_gap(pair):
     np.testing.assert_allclose(heard, played[: heard.size], atol=1e-12)
 
 
+@pytest.mark.parametrize(("device", "block"), [("Dev1", 1000), ("Dev2", 1000), ("Dev2", 7000)])
+def test_a_buffer_as_large_as_the_first_block_suffices_with_the_memory_of_the_device(daq, device, block):
+    inputs, outputs = daq.task(), daq.task()
+    inputs.ai_channels.add_ai_voltage_chan(f"{device}/ai0", min_val=-10, max_val=10)
+    outputs.ao_channels.add_ao_voltage_chan(f"{device}/ao0", min_val=-3.5, max_val=3.5)
+    for task in (inputs, outputs):
+        task.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
+    outputs.triggers.start_trigger.cfg_dig_edge_start_trig(f"/{device}/ai/StartTrigger")
+    outputs.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION
+    played = np.random.default_rng(block).uniform(-3, 3, 12 * block)
+    outputs.write(played[:block])
+    outputs.start()
+    inputs.start()
+    for first in range(block, played.size, block):
+        outputs.write(played[first : first + block])
+    np.testing.assert_allclose(inputs.read(played.size - block), played[:-block], atol=1e-12)
+
+
 def test_writing_into_a_full_buffer_waits_for_the_output_to_play(pair):
     inputs, outputs = pair
     outputs.out_stream.regen_mode = RegenerationMode.DONT_ALLOW_REGENERATION

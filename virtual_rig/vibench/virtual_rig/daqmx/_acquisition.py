@@ -1,6 +1,7 @@
 """A running acquisition: the sampler, and the circular buffer between the device and the reader."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from nidaqmx.constants import OverwriteMode
@@ -10,9 +11,13 @@ from numpy.typing import NDArray
 from ..analogue import Sampler
 from ._errors import DaqmxRefusal
 from ._pace import Overflow
+from ._reference_trigger import TriggerWatch
 
 _ROUNDING_SAMPLES = 1e-5
 """Rig time is a sum of many durations: a sample is due although the sum falls this much of a period short."""
+
+_LOOK_S = 0.1
+"""Rig time between two looks for an analogue reference trigger."""
 
 
 class Acquisition:
@@ -28,11 +33,15 @@ class Acquisition:
         buffer_size: int,
         overflow: Overflow,
         overwrite: OverwriteMode,
+        watch: TriggerWatch | None = None,
+        logged: Callable[[NDArray[np.float64], float], None] | None = None,
     ) -> None:
-        """Begin at rig time ``began_s``; ``total`` samples, or infinity."""
+        """Begin at rig time ``began_s``; ``total`` samples, or infinity, around what ``watch`` waits for."""
         self.rate_hz = rate_hz
         self.began_s = began_s
-        self.total = total
+        self.total = total if watch is None else math.inf
+        self.triggered_at = 0
+        """The sample that is the first after the reference trigger."""
         self.acquired = 0
         self.position = 0
         self.asked_at = -1
@@ -43,6 +52,9 @@ class Acquisition:
         self._ring = np.empty((channels, max(1, buffer_size)))
         self._overflow = overflow
         self._overwrite = overwrite
+        self._watch = watch
+        self._logged = logged
+        """Is given what goes into the buffer, and the rig time of its first sample."""
         self._is_open = True
 
     @property
@@ -87,20 +99,63 @@ class Acquisition:
         """Convert whatever is due at rig time ``now_s``."""
         due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
         due = int(min(due, self.total))
-        while self.acquired < due and self._is_open and self.failure is None:
+        while self.acquired < min(due, self.total) and self._is_open and self.failure is None:
             count = min(due - self.acquired, self.buffer_size)
-            self._store(self._sampler.read(count))
+            block = self._sampler.read(count)
+            if self._watch is not None:
+                self._look_for_trigger(self._watch, block)
+                block = block[:, : int(min(count, self.total - self.acquired))]
+            self._store(block)
         if self.is_done:
             self.close()
 
+    @property
+    def awaits_trigger(self) -> bool:
+        """Whether it keeps only the newest samples, until its reference trigger comes."""
+        return self._watch is not None and self._is_open and self.total == math.inf
+
+    @property
+    def next_look_s(self) -> float:
+        """Rig time by which the reference trigger may have come; infinite if others must raise it [s]."""
+        assert self._watch is not None
+        missing = self._watch.trigger.pretrigger - self.acquired
+        if missing <= 0 and self._watch.trigger.level is None:
+            return math.inf
+        return self.began_s + (self.acquired + max(missing, 1, self.rate_hz * _LOOK_S)) / self.rate_hz
+
+    def trigger(self, after: int = 0) -> bool:
+        """Let the reference trigger come ``after`` so many samples more; say whether it counts.
+
+        It does not while there are fewer samples than are to be kept from before it.
+        """
+        assert self._watch is not None
+        kept, at = self._watch.trigger.pretrigger, self.acquired + after
+        if not self.awaits_trigger or at < kept:
+            return False
+        self.triggered_at, self.position = at, at - kept
+        self.total = at + self._watch.samples - kept
+        return True
+
+    def _look_for_trigger(self, watch: TriggerWatch, block: NDArray[np.float64]) -> None:
+        if self.awaits_trigger:
+            first = max(0, watch.trigger.pretrigger - self.acquired)
+            for edge in watch.edges(block):
+                if edge >= first:
+                    self.trigger(edge)
+                    return
+
     def _store(self, block: NDArray[np.float64]) -> None:
         count = block.shape[1]
-        if self.available + count > self.buffer_size:
+        if self.awaits_trigger:
+            self.position = self.acquired + count
+        elif self.available + count > self.buffer_size:
             self._overrun(count)
         first = self.acquired % self.buffer_size
         head = min(count, self.buffer_size - first)
         self._ring[:, first : first + head] = block[:, :head]
         self._ring[:, : count - head] = block[:, head:]
+        if self._logged is not None:
+            self._logged(block, self.began_s + self.acquired / self.rate_hz)
         self.acquired += count
 
     def _overrun(self, count: int) -> None:

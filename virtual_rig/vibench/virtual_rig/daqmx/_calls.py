@@ -1,18 +1,28 @@
 """What a remote call of the simulated driver is, and the calls on tasks, clocks, scales and devices."""
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
-from nidaqmx.constants import AcquisitionType, Edge, SampleTimingType, ScaleType, TaskMode
+from nidaqmx.constants import (
+    AcquisitionType,
+    Edge,
+    LoggingMode,
+    LoggingOperation,
+    SampleTimingType,
+    ScaleType,
+    Slope,
+    TaskMode,
+)
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
 from ._errors import DaqmxRefusal, member, sentence, unsupported_value
 from ._scales import LinearScale, PolynomialScale, TableScale
 from ._system import DaqmxSystem
-from ._task_attributes import set_output_buffer, set_trigger_source
+from ._task_attributes import full_terminal, set_output_buffer, set_trigger_source
 from ._tasks import Task
-from ._timing import check_samples
+from ._timing import LogSettings, ReferenceTrigger, check_samples
 
 Fields = Mapping[str, object]
 """The fields of a response; status 0 is left out."""
@@ -52,6 +62,9 @@ class TaskCalls:
             "CfgInputBuffer": self._input_buffer,
             "CfgOutputBuffer": self._output_buffer,
             "CfgDigEdgeStartTrig": self._edge_trigger,
+            "ConfigureLogging": self._logging,
+            "CfgDigEdgeRefTrig": self._digital_reference,
+            "CfgAnlgEdgeRefTrig": self._analog_reference,
             "UnregisterEveryNSamplesEvent": self._unregister,
             "UnregisterDoneEvent": self._unregister,
             "UnregisterSignalEvent": self._unregister,
@@ -148,9 +161,38 @@ class TaskCalls:
         self._task(request)
         return NOTHING
 
-    def _no_reference_trigger(self, request: Any) -> Fields:
-        self._task(request).require_stopped()
+    def _logging(self, request: Any) -> Fields:
+        task = self._task(request)
+        task.require_stopped()
+        if task.outputs:
+            raise DaqmxRefusal(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS, f"Task Name: {task.name}")
+        mode = member(LoggingMode, pick(request, "logging_mode"), "Logging_Mode")
+        operation = member(LoggingOperation, pick(request, "operation"), "Logging_TDMS_Operation")
+        settings = LogSettings(Path(request.file_path), mode, request.group_name or task.name, operation)
+        task.reading.logging = None if mode is LoggingMode.OFF else settings
         return NOTHING
+
+    def _digital_reference(self, request: Any) -> Fields:
+        task = self._task(request)
+        slope = member(Slope, pick(request, "trigger_edge"), "DigEdge_RefTrig_Edge")
+        source = full_terminal(task, request.trigger_source)
+        return _refer(task, ReferenceTrigger(source, request.pretrigger_samples, slope=slope))
+
+    def _analog_reference(self, request: Any) -> Fields:
+        task = self._task(request)
+        slope = member(Slope, pick(request, "trigger_slope"), "AnlgEdge_RefTrig_Slope")
+        (channel,) = task.find(request.trigger_source)
+        level = request.trigger_level
+        return _refer(task, ReferenceTrigger(channel.name, request.pretrigger_samples, level, slope))
+
+    def _no_reference_trigger(self, request: Any) -> Fields:
+        return _refer(self._task(request), None)
+
+
+def _refer(task: Task, reference: ReferenceTrigger | None) -> Fields:
+    task.require_stopped()
+    task.timing.reference = reference
+    return NOTHING
 
 
 def _nth(names: list[str], index: int) -> str:

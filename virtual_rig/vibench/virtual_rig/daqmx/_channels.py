@@ -44,6 +44,20 @@ SI_PER_UNIT: dict[int, float] = {
 }
 """How much one unit of a channel is in SI."""
 
+UNIT_NAMES: dict[int, str] = {
+    VoltageUnits.VOLTS.value: "Volts",
+    AccelUnits.G.value: "g",
+    AccelUnits.METERS_PER_SECOND_SQUARED.value: "m/s^2",
+    AccelUnits.INCHES_PER_SECOND_SQUARED.value: "in/s^2",
+    VelocityUnits.METERS_PER_SECOND.value: "m/s",
+    VelocityUnits.INCHES_PER_SECOND.value: "in/s",
+    ForceUnits.NEWTONS.value: "Newtons",
+    ForceUnits.POUNDS.value: "Pounds",
+    ForceUnits.KILOGRAM_FORCE.value: "kgf",
+    SoundPressureUnits.PA.value: "Pascals",
+}
+"""What waveforms and files call them."""
+
 VOLTS_PER_SI: dict[int, float] = {
     AccelSensitivityUnits.MILLIVOLTS_PER_G.value: 1e-3 / _STANDARD_GRAVITY,
     AccelSensitivityUnits.VOLTS_PER_G.value: 1 / _STANDARD_GRAVITY,
@@ -103,6 +117,11 @@ class InputChannel:
         return self.sensor.volts_per_si * SI_PER_UNIT.get(self.units, 1.0)
 
     @property
+    def unit_name(self) -> str:
+        """The unit in words."""
+        return self.scale.scaled_units if self.scale else UNIT_NAMES.get(self.units, "")
+
+    @property
     def iepe_current_a(self) -> float:
         """Current the device feeds into the sensor [A]."""
         return self.excitation_a if self.excitation is ExcitationSource.INTERNAL else 0.0
@@ -130,9 +149,7 @@ class InputChannel:
 
     @property
     def _wanted_v(self) -> float:
-        extremes = np.array([self.minimum, self.maximum])
-        volts = self.scale.inverse(extremes) if self.scale else extremes * self.volts_per_unit
-        return float(np.max(np.abs(volts)))
+        return float(np.max(np.abs(self.to_volts(np.array([self.minimum, self.maximum])))))
 
     @property
     def volts_per_count(self) -> float:
@@ -171,6 +188,10 @@ class InputChannel:
         if self.scale is not None:
             return self.scale.forward(volts)
         return volts if self.volts_per_unit == 1.0 else volts / self.volts_per_unit
+
+    def to_volts(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values in the channel's units as volts at the converter."""
+        return self.scale.inverse(values) if self.scale else values * self.volts_per_unit
 
     def wiring(self) -> Input:
         """Describe the channel to the analogue world."""

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 from ni.protobuf.types.waveform_pb2 import DoubleAnalogWaveform
-from nidaqmx.constants import FillMode, SampleTimingType
+from nidaqmx.constants import FillMode, SampleTimingType, WaveformAttributeMode
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ._calls import NOTHING, Call, Fields, pick
 from ._errors import DaqmxRefusal, unsupported_value
-from ._generation import LEAD_S, Generation
+from ._generation import Generation
 from ._reading import READ_ALL, Reading, default_samples, read
 from ._system import DaqmxSystem
 from ._tasks import Task
@@ -126,9 +126,8 @@ def _await_space(task: Task, generation: Generation, samples: int, deadline_s: f
         has_ended = generation.failure is not None or task.generation is not generation
         return generation.space >= samples or has_ended
 
-    played = generation.buffer.written + samples - generation.buffer.size
     left_s = -1.0 if math.isinf(deadline_s) else max(0.0, deadline_s - time.monotonic())
-    has_come = task.rig.pace.ask(task.rig, generation.time_of(played) - LEAD_S, is_there, left_s)
+    has_come = task.rig.pace.ask(task.rig, generation.time_of_room(samples), is_there, left_s)
     if generation.failure is not None:
         raise generation.failure
     if task.generation is not generation:
@@ -136,6 +135,8 @@ def _await_space(task: Task, generation: Generation, samples: int, deadline_s: f
     return has_come
 
 
+_SECONDS_1904_TO_1970 = 2_082_844_800
+"""NI's time stamps count from 1904."""
 _SIZES = {"I16": 16, "U16": 16, "I32": 32, "U32": 32}
 
 
@@ -183,11 +184,8 @@ class DataCalls:
     def _read_waveforms(self, request: Any) -> Fields:
         task = self._task(request)
         reading = read(task, request.num_samps_per_chan, request.timeout)
-        period_s = 1 / task.rate_hz
-        waveforms = [
-            DoubleAnalogWaveform(dt=period_s, y_data=task.inputs[row].to_units(reading.volts[row]))
-            for row in _rows(task)
-        ]
+        mode = WaveformAttributeMode(pick(request, "waveform_attribute_mode"))
+        waveforms = [_waveform(task, row, reading, mode) for row in _rows(task)]
         return {"status": reading.status, "waveforms": waveforms, "samps_per_chan_read": reading.samples}
 
     def _read_raw(self, request: Any) -> Fields:
@@ -244,6 +242,20 @@ class DataCalls:
             return {"samps_per_chan_written": write(task, volts, _start(request), request.timeout)}
 
         return write_binary
+
+
+def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMode) -> DoubleAnalogWaveform:
+    channel = task.inputs[row]
+    waveform = DoubleAnalogWaveform(y_data=channel.to_units(reading.volts[row]))
+    if WaveformAttributeMode.TIMING in mode:
+        part_s, whole_s = math.modf(task.rig.wall_s(reading.began_s))
+        waveform.t0.seconds = int(whole_s) + _SECONDS_1904_TO_1970
+        waveform.t0.fractional_seconds = int(part_s * 2**64)
+        waveform.dt = 1 / task.rate_hz
+    if WaveformAttributeMode.EXTENDED_PROPERTIES in mode:
+        waveform.attributes["NI_ChannelName"].string_value = channel.name
+        waveform.attributes["NI_UnitDescription"].string_value = channel.unit_name
+    return waveform
 
 
 def _rows(task: Task) -> list[int]:

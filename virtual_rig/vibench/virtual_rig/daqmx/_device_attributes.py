@@ -86,6 +86,11 @@ def _highest_total_rate(device: Device) -> float:
     return inputs.rates.maximum_hz / shared
 
 
+def _input_triggers(device: Device) -> int:
+    reference = (TriggerUsage.REFERENCE,) if device.inputs else ()
+    return _bits((*device.trigger_usage, *reference), _TRIGGER_BITS)
+
+
 SYSTEM = AttributeGroup[System](
     "System",
     {
@@ -115,7 +120,9 @@ DEVICE = AttributeGroup[Device](
         "COMPACT_DAQ_CHASSIS_DEV_NAME": Attribute(_chassis),
         "COMPACT_DAQ_SLOT_NUM": Attribute(_slot),
         "TERMINALS": Attribute(lambda device: join(device.terminals)),
-        "ANLG_TRIG_SUPPORTED": Attribute(lambda _: False),
+        "ANLG_TRIG_SUPPORTED": Attribute(
+            lambda device: bool(device.inputs and device.inputs.has_analog_trigger)
+        ),
         "DIG_TRIG_SUPPORTED": Attribute(lambda device: bool(device.trigger_usage)),
         "TIME_TRIG_SUPPORTED": Attribute(lambda _: False),
         "TEDS_HWTEDS_SUPPORTED": Attribute(lambda _: False),
@@ -136,7 +143,7 @@ DEVICE = AttributeGroup[Device](
         ),
         "AI_NUM_SAMP_TIMING_ENGINES": Attribute(lambda device: _TIMING_ENGINES if device.inputs else 0),
         "AI_SAMP_MODES": Attribute(lambda device: _SAMPLE_MODES if device.inputs else ()),
-        "AI_TRIG_USAGE": Attribute(lambda device: _bits(device.trigger_usage, _TRIGGER_BITS)),
+        "AI_TRIG_USAGE": Attribute(_input_triggers),
         "AI_VOLTAGE_RNGS": Attribute(lambda device: _both_signs(_inputs(device).ranges_v)),
         "AI_CURRENT_INT_EXCIT_DISCRETE_VALS": Attribute(
             lambda device: [0.0, *_inputs(device).iepe_currents_a] if _inputs(device).iepe_currents_a else []

@@ -2,7 +2,8 @@
 
 Sources: NI 9234 and NI USB-9234 guides (ranges, IEPE, data rates fM/256/n), NI USB-443x
 specifications (ranges, rates, IEPE), NI USB-6211 specifications. Not confirmed on a device: the
-minimum rate and the rate steps of the USB-4431, the default couplings, and the USB-6211's figures.
+minimum rate, the rate steps and the output memory of the USB-4431, the default couplings, and the
+USB-6211's figures.
 """
 
 import math
@@ -108,6 +109,11 @@ class AnalogInputs:
     conversion: Conversion
     measurements: tuple[UsageTypeAI, ...] = (UsageTypeAI.VOLTAGE,)
 
+    @property
+    def has_analog_trigger(self) -> bool:
+        """Whether a level of its own input can trigger it: delta-sigma devices can, a USB-621x cannot."""
+        return self.untimed is Untimed.SAMPLE_CLOCK
+
 
 @dataclass(frozen=True)
 class AnalogOutputs:
@@ -120,6 +126,8 @@ class AnalogOutputs:
     idle: Idle
     untimed: Untimed
     terminal: TerminalConfiguration
+    memory: int
+    """Samples per channel that wait on the device itself, between the program's buffer and the converter."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +172,9 @@ class Device:
         pfi = [f"/{self.name}/PFI{n}" for n in range(self.pfi_lines)]
         sides = [side for side, names in (("ai", self.input_names), ("ao", self.output_names)) if names]
         inner = [
-            f"/{self.name}/{side}/{signal}" for side in sides for signal in ("SampleClock", "StartTrigger")
+            f"/{self.clock_name}/{side}/{signal}"
+            for side in sides
+            for signal in ("SampleClock", "StartTrigger")
         ]
         return (*pfi, *inner)
 
@@ -200,7 +210,7 @@ USB_4431 = Device(
     ),
     outputs=AnalogOutputs(
         count=1, range_v=3.5, rates=AnyRate(1000.0, 96e3), bits=24, idle=Idle.ZERO,
-        untimed=Untimed.SAMPLE_CLOCK, terminal=TerminalConfiguration.PSEUDO_DIFF,
+        untimed=Untimed.SAMPLE_CLOCK, terminal=TerminalConfiguration.PSEUDO_DIFF, memory=1023,
     ),
 )  # fmt: skip
 
@@ -216,7 +226,7 @@ USB_6211 = Device(
     ),
     outputs=AnalogOutputs(
         count=2, range_v=10.0, bits=16, idle=Idle.HOLD, untimed=Untimed.ON_DEMAND,
-        terminal=TerminalConfiguration.RSE,
+        terminal=TerminalConfiguration.RSE, memory=8191,
         rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
     ),
 )  # fmt: skip

@@ -8,7 +8,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ..analogue import AnalogueWorld
-from ._devices import Idle
+from ._devices import AnalogOutputs, Idle
 from ._errors import DaqmxRefusal
 
 LEAD_S = 0.005
@@ -63,7 +63,7 @@ class Generation:
         total: float,
         buffer: OutputBuffer,
         regeneration: RegenerationMode,
-        idle: Idle,
+        device: AnalogOutputs,
     ) -> None:
         """Begin at rig time ``began_s``; ``total`` samples, or infinity."""
         self.rate_hz = rate_hz
@@ -76,7 +76,12 @@ class Generation:
         self._world = world
         self._outputs = outputs
         self._repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
-        self._idle = idle
+        self._idle = device.idle
+        self._memory = np.empty((len(outputs), 0))
+        """What has left the buffer and waits on the device; a repeated buffer is not fetched ahead."""
+        self._most_in_memory = 0 if self._repeats else device.memory
+        self._fetched = 0
+        self._recent = np.empty((len(outputs), 0))
         self._is_open = True
 
     @property
@@ -89,7 +94,13 @@ class Generation:
         """Samples per channel that can be written now; a repeated buffer can always be rewritten."""
         if self._repeats:
             return self.buffer.size
-        return self.buffer.size - (self.buffer.written - self.handed_over)
+        self._fetch(self.handed_over + self._most_in_memory)
+        return self.buffer.size - (self.buffer.written - self._fetched)
+
+    def time_of_room(self, samples: int) -> float:
+        """Rig time at which there is room for so many samples [s]."""
+        left = self.buffer.written + samples - self.buffer.size - self._most_in_memory
+        return self.time_of(max(0, left)) - LEAD_S
 
     @property
     def uses_up_its_buffer(self) -> bool:
@@ -122,10 +133,20 @@ class Generation:
         count = int(min(wanted, self.total, self._end)) - self.handed_over
         if count <= 0:
             return
-        block = self.buffer.cyclic(self.handed_over, count)
+        self._fetch(self.handed_over + count)
+        block, self._memory = self._memory[:, :count], self._memory[:, count:]
         for output, volts in zip(self._outputs, block, strict=True):
             self._world.play(output, volts, self.rate_hz)
         self.handed_over += count
+        kept = math.ceil(LEAD_S * self.rate_hz) + 1
+        self._recent = np.concatenate([self._recent, block], axis=1)[:, -kept:]
+
+    def _fetch(self, until: int) -> None:
+        """Move samples from the buffer to the device, as far as there are any."""
+        count = int(min(until, self.total, self._end)) - self._fetched
+        if count > 0:
+            self._memory = np.concatenate([self._memory, self.buffer.cyclic(self._fetched, count)], axis=1)
+            self._fetched += count
 
     @property
     def _end(self) -> float:
@@ -154,6 +175,6 @@ class Generation:
         for output in self._outputs:
             self._world.silence(output)
         if self._idle is Idle.HOLD and self.generated:
-            last = self.buffer.cyclic(self.generated - 1, 1)
-            for output, volts in zip(self._outputs, last, strict=True):
+            last = max(0, self._recent.shape[1] - 1 - (self.handed_over - self.generated))
+            for output, volts in zip(self._outputs, self._recent[:, last : last + 1], strict=True):
                 self._world.play(output, volts, self.rate_hz)

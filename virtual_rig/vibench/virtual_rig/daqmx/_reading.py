@@ -25,6 +25,8 @@ class Reading:
     """Shape (channels, samples), of all channels of the task [V]."""
     status: int = 0
     """0, or why there are fewer samples than requested."""
+    began_s: float = 0.0
+    """Rig time of the first of them [s]."""
 
     @property
     def samples(self) -> int:
@@ -103,7 +105,7 @@ def _read_on_demand(task: Task, samples: int) -> Reading:
     sampler = task.rig.world.sample(tuple(channel.wiring() for channel in task.inputs), rate_hz)
     volts = sampler.read(samples)
     sampler.close()
-    return Reading(volts)
+    return Reading(volts, began_s=task.rig.now_s - samples / rate_hz)
 
 
 def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
@@ -113,6 +115,10 @@ def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
     acquisition = task.acquisition
     if acquisition is None:
         raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", samples_read=0)
+    if task.log is not None and not task.log.is_read:
+        raise DaqmxRefusal(DAQmxErrors.READ_NOT_SUPPORTED_FOR_LOGGING_MODE, f"Task Name: {task.name}")
+    if not task.await_reference(deadline_s):
+        return _nothing_in_time(task, wanted)
     first = _first_sample(task, acquisition)
     count = int(min(wanted, max(0, acquisition.total - first)))
     status = 0 if count == wanted else int(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE)
@@ -130,7 +136,11 @@ def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
         task.rig.changed.notify_all()
         if not has_come:
             break
-    return Reading(np.concatenate(blocks, axis=1) if blocks else np.empty((len(task.inputs), 0)), status)
+    volts = np.concatenate(blocks, axis=1) if blocks else np.empty((len(task.inputs), 0))
+    began_s = acquisition.began_s + first / acquisition.rate_hz
+    if task.log is not None and volts.size:
+        task.log.write(volts, began_s)
+    return Reading(volts, status, began_s)
 
 
 def _first_sample(task: Task, acquisition: Acquisition) -> int:
@@ -139,6 +149,11 @@ def _first_sample(task: Task, acquisition: Acquisition) -> int:
             origin = acquisition.position
         case ReadRelativeTo.FIRST_SAMPLE:
             origin = 0
+        case ReadRelativeTo.REFERENCE_TRIGGER:
+            origin = acquisition.triggered_at
+        case ReadRelativeTo.FIRST_PRETRIGGER_SAMPLE:
+            reference = task.timing.reference
+            origin = acquisition.triggered_at - (reference.pretrigger if reference else 0)
         case _:
             task.rig.pace.answer_progress(task.rig)
             origin = acquisition.acquired

@@ -1,6 +1,7 @@
 """The rig behind the simulated driver: one world, one time for all running tasks, and the trigger lines."""
 
 import threading
+import time
 from collections.abc import Callable
 from typing import Protocol
 
@@ -36,6 +37,7 @@ class Rig:
         self.world = world
         self.pace = pace
         self.changed = threading.Condition(threading.RLock())
+        self._epoch_s = time.time() - world.time_s
         self._acquisitions: list[Stream] = []
         self._generations: list[Source] = []
         self._armed: dict[str, list[Callable[[], None]]] = {}
@@ -44,6 +46,10 @@ class Rig:
     def now_s(self) -> float:
         """Rig time reached so far [s]."""
         return self.world.time_s
+
+    def wall_s(self, rig_s: float) -> float:
+        """Wall-clock time of a moment of rig time [s since 1970]; they met when the rig was switched on."""
+        return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
         """Let rig time pass in slices: outputs are fed first, then inputs convert, then the rest passes."""

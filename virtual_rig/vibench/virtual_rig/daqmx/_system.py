@@ -64,8 +64,8 @@ class DaqmxSystem:
     # --- devices -------------------------------------------------------------------------
 
     def device(self, name: str) -> Device:
-        """Find a device by name (-200220 if there is none)."""
-        device = self.catalogue.find(name)
+        """Find a device by its name, or by that of anything on it (-200220 if there is none)."""
+        device = self.catalogue.find(name.strip("/").partition("/")[0])
         if device is None:
             known = ", ".join(known.name for known in self.catalogue.devices)
             raise DaqmxRefusal(DAQmxErrors.INVALID_DEVICE_ID, f"Device Specified: {name}\nDevices: {known}")
@@ -81,7 +81,7 @@ class DaqmxSystem:
 
     def physical(self, name: str) -> PhysicalChannel:
         """One physical channel (-200220, -200170 if there is no such thing)."""
-        device = self.device(name.strip("/").partition("/")[0])
+        device = self.device(name)
         names = (*device.input_names, *device.output_names)
         for known in names:
             if known.lower() == name.lower():
@@ -105,6 +105,13 @@ class DaqmxSystem:
             if channel.name not in side(channel.device):
                 raise DaqmxRefusal(DAQmxErrors.INVALID_PHYS_CHAN_TYPE, f"Physical Channel: {channel.name}")
         return channels
+
+    def require_terminal(self, name: str) -> None:
+        """Refuse a terminal that no device has (-89120)."""
+        known = {known.lower() for device in self.catalogue.devices for known in device.terminals}
+        if name.lower() not in known:
+            detail = f"Source Terminal: {name}"
+            raise DaqmxRefusal(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING, detail)
 
     # --- scales --------------------------------------------------------------------------
 

@@ -19,12 +19,13 @@ from ._errors import DaqmxRefusal, member, unsupported_value
 from ._names import expand, join
 from ._reading import asked_available, available, default_samples
 from ._tasks import Task, TaskState
-from ._timing import check_samples
+from ._timing import ReferenceTrigger, check_samples
 
 _DEFAULT_SAMPLES_TO_READ = "0x31E8"
 """Not named in the protocol: how many samples a read of "all" brings."""
 
 _BITS_PER_BYTE = 8
+_OF_A_REFERENCE = (ReadRelativeTo.REFERENCE_TRIGGER, ReadRelativeTo.FIRST_PRETRIGGER_SAMPLE)
 
 
 def _name_known_terminal(task: Task, terminal: str) -> str:
@@ -92,9 +93,29 @@ def _trigger_type(task: Task) -> TriggerType:
 
 def set_trigger_source(task: Task, source: str) -> None:
     """Wait for that terminal, given as ``"/Dev1/PFI0"``, or ``"PFI0"`` of the task's own device."""
+    task.timing.trigger_source = full_terminal(task, source)
+
+
+def full_terminal(task: Task, source: str) -> str:
+    """Name a terminal with its device: ``"PFI0"`` is one of the task's own."""
     task.require_channels()
-    is_full = source.startswith("/")
-    task.timing.trigger_source = source if is_full else f"/{task.devices[0].clock_name}/{source}"
+    return source if source.startswith("/") else f"/{task.devices[0].clock_name}/{source}"
+
+
+def _reference_type(task: Task) -> TriggerType:
+    match task.timing.reference:
+        case None:
+            return TriggerType.NONE
+        case ReferenceTrigger(level=None):
+            return TriggerType.DIGITAL_EDGE
+        case _:
+            return TriggerType.ANALOG_EDGE
+
+
+def _reference(task: Task) -> ReferenceTrigger:
+    if task.timing.reference is None:
+        raise DaqmxRefusal(DAQmxErrors.NO_REF_TRIG_CONFIGURED, f"Task Name: {task.name}")
+    return task.timing.reference
 
 
 def _set_trigger_edge(task: Task, edge: int) -> None:
@@ -108,7 +129,13 @@ TRIGGER = AttributeGroup[Task](
         "START_TRIG_TERM": Attribute(lambda task: _name_known_terminal(task, task.start_terminal)),
         "DIG_EDGE_START_TRIG_SRC": Attribute(lambda task: task.timing.trigger_source, set_trigger_source),
         "DIG_EDGE_START_TRIG_EDGE": Attribute(lambda task: task.timing.trigger_edge, _set_trigger_edge),
-        "REF_TRIG_TYPE": Attribute(lambda _: TriggerType.NONE),
+        "REF_TRIG_TYPE": Attribute(_reference_type),
+        "REF_TRIG_PRETRIG_SAMPLES": Attribute(lambda task: _reference(task).pretrigger),
+        "DIG_EDGE_REF_TRIG_SRC": Attribute(lambda task: _reference(task).source),
+        "DIG_EDGE_REF_TRIG_EDGE": Attribute(lambda task: _reference(task).slope),
+        "ANLG_EDGE_REF_TRIG_SRC": Attribute(lambda task: _reference(task).source),
+        "ANLG_EDGE_REF_TRIG_SLOPE": Attribute(lambda task: _reference(task).slope),
+        "ANLG_EDGE_REF_TRIG_LVL": Attribute(lambda task: _reference(task).level or 0.0),
         "PAUSE_TRIG_TYPE": Attribute(lambda _: TriggerType.NONE),
         "ARM_START_TRIG_TYPE": Attribute(lambda _: TriggerType.NONE),
         "START_TRIG_RETRIGGERABLE": Attribute(lambda _: False),
@@ -174,14 +201,10 @@ def _set_overwrite(task: Task, mode: int) -> None:
 
 
 def _set_relative_to(task: Task, origin: int) -> None:
-    origins = (
-        ReadRelativeTo.FIRST_SAMPLE,
-        ReadRelativeTo.CURRENT_READ_POSITION,
-        ReadRelativeTo.MOST_RECENT_SAMPLE,
-    )
-    if origin not in [option.value for option in origins]:
-        raise unsupported_value("Read_RelativeTo", origin, ", ".join(option.name for option in origins))
-    task.reading.relative_to = ReadRelativeTo(origin)
+    relative_to = member(ReadRelativeTo, origin, "Read_RelativeTo")
+    if relative_to in _OF_A_REFERENCE and task.timing.reference is None:
+        raise DaqmxRefusal(DAQmxErrors.NO_REF_TRIG_CONFIGURED, f"Task Name: {task.name}")
+    task.reading.relative_to = relative_to
 
 
 def _set_offset(task: Task, offset: int) -> None:

@@ -1,5 +1,7 @@
 """A simulated DAQmx task: its channels, its states, and the terminals of its clock and trigger."""
 
+import math
+import time
 from enum import IntEnum
 from typing import Protocol
 
@@ -14,29 +16,13 @@ from ._devices import AnalogInputs, AnalogOutputs, Device
 from ._errors import DaqmxRefusal
 from ._generation import Generation, OutputBuffer
 from ._names import expand
+from ._reference_trigger import TriggerWatch, verify_reference
 from ._rig import Rig
+from ._tdms_log import TdmsLog
+from ._terminals import SAMPLE_CLOCK, START_TRIGGER, awaited_terminal, terminal
 from ._timing import InputSettings, OutputSettings, Timing, actual_rate, input_buffer_size, kind_of
 
-START_TRIGGER = "StartTrigger"
-SAMPLE_CLOCK = "SampleClock"
-_OWN_CLOCKS = ("", "onboardclock")
-
-
-def terminal(device: Device, side: str, signal: str) -> str:
-    """Name the terminal of a device's timing engine, ``"/Dev1/ai/StartTrigger"`` for example."""
-    return f"/{device.clock_name}/{side}/{signal}"
-
-
-def awaited_terminal(timing: Timing, own_clock: str) -> str:
-    """Name the terminal whose edge makes a task begin; empty: its own start.
-
-    Another task's sample clock begins to tick with that task, so waiting for it is waiting for its start.
-    """
-    if timing.trigger_source:
-        return timing.trigger_source
-    source = timing.clock_source.lower()
-    is_own = source in _OWN_CLOCKS or source == own_clock.lower()
-    return "" if is_own else timing.clock_source.replace(SAMPLE_CLOCK, START_TRIGGER)
+_BREATH_S = 1e-4
 
 
 INPUT_SIDE = "ai"
@@ -62,6 +48,9 @@ class Reservations(Protocol):
     def release(self, holder: "Task") -> None:
         """Give back everything that task holds."""
 
+    def require_terminal(self, name: str) -> None:
+        """Refuse a terminal that no device has (-89120)."""
+
 
 class Task:
     """One task; every method is called with the rig's lock held."""
@@ -79,6 +68,7 @@ class Task:
         self.acquisition: Acquisition | None = None
         self.generation: Generation | None = None
         self.buffer: OutputBuffer | None = None
+        self.log: TdmsLog | None = None
         self._reservations = reservations
         self._rests_in = TaskState.UNVERIFIED
 
@@ -223,6 +213,9 @@ class Task:
             channel.verify()
         if self.kind is not SampleTimingType.ON_DEMAND:
             _ = self.rate_hz
+            if awaited := awaited_terminal(self.timing, self.clock_terminal):
+                self._reservations.require_terminal(awaited)
+        verify_reference(self.timing, self.inputs, self._reservations.require_terminal)
 
     def _reserve(self) -> None:
         side = INPUT_SIDE if self.inputs else OUTPUT_SIDE
@@ -266,23 +259,59 @@ class Task:
         if self.inputs:
             self.acquisition = self._acquire()
             self.rig.run_acquisition(self.acquisition)
+            self._await_reference_edge()
         else:
             self.generation = self._generate()
             self.rig.run_generation(self.generation)
         self.rig.edge(self.start_terminal)
 
     def _acquire(self) -> Acquisition:
+        self.log = self._new_log()
+        logged = self.log.write if self.log is not None and not self.log.is_read else None
         sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
         return Acquisition(
             sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
-            self.buffer_size, self.rig.pace.overflow, self.reading.overwrite,
+            self.buffer_size, self.rig.pace.overflow, self.reading.overwrite, self._watch(), logged,
         )  # fmt: skip
+
+    def _new_log(self) -> TdmsLog | None:
+        settings = self.reading.logging
+        return None if settings is None else TdmsLog(settings, self.inputs, self.rate_hz, self.rig.wall_s)
+
+    def _watch(self) -> TriggerWatch | None:
+        reference = self.timing.reference
+        return None if reference is None else TriggerWatch(reference, self.timing.samples, self.inputs)
+
+    def _await_reference_edge(self) -> None:
+        reference = self.timing.reference
+        if reference is not None and reference.level is None:
+            self.rig.arm(reference.source, self._reference_edge)
+
+    def _reference_edge(self) -> None:
+        """Take an edge for the reference trigger; one that comes too early is ignored."""
+        if self.acquisition is not None and not self.acquisition.trigger():
+            self._await_reference_edge()
+
+    def await_reference(self, deadline_s: float) -> bool:
+        """Wait for a reference trigger until a moment of the wall's clock; say whether none is awaited."""
+        acquisition = self.acquisition
+        if acquisition is None:
+            return True
+
+        def is_there() -> bool:
+            return self.acquisition is not acquisition or not acquisition.awaits_trigger
+
+        while not is_there() and (left_s := deadline_s - time.monotonic()) > 0:
+            wait_s = -1.0 if math.isinf(left_s) else left_s
+            self.rig.pace.ask(self.rig, acquisition.next_look_s, is_there, wait_s)
+            self.rig.changed.wait(_BREATH_S)  # who wants to stop this task is let in
+        return is_there()
 
     def _generate(self) -> Generation:
         physical = tuple(channel.physical for channel in self.outputs)
         return Generation(
             self.rig.world, physical, self.rate_hz, self.rig.now_s, self.timing.total,
-            self.output_buffer, self.writing.regeneration, self.outputs[0].outputs.idle,
+            self.output_buffer, self.writing.regeneration, self.outputs[0].outputs,
         )  # fmt: skip
 
     def is_done(self) -> bool:
@@ -296,8 +325,11 @@ class Task:
 
     def wait_until_done(self, timeout_s: float) -> None:
         """Wait for the end of a finite task (-200560 if it does not come)."""
-        until_s = self.stream.time_of(self.stream.total) if self.stream else float("inf")
-        if not self.rig.pace.ask(self.rig, until_s, self.is_done, timeout_s):
+        began_s = time.monotonic()
+        self.await_reference(math.inf if timeout_s < 0 else began_s + timeout_s)
+        until_s = self.stream.time_of(self.stream.total) if self.stream else math.inf
+        left_s = timeout_s if timeout_s < 0 else max(0.0, began_s + timeout_s - time.monotonic())
+        if not self.rig.pace.ask(self.rig, until_s, self.is_done, left_s):
             code = DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE
             raise DaqmxRefusal(code, f"Task Name: {self.name}")
 
@@ -306,11 +338,12 @@ class Task:
         if not self.is_running:
             return
         self.rig.disarm(self._begin)
+        self.rig.disarm(self._reference_edge)
         if self.stream is not None:
             self.rig.end(self.stream)
         if self.generation is not None and self.generation.uses_up_its_buffer:
             self.buffer = None
-        self.acquisition = self.generation = None
+        self.acquisition = self.generation = self.log = None
         self.state = self._rests_in
         if self.state < TaskState.RESERVED:
             self._reservations.release(self)

@@ -3,14 +3,18 @@
 import math
 from dataclasses import dataclass
 from enum import Enum, auto
+from pathlib import Path
 
 from nidaqmx.constants import (
     AcquisitionType,
     Edge,
+    LoggingMode,
+    LoggingOperation,
     OverwriteMode,
     ReadRelativeTo,
     RegenerationMode,
     SampleTimingType,
+    Slope,
 )
 
 from ._devices import AnalogInputs, AnalogOutputs, Conversion, Untimed
@@ -21,6 +25,19 @@ DEFAULT_SAMPLES = 1000
 
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
 """Up to that rate, that many samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
+
+
+@dataclass(frozen=True)
+class ReferenceTrigger:
+    """The edge around which a finite task keeps its samples."""
+
+    source: str
+    """A terminal, or for an analogue edge a channel of the task."""
+    pretrigger: int
+    """Samples per channel that are kept from before it."""
+    level: float | None = None
+    """Of an analogue edge, in the channel's units; None: a digital edge."""
+    slope: Slope = Slope.RISING
 
 
 @dataclass
@@ -38,11 +55,22 @@ class Timing:
     trigger_source: str = ""
     """Empty: the task begins when it is started."""
     trigger_edge: Edge = Edge.RISING
+    reference: ReferenceTrigger | None = None
 
     @property
     def total(self) -> float:
         """Samples to convert, or infinity."""
         return self.samples if self.mode is AcquisitionType.FINITE else math.inf
+
+
+@dataclass(frozen=True)
+class LogSettings:
+    """The TDMS file that a task logs to, and what."""
+
+    path: Path
+    mode: LoggingMode
+    group: str
+    operation: LoggingOperation
 
 
 @dataclass
@@ -56,6 +84,7 @@ class InputSettings:
     offset: int = 0
     starts_by_itself: bool = True
     reads_all_available: bool = False
+    logging: LogSettings | None = None
     channels: tuple[str, ...] = ()
     """Channels to read; empty: all."""
 

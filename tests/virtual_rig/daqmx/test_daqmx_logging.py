@@ -1,0 +1,93 @@
+"""Samples that the simulated driver logs to TDMS, read back with npTDMS."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from nidaqmx.constants import AccelUnits, AcquisitionType, LoggingMode, LoggingOperation
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqError
+from nptdms import TdmsFile
+
+RATE_HZ = 2000.0
+
+
+@pytest.fixture
+def task(daq):
+    task = daq.task("shaken")
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.ai_channels.add_ai_accel_chan("Dev1/ai2", units=AccelUnits.G, current_excit_val=0.0021)
+    task.timing.cfg_samp_clk_timing(RATE_HZ, sample_mode=AcquisitionType.CONTINUOUS)
+    return task
+
+
+def logging(task, path, mode=LoggingMode.LOG_AND_READ, operation=LoggingOperation.CREATE_OR_REPLACE, **more):
+    task.in_stream.configure_logging(str(path), mode, operation=operation, **more)
+
+
+def logged(path, group="shaken"):
+    with TdmsFile.open(path) as file:
+        return {channel.name: (channel[:], dict(channel.properties)) for channel in file[group].channels()}
+
+
+def refused(call):
+    with pytest.raises(DaqError) as caught:
+        call()
+    return caught.value.error_code
+
+
+def test_what_was_read_stands_in_the_file_with_units_interval_and_begin(task, tmp_path):
+    logging(task, tmp_path / "read.tdms")
+    task.start()
+    before = datetime.now(UTC)
+    read = np.hstack([task.read(700), task.read(64)])
+    task.stop()
+    found = logged(tmp_path / "read.tdms")
+    assert list(found) == ["Dev1/ai1", "Dev1/ai2"]
+    for (volts, properties), unit, row in zip(found.values(), ("Volts", "g"), read, strict=True):
+        np.testing.assert_array_equal(volts, row)
+        assert (properties["unit_string"], properties["wf_increment"]) == (unit, 1 / RATE_HZ)
+        began = properties["wf_start_time"].astype(datetime).replace(tzinfo=UTC)
+        assert abs((began - before).total_seconds()) < 60
+
+
+def test_without_reading_all_that_is_acquired_is_logged(daq, task, tmp_path):
+    logging(task, tmp_path / "all.tdms", LoggingMode.LOG, group_name="noise")
+    task.start()
+    daq.server.let_pass(0.5)
+    assert refused(lambda: task.read(10)) == DAQmxErrors.READ_NOT_SUPPORTED_FOR_LOGGING_MODE
+    task.stop()
+    assert [len(volts) for volts, _ in logged(tmp_path / "all.tdms", "noise").values()] == [1000, 1000]
+
+
+def test_a_file_is_made_replaced_or_gone_on_with_as_asked(task, tmp_path):
+    path = tmp_path / "some.tdms"
+    lengths = []
+    for operation in (
+        LoggingOperation.CREATE,
+        LoggingOperation.OPEN,
+        LoggingOperation.OPEN_OR_CREATE,
+        LoggingOperation.CREATE_OR_REPLACE,
+    ):
+        logging(task, path, operation=operation)
+        task.start()
+        task.read(100)
+        task.stop()
+        lengths.append(len(logged(path)["Dev1/ai1"][0]))
+    assert lengths == [100, 200, 300, 100]
+    logging(task, path, operation=LoggingOperation.CREATE)
+    assert refused(task.start) == DAQmxErrors.GENERIC_FILE_IO
+    assert len(logged(path)["Dev1/ai1"][0]) == 100
+    logging(task, tmp_path / "none.tdms", operation=LoggingOperation.OPEN)
+    assert refused(task.start) == DAQmxErrors.TDMS_NOT_FOUND
+    logging(task, tmp_path / "no_folder" / "x.tdms")
+    assert refused(task.start) == DAQmxErrors.GENERIC_FILE_IO
+    logging(task, path, LoggingMode.OFF)
+    task.start()
+    assert len(task.read(10)) == 2
+
+
+def test_outputs_are_not_logged(daq, tmp_path):
+    output = daq.task()
+    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    assert refused(lambda: logging(output, tmp_path / "x")) == DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS
