@@ -217,13 +217,18 @@ class QueuePage(Page):
         else:
             self.context.selection.choose_campaign(campaign)
 
+    @property
+    def _chosen_entry(self) -> int:
+        """Number of the chosen row; -1 for none, and while the rows are those of an earlier campaign."""
+        return self.entries.currentRow() if self.entries.isEnabled() else -1
+
     def _remove(self) -> None:
-        campaign, number = self.context.selection.campaign, self.entries.currentRow()
+        campaign, number = self.context.selection.campaign, self._chosen_entry
         if campaign is not None and number >= 0:
             self.context.selection.choose_campaign(without(campaign, number))
 
     def _move_up(self) -> None:
-        campaign, number = self.context.selection.campaign, self.entries.currentRow()
+        campaign, number = self.context.selection.campaign, self._chosen_entry
         if campaign is not None and number > 0:
             self.context.selection.choose_campaign(moved_up(campaign, number))
             self.entries.setCurrentCell(number - 1, 0)

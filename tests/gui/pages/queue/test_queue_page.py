@@ -1,0 +1,32 @@
+"""Edits of the Queue page act on the campaign that its rows are of."""
+
+import pytest
+
+from vibench.acquisition import load_campaign, shipped
+from vibench.gui.pages.queue import QueuePage
+
+
+@pytest.fixture
+def page(shared_context, qtbot):
+    made = QueuePage(shared_context)
+    qtbot.addWidget(made)
+    return made
+
+
+def test_rows_of_an_earlier_campaign_name_no_entry_to_take_away(page, waited):
+    """Remove, twice in a row: the second one took what stood elsewhere by then, or nothing that there was."""
+    page.open_file(shipped("campaigns/quick.toml"))
+    first = load_campaign(shipped("campaigns/quick.toml"))
+    waited(lambda: page.entries.rowCount() > 1)
+    last = page.entries.rowCount() - 1
+    page.entries.selectRow(last)
+    page._remove()
+    shorter = page.context.selection.campaign
+    assert shorter != first
+    page._remove()
+    page._move_up()
+    assert page.context.selection.campaign == shorter
+    waited(page.entries.isEnabled)
+    assert page.entries.rowCount() == last
+    page._remove()
+    assert page.context.selection.campaign != shorter
