@@ -104,7 +104,7 @@ def test_settings_are_one_form_and_are_kept(window, qapp, tmp_path):
     dialog.form.form.show_content(
         {
             "theme": "dark",
-            "font_points": 12,
+            "font_pt": 12,
             "patience_s": 4.0,
             "recordings_folder": str(tmp_path / "elsewhere"),
         }

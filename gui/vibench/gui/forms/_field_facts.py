@@ -21,6 +21,7 @@ UNITS = (
     ("_m_per_s", "m/s"),
     ("_per_s", "1/s"),
     ("_vpp", "Vpp"),
+    ("_pt", "pt"),
     ("_hz", "Hz"),
     ("_db", "dB"),
     ("_deg", "°"),

@@ -26,6 +26,9 @@ from ._push_button import (
 from ._read_table import (
     ReadTable as ReadTable,
 )
+from ._table_copy import (
+    offer_copies as offer_copies,
+)
 from ._theme import (
     DARK as DARK,
     LIGHT as LIGHT,

@@ -27,7 +27,7 @@ class Preferences(FrozenModel):
 
     theme: Literal["light", "dark"]
     """Colours of the window; figures of exports are light."""
-    font_points: Annotated[int, Field(ge=7, le=24)]
+    font_pt: Annotated[int, Field(ge=7, le=24)]
     """Height of the letters; what is open already takes it as far as it goes, all of it the next start."""
     patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)]
     """How long a test far from every limit may go on while the window does not answer."""
@@ -56,7 +56,7 @@ class SettingsDialog(QDialog):
         self.form.show_value(
             Preferences(
                 theme=context.theme.name,
-                font_points=QApplication.font().pointSize(),
+                font_pt=QApplication.font().pointSize(),
                 patience_s=context.patience_s,
                 recordings_folder=str(context.folder),
             )
@@ -70,9 +70,9 @@ class SettingsDialog(QDialog):
         if wanted.theme != self._context.theme.name:
             self._context.choose_theme(THEMES[wanted.theme])
         self._context.settings.keep_text(Remembered.PATIENCE, f"{wanted.patience_s:g}")
-        self._context.settings.keep_text(Remembered.FONT, str(wanted.font_points))
+        self._context.settings.keep_text(Remembered.FONT, str(wanted.font_pt))
         font = QFont(QApplication.font())
-        font.setPointSize(wanted.font_points)
+        font.setPointSize(wanted.font_pt)
         QApplication.setFont(font)
         folder = Path(wanted.recordings_folder).expanduser()
         if folder != self._context.folder:

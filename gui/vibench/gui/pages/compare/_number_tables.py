@@ -3,18 +3,18 @@
 from math import isfinite
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent, QKeySequence, QPainter, QPaintEvent
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
 
 from vibench.analysis import Curve, curve_peaks, readings
 
-from ...widgets import paint_hint
+from ...widgets import offer_copies, paint_hint
 
 PEAK_HEADINGS = ("Curve", "Peak at (Hz)", "|x / U|", "±", "Width at -3 dB (Hz)", "Damping ratio (%)")
 
 
 class NumberTable(QTableWidget):
-    """A table to read and to copy; Ctrl+C takes the chosen cells, with tabs between them."""
+    """A table to read and to copy, with other headings each time."""
 
     def __init__(self, name: str, hint: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -22,6 +22,7 @@ class NumberTable(QTableWidget):
         self.setAccessibleName(name)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setAlternatingRowColors(True)
+        offer_copies(self)
         self.setTabKeyNavigation(False)
         self.verticalHeader().hide()
         self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
@@ -46,22 +47,6 @@ class NumberTable(QTableWidget):
         if self.rowCount() == 0:
             colour = self.palette().placeholderText().color()
             paint_hint(QPainter(self.viewport()), self.viewport().rect(), self._hint, colour)
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Copy."""
-        if event.matches(QKeySequence.StandardKey.Copy):
-            QGuiApplication.clipboard().setText(self.chosen_text())
-            event.accept()
-            return
-        super().keyPressEvent(event)
-
-    def chosen_text(self) -> str:
-        """Give the chosen cells, rows by lines."""
-        chosen = sorted((index.row(), index.column(), index.data() or "") for index in self.selectedIndexes())
-        rows: dict[int, list[str]] = {}
-        for row, _, text in chosen:
-            rows.setdefault(row, []).append(text)
-        return "\n".join("\t".join(cells) for cells in rows.values())
 
 
 def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:

@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidge
 from vibench.analysis.live import THUMBNAIL_COLUMNS, Thumbnail
 
 from ...forms import Choice
-from ...widgets import Theme, moment_text, paint_hint
+from ...widgets import Theme, moment_text, offer_copies, paint_hint
 from ._file_words import duration_text, size_text, state_text
 from ._listing import ListedCampaign, ListedRecording
 
@@ -213,6 +213,7 @@ class RecordingTable(QTableView):
         self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setAlternatingRowColors(True)
+        offer_copies(self)
         self.setShowGrid(False)
         self.setTabKeyNavigation(False)
         self.setIconSize(THUMBNAIL_SIZE)

@@ -1,0 +1,43 @@
+"""Every table is copied from, by its key and by its context menu."""
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QAbstractItemView, QTableView
+
+from vibench.gui.widgets import ReadTable
+
+
+@pytest.fixture
+def table(qapp, qtbot):
+    made = ReadTable("Loads", ("used", "quantity", "limit"))
+    qtbot.addWidget(made)
+    made.show_rows([("12 %", "stroke", "10 mm"), ("3 %", "force", "20 N")])
+    made.show()
+    made.activateWindow()
+    made.setFocus()
+    qtbot.waitUntil(made.hasFocus)
+    return made
+
+
+def clipboard():
+    return QGuiApplication.clipboard().text()
+
+
+def test_the_chosen_rows_are_copied_by_the_key_and_everything_while_none_is_chosen(table, qtbot):
+    qtbot.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    whole = "used\tquantity\tlimit\n12 %\tstroke\t10 mm\n3 %\tforce\t20 N"
+    assert clipboard() == whole
+    table.selectRow(1)
+    qtbot.keyClick(table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    assert clipboard() == "3 %\tforce\t20 N"
+    next(each for each in table.actions() if "whole" in each.text()).trigger()
+    assert clipboard() == whole
+
+
+def test_every_table_of_the_window_offers_it(window):
+    tables = [each for each in window.findChildren(QTableView) if isinstance(each, QAbstractItemView)]
+    assert len(tables) >= 8
+    for each in tables:
+        assert [action.text() for action in each.actions()] == ["Copy", "Copy the whole table"], each
+        assert each.contextMenuPolicy() is Qt.ContextMenuPolicy.ActionsContextMenu
