@@ -22,15 +22,15 @@ class Editor(Protocol):
     def widget(self) -> QWidget:
         """What is put into the form."""
 
+    @property
+    def complaint(self) -> str:
+        """What is wrong before the plan is even asked."""
+
     def content(self) -> Any:
         """Say what a file would say; None for nothing."""
 
     def show_content(self, content: Any) -> None:
         """Show what a file says."""
-
-    @property
-    def complaint(self) -> str:
-        """What is wrong before the plan is even asked."""
 
 
 _LEFT_OPEN = "left open"
@@ -46,11 +46,7 @@ class QuantityEditor:
         self._edit = QuantityEdit(facts.unit, kind)
         self._edit.lineEdit().setPlaceholderText(empty)
         self._edit.changed.connect(changed)
-
-    @property
-    def widget(self) -> QWidget:
-        """The field."""
-        return self._edit
+        self.widget = self._edit
 
     @property
     def complaint(self) -> str:
@@ -93,7 +89,9 @@ class Choice(QComboBox):
 
 
 class ChoiceEditor:
-    """One of a few values."""
+    """One of a few values: nothing can be wrong."""
+
+    complaint = ""
 
     def __init__(self, values: tuple[Any, ...], changed: Callable[..., None]) -> None:
         self._values = values
@@ -102,16 +100,7 @@ class ChoiceEditor:
         for value in values:
             self._box.addItem(str(value).replace("_", " "))
         self._box.currentIndexChanged.connect(changed)
-
-    @property
-    def widget(self) -> QWidget:
-        """The box."""
-        return self._box
-
-    @property
-    def complaint(self) -> str:
-        """Nothing can be wrong."""
-        return ""
+        self.widget = self._box
 
     def content(self) -> Any:
         """Give the chosen value."""
@@ -124,21 +113,14 @@ class ChoiceEditor:
 
 
 class TextEditor:
-    """A word or a sentence."""
+    """A word or a sentence; the plan itself judges it."""
+
+    complaint = ""
 
     def __init__(self, changed: Callable[..., None]) -> None:
         self._line = LineField()
         self._line.editingFinished.connect(changed)
-
-    @property
-    def widget(self) -> QWidget:
-        """The line."""
-        return self._line
-
-    @property
-    def complaint(self) -> str:
-        """The plan itself judges a text."""
-        return ""
+        self.widget = self._line
 
     def content(self) -> str:
         """Give the text."""
@@ -150,7 +132,9 @@ class TextEditor:
 
 
 class SuggestionEditor:
-    """A text that is chosen from a list, or typed."""
+    """A text that is chosen from a list, or typed; the plan itself judges it."""
+
+    complaint = ""
 
     def __init__(self, examples: tuple[str, ...], changed: Callable[..., None]) -> None:
         self._box = Choice()
@@ -164,16 +148,7 @@ class SuggestionEditor:
         line = self._box.lineEdit()
         if line is not None:
             line.editingFinished.connect(self._tell)
-
-    @property
-    def widget(self) -> QWidget:
-        """The box."""
-        return self._box
-
-    @property
-    def complaint(self) -> str:
-        """The plan itself judges a text."""
-        return ""
+        self.widget = self._box
 
     def content(self) -> str:
         """Give the text."""
@@ -198,11 +173,7 @@ class ListEditor:
         self._line.setPlaceholderText("none; or for example 95, 266, 500")
         self._line.editingFinished.connect(changed)
         self._complaint = ""
-
-    @property
-    def widget(self) -> QWidget:
-        """The line."""
-        return self._line
+        self.widget = self._line
 
     @property
     def complaint(self) -> str:
