@@ -100,3 +100,21 @@ def test_what_is_too_large_for_a_window_is_told(page):
 def test_the_page_turns_dark(page):
     page.retheme(DARK)
     assert page.map.plot.backgroundBrush().color().name() == DARK.base
+
+
+def test_a_map_and_a_motion_of_another_specimen_lie_under_a_veil(page, waited):
+    mapped(page, waited)
+    page.pick(120.0, 1e-5)
+    waited(lambda: page._motion_of is not None and page.motion.isEnabled(), 100.0)
+    assert page.map.isEnabled()
+    before = page.form.form.content()
+    page.form.form.show_content({**before, "gap_m": 60e-6})
+    assert [each.widget.isEnabled() for each in page.shown] == [False, False]
+    page.form.form.show_content(before)
+    assert [each.widget.isEnabled() for each in page.shown] == [True, True]
+    page.pick(130.0, 1e-5)
+    assert not page.motion.isEnabled()
+    assert all(each.is_true for each in page.shown)
+    page.begin()
+    assert page.map.image.image is None
+    page.cancel()

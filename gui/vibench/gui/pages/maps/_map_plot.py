@@ -19,6 +19,7 @@ from ...widgets import Theme
 AMPLITUDE = PlotAxis("Base amplitude A0", "µm", factor=1e6, scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
 """Over the colours of a map, which are the same in every theme."""
+HINT = "What motions there are; drawn as it is computed. A click shows the motion there."
 UNKNOWN = (0, 0, 0, 0)
 SHARPEST = 0.998
 """Quantile at either end beyond which colours are not spread."""
@@ -33,9 +34,7 @@ class MapPlot(QWidget):
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.plot = Plot("Map of motions over frequency and amplitude", FREQUENCY, AMPLITUDE, theme)
-        self.plot.with_hint(
-            "What motions there are; drawn as it is computed. A click shows the motion there."
-        )
+        self.plot.with_hint(HINT)
         self.image = pg.ImageItem(axisOrder="row-major")
         self.plot.addItem(self.image)
         self._mark = self.plot.dots(ON_TOP, size=10)
@@ -67,9 +66,11 @@ class MapPlot(QWidget):
             self.plot.setXRange(left, right, padding=0.0)
             self.plot.setYRange(log10(low), log10(high), padding=0.0)
 
-    def look_at_next(self) -> None:
-        """Let the axes show the whole of the next map, wherever they were."""
+    def clear(self) -> None:
+        """Show no map; the axes show the whole of the next one, wherever they were."""
         self._seen = None
+        self.image.clear()
+        self.plot.with_hint(HINT)
 
     def mark(self, frequency_hz: float, amplitude_m: float) -> None:
         """Show which point the motion is of."""

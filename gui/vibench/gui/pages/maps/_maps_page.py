@@ -1,5 +1,6 @@
 """Maps: what is asked on the left; on the right the map as far as it has come, and the motion at a point."""
 
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -19,7 +20,7 @@ from vibench.analysis.simulation import (
 
 from ...background import Job
 from ...forms import Choice, JudgedForm
-from ...page import AppContext, Page, SideAndPicture, Simulator
+from ...page import AppContext, Page, Shown, SideAndPicture, Simulator
 from ...widgets import MAPS, SIMULATE, Notice, NoticeKind, Theme, push_button
 from ._map_plot import COLOURINGS, MapPlot
 from ._motion_view import MotionView
@@ -43,6 +44,8 @@ class MapsPage(Page):
         self._asked: MapRequest | None = None
         self._point: tuple[float, float] | None = None
         self._job: Job | None = None
+        self._motion_of: MotionRequest | None = None
+        """What the motion that is shown was computed from."""
         self._levels: list[RecordedLevel] = []
         self._is_stale = False
         self._build()
@@ -65,6 +68,27 @@ class MapsPage(Page):
         """What stands below the map."""
         return self._state.text()
 
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The map, of what was asked; the motion, of the point that was clicked."""
+        return (
+            Shown(self.map, self._asked, self.form.value),
+            Shown(self.motion, self._motion_of, self._motion_wanted),
+        )
+
+    @property
+    def _motion_wanted(self) -> MotionRequest | None:
+        request = self.form.value
+        if request is None or self._point is None:
+            return None
+        frequency_hz, amplitude_m = self._point
+        return MotionRequest(
+            **request.model_dump(include={"specimen", "model", "damping_time_s", "gap_m", "periods"}),
+            described=request.described,
+            frequency_hz=frequency_hz,
+            amplitude_m=amplitude_m,
+        )
+
     def refresh(self) -> None:
         """Draw what has come since the last time."""
         if self._is_stale and self.picture is not None:
@@ -86,7 +110,8 @@ class MapsPage(Page):
         if request is None:
             return
         self._asked, self.picture = request, None
-        self.map.look_at_next()
+        self.map.clear()
+        self._judge()
         self.simulator.begin(request)
         self._say("Computing; the first picture waits for the program to be made ready…")
 
@@ -108,22 +133,20 @@ class MapsPage(Page):
 
     def pick(self, frequency_hz: float, amplitude_m: float) -> None:
         """Show the motion at a point of the map."""
-        request = self._asked or self.form.value
-        if request is None or frequency_hz <= 0.0:
+        if self.form.value is None or frequency_hz <= 0.0:
             return
-        asked = MotionRequest(
-            **request.model_dump(include={"specimen", "model", "damping_time_s", "gap_m", "periods"}),
-            described=request.described,
-            frequency_hz=frequency_hz,
-            amplitude_m=amplitude_m,
-        )
         self._point = (frequency_hz, amplitude_m)
+        asked = self._motion_wanted
+        assert asked is not None
         self.map.mark(frequency_hz, amplitude_m)
         self.motion.said.setText("Following the motion…")
         self._open.setEnabled(True)
+        self._judge()
         if self._job is not None:
             self._job.drop()
-        self._job = self.context.background.ask(settled_motion, self._show_motion, self._fail, asked)
+        self._job = self.context.background.ask(
+            settled_motion, partial(self._show_motion, asked), self._fail, asked
+        )
 
     def add_recordings(self, paths: object) -> None:
         """Lay the levels of recordings over the map, where they have one over frequency."""
@@ -150,11 +173,15 @@ class MapsPage(Page):
         )
         self._say("It broke off.")
 
-    def _show_motion(self, motion: SettledMotion) -> None:
+    def _show_motion(self, asked: MotionRequest, motion: SettledMotion) -> None:
+        self._motion_of = asked
         self.motion.show_motion(motion)
+        self._judge()
 
     def _fail(self, error: BaseException) -> None:
-        self.motion.said.setText(str(error))
+        self._motion_of = None
+        self.motion.show_nothing(str(error))
+        self._judge()
 
     def _show_level(self, level: RecordedLevel) -> None:
         self._levels.append(level)
@@ -165,8 +192,11 @@ class MapsPage(Page):
         self._cancel.setEnabled(self.simulator.is_busy)
 
     def _judge(self) -> None:
-        self._begin.setEnabled(self.form.value is not None)
-        self._finer.setEnabled(self.form.value is not None)
+        wanted = self.form.value
+        for button in (self._begin, self._finer):
+            button.setEnabled(wanted is not None)
+        self.map.setEnabled(self._asked in (None, wanted))
+        self.motion.setEnabled(self._motion_of in (None, self._motion_wanted))
 
     def _recolour(self, *_: object) -> None:
         self._is_stale = True

@@ -37,6 +37,12 @@ class MotionView(QWidget):
         layout.addWidget(self.said)
         layout.addLayout(row, 1)
 
+    def show_nothing(self, why: str) -> None:
+        """Show no motion, and say why."""
+        self.said.setText(why)
+        for curve in self.curves:
+            curve.clear()
+
     def show_motion(self, motion: SettledMotion) -> None:
         """Draw another motion."""
         self.said.setText(motion.said)
