@@ -1,11 +1,12 @@
 """Who looks after a run: the window's process, whatever its drawing thread does at the moment."""
 
+import os
 from time import sleep
 
 import pytest
 
 from vibench.acquisition import shipped
-from vibench.acquisition.engine import DRIVING, EngineState
+from vibench.acquisition.engine import DRIVING, EngineClient, EngineState
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.gui.widgets import QUEUE
@@ -54,3 +55,18 @@ def test_a_window_that_is_busy_for_a_second_stops_nothing_and_a_campaign_is_left
     assert seen[-1].attendance.value == "unattended"
     assert "unattended" in seen[-1].lines[-1]
     window.user_actions.disarm()
+
+
+def test_orders_that_an_engine_took_along_are_not_counted_against_the_next_one(window, qtbot):
+    bridge, rig = window.context.bridge, load_rig(shipped("hardware_configs/virtual_rig.toml"))
+    bridge.open(rig, None)
+    qtbot.waitUntil(lambda: bridge.state is EngineState.READY, timeout=PATIENCE_MS)
+    os.kill(bridge.engine_pid, 9)
+    for _ in range(3):
+        bridge.order(EngineClient.mark, "here")
+    qtbot.waitUntil(lambda: bridge.engine_pid is None, timeout=PATIENCE_MS)
+    assert not bridge.is_ordering
+    bridge.open(rig, None)
+    assert bridge.is_ordering
+    window.tick()
+    assert window.banner.indicator.word == "OPENING"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from PySide6.QtCore import QTimer
 
-from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState
+from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState, Supervision
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.gui.page import AppContext, Settings
@@ -20,7 +20,7 @@ PLAN = {
 }
 
 
-def main(folder: Path, config: Path) -> None:
+def main(folder: Path, config: Path, attendance: Supervision) -> None:
     """Open the window, and let it measure until it is killed."""
     rig = load_rig(config)
     rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
@@ -41,6 +41,7 @@ def main(folder: Path, config: Path) -> None:
                     CampaignRequest(
                         campaign=Campaign.model_validate(PLAN),
                         folder=folder / "recordings",
+                        attendance=attendance,
                         longest_patience_s=window.context.patience_s,
                     )
                 )
@@ -58,4 +59,4 @@ def main(folder: Path, config: Path) -> None:
 
 
 if __name__ == "__main__":  # the window's own workers import this file
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), Supervision(sys.argv[3]))

@@ -21,7 +21,7 @@ from vibench.acquisition.engine._wire import Message
 WORDS = {
     *("open", "close", "check", "arm", "disarm", "start", "stop"),
     *("resume", "mark", "status", "beat", "look", "shutdown"),
-    *("rig", "twin", "tell_twin", "tell_change"),
+    *("rig", "request", "twin", "tell_twin", "tell_change"),
 }
 RESTRICTED = {"open", "close", "check", "arm", "start", "mark", "tell_change"}
 

@@ -39,7 +39,9 @@ from ._server import (
     serving as serving,
 )
 from ._start import (
+    AdoptedEngine as AdoptedEngine,
     EngineProcess as EngineProcess,
+    left_alone as left_alone,
     start_engine as start_engine,
 )
 from ._state import (

@@ -76,7 +76,7 @@ def _follow_parent(handler: RequestHandler) -> None:
     while os.read(sys.stdin.fileno(), 4096):
         pass
     pause = Event()
-    while handler.goes_on_alone:
+    while handler.outlives_its_parent:
         pause.wait(PARENT_INTERVAL_S)
     handler.shutdown(Cause.PARENT_GONE, "the program that started the engine has ended")
 

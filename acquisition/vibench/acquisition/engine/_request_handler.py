@@ -109,6 +109,8 @@ STALL_S = 0.2
 """A look after this process's own viewers that comes so late tells of a stall of this process [s]."""
 LATE_FACTOR = 4.0
 """A viewer is given so many times what this process itself comes late: it shares the computer."""
+TAKEN_OVER_S = 2.0
+"""An engine without parent is somebody's who has asked so lately: a window asks 25 times a second [s]."""
 FORGETTING = 0.995
 """Of the worst lateness, from one look to the next: half of it is forgotten in seven seconds."""
 
@@ -126,6 +128,8 @@ class RequestHandler:
         self._jobs = jobs
         self._asking = Lock()
         self._request: CampaignRequest | None = None
+        self._carried: CampaignRequest | None = None
+        self._is_orphan = False
         self._armed_s = 0.0
         self._last_request_s = self._last_round_s = monotonic()
         self._late_s = self._still_s = 0.0
@@ -156,7 +160,9 @@ class RequestHandler:
 
     def status(self) -> EngineStatus:
         """Say where the engine stands."""
-        return self._engine.published.status()
+        status = self._engine.published.status()
+        is_left_alone = self._is_orphan and not self._is_looked_after
+        return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
     def status_since(self, known_rows: int = -1) -> EngineStatus:
         """Say where the engine stands, and leave out rows that are known."""
@@ -203,6 +209,7 @@ class RequestHandler:
         """Carry out what is armed."""
         assert self._request is not None
         request, self._request = self._request, None
+        self._carried = request
         self._engine.switch = StopSwitch()
         self._engine.published.enter(EngineState.RUNNING)
         self._jobs.put(lambda: self._engine.measure(request))
@@ -232,6 +239,12 @@ class RequestHandler:
                 f"no bench is open while the engine is {self._engine.published.state.value}; open one first"
             )
         return rig
+
+    def carried_request(self) -> CampaignRequest:
+        """Give the campaign that was started last, and how."""
+        if self._carried is None:
+            raise EngineError("nothing was started by a request to this engine; arm and start a campaign")
+        return self._carried
 
     def turn_twin(self, switch: TwinSwitch) -> None:
         """Start or end the live twin."""
@@ -273,6 +286,21 @@ class RequestHandler:
     def goes_on_alone(self) -> bool:
         """Whether something runs that was meant to be left alone."""
         return self._attendance is Supervision.UNATTENDED and self._engine.published.state in DRIVING
+
+    @property
+    def outlives_its_parent(self) -> bool:
+        """Whether there is something to do once whoever started the engine has ended.
+
+        That is what was left alone; then, as long as somebody who has taken the engine over looks after it.
+        """
+        if self.goes_on_alone and not self._is_orphan:
+            self._is_orphan = True
+            self._last_request_s = monotonic() - TAKEN_OVER_S  # whoever asked until now has gone
+        return self.goes_on_alone or (self._is_orphan and self._is_looked_after)
+
+    @property
+    def _is_looked_after(self) -> bool:
+        return monotonic() - self._last_request_s < TAKEN_OVER_S
 
     def is_forgotten(self, after_s: float) -> bool:
         """Whether nobody has asked for so long, and nothing was carried out that they may come back to."""

@@ -2,15 +2,57 @@
 
 import subprocess
 import sys
+from contextlib import suppress
+from threading import Event
+from time import monotonic
 
 from ..host import ClosedOnLeaving, chosen
 from ._address import EngineAddress
+from ._announcement import Announcement, announced_engines
 from ._client import EngineClient
 from ._errors import EngineGone
 from ._state import ConnectionRole, Supervision
 
 LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""
+LOOK_S = 0.02
+"""How often the end of a process is looked for that is not a child of this one [s]."""
+
+
+class AdoptedEngine(ClosedOnLeaving):
+    """An engine that was left alone, taken over: from now on it ends with what it does, or when told to."""
+
+    def __init__(self, announcement: Announcement) -> None:
+        self._announcement = announcement
+        self.address = announcement.address
+        self.client = EngineClient.attach(announcement.address, ConnectionRole.ATTENDING)
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._announcement.pid
+
+    def leave(self) -> None:
+        """Let go of it; what was armed to be left alone goes on."""
+        self.client.close()
+
+    def close(self) -> None:
+        """Let the engine ramp down and end, and wait for that. Legal at any time."""
+        with suppress(EngineGone):
+            self.client.shutdown()
+        self.client.close()
+        give_up_s, pause = monotonic() + LEAVING_S, Event()
+        while self._announcement.is_alive and monotonic() < give_up_s:
+            pause.wait(LOOK_S)
+
+
+def left_alone() -> Announcement | None:
+    """Find an engine that carries something out and was left alone by whoever started it."""
+    for told in announced_engines():
+        with suppress(EngineGone), EngineClient.attach(told.address) as client:
+            if client.status().is_left_alone:
+                return told
+    return None
 
 
 class EngineProcess(ClosedOnLeaving):

@@ -165,5 +165,7 @@ class EngineStatus(FrozenModel):
     """Changes with every recording; what was seen of another one is no longer true."""
     twin: TwinStatus | None = None
     """What the live twin told last; None while there is none."""
+    is_left_alone: bool = False
+    """Whoever started the engine has ended, what it carries out goes on, and nobody has taken it over."""
     messages: tuple[EngineMessage, ...] = ()
     """The newest, oldest first."""

@@ -133,6 +133,7 @@ def _samples_read(facts: Mapping[str, Any], payload: bytes) -> SampleSlice:
 DONE: Answer[None] = Answer(lambda _: Message(b'{"ok": true}'), lambda _facts, _payload: None)
 SAMPLES = Answer(_samples_written, _samples_read)
 PLAN, STATUS, RIG = _model(ArmedPlan), _model(EngineStatus), _model(Rig)
+REQUESTED = _model(CampaignRequest)
 
 
 def _with_absolute_folder(request: CampaignRequest) -> CampaignRequest:
@@ -198,6 +199,11 @@ class EngineVerbs:
     @verb("rig", RIG)
     def open_rig(self) -> Rig:
         """Give the configuration of the open bench."""
+        raise NotImplementedError
+
+    @verb("request", REQUESTED)
+    def carried_request(self) -> CampaignRequest:
+        """Give the campaign that was started last, and how: for a viewer that did not arm it."""
         raise NotImplementedError
 
     @verb("twin", DONE)

@@ -12,6 +12,8 @@ from PySide6.QtWidgets import QApplication
 from vibench.acquisition import AcquisitionError, StopLevel
 from vibench.acquisition.engine import (
     DRIVING,
+    AdoptedEngine,
+    Announcement,
     ArmedPlan,
     BenchFacts,
     CampaignRequest,
@@ -53,6 +55,8 @@ class Bridge(QObject):
     """A `Notice` from the engine, or about it."""
     armed = Signal(object)
     """The `ArmedPlan` after `arm` was granted."""
+    adopted = Signal(object)
+    """The `CampaignRequest` that an engine carries out which another window has left alone."""
     advanced = Signal()
     """What was wanted has come about: a bench is open, a plan armed, a run begun."""
     recording_ended = Signal(object)
@@ -139,6 +143,20 @@ class Bridge(QObject):
         self._rig = rig
         self._order(lambda client: _open(client, rig, confirmations))
 
+    def adopt(self, announcement: Announcement) -> None:
+        """Take over an engine that was left alone, with what it carries out; `adopted` follows."""
+        if self._line is not None:
+            return
+        self._line = EngineLine(lambda: AdoptedEngine(announcement))
+
+        def keep(found: tuple[Rig, CampaignRequest, EngineStatus]) -> None:
+            self._rig, request, self._status = found
+            self._campaign, self._attendance = request.campaign, Supervision.UNATTENDED
+            self._tell(self._status)  # what happened before anybody looked again
+            self.adopted.emit(request)
+
+        self._order(_taken_over, keep)
+
     def order(
         self, verb: Callable[Concatenate[EngineClient, P], object], *args: P.args, **kwargs: P.kwargs
     ) -> None:
@@ -182,16 +200,21 @@ class Bridge(QObject):
             )
             return
         self._orders += 1
+        line = self._line
+
+        def over() -> None:
+            if self._line is line:  # or it has been forgotten, with all its orders
+                self._orders -= 1
 
         def answered(answer: Any) -> None:
-            self._orders -= 1
+            over()
             (on_answer or _done)(answer)
 
         def refused(error: AcquisitionError) -> None:
-            self._orders -= 1
+            over()
             self._refused(error)
 
-        self._line.ask(Urgency.ORDER, question, answered, refused)
+        line.ask(Urgency.ORDER, question, answered, refused)
 
     def _look_question(self) -> Callable[[EngineClient], Snapshot]:
         view, run, status = self._view, self._view_run, self._status
@@ -282,6 +305,11 @@ def _open(client: EngineClient, rig: Rig, confirmations: KnobSheet | None) -> No
     """Open a bench, and meanwhile load what the first picture of a run needs: no frame has time for that."""
     client.open(rig, confirmations)
     warm_up()
+
+
+def _taken_over(client: EngineClient) -> tuple[Rig, CampaignRequest, EngineStatus]:
+    warm_up()
+    return client.open_rig(), client.carried_request(), client.status()
 
 
 def _done(_: object) -> None:

@@ -10,9 +10,9 @@ from time import monotonic
 from typing import Any
 
 from vibench.acquisition import AcquisitionError
-from vibench.acquisition.engine import EngineClient, EngineProcess, Heartbeat, start_engine
+from vibench.acquisition.engine import AdoptedEngine, EngineClient, EngineProcess, Heartbeat, start_engine
 
-Starter = Callable[[], EngineProcess]
+Starter = Callable[[], EngineProcess | AdoptedEngine]
 Question = Callable[[EngineClient], Any]
 Listener = Callable[[Any], None]
 
@@ -80,7 +80,7 @@ class EngineLine:
         self._calls: PriorityQueue[_Call] = PriorityQueue()
         self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._numbers = count()
-        self._engine: EngineProcess | None = None
+        self._engine: EngineProcess | AdoptedEngine | None = None
         self._pulse: Pulse | None = None
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()

@@ -47,8 +47,9 @@ class Selection(QObject):
 
     def choose_rig(self, rig: Rig | None) -> None:
         """Mean another rig."""
-        self._rig = rig
-        self.rig_changed.emit()
+        if rig != self._rig:
+            self._rig = rig
+            self.rig_changed.emit()
 
     def choose_measurement(self, measurement: Measurement | None) -> None:
         """Mean another test."""

@@ -19,10 +19,11 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.acquisition import ConfigurationError
+from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
 
 from ..engine_link import SignOfLife, Urgency
 from ..page import AppContext, Page, Remembered, UserActions, file_kind
-from ..widgets import RUN, Theme, notice_of, palette, style_sheet
+from ..widgets import RUN, Notice, NoticeKind, Theme, notice_of, palette, style_sheet
 from ._banner import Banner
 from ._event_loop_monitor import EventLoopMonitor
 from ._menus import AbortKey, build_menus
@@ -133,6 +134,30 @@ class Window(QMainWindow):
         self.context.background.close()
         super().closeEvent(event)
 
+    def look_for_left_campaign(self) -> None:
+        """Take over an engine that another window has left alone with a campaign, if there is one."""
+        self.context.background.ask(
+            left_alone, self._take_over, lambda error: self.context.say(notice_of(error))
+        )
+
+    def _take_over(self, left: Announcement | None) -> None:
+        if left is not None:
+            self.context.bridge.adopt(left)
+
+    def _show_adopted(self, request: CampaignRequest) -> None:
+        """Show a campaign that goes on, as if it had been armed here."""
+        self.context.selection.choose_rig(self.context.bridge.rig)
+        self.context.selection.choose_campaign(request.campaign)
+        self.context.say(
+            Notice(
+                NoticeKind.INFO,
+                f"The campaign {request.campaign.name} had been left alone and goes on.",
+                "It is shown here.",
+                "STOP ramps down as planned; Esc aborts.",
+            )
+        )
+        self.show_page(RUN)
+
     def _how_to_close(self) -> Urgency | None:
         """Ask what becomes of what runs; the drive goes on meanwhile, and Esc aborts it. None: stay."""
         if not self.context.bridge.is_driving:
@@ -144,7 +169,8 @@ class Window(QMainWindow):
         if self.context.bridge.may_leave:
             leave = box.addButton("Let it go on and close", QMessageBox.ButtonRole.DestructiveRole)
             box.setInformativeText(
-                "It was armed to be left alone: 'vibench watch' shows it, 'vibench stop' ends it."
+                "It was armed to be left alone: the next window shows it, as 'vibench watch' does; "
+                "'vibench stop' ends it."
             )
         box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
         box.exec()
@@ -180,6 +206,7 @@ class Window(QMainWindow):
         self.abort_key.pressed.connect(self.user_actions.abort)
         self.banner.stop_wanted.connect(self.user_actions.stop)
         self.context.bridge.armed.connect(lambda _plan: self.show_page(RUN))
+        self.context.bridge.adopted.connect(self._show_adopted)
         self.context.bridge.advanced.connect(self.strip.give_way)
 
     def _restore(self) -> None:
