@@ -62,6 +62,11 @@ class Page(QWidget):
         """What the page shows that was computed, with what it was computed from."""
         return ()
 
+    @property
+    def styled(self) -> tuple[QWidget, ...]:
+        """Its parts, for a style sheet: one after the other, where the whole would hold the window up."""
+        return (self,)
+
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours; widgets follow the palette by themselves, plots do not."""
 

@@ -441,7 +441,6 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Write the legend anew: its colours follow the theme."""
         if self._legend is None:
             return
-        self._legend.setStyleSheet(f"background: {self._theme.base}; color: {self._theme.text}")
         self._legend.show_entries(
             tuple(
                 LegendEntry(sign, line_style.colour(self._theme), name)

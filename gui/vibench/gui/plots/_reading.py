@@ -6,6 +6,7 @@ from math import isfinite, log10
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QPalette
 from PySide6.QtWidgets import QLabel, QWidget
 
 from ..widgets import Theme
@@ -30,7 +31,9 @@ class Reading:
             add(line)
         self._label = QLabel(host)
         self._label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._label.setBackgroundRole(QPalette.ColorRole.Base)
         self._label.setAutoFillBackground(True)
+        self._label.setContentsMargins(4, 1, 4, 1)
         self._label.hide()
         self._marked: tuple[float, float] | None = None
         self.place: tuple[float, float] | None = None
@@ -47,7 +50,6 @@ class Reading:
             line.setPen(pg.mkPen(theme.muted))
         for line in self._marks:
             line.setPen(pg.mkPen(theme.accent, style=Qt.PenStyle.DashLine))
-        self._label.setStyleSheet(f"background: {theme.base}; color: {theme.text}; padding: 1px 4px")
 
     def show_at(self, point: QPointF, axes: tuple[PlotAxis, PlotAxis], scales: list[Scale]) -> None:
         """Read at a point of the picture, in the coordinates that are drawn."""

@@ -32,15 +32,16 @@ class AbortKey(QObject):
         self._last_seen: tuple[int, int] | None = None
         application.installEventFilter(self)
 
-    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
         """Watch for the keys, and let everything pass."""
-        if event.type() is QEvent.Type.KeyRelease:
+        kind = event.type()
+        if kind is QEvent.Type.KeyRelease:
             self._last_seen = None
-        elif event.type() in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride):
+        elif kind in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride):
             assert isinstance(event, QKeyEvent)
             if event.key() in ABORT_KEYS and not event.isAutoRepeat() and self._is_new(event):
                 self.pressed.emit()
-        return super().eventFilter(watched, event)
+        return False
 
     def _is_new(self, event: QKeyEvent) -> bool:
         """One press comes by several times: as an override, at the window, and at its widget."""

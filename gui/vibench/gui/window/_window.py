@@ -236,11 +236,18 @@ class Window(QMainWindow):
         # A style sheet for the whole application would hold the window up for a third of a second.
         for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
-        pages = sorted(self.pages.values(), key=lambda each: each is not self._stack.currentWidget())
+        in_sight = self._stack.currentWidget()
+        # Painted once, when it is done, and not after each step.
+        in_sight.setUpdatesEnabled(False)
+        pages = sorted(self.pages.values(), key=lambda each: each is not in_sight)
         self._unthemed = [
             step
             for page in pages
-            for step in (partial(page.retheme, theme), partial(page.setStyleSheet, sheet))
+            for step in (
+                partial(page.retheme, theme),
+                *(partial(part.setStyleSheet, sheet) for part in page.styled),
+                partial(page.setUpdatesEnabled, True),
+            )
         ]
 
     @property

@@ -12,10 +12,10 @@ from vibench.acquisition.campaign import JournalPointState, ReasonCode
 from vibench.acquisition.campaign._bench_identity import BenchIdentity
 from vibench.acquisition.campaign._journal import Journal, journal_path
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
-from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.recording import RecordingState, open_recording
 from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
-from vibench.gui.pages.files import FilesPage
+from vibench.gui.pages.files import FilesPage, _files_page
 from vibench.gui.pages.files._listing import made_levels
 from vibench.gui.pages.files._recording_table import HEADINGS
 from vibench.gui.widgets import DARK
@@ -206,7 +206,7 @@ def test_chosen_recordings_are_handed_to_compare(page, folder, qtbot):
 def test_a_recording_from_another_folder_is_opened_when_somebody_wants_it(page, record, tmp_path, qtbot):
     path = record(tmp_path, "elsewhere")
     page.context.recording_wanted.emit(path)
-    assert page._opened.path == path
+    qtbot.waitUntil(lambda: page._opened.path == path)
     qtbot.waitUntil(lambda: page.table.chosen_paths() == (path,), timeout=20_000)
 
 
@@ -227,6 +227,19 @@ def test_the_spectrogram_of_what_is_in_sight_shows_the_drive_and_the_impact(open
         assert at_s == pytest.approx(IMPACT_S, abs=0.1)
     assert "dB re 1 (m/s)²/Hz" in view.image.bar.axis.labelText
     page.pictures.setCurrentWidget(page.time_histories)
+
+
+def test_a_recording_that_is_opened_by_its_path_is_read_once(opened, folder, waited, monkeypatch):
+    page, read = opened("stopped.h5"), []
+
+    def counted(path):
+        read.append(path)
+        return open_recording(path)
+
+    monkeypatch.setattr(_files_page, "open_recording", counted)
+    page.open_path(folder / "whole.h5")
+    waited(lambda: page._opened.path == folder / "whole.h5" and len(page.time_histories.plots) == 3)
+    assert read == [folder / "whole.h5"]
 
 
 def test_a_recording_that_is_finished_while_it_is_looked_at_is_no_fault(

@@ -97,8 +97,15 @@ class FilesPage(Page):
         self._wanted = path
         if path.parent != self._folder and self._folder not in path.parents:
             self._go_to(path.parent)
+        # The page comes into sight first: both at once would hold the window up.
+        QTimer.singleShot(0, self, lambda: self._choose(path))
+
+    def _choose(self, path: Path) -> None:
+        """Open a recording, anew if it is open; where it is listed, to choose it opens it."""
+        before = self._opened
         self.table.choose(path)
-        self._open(path)
+        if self._opened is before:
+            self._open(path)
 
     def _listed(self, found: Listing) -> None:
         entries = found.recordings

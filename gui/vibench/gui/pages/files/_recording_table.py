@@ -74,8 +74,8 @@ _THIS_ROW_TOO = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.S
 _WIDE = HEADINGS.index("Excitation")
 PATH_ROLE = Qt.ItemDataRole.UserRole
 SORT_ROLE = Qt.ItemDataRole.UserRole + 1
-_MEASURED_ROWS = 60
-"""Rows whose cells say how wide their columns are: a thousand would take a tenth of a second."""
+_MEASURED_ROWS = 24
+"""Rows whose cells say how wide their columns are: more than a page shows, and few, for the loop waits."""
 THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
 
 

@@ -102,6 +102,11 @@ class SimulatePage(Page):
         """The curves, of the scene that was asked for."""
         return (Shown(self.plots, self._request, self.form.value), *(view.shown for view in self._views))
 
+    @property
+    def styled(self) -> tuple[QWidget, ...]:
+        """Its tabs: each has as many fields as another page."""
+        return (self._parts, *self._views)
+
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
         self.plots.retheme(theme)
