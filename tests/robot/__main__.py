@@ -27,6 +27,8 @@ def main() -> int:
         count = os.cpu_count() or 1 if options.beside_work else 0
         others = [subprocess.Popen([sys.executable, "-c", SPIN]) for _ in range(count)]
         try:
+            with Path(folder, "stderr").open("wb") as errors:
+                os.dup2(errors.fileno(), sys.stderr.fileno())  # of this process and of all that it starts
             robot = Robot(options.seed, Path(folder))
             robot.work(60.0 * options.minutes)
             told = robot.close()

@@ -104,6 +104,7 @@ ANSWERED_S = 300.0
 """A page that has not answered after this long is dead; compiling for the first time takes a part of it."""
 LONGEST_DEED_S = 20.0
 """The window's loop is held up for no longer, other work included."""
+TRACEBACK = "Traceback (most recent call last)"
 DWELL = Dwell(amplitude_vpp=0.5, frequency_hz=180.0, settle_s=0.2, duration_s=600.0)
 
 
@@ -114,6 +115,7 @@ class Robot:
         self.random = Random(seed)
         self.seed, self.folder = seed, folder
         self.findings, self.done = [], Counter()
+        self.errors = (folder / "stderr").open(errors="replace")
         self.recent = deque(maxlen=25)
         sys.excepthook = self._raised
         sys.unraisablehook = lambda told: self._raised(
@@ -160,12 +162,19 @@ class Robot:
             if "deleted" not in str(error):
                 raise
         self.live(20)
+        self.read_errors()
         if (
             deed not in (self.stop, self.wait, self.pause_engine)
             and time.monotonic() - begun_s > LONGEST_DEED_S
         ):
             self.find(f"the window was held up for {time.monotonic() - begun_s:.1f} s")
         self.look()
+
+    def read_errors(self):
+        """No process may say that it has not foreseen something: engines and workers have no window."""
+        said = self.errors.read()
+        if TRACEBACK in said:
+            self.find(said[said.index(TRACEBACK) :][-1500:])
 
     def look(self):
         """No number may belong to other inputs."""
@@ -181,7 +190,7 @@ class Robot:
         """Note something that must not be."""
         if not any(what.partition(" shows ")[0] in each for each in self.findings):
             self.findings.append(f"{what}\n    after {', '.join(self.recent)}")
-            print(f"FOUND: {self.findings[-1]}", file=sys.stderr, flush=True)
+            print(f"FOUND: {self.findings[-1]}", flush=True)
 
     def close(self):
         """End the window; gives what was found."""

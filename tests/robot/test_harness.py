@@ -1,5 +1,7 @@
 """The robot finds what it is there for: a number of other inputs, and an exception in a slot."""
 
+import subprocess
+import sys
 from collections import deque
 from types import SimpleNamespace
 
@@ -35,6 +37,16 @@ def test_a_number_of_other_inputs_is_found_unless_it_looks_like_one(robot):
     assert "amplitude 2" in found
     assert "amplitude 1" in found
     assert "type_value" in found
+
+
+def test_what_another_process_has_not_foreseen_is_found(robot, tmp_path):
+    with (tmp_path / "stderr").open("w+") as told, (tmp_path / "stderr").open() as robot.errors:
+        subprocess.run([sys.executable, "-c", "print(0)"], stderr=told, stdout=told, check=True)
+        robot.read_errors()
+        assert robot.findings == []
+        subprocess.run([sys.executable, "-c", "None.nothing"], stderr=told, check=False)
+        robot.read_errors()
+    assert "no attribute 'nothing'" in robot.findings[0]
 
 
 def test_an_exception_is_found_with_its_place(robot):

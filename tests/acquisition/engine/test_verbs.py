@@ -9,6 +9,7 @@ from vibench.acquisition import ConfigurationError
 from vibench.acquisition.engine import (
     Engine,
     EngineClient,
+    EngineError,
     EngineState,
     JobQueue,
     RequestHandler,
@@ -55,6 +56,25 @@ def test_a_state_that_does_not_permit_a_verb_refuses_it(handler, word):
     arguments = dict.fromkeys(name for name in verb.request.model_fields if name != "ask")
     with pytest.raises(Exception, match=f"is closed and cannot {word} now; it can when it is "):
         handler.carry_out(verb, arguments)
+
+
+def test_a_bench_that_is_being_closed_takes_nothing_on(shipped_rig):
+    """To arm between the wish to close and the deed ended the connection of whoever asked."""
+    engine = Engine(Supervision.UNATTENDED)
+    jobs = JobQueue(engine)
+    handler = RequestHandler(engine, jobs)
+    engine.open(shipped_rig)
+    handler.carry_out(VERBS["close"], {})
+    with pytest.raises(EngineError, match="is being closed, and the engine cannot check meanwhile"):
+        handler.carry_out(VERBS["check"], {})
+    jobs.leave()
+    jobs.run()
+    assert engine.published.state is EngineState.CLOSED
+    handler.carry_out(VERBS["open"], {"rig": shipped_rig})
+    handler.shutdown()
+    with pytest.raises(EngineError, match="is being closed"):
+        handler.carry_out(VERBS["close"], {})
+    jobs.run()
 
 
 @pytest.mark.parametrize(

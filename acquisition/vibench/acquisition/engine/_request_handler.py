@@ -129,7 +129,7 @@ class RequestHandler:
         self._asking = Lock()
         self._request: CampaignRequest | None = None
         self._carried: CampaignRequest | None = None
-        self._is_orphan = False
+        self._is_orphan = self._is_closing = False
         self._armed_s = 0.0
         self._last_request_s = self._last_round_s = monotonic()
         self._late_s = self._still_s = 0.0
@@ -142,6 +142,11 @@ class RequestHandler:
             return method(**arguments)
         with self._asking:
             state = self._engine.published.state
+            if self._is_closing:
+                raise EngineError(
+                    f"the bench is being closed, and the engine cannot {verb.word} meanwhile; "
+                    "ask again when it is closed"
+                )
             if state not in verb.states:
                 now, *permitted = (each.value.replace("_", " ") for each in (state, *verb.states))
                 allowed = " or ".join(permitted)
@@ -182,7 +187,8 @@ class RequestHandler:
     def close_bench(self) -> None:
         """Close the bench."""
         self._disarm()
-        self._jobs.put(self._engine.close)
+        self._is_closing = True
+        self._jobs.put(self._close)
 
     def check(self, folder: Path = Path()) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
@@ -258,6 +264,7 @@ class RequestHandler:
     def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "the engine was told to end") -> None:
         """End what runs, silence everything, and let the engine end. Legal in every state."""
         self._stop(StopRequest.by(cause, reason))
+        self._is_closing = True
         self._jobs.leave()
 
     def enforce_deadlines(self) -> None:
@@ -325,6 +332,12 @@ class RequestHandler:
                 "If the computer was too busy, end other programs, grant more patience (Settings), or arm a "
                 "campaign that is left alone, unattended (Queue page, or vibench measure).",
             )
+
+    def _close(self) -> None:
+        try:
+            self._engine.close()
+        finally:
+            self._is_closing = False
 
     def _stop(self, request: StopRequest) -> None:
         self._engine.switch.ask(request)
