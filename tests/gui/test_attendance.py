@@ -9,7 +9,7 @@ from vibench.acquisition import shipped
 from vibench.acquisition.engine import DRIVING, EngineClient, EngineState
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import load_rig
-from vibench.gui.widgets import QUEUE
+from vibench.gui.widgets import QUEUE, RUN
 
 DWELL = {"kind": "dwell", "amplitude_vpp": 0.5, "frequency_hz": 180, "settle_s": 0.2, "duration_s": 600}
 PATIENCE_MS = 100_000
@@ -57,16 +57,37 @@ def test_a_window_that_is_busy_for_a_second_stops_nothing_and_a_campaign_is_left
     window.user_actions.disarm()
 
 
-def test_orders_that_an_engine_took_along_are_not_counted_against_the_next_one(window, qtbot):
+def test_nothing_of_an_engine_that_was_killed_is_taken_for_the_next_one(window, qtbot):
+    """Its orders were waited for, and its last picture was continued by the next engine's first run."""
     bridge, rig = window.context.bridge, load_rig(shipped("hardware_configs/virtual_rig.toml"))
-    bridge.open(rig, None)
-    qtbot.waitUntil(lambda: bridge.state is EngineState.READY, timeout=PATIENCE_MS)
+    page = window.pages[RUN]
+
+    def run():
+        bridge.open(rig, None)
+        assert bridge.is_ordering
+        window.tick()
+        assert window.banner.indicator.word == "OPENING"
+        qtbot.waitUntil(lambda: bridge.state is EngineState.READY, timeout=PATIENCE_MS)
+        window.user_actions.arm_test()
+        qtbot.waitUntil(lambda: bridge.state is EngineState.ARMED, timeout=PATIENCE_MS)
+        yield
+        window.user_actions.start()
+        qtbot.waitUntil(lambda: bridge.view is not None and bridge.view.next_sample > 0, timeout=PATIENCE_MS)
+
+    window.context.selection.choose_measurement(Measurement(name="first", excitation=DWELL))
+    for _ in run():
+        assert page.time_histories.isEnabled()
+    window.tick()
+    first = bridge.view
     os.kill(bridge.engine_pid, 9)
     for _ in range(3):
         bridge.order(EngineClient.mark, "here")
     qtbot.waitUntil(lambda: bridge.engine_pid is None, timeout=PATIENCE_MS)
     assert not bridge.is_ordering
-    bridge.open(rig, None)
-    assert bridge.is_ordering
+    for _ in run():
+        window.tick()
+        assert not any(each.widget.isEnabled() for each in page.shown), "pictures of another run"
     window.tick()
-    assert window.banner.indicator.word == "OPENING"
+    assert bridge.view is not first
+    assert page.shown
+    assert all(each.inputs is bridge.view and each.widget.isEnabled() for each in page.shown)

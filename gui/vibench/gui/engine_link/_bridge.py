@@ -99,7 +99,7 @@ class Bridge(QObject):
 
     @property
     def view(self) -> LiveView | None:
-        """The newest samples of the run; None before the first run."""
+        """The newest samples of the run; None before the first one, and since another plan was armed."""
         return self._view
 
     @property
@@ -168,6 +168,7 @@ class Bridge(QObject):
 
         def keep(plan: ArmedPlan) -> None:
             self._campaign, self._attendance = request.campaign, plan.attendance
+            self._view = None
             self.armed.emit(plan)
 
         self._order(lambda client: client.arm_request(request), keep)
@@ -222,7 +223,7 @@ class Bridge(QObject):
 
         def look(client: EngineClient) -> Snapshot:
             now = client.status()
-            since = view.next_sample if view is not None and now.run_id == run else 0
+            since = 0 if now.run_id != run else now.samples if view is None else view.next_sample
             if now.samples <= since or rate_hz == 0.0:
                 return now, None
             return now, client.look(since, most=round(CATCH_UP_S * rate_hz))
@@ -285,7 +286,7 @@ class Bridge(QObject):
             return
         line, self._line = self._line, None
         self._status, self._last_message, self._ended = None, 0, frozenset()
-        self._orders = 0
+        self._orders = self._view_run = 0  # another engine counts its runs from 1 again
         line.leave()
         self.noticed.emit(notice_of(error, "Look at the bench, then open it again on the Rig page."))
 

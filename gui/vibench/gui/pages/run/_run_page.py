@@ -15,7 +15,7 @@ from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
-from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, UserActions
+from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, Shown, UserActions
 from ...widgets import FILES, Theme
 from ._arm_card import ArmCard
 from ._hidden_motion_plot import HiddenMotionPlot
@@ -88,6 +88,8 @@ class RunPage(Page):
         if not self.watch_card.freeze.isChecked() and self.hidden_motion.isVisible():
             self.hidden_motion.show_status(status)
         view = self.context.bridge.view
+        for part in self._of_the_run:
+            part.setEnabled(view is not None or self._view is None)
         if view is None or self.watch_card.freeze.isChecked():
             return
         if view is not self._view:
@@ -103,6 +105,18 @@ class RunPage(Page):
             shown = tabs.currentWidget()
             if isinstance(shown, LivePlot):
                 shown.show_view(view)
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """Pictures and numbers, of the run that they are of; frozen ones are what somebody wants to see."""
+        if self.watch_card.freeze.isChecked() or not self.isVisible():
+            return ()
+        return tuple(Shown(each, self._view, self.context.bridge.view) for each in self._of_the_run)
+
+    @property
+    def _of_the_run(self) -> tuple[QWidget, ...]:
+        card = self.watch_card
+        return (self.time_histories, card.impacts, card.meters, *self._pictures.values())
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""

@@ -74,7 +74,8 @@ class LevelMeters(QWidget):
 
     def _paint_row(self, painter: QPainter, area: QRectF, word: str, level: Level) -> None:
         text_height = self.fontMetrics().height()
-        painter.setPen(QColor(self._theme.text))
+        ink = self._theme.text if self.isEnabled() else self._theme.muted
+        painter.setPen(QColor(ink))
         line = QRectF(area.left(), area.top(), area.width(), text_height)
         painter.drawText(line, Qt.AlignmentFlag.AlignLeft, word)
         said = f"{_WORDS[level.verdict]}  {100 * level.held_share:.1f} %"
@@ -84,9 +85,9 @@ class LevelMeters(QWidget):
         tone = Tone.DANGER if level.verdict is LevelVerdict.OVER else Tone.GOOD
         used = QRectF(bar)
         used.setWidth(bar.width() * min(level.peak_share, 1.0))
-        painter.fillRect(used, QColor(self._theme.tones[tone].ground))
+        painter.fillRect(used, QColor(self._theme.tones[tone].ground if self.isEnabled() else ink))
         danger = self._theme.tones[Tone.DANGER].ground
-        for share, colour in ((level.held_share, self._theme.text), (OVER_SHARE, danger)):
+        for share, colour in ((level.held_share, ink), (OVER_SHARE, danger)):
             mark = QRectF(bar.left() + bar.width() * min(share, 1.0) - 1, bar.top(), 2, bar.height())
             painter.fillRect(mark, QColor(colour))
 
