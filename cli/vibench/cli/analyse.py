@@ -317,7 +317,8 @@ def fitted_to(
     paths: Sequence[Path], name: str, observer: ProgressObserver, also_free: Sequence[Parameter] = ()
 ) -> UpdatedSpecimen:
     """Fit the specimen to recordings, whatever the report is to show of them."""
-    return update_model(analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer), also_free)
+    measured = analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer)
+    return update_model(measured, also_free, observer)
 
 
 def complain_about(results: CampaignResults) -> None:

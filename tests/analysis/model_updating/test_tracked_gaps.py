@@ -24,12 +24,12 @@ def collided(world, tmp_path_factory):
 
 def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(collided):
     updated = update_model(collided)
-    lower, upper = updated.tracked.gaps
+    lower, upper = updated.collisions.gaps
     assert lower.low <= 35e-6 <= lower.high
     assert upper.low <= 55e-6 <= upper.high
     assert updated.specimen.gaps_m == (lower.value, upper.value)
     assert updated.description.gap_m == (lower.value, upper.value)
-    told = {each.what: each for each in updated.tracked.told}
+    told = {each.what: each for each in updated.collisions.told}
     assert told[Hidden.M1].low <= TRUE.masses[1] <= told[Hidden.M1].high
     assert not updated.fits
     (suspect,) = updated.suspects

@@ -51,6 +51,8 @@ from ._numbers import (
 )
 from ._parameters import (
     Hidden as Hidden,
+    value_of as value_of,
+    with_values as with_values,
 )
 from ._prepared_motion import (
     ChannelNoise as ChannelNoise,
@@ -60,4 +62,5 @@ from ._tracking import (
 )
 from ._tracking_model import (
     TrackedSpecimen as TrackedSpecimen,
+    tracked_specimen as tracked_specimen,
 )

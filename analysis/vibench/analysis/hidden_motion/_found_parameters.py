@@ -16,7 +16,7 @@ from ..tables import plus_minus
 from ._contact_free import FITTED, FreeGap, free_gaps, free_motion, free_numbers
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
-from ._parameters import Hidden, value_of, with_values
+from ._parameters import PRIOR_SD, Hidden, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
@@ -76,6 +76,7 @@ _STARTS_APART = 0.3
 _SHOWN = {
     Hidden.LOWER_GAP: ("lower gap", 1e6, "µm"),
     Hidden.UPPER_GAP: ("upper gap", 1e6, "µm"),
+    Hidden.MEAN_GAP: ("mean gap", 1e6, "µm"),
     Hidden.M1: ("m1", 1e3, "g"),
     Hidden.C1: ("c1", 1e3, "mN s/m"),
     Hidden.K0: ("k0", 1.0, "N/m"),
@@ -205,7 +206,7 @@ def _judged(what: Hidden, value: float, half: float, described: float, told: flo
 
 def _nothing(tracked: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
     nan = float("nan")
-    parameters = tuple(FoundParameter(each, nan, nan, nan, value_of(tracked, each), why) for each in Hidden)
+    parameters = tuple(FoundParameter(each, nan, nan, nan, value_of(tracked, each), why) for each in PRIOR_SD)
     return FoundSpecimen(tracked, parameters, 0, searched)
 
 

@@ -21,6 +21,8 @@ class Hidden(StrEnum):
     FORCE = "force_at_1um_n"
     """Of a stop pressed in by 1 um, F = FORCE (d / 1 um)^EXPONENT."""
     EXPONENT = "contact_exponent"
+    MEAN_GAP = "mean_gap_m"
+    """Of both sides: what statistics tell better than either."""
 
 
 PRIOR_SD = {
@@ -54,12 +56,13 @@ def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
         Hidden.C2: c2,
         Hidden.FORCE: tracked.force_at_1um_n,
         Hidden.EXPONENT: tracked.exponent,
+        Hidden.MEAN_GAP: 0.5 * (lower + upper),
     }[what]
 
 
 def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> TrackedSpecimen:
     """Give others; k1 stays when m1 changes."""
-    new = {each: values.get(each, value_of(tracked, each)) for each in Hidden}
+    new = {each: values.get(each, value_of(tracked, each)) for each in PRIOR_SD}
     m0, _, m2 = tracked.specimen.masses
     specimen = replace(
         tracked.specimen,

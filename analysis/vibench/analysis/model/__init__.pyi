@@ -9,8 +9,10 @@ from ._draws import (
     Drawn as Drawn,
     DrawSource as DrawSource,
     SimulatedRun as SimulatedRun,
+    StretchDraws as StretchDraws,
     base_source as base_source,
     drawn as drawn,
+    stretch_draws as stretch_draws,
     voltage_source as voltage_source,
 )
 from ._driven_rig import (

@@ -13,7 +13,7 @@ import numpy as np
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
-from vibench.sim.shaker import MotionFailed, follow_voltage
+from vibench.sim.shaker import MotionFailed, SampledMotion, follow_voltage
 
 from ..errors import UnusableData
 from ..recordings import BASE, DRIVE, RESPONSE, RecordedChannels
@@ -39,6 +39,11 @@ START_M = 5e-9
 """Standard deviation of each mass' place at the start."""
 CLOCK_TOLERANCE = 50e-6
 """Of the converter's clock, relative: what NI 9234 and its kind promise. It shifts resonances."""
+_LEAD_S, _FADE_S = 0.5, 0.2
+"""Simulated before a stretch, and raised from nothing within it [s]."""
+_NOISE = 0.4
+"""How far, as a logarithm, a channel's noise may be from what its quietest stretch shows: the converter's
+noise in the recorded voltage moves a simulated table too."""
 _MORE = 3
 _SEED = 17
 _MOST_BYTES = 2e9
@@ -211,13 +216,28 @@ def _drawn_channels(
     number: int,
 ) -> SimulatedChannels:
     rng = np.random.default_rng([_SEED, number])
-    recording, rate = recorded.recording, recorded.sample_rate_hz
     table = rig.table if fitted is None else replace(rig.table, shaker=fitted.drawn(rng))
+    motion, base, velocity = _moved(replace(rig, table=table), volts, recorded.recording, noise, rng)
+    return SimulatedChannels(
+        recorded,
+        velocity,
+        (motion.impact_times_s, motion.impacts.astype(np.float64)),
+        recorded.response_delay_s,
+        base,
+        drive_v,
+        recorded.response_gain,
+    )
+
+
+def _moved(
+    rig: DrivenRig, volts: Reals, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
+) -> tuple[SampledMotion, Reals, Reals]:
+    """Move rig and specimen from a start of their own; gives the base's and m0's channels too, with noise."""
     try:
         motion = follow_voltage(
-            table,
+            rig.table,
             volts,
-            rate * (1 + CLOCK_TOLERANCE * rng.uniform(-1.0, 1.0)),
+            recording.sample_rate_hz * (1 + CLOCK_TOLERANCE * rng.uniform(-1.0, 1.0)),
             start=np.concatenate([START_M * rng.standard_normal(3), np.zeros(3)]),
             noise_rms_v=noise.converter_v * abs(recording.channel(rig.role).physical_per_volt),
             seed=int(rng.integers(2**32)),
@@ -228,12 +248,53 @@ def _drawn_channels(
         seen + noise.rms[role] * rng.standard_normal(seen.size)
         for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity))
     )
-    return SimulatedChannels(
-        recorded,
-        velocity,
-        (motion.impact_times_s, motion.impacts.astype(np.float64)),
-        recorded.response_delay_s,
-        base,
-        drive_v,
-        recorded.response_gain,
-    )
+    return motion, base, velocity
+
+
+@dataclass(frozen=True, eq=False)
+class StretchDraws:
+    """Draws of a stretch of a recording, each of a specimen of its own: for statistics of irregular motion.
+
+    A run begins at rest, half a second before the stretch, with the recorded voltage faded in: how a motion
+    began is not a part of it.
+    """
+
+    recording: Recording
+    rig: DrivenRig
+    fitted: FittedShaker | None
+    noise: ChannelNoise
+    volts: Reals
+    kept: slice
+    """The stretch within ``volts``."""
+
+    @property
+    def noise_rms(self) -> Reals:
+        """White noise of base acceleration [m/s2] and m0's velocity [m/s], per sample."""
+        return np.array([self.noise.rms[role] for role in (BASE, RESPONSE)])
+
+    def draw(self, specimen: Specimen, rng: np.random.Generator) -> Reals:
+        """Give base acceleration [m/s2] and m0's velocity [m/s] of a run, noise included; shape (2, samples).
+
+        Raises UnusableData when the simulation did not reach its end.
+        """
+        shaker = self.rig.table.shaker if self.fitted is None else self.fitted.drawn(rng)
+        rig = replace(self.rig, table=replace(self.rig.table, shaker=shaker, specimen=specimen))
+        rms = {role: each * np.exp(rng.uniform(-1, 1) * _NOISE) for role, each in self.noise.rms.items()}
+        _, base, velocity = _moved(rig, self.volts, self.recording, replace(self.noise, rms=rms), rng)
+        return np.stack([base[self.kept], velocity[self.kept]])
+
+
+def stretch_draws(
+    recording: Recording, specimen: Specimen, start: int, stop: int, fitted: FittedShaker | None = None
+) -> StretchDraws:
+    """Let the recorded voltage of samples ``start`` to ``stop`` move rig and specimens together.
+
+    Raises UnusableData when samples were lost there, or nothing is known of the shaker.
+    """
+    rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
+    first = max(0, start - round(_LEAD_S * recording.sample_rate_hz))
+    volts = recorded_voltage(recording, rig, first, stop)
+    fade = min(volts.size, round(_FADE_S * recording.sample_rate_hz))
+    volts[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
+    noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
+    return StretchDraws(recording, rig, fitted, noise, volts, slice(start - first, stop - first))

@@ -101,12 +101,12 @@ def _configured(recording: Recording) -> Rig | None:
         return None
 
 
-def recorded_voltage(recording: Recording, rig: DrivenRig) -> Reals:
-    """Read the voltage that drove the rig, over the whole recording [V]; shape (samples,).
+def recorded_voltage(recording: Recording, rig: DrivenRig, start: int = 0, stop: int | None = None) -> Reals:
+    """Read the voltage that drove the rig, over the whole recording unless told otherwise [V]; (samples,).
 
     Raises UnusableData when samples were lost: a motion cannot be followed across a hole.
     """
-    volts = recording.read(rig.role)
+    volts = recording.read(rig.role, start, stop)
     lost = int(np.count_nonzero(np.isnan(volts)))
     if lost:
         raise UnusableData(

@@ -6,6 +6,9 @@ from ._specimen_fit import (
     SpecimenFit as SpecimenFit,
     fit_specimen as fit_specimen,
 )
+from ._statistical_numbers import (
+    statistical_numbers as statistical_numbers,
+)
 from ._suspects import (
     Assumption as Assumption,
     Suspect as Suspect,

@@ -12,7 +12,16 @@ from ..errors import InvalidRequest
 from ..frequency_response import FrequencyResponse
 from ..signals import DEFAULT_CONFIDENCE, Reals
 from ._lines import Lines, descended, lines_of
-from ._parameters import ALSO_FREE, DAMPERS, LINEAR, MASSES, FittedValue, Parameter, parameter_value
+from ._parameters import (
+    ALSO_FREE,
+    DAMPERS,
+    LINEAR,
+    MASSES,
+    FittedValue,
+    Parameter,
+    parameter_value,
+    with_values,
+)
 from ._suspects import Suspect, suspects
 
 CLOCK_RELATIVE_SD = 25e-6
@@ -46,6 +55,12 @@ class SpecimenFit:
     def fits(self) -> bool:
         """Whether the model explains the lines."""
         return self.reduced_chi_square <= self.limit
+
+    def drawn(self, rng: np.random.Generator) -> Specimen:
+        """Give a specimen of the fit's uncertainty."""
+        logarithms = rng.multivariate_normal([np.log(each.value) for each in self.values], self.covariance)
+        drawn = zip((each.parameter for each in self.values), np.exp(logarithms), strict=True)
+        return with_values(self.specimen, {name: float(value) for name, value in drawn})
 
     def value(self, parameter: Parameter) -> FittedValue:
         """Give one fitted value; InvalidRequest when it was not fitted."""

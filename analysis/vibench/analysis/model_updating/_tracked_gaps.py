@@ -1,7 +1,11 @@
-"""What collisions tell of a specimen, tracked: the gap of each side, m1, c1 and the contact law."""
+"""What collisions tell of a specimen: the gap of each side, m1, c1 and the contact law.
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+Tracked where the motion can be followed; else from statistics of its chaos.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from math import isfinite
 from pathlib import Path
 
@@ -10,9 +14,13 @@ from vibench.acquisition.recording import Recording, SegmentLabel
 from vibench.sim import Specimen
 
 from ..errors import AnalysisError
-from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, hidden_motion, parameter_rows
+from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, hidden_motion
+from ..model import FittedShaker, fitted_shaker, says_shaker
+from ..recordings import ProgressObserver
 from ..results import CampaignResults
 from ..sine import DwellAnalysis
+from ._specimen_fit import SpecimenFit
+from ._statistical_numbers import statistical_numbers
 
 CALM, COLLIDING = 1.01, 1.05
 """Response I over Response II: 1 for a sine; between the two nothing is said."""
@@ -24,20 +32,35 @@ _LEAST_FOLLOWED = 0.95
 _HIGHEST_LEVEL = 1.25
 """Mean squared innovation in flight above which the specimen is another than the filter's; 0.8 to 1.1 with
 the right one."""
-_JUDGED = (Hidden.LOWER_GAP, Hidden.UPPER_GAP, Hidden.M1, Hidden.C1, Hidden.FORCE, Hidden.EXPONENT)
+_JUDGED = (
+    Hidden.LOWER_GAP,
+    Hidden.UPPER_GAP,
+    Hidden.MEAN_GAP,
+    Hidden.M1,
+    Hidden.C1,
+    Hidden.FORCE,
+    Hidden.EXPONENT,
+)
 """What noise does not tell."""
-_GAPS = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
+_SIDES = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
+
+
+class Way(StrEnum):
+    """How collisions tell numbers."""
+
+    TRACKED = "tracked"
+    STATISTICS = "statistics"
 
 
 @dataclass(frozen=True, eq=False)
-class TrackedNumbers:
-    """Numbers of a specimen from one tracked recording."""
+class CollisionNumbers:
+    """Numbers of a specimen from one recording that collides."""
 
+    way: Way
     recording: str
     parameters: tuple[FoundParameter, ...]
-    rows: tuple[tuple[str, str, str], ...]
-    """The same to read: name, value with its bounds or why there is none, as described."""
-    innovation_level: float
+    misfit: float
+    """Mean squared innovation of the track, or squared distance of the statistics: about 1."""
 
     @property
     def told(self) -> tuple[FoundParameter, ...]:
@@ -47,16 +70,39 @@ class TrackedNumbers:
     @property
     def gaps(self) -> tuple[FoundParameter, ...]:
         """Of the lower and the upper side; empty unless both are told."""
-        found = tuple(each for each in self.told if each.what in _GAPS)
-        return found if len(found) == len(_GAPS) else ()
+        found = tuple(each for each in self.told if each.what in _SIDES)
+        return found if len(found) == len(_SIDES) else ()
+
+    def on(self, specimen: Specimen) -> Specimen:
+        """Give a specimen the gaps that are told; where only their mean is, both as far apart as they are."""
+        mean = next((each for each in self.told if each.what is Hidden.MEAN_GAP), None)
+        if self.gaps:
+            lower, upper = (each.value for each in self.gaps)
+        elif mean is not None:
+            lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
+        else:
+            return specimen
+        return replace(specimen, gap_m=upper, lower_gap_m=lower)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Say each number."""
+        how = {Way.TRACKED: "Tracked", Way.STATISTICS: "From statistics of the motion:"}[self.way]
+        rows = (each.row for each in self.parameters)
+        return tuple(f"{how} {label}: {said}; described as {known}." for label, said, known in rows)
+
+    @property
+    def gap_fields(self) -> tuple[str, ...]:
+        """What is told of gaps."""
+        return tuple(each.what.value for each in self.told if each.what in (*_SIDES, Hidden.MEAN_GAP))
 
     @property
     def contradicted(self) -> tuple[str, ...]:
         """What of the description lies outside of its bounds by more than they are wide, worst first."""
         apart = [
-            (abs(each.value - each.described) / (each.high - each.low), label, said, described)
-            for each, (label, said, described) in zip(self.parameters, self.rows, strict=True)
-            if each.is_determined and each.what in _JUDGED
+            (abs(each.value - each.described) / (each.high - each.low), *each.row)
+            for each in self.told
+            if each.what in _JUDGED
         ]
         surely = sorted((each for each in apart if each[0] > 1.0), reverse=True)
         return tuple(f"{label} of {said} instead of {described}" for _, label, said, described in surely)
@@ -68,7 +114,7 @@ def peakedness(dwell: DwellAnalysis) -> float:
     return (found.response_i - found.noise_bias_i) / found.response_ii
 
 
-def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[TrackedNumbers | None, str]:
+def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
     """Track the colliding recordings, and give the numbers of the one that tells the gaps best.
 
     Returns
@@ -76,30 +122,67 @@ def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[Track
     The numbers, or None and a sentence that says why no recording tells them.
 
     """
-    found: list[TrackedNumbers] = []
+    found: list[CollisionNumbers] = []
     why: list[str] = []
-    for name, stretch, path in list(_colliding(results))[:_MOST_RECORDINGS]:
+    for each in list(_colliding(results))[:_MOST_RECORDINGS]:
         try:
-            with open_recording(path) as recording:
-                motion = hidden_motion(recording, specimen, *stretch(recording))
+            with open_recording(each.path) as recording:
+                motion = hidden_motion(recording, specimen, *each.within(recording))
         except AnalysisError as error:
-            why.append(f"{name}: {error}")
+            why.append(f"{each.name}: {error}")
             continue
         refused = _refused(motion)
         if refused:
-            why.append(f"{name}: {refused}")
+            why.append(f"{each.name}: {refused}")
         else:
-            found.append(
-                TrackedNumbers(
-                    name, motion.parameters, parameter_rows(motion), motion.tracked.innovation_level
-                )
-            )
+            level = motion.tracked.innovation_level
+            found.append(CollisionNumbers(Way.TRACKED, each.name, motion.parameters, level))
     if not found:
         return None, "; ".join(why) or "no recording collides"
     return min(found, key=_width), ""
 
 
-def _width(found: TrackedNumbers) -> float:
+def numbers_from_statistics(
+    results: CampaignResults,
+    specimen: Specimen,
+    linear: SpecimenFit | None,
+    observer: ProgressObserver,
+) -> tuple[CollisionNumbers | None, str]:
+    """Compare statistics of the recording that tells most with those of simulated specimens.
+
+    Returns
+    -------
+    The numbers, or None and a sentence that says why they are not determined.
+
+    """
+    why: list[str] = []
+    for each in list(_colliding(results))[:_MOST_RECORDINGS]:
+        observer.begin(each.name, "comparing its statistics with those of specimens drawn at random")
+        try:
+            with open_recording(each.path) as recording:
+                shaker = _fitted_shaker(recording, results, specimen)
+                found, distance = statistical_numbers(
+                    recording, specimen, each.within(recording), each.drive_hz, shaker, linear
+                )
+        except AnalysisError as error:
+            why.append(f"{each.name}: {error}")
+            continue
+        numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
+        if numbers.told:
+            return numbers, ""
+        why.append(f"{each.name}: its statistics tell nothing better than it was assumed")
+    return None, "; ".join(why)
+
+
+def _fitted_shaker(recording: Recording, results: CampaignResults, specimen: Specimen) -> FittedShaker | None:
+    if says_shaker(recording) or not results.noise:
+        return None
+    weakest = results.noise[0].analysis
+    with open_recording(weakest.facts.path) as noise:
+        return fitted_shaker(noise, weakest, specimen)
+
+
+def _width(found: CollisionNumbers) -> float:
     return max((each.high - each.low) / each.value for each in found.gaps)
 
 
@@ -113,18 +196,45 @@ def _refused(motion: HiddenMotion) -> str:
             f"the tracked motion leaves {tracked.innovation_level:.3g} times the noise, so the specimen is "
             "not the one it was tracked with"
         )
-    missing = [each for each in motion.parameters if each.what in _GAPS and not each.is_determined]
+    missing = [each for each in motion.parameters if each.what in _SIDES and not each.is_determined]
     return missing[0].not_determined if missing else ""
 
 
-_Stretch = Callable[[Recording], tuple[float, float]]
+@dataclass(frozen=True)
+class _Colliding:
+    """A stretch of a recording in which m1 strikes its stops."""
+
+    name: str
+    path: Path
+    label: SegmentLabel
+    middle: float
+    """Of the stretch within the longest segment of that name, 0 to 1."""
+    drive_hz: float | None = None
+
+    def within(self, recording: Recording) -> tuple[float, float]:
+        """Give its begin and end [s]."""
+        rate = recording.sample_rate_hz
+        start_s, stop_s = max(
+            (
+                (each.start / rate, each.stop / rate)
+                for each in recording.segments
+                if each.label == self.label
+            ),
+            key=lambda each: each[1] - each[0],
+            default=(0.0, recording.samples / rate),
+        )
+        length_s = min(_LENGTH_S, stop_s - start_s)
+        begin_s = start_s + self.middle * (stop_s - start_s) - 0.5 * length_s
+        begin_s = min(max(begin_s, start_s), stop_s - length_s)
+        return begin_s, begin_s + length_s
 
 
-def _colliding(results: CampaignResults) -> Iterator[tuple[str, _Stretch, Path]]:
+def _colliding(results: CampaignResults) -> Iterator[_Colliding]:
     """Give what collides: dwells first, which stay where they are; the strongest of them first."""
     for dwell in sorted(results.dwells, key=lambda each: -each.analysis.excitation.amplitude_vpp):
         if peakedness(dwell.analysis) >= COLLIDING:
-            yield dwell.analysis.facts.name, _within(SegmentLabel.DWELL, 0.5), dwell.analysis.facts.path
+            facts, drive = dwell.analysis.facts, dwell.analysis.response.drive
+            yield _Colliding(facts.name, facts.path, SegmentLabel.DWELL, 0.5, drive.frequency_hz)
     for sweep in results.sweeps:
         analysis = sweep.analysis
         longest = max(
@@ -133,25 +243,7 @@ def _colliding(results: CampaignResults) -> Iterator[tuple[str, _Stretch, Path]]
         if longest is not None:
             length_s = analysis.response.time_s[-1] or 1.0
             middle = 0.5 * (longest.start.time_s + longest.stop.time_s) / length_s
-            yield analysis.facts.name, _within(SegmentLabel.SWEEP, middle), analysis.facts.path
+            yield _Colliding(analysis.facts.name, analysis.facts.path, SegmentLabel.SWEEP, middle)
     for noise in reversed(results.noise[1:]):
         label = SegmentLabel.NOISE if noise.analysis.response.periodic is None else SegmentLabel.REALISATION
-        yield noise.analysis.facts.name, _within(label, 0.5), noise.analysis.facts.path
-
-
-def _within(label: SegmentLabel, middle: float) -> _Stretch:
-    """Take a stretch around a part of the longest segment of that name."""
-
-    def stretch(recording: Recording) -> tuple[float, float]:
-        rate = recording.sample_rate_hz
-        start_s, stop_s = max(
-            ((each.start / rate, each.stop / rate) for each in recording.segments if each.label == label),
-            key=lambda each: each[1] - each[0],
-            default=(0.0, recording.samples / rate),
-        )
-        length_s = min(_LENGTH_S, stop_s - start_s)
-        begin_s = start_s + middle * (stop_s - start_s) - 0.5 * length_s
-        begin_s = min(max(begin_s, start_s), stop_s - length_s)
-        return begin_s, begin_s + length_s
-
-    return stretch
+        yield _Colliding(noise.analysis.facts.name, noise.analysis.facts.path, label, 0.5)

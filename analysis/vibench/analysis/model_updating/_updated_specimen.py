@@ -9,8 +9,8 @@ from vibench.sim import Specimen, SpecimenDescription, SpecimenTable
 from ..errors import AnalysisError, NotEnoughData
 from ..frequency_response import scatters_beyond_noise
 from ..kinds import NoiseResult
-from ..recordings import described_specimen
-from ..results import CampaignResults
+from ..recordings import ProgressObserver, described_specimen
+from ..results import UNOBSERVED, CampaignResults
 from ..tables import named, plain, plus_minus
 from ..uncertainty import stated_of
 from ._bracketed_gap import bracketed_gap
@@ -19,7 +19,7 @@ from ._parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
 from ._specimen_fit import SpecimenFit, fit_specimen
 from ._suspects import Assumption, Suspect
 from ._table import TableFit, fitted_table
-from ._tracked_gaps import TrackedNumbers, tracked_numbers
+from ._tracked_gaps import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
 
 _NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
 
@@ -31,8 +31,8 @@ class UpdatedSpecimen:
     specimen: Specimen
     values: tuple[FittedValue, ...]
     """Of a model that fits; none where it does not."""
-    tracked: TrackedNumbers | None
-    """What collisions tell, tracked; None where they cannot be."""
+    collisions: CollisionNumbers | None
+    """What collisions tell, tracked or from their statistics; None where neither can be."""
     linear: SpecimenFit | None
     """Of the weakest noise; None where there is none."""
     linear_from: str
@@ -46,7 +46,7 @@ class UpdatedSpecimen:
     @property
     def fitted(self) -> bool:
         """Whether anything of it is more than the bench's description."""
-        return bool(self.values) or self.tracked is not None
+        return bool(self.values) or self.collisions is not None
 
     @property
     def fits(self) -> bool:
@@ -63,15 +63,15 @@ class UpdatedSpecimen:
         """Assumptions that a recording contradicts, of each recording the likeliest first."""
         linear = () if self.linear is None else self.linear.suspects
         table = () if self.table is None else self.table.suspects
-        return (*linear, *table, *_contradicted(self.tracked))
+        return (*linear, *table, *_contradicted(self.collisions))
 
     @property
     def description(self) -> SpecimenDescription:
         """The fitted specimen as a file has it; what was not fitted is the bench's."""
         lower, upper = self.specimen.gaps_m
         fitted = {each.parameter.value for each in self.values}
-        if self.tracked is not None:
-            fitted |= {each.what.value for each in self.tracked.gaps}
+        if self.collisions is not None:
+            fitted |= set(self.collisions.gap_fields)
         return SpecimenDescription(
             name=f"{self.nominal.name}_fitted",
             about=f"{self.nominal.name}, fitted to recordings: {', '.join(sorted(fitted))}",
@@ -109,11 +109,7 @@ class UpdatedSpecimen:
                 }
                 for each in self.values
             },
-            "tracked_from": None if self.tracked is None else self.tracked.recording,
-            "tracked": {
-                each.what.value: {**named(each, "value", "low", "high"), "bench": each.described}
-                for each in (() if self.tracked is None else self.tracked.told)
-            },
+            **{key: value for way in Way for key, value in self._told(way).items()},
             "linear_from": self.linear_from or None,
             "lines": 0 if linear is None else linear.lines,
             "reduced_chi_square": None if linear is None else linear.reduced_chi_square,
@@ -133,12 +129,22 @@ class UpdatedSpecimen:
             "specimen": self.description.model_dump(mode="json", exclude_none=True),
         }
 
+    def _told(self, way: Way) -> dict[str, object]:
+        """Plain values of what collisions tell in one way."""
+        found = self.collisions if self.collisions is not None and self.collisions.way is way else None
+        return {
+            f"{way}_from": None if found is None else found.recording,
+            f"{way}": {
+                each.what.value: {**named(each, "value", "low", "high"), "bench": each.described}
+                for each in (() if found is None else found.told)
+            },
+        }
+
 
 def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
     yield from (_said(each) for each in updated.values)
-    if updated.tracked is not None:
-        for label, said, described in updated.tracked.rows:
-            yield f"Tracked {label}: {said}; described as {described}."
+    if updated.collisions is not None:
+        yield from updated.collisions.sentences
     linear, table = updated.linear, updated.table
     if linear is not None and not linear.fits:
         yield (
@@ -150,7 +156,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
         yield table.sentence
         if table.suspects:
             yield f"The table does not fit: {culprits_text(table.suspects)}."
-    contradicted = _contradicted(updated.tracked)
+    contradicted = _contradicted(updated.collisions)
     if contradicted:
         yield f"Collisions contradict the description: {culprits_text(contradicted)}."
     yield from updated.not_told
@@ -170,11 +176,11 @@ def culprits_text(suspects: Sequence[Suspect]) -> str:
     return f"{choice}{named}" if choice else f"what would mend it is {named}"
 
 
-def _contradicted(tracked: TrackedNumbers | None) -> tuple[Suspect, ...]:
-    if tracked is None or not tracked.contradicted:
+def _contradicted(found: CollisionNumbers | None) -> tuple[Suspect, ...]:
+    if found is None or not found.contradicted:
         return ()
-    sentence = " and ".join(tracked.contradicted)
-    return (Suspect(Assumption.GAPS, sentence, tracked.innovation_level, mends=True, behind=0.0),)
+    sentence = " and ".join(found.contradicted)
+    return (Suspect(Assumption.GAPS, sentence, found.misfit, mends=True, behind=0.0),)
 
 
 def _said(found: FittedValue) -> str:
@@ -188,12 +194,17 @@ def _said(found: FittedValue) -> str:
     return f"Fitted {name} = {value} {unit} ({low} to {high} {unit}, 95 %); the bench says {nominal} {unit}."
 
 
-def update_model(results: CampaignResults, also_free: Sequence[Parameter | str] = ()) -> UpdatedSpecimen:
+def update_model(
+    results: CampaignResults,
+    also_free: Sequence[Parameter | str] = (),
+    observer: ProgressObserver = UNOBSERVED,
+) -> UpdatedSpecimen:
     """Fit a specimen to recordings, or say which assumption of the model they contradict.
 
     Damping and frequencies come from the weakest noise; the gap of each side, m1, c1 and the contact law from
-    tracking a motion that collides; the gap of the nearer side, where no motion can be tracked, from where
-    sweeps begin to collide or from two dwells. The table's mass comes from how the base follows the voltage.
+    tracking a motion that collides, or, where none can be tracked, from statistics of its chaos (minutes of
+    simulation); failing both, the gap of the nearer side from where sweeps begin to collide or from two
+    dwells. The table's mass comes from how the base follows the voltage.
 
     Parameters
     ----------
@@ -202,6 +213,8 @@ def update_model(results: CampaignResults, also_free: Sequence[Parameter | str] 
         displacement.
     also_free
         What is fitted to noise beside damping and frequencies: masses (one at a time) and single dampers.
+    observer
+        Told what takes long.
 
     Raises
     ------
@@ -221,7 +234,7 @@ def update_model(results: CampaignResults, also_free: Sequence[Parameter | str] 
     updated = UpdatedSpecimen(
         specimen=nominal if linear is None else linear.specimen,
         values=() if linear is None else linear.values,
-        tracked=None,
+        collisions=None,
         linear=linear,
         linear_from="" if linear is None else Path(results.noise[0].analysis.facts.name).name,
         table=table,
@@ -231,7 +244,7 @@ def update_model(results: CampaignResults, also_free: Sequence[Parameter | str] 
     if linear is not None and not linear.fits:
         not_told.append("Gaps and contacts stay as the bench says: the linear model does not fit.")
     else:
-        updated = _with_gaps(updated, results, not_told)
+        updated = _with_gaps(updated, results, not_told, observer)
         if not updated.fitted:
             raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(not_told)}")
     return replace(updated, not_told=tuple(not_told))
@@ -266,17 +279,23 @@ def _table(weakest: NoiseResult, linear: SpecimenFit, not_told: list[str]) -> Ta
         return None
 
 
-def _with_gaps(updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str]) -> UpdatedSpecimen:
-    """Give each side's gap by tracking; where that cannot be, the nearer one by where collisions begin."""
-    tracked, why = tracked_numbers(results, updated.specimen)
-    if tracked is not None:
-        lower, upper = (each.value for each in tracked.gaps)
-        return replace(
-            updated,
-            specimen=replace(updated.specimen, gap_m=upper, lower_gap_m=lower),
-            tracked=tracked,
+def _with_gaps(
+    updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str], observer: ProgressObserver
+) -> UpdatedSpecimen:
+    """Give each side's gap by tracking, else by statistics; else the nearer one by where collisions begin."""
+    found, why = tracked_numbers(results, updated.specimen)
+    if found is None:
+        found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
+        not_told.append(
+            "Each side's gap, m1, c1 and the contact law are not determined: "
+            f"{why}; by statistics: {why_not}."
+            if found is None
+            else f"No motion could be tracked: {why}."
         )
-    not_told.append(f"Each side's gap, m1, c1 and the contact law are not determined: {why}.")
+    if found is not None:
+        updated = replace(updated, collisions=found, specimen=found.on(updated.specimen))
+        if found.gap_fields:
+            return updated
     gap = _onset_gap(results, updated.specimen, updated.linear, not_told)
     if gap is None:
         return updated

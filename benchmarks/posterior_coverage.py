@@ -1,0 +1,147 @@
+"""How often bounds from statistics of chaos hold the truth, on random specimens whose motion is not tracked.
+
+    python benchmarks/posterior_coverage.py --draws 30 --seed 1
+    python benchmarks/posterior_coverage.py --draws 30 --seed 1 --shard 1/3
+
+Each draw is another specimen (gaps of both sides, m1, c1, contact stiffness), another description of it,
+another sine or random noise, and three to a hundred times the usual rig's sensor noise. The recording is
+the virtual world's. A draw whose motion does not collide is drawn again.
+"""
+
+import argparse
+import importlib.util
+import math
+import sys
+import tempfile
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+from vibench.acquisition import open_recording
+from vibench.analysis import AnalysisError
+from vibench.analysis.hidden_motion import Hidden, tracked_specimen, value_of
+from vibench.analysis.model_updating import statistical_numbers
+from vibench.sim import Hertz, Specimen, gong2025
+
+WORLD = Path(__file__).parents[1] / "tests" / "analysis" / "hidden_motion" / "shaken_world.py"
+RECORDED_S, BEGIN_S = 1.8, 0.5
+FEWEST_IMPACTS = 100
+CONFIDENCE_Z = 1.96
+
+
+def other(specimen: Specimen, rng: np.random.Generator, shares: tuple[float, ...]) -> Specimen:
+    """Draw a specimen about another: mean gap, gaps apart, m1, c1 and stiffness by factors up to these."""
+    mean, apart, m1, c1, force = (math.exp(rng.uniform(-1, 1) * math.log(share)) for share in shares)
+    masses, dampings = list(specimen.masses), list(specimen.dampings)
+    masses[1] *= m1
+    dampings[1] *= c1
+    lower, upper = specimen.gaps_m
+    assert isinstance(specimen.contact, Hertz)
+    return replace(
+        specimen,
+        masses=tuple(masses),
+        dampings=tuple(dampings),
+        gap_m=mean * apart * upper,
+        lower_gap_m=mean / apart * lower,
+        contact=Hertz(specimen.contact.stiffness * force),
+    )
+
+
+def drawn(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, bool | None]]:
+    """Draw, record, and hold bounds against the truth: None where a number is not determined."""
+    rng = np.random.default_rng([seed, index])
+    while True:
+        true = other(
+            gong2025(damping_time_s=float(rng.uniform(1.5e-5, 2.5e-5))), rng, (1.3, 1.2, 1.03, 1.4, 2)
+        )
+        described = other(true, rng, (1.4, 1.2, 1.03, 1.4, 1.8))
+        sine = rng.random() < 0.7
+        kind = float(np.round(rng.uniform(230, 290), 1)) if sine else "noise"
+        level_vpp = float(rng.uniform(1.2, 3.0) if sine else rng.uniform(7, 12))
+        noise = float(10 ** rng.uniform(0.5, 2))
+        with tempfile.TemporaryDirectory() as folder:
+            shaken = world.shaken(
+                Path(folder),
+                kind,
+                level_vpp,
+                duration_s=RECORDED_S,
+                seed=int(rng.integers(1 << 30)),
+                noise=noise,
+                specimen=true,
+            )
+            if shaken.touches.size < FEWEST_IMPACTS:
+                continue
+            words = f"{kind}, {level_vpp:.2g} Vpp, noise x{noise:.3g}"
+            with open_recording(shaken.path) as recording:
+                try:
+                    found, distance = statistical_numbers(
+                        recording, described, (BEGIN_S, RECORDED_S), kind if sine else None
+                    )
+                except AnalysisError as error:
+                    return f"{words}: refused: {error}", {}
+        truth = {each.what: value_of(tracked_specimen(true), each.what) for each in found}
+        held = {
+            each.what: each.low <= truth[each.what] <= each.high if each.is_determined else None
+            for each in found
+            if each.what is not Hidden.EXPONENT
+        }
+        told = "; ".join(
+            f"{each.row[0]} {each.row[1]} of {truth[each.what]:.4g}{'' if held[each.what] else ' MISSED'}"
+            for each in found
+            if each.is_determined
+        )
+        return f"{words}: distance {distance:.2f}: {told}", held
+
+
+def wilson(held: int, count: int) -> tuple[float, float]:
+    """Give the interval of 95 % of a share."""
+    z2 = CONFIDENCE_Z**2
+    middle = (held + z2 / 2) / (count + z2)
+    half = CONFIDENCE_Z / (count + z2) * math.sqrt(held * (count - held) / count + z2 / 4)
+    return middle - half, middle + half
+
+
+def counted(found: list[dict[Hidden, bool | None]]) -> Iterator[str]:
+    """Say how often each number's bounds held."""
+    by_name: dict[str, list[bool | None]] = defaultdict(list)
+    for each in found:
+        for what, held in each.items():
+            by_name[what.value].append(held)
+            by_name["all"].append(held)
+    for name, answers in by_name.items():
+        told = [each for each in answers if each is not None]
+        if told:
+            low, high = wilson(sum(told), len(told))
+            share = f"{100 * sum(told) / len(told):.1f} % ({100 * low:.0f} to {100 * high:.0f} %)"
+            yield f"{name}: told in {len(told)} of {len(answers)}, held in {sum(told)} = {share}"
+        else:
+            yield f"{name}: never told"
+    yield f"refused: {sum(not each for each in found)} of {len(found)}"
+
+
+def main() -> None:
+    """Draw and count."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--draws", type=int, default=30)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--shard", default="1/1", help="i/n: every nth draw, from the ith")
+    asked = parser.parse_args()
+    spec = importlib.util.spec_from_file_location("shaken_world", WORLD)
+    world = importlib.util.module_from_spec(spec)
+    sys.modules["shaken_world"] = world
+    spec.loader.exec_module(world)
+    shard, shards = (int(part) for part in asked.shard.split("/"))
+    found = []
+    for index in range(shard - 1, asked.draws, shards):
+        words, held = drawn(asked.seed, index, world)
+        print(f"{index}: {words}", flush=True)
+        found.append(held)
+    print("\n".join(counted(found)))
+
+
+if __name__ == "__main__":
+    main()

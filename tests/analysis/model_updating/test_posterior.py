@@ -1,0 +1,58 @@
+"""Parameters from statistics of runs: against a model whose posterior is known in closed form."""
+
+import numpy as np
+import pytest
+
+from vibench.analysis.model_updating._posterior import posterior
+
+ROUNDS = (60, 60, 120)
+BOX = np.array([[-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0]])
+SCATTER = 0.1
+CASES = 60
+
+
+class Linear:
+    """Statistics that are linear in the first two parameters, and noise; the third has no part in them."""
+
+    def __init__(self, seed):
+        self.rng = np.random.default_rng(seed)
+        self.gain = np.random.default_rng(1).normal(size=(3, 20))
+        self.gain[2] = 0.0
+
+    def __call__(self, parameters):
+        scatter = SCATTER * self.rng.standard_normal((len(parameters), self.gain.shape[1]))
+        return parameters @ self.gain + scatter
+
+
+@pytest.fixture(scope="module")
+def cases():
+    """Draw parameters, observe, and look for them."""
+    found = []
+    for seed in range(CASES):
+        runs, true = Linear(seed), np.random.default_rng(1000 + seed).uniform(-0.9, 0.9, 3)
+        found.append((true, posterior(runs, runs(true[None])[0], BOX, seed, ROUNDS)))
+    return found
+
+
+def test_bounds_of_95_percent_hold_as_often_and_are_as_wide_as_they_must(cases):
+    bounds = np.array([np.quantile(each.draws, [0.025, 0.975], axis=0) for _, each in cases])
+    held = np.array([(low <= true) & (true <= high) for (true, _), (low, high) in zip(cases, bounds)])  # noqa: B905
+    count = held[:, :2].size
+    assert held[:, :2].sum() > 0.95 * count - 3 * np.sqrt(0.95 * 0.05 * count)
+    width = np.median(bounds[:, 1] - bounds[:, 0], axis=0)
+    gain = Linear(0).gain[:2]
+    best = 2 * 1.96 * SCATTER * np.sqrt(np.diag(np.linalg.inv(gain @ gain.T)))
+    assert np.all(width[:2] < 1.4 * best)
+
+
+def test_what_the_statistics_do_not_know_stays_as_wide_as_it_was(cases):
+    wide = [np.ptp(np.quantile(each.draws[:, 2], [0.025, 0.975])) for _, each in cases]
+    assert np.median(wide) > 0.85 * 2.0
+
+
+def test_statistics_of_the_model_fit_and_those_of_another_do_not(cases):
+    assert sum(not each.fits for _, each in cases) <= 3
+    runs = Linear(5)
+    off = np.linalg.svd(runs.gain[:2])[2][-1]  # what no parameter does
+    strange = runs(np.array([[0.3, -0.2, 0.0]]))[0] + 12 * SCATTER * off
+    assert not posterior(runs, strange, BOX, 5, ROUNDS).fits

@@ -1,0 +1,97 @@
+"""Where a motion cannot be tracked, statistics of its chaos tell gap and mass, with bounds that hold."""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_recording
+from vibench.analysis import AnalysisError, Simulation, analyse_files, update_model
+from vibench.analysis.hidden_motion import Hidden
+from vibench.analysis.model_updating import statistical_numbers
+from vibench.analysis.model_updating._chaos_statistics import chaos_statistics
+from vibench.sim import gong2025
+
+TRUE = gong2025(gap_m=51e-6)
+FEW = (60, 60, 80)
+STRETCH_S = (0.5, 1.5)
+
+
+@pytest.fixture(scope="module")
+def buried(world, tmp_path_factory):
+    """Record a chaotic dwell under sixty times the noise; the bench says 45 um."""
+    return world.shaken(
+        tmp_path_factory.mktemp("buried"), 260.0, 1.8, duration_s=1.6, seed=8, noise=60.0, specimen=TRUE
+    )
+
+
+def test_the_mean_gap_and_m1_are_told_and_what_is_flat_is_not_determined(buried):
+    with open_recording(buried.path) as recording:
+        found, _ = statistical_numbers(recording, gong2025(), STRETCH_S, 260.0, rounds=FEW)
+    told = {each.what: each for each in found}
+    gap = told[Hidden.MEAN_GAP]
+    assert gap.is_determined
+    assert gap.low < 51e-6 < gap.high
+    assert gap.high / gap.low < 1.4
+    assert told[Hidden.M1].low < TRUE.masses[1] < told[Hidden.M1].high
+    assert not told[Hidden.EXPONENT].is_determined
+    assert "exponent" in told[Hidden.EXPONENT].not_determined
+
+
+def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_drawn(buried, tmp_path):
+    other = shutil.copy(buried.path, tmp_path / "other.h5")
+    with h5py.File(other, "r+") as file:
+        bench = json.loads(file["configuration/bench_json"][()])
+        bench["shaker"]["force_constant_n_per_a"] = 30.0
+        del file["configuration/bench_json"]
+        file["configuration/bench_json"] = np.bytes_(json.dumps(bench))
+    with open_recording(other) as recording, pytest.raises(AnalysisError, match="describe amplifier and"):
+        statistical_numbers(recording, gong2025(), STRETCH_S, 260.0)
+
+
+def test_statistics_are_the_same_of_another_run_and_sides_change_signs_of_even_harmonics():
+    rate_hz, time_s = 20_000.0, np.arange(40_000) / 20_000.0
+    turn = 2 * math.pi * 250.0 * time_s
+    base = np.sin(turn) + 1e-3 * np.random.default_rng(1).standard_normal(turn.size)
+
+    def velocity(sign, late):
+        return np.sin(turn + late) + sign * 0.2 * np.cos(2 * (turn + late))
+
+    one, turned = (
+        chaos_statistics(np.stack([base, velocity(sign, 0.3)]), rate_hz, 250.0) for sign in (1.0, -1.0)
+    )
+    even = one - turned
+    assert np.abs(even[-10:]).max() > 0.1
+    assert np.count_nonzero(np.abs(even[-10:]) > 1e-3) == 2  # real and imaginary part of the second
+    assert np.allclose(even[:18], 0.0)  # of the base
+
+
+@pytest.mark.slow
+def test_a_fit_tells_numbers_of_a_motion_that_noise_hides_from_tracking(buried):
+    updated = update_model(analyse_files([buried.path], "buried", Simulation.LEFT_OUT))
+    gap = {each.what: each for each in updated.collisions.told}[Hidden.MEAN_GAP]
+    assert gap.low < 51e-6 < gap.high
+    assert np.mean(updated.specimen.gaps_m) == pytest.approx(gap.value, rel=0.02)
+    assert any(each.startswith("From statistics of the motion: mean gap") for each in updated.sentences)
+    assert any(each.startswith("No motion could be tracked: ") for each in updated.not_told)
+    assert updated.to_dict()["statistics_from"] == updated.collisions.recording
+
+
+@pytest.mark.slow
+def test_bounds_hold_on_random_specimens():
+    """Thirty draws; `--seed` and `--shard` ask for others."""
+    place = Path(__file__).parents[3] / "benchmarks" / "posterior_coverage.py"
+    told = subprocess.run(
+        [sys.executable, place, "--draws", "30", "--seed", "77"], capture_output=True, text=True, check=True
+    ).stdout
+    (line,) = (each for each in told.splitlines() if each.startswith("all: "))
+    held, asked = int(line.split("held in ")[1].split(" ")[0]), int(line.split("told in ")[1].split(" ")[0])
+    assert asked >= 30
+    # Numbers of one draw stand or fall together: the scatter is that of the draws.
+    assert held / asked > 0.9 - 3 * math.sqrt(0.9 * 0.1 / 30)
