@@ -21,7 +21,6 @@ from vibench.sim import (
     base_transmissibility,
     gong2025,
     integrate,
-    response_curve,
     spring_of,
     steady_response,
 )
@@ -330,8 +329,7 @@ REFUSED = [
     (lambda: Harmonic(100.0, math.nan), "nan m is not allowed"),
     (lambda: Sampled(np.array([]), 1e3), r"shape \(0,\) is not allowed"),
     (lambda: Sampled(np.array([0.0, math.inf, 0.0, 0.0]), 1e3), "Sample 1 of the drive is inf"),
-    (lambda: response_curve(gong2025(), 1e-6, []), r"Frequencies of shape \(0,\) are not allowed"),
-    (lambda: response_curve(gong2025(), 1e-6, [100.0, math.nan]), "Drive frequency nan Hz is not allowed"),
+    (lambda: Harmonic(math.nan, 1e-6), "Drive frequency nan Hz is not allowed"),
     (lambda: steady_response(gong2025(), Harmonic(100.0, 0.0)), "A drive of amplitude 0 m has no response"),
     (lambda: steady_response(gong2025(), DRIVE, duration_s=math.inf), "Duration inf s is not allowed"),
     (lambda: steady_response(gong2025(), Harmonic(0.01, 1e-6)), "it must hold one drive period, 100.0 s"),

@@ -37,20 +37,10 @@ def orbit():
     return sim.periodic_orbit(SMOOTH, DRIVE, start=np.zeros(6))
 
 
-def balance():
-    return sim.balance_specimen(SMOOTH, DRIVE)
-
-
-def balanced_branch(**words):
-    parts = sim.structure_of(SMOOTH), sim.PowerSpring(45e-6, ((3, 1e-9),))
-    return sim.harmonic_balance_branch(*parts, balance(), stop=130.01, **words)
-
-
 CALLS = {
     sim.integrate: lambda **words: sim.integrate(SPECIMEN, DRIVE, 0.01, **words),
     sim.follow_samples: lambda **words: sim.follow_samples(SPECIMEN, SAMPLES, **words),
     sim.steady_response: lambda **words: sim.steady_response(SPECIMEN, DRIVE, **SHORT, **words),
-    sim.response_curve: lambda **words: sim.response_curve(SPECIMEN, 1e-6, [130.0], **SHORT, **words),
     sim.lyapunov_exponent: lambda **words: sim.lyapunov_exponent(
         SPECIMEN, DRIVE, duration_s=1.0, settle_s=0.1, **words
     ),
@@ -62,8 +52,6 @@ CALLS = {
     sim.phase_resonance_branch: lambda **words: sim.phase_resonance_branch(
         SMOOTH, (490.0, 510.0), (1e-8, 1.1e-8), **words
     ),
-    sim.harmonic_balance_branch: balanced_branch,
-    sim.check_balance: lambda **words: sim.check_balance(SMOOTH, balance(), duration_s=0.1, **words),
     chain.integrate_chain: lambda **words: chain.integrate_chain(
         chain.chain_of(SPECIMEN, 2), DRIVE, 0.01, **words
     ),

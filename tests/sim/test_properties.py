@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim import (
@@ -19,7 +18,6 @@ from vibench.sim import (
     Sampled,
     gong2025,
     integrate,
-    response_curve,
 )
 
 LAWS = ["hertz", "linear_gap", "hunt_crossley:0.5", "power:5", "power:29", "rigid:0", "rigid:0.7", "rigid:1"]
@@ -175,18 +173,3 @@ def test_a_run_cut_anywhere_ends_where_the_whole_does(contact, cuts):
         part = integrate(specimen, drive, until - now, Accuracy.REFERENCE, motion, start_time_s=now)
         motion, now = part.final_state, until
     assert np.all(np.abs(motion - whole.final_state) < LIMITS)
-
-
-@pytest.mark.parametrize("contact", ["hertz", "power:5", "rigid:0.7"])
-def test_any_number_of_workers_gives_the_same_curve_to_the_bit(contact):
-    frequencies = np.linspace(80.0, 480.0, 9)
-    curves = [
-        response_curve(paper(contact), 20e-6, frequencies, workers=workers, duration_s=0.5, window_s=0.2)
-        for workers in (1, 2, 7)
-    ]
-    for curve in curves[1:]:
-        for one, other in zip(curves[0].points, curve.points, strict=True):
-            np.testing.assert_array_equal(one.final_state, other.final_state)
-            assert one.largest_x_m == other.largest_x_m
-            assert one.line_x_m == other.line_x_m
-            assert one.impacts == other.impacts

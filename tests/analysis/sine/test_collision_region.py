@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.analysis.sine import collisions
-from vibench.analysis.sine._sweep import sweep_response
 from vibench.sim import LinearSweep, gong2025, integrate
 
 RATE = 12_800.0

@@ -3,10 +3,20 @@
 import numpy as np
 import pytest
 
+from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.analysis import InvalidRequest
 from vibench.analysis.sine import hysteresis, jumps
-from vibench.analysis.sine._sweep import sweep_response
-from vibench.sim import LinearSweep, gong2025, integrate, jump_frequencies, spring_of, structure_of
+from vibench.sim import (
+    BalanceOptions,
+    BifurcationKind,
+    FrequencyPath,
+    LinearSweep,
+    gong2025,
+    integrate,
+    spring_of,
+    structure_of,
+)
+from vibench.sim.periodic import balance, balance_branch_within
 
 TIME_S = 0.1 * np.arange(2000)
 FREQUENCY_HZ = 150 + TIME_S
@@ -72,7 +82,11 @@ def hardening():
 
 def test_a_hardening_specimen_jumps_down_where_its_branch_folds_and_later_than_it_jumps_up(hardening):
     specimen, amplitude_m, (up, down) = hardening
-    folds = jump_frequencies(structure_of(specimen), spring_of(specimen), amplitude_m, *BAND_HZ)
+    parts, options = (structure_of(specimen), spring_of(specimen)), BalanceOptions(fewest=1, most=1)
+    start = balance(*parts, BAND_HZ[0], amplitude_m, options)
+    branch = balance_branch_within(*parts, start, FrequencyPath((amplitude_m,)), *BAND_HZ, options)
+    folds = sorted(e.frequency_hz for e in branch.events if e.kind is BifurcationKind.FOLD)
+    assert len(folds) == 2
     up_jumps = jumps(up.time_s, up.frequency_hz, up.response_ii)
     down_jumps = jumps(down.time_s, down.frequency_hz, down.response_ii)
     assert len(up_jumps) == len(down_jumps) == 1

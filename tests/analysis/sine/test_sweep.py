@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.acquisition.plan import SineSweep
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings import Verdict
 from vibench.analysis.signals import Decimator
 from vibench.analysis.sine import SweepSums, played_check
-from vibench.analysis.sine._sweep import drive_phase, sweep_response
+from vibench.analysis.sine._sweep import drive_phase
 from vibench.analysis.tones import tracked_orders
 
 RATE = 8192.0

@@ -9,7 +9,6 @@ from vibench.sim import (
     base_transmissibility,
     gong2025,
     integrate,
-    response_curve,
     steady_response,
 )
 
@@ -79,35 +78,3 @@ def test_a_sweep_by_hand_goes_on_from_the_state_before():
 def test_what_has_no_response_is_refused(drive, options, sentence):
     with pytest.raises(ValueError, match=sentence):
         steady_response(gong2025(), drive, **options)
-
-
-def test_a_curve_keeps_the_order_of_its_frequencies_whatever_the_threads():
-    specimen, frequencies = gong2025(), [300.0, 100.0, 200.0, 90.0, 250.0]
-    options = {"duration_s": 0.4, "window_s": 0.2}
-    alone = response_curve(specimen, 5e-6, frequencies, workers=1, **options)
-    together = response_curve(specimen, 5e-6, frequencies, workers=3, **options)
-    np.testing.assert_array_equal(alone.frequency_hz, frequencies)
-    np.testing.assert_array_equal(alone.values("response_i"), together.values("response_i"))
-    assert together.is_complete
-
-
-def test_a_curve_tells_its_progress_and_stops_when_it_is_cancelled():
-    seen = []
-    curve = response_curve(
-        gong2025(),
-        1e-6,
-        np.linspace(50.0, 60.0, 200),
-        workers=1,
-        duration_s=0.4,
-        window_s=0.2,
-        progress=lambda done, asked: seen.append((done, asked)),
-        cancelled=lambda: len(seen) >= 3,
-    )
-    assert seen[:3] == [(1, 200), (2, 200), (3, 200)]
-    assert 3 <= len(curve.points) < 200
-    assert not curve.is_complete
-
-
-def test_a_curve_refuses_a_frequency_before_it_computes_anything():
-    with pytest.raises(ValueError, match=r"Drive frequency -1\.0 Hz"):
-        response_curve(gong2025(), 1e-6, [100.0, -1.0])

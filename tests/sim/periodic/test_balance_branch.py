@@ -6,21 +6,22 @@ from scipy.integrate import solve_ivp
 
 from vibench.sim import (
     PowerSpring,
+    first_order_states,
     gong2025,
-    harmonic_balance_branch,
-    jump_frequencies,
     spring_of,
     structure_of,
 )
-from vibench.sim.periodic._balance_branch import raised_balance
+from vibench.sim.periodic._balance_branch import balance_branch_within
 from vibench.sim.periodic._balance_solver import BalanceOptions, balance
-from vibench.sim.periodic._branch import BifurcationKind, Parameter
+from vibench.sim.periodic._branch import BifurcationKind
 from vibench.sim.periodic._condensation import LinearStructure
 from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
+from vibench.sim.periodic._drive_path import AmplitudePath, FrequencyPath
 from vibench.sim.periodic._harmonic_balance import BalanceEnd, HarmonicSet
 from vibench.sim.periodic._restoring_force import GapSpring, NoForce
 
 ONE = np.array([[1.0]])
+ENOUGH, STEPS = BalanceOptions(), ArcSteps()
 
 
 def oscillator(damping, stiffness=1.0):
@@ -28,20 +29,47 @@ def oscillator(damping, stiffness=1.0):
     return LinearStructure(ONE, damping * ONE, stiffness * ONE, np.ones(1), np.ones(1), np.zeros(1))
 
 
+def along_frequency(structure, spring, start, other_hz, options, steps=STEPS):
+    """The branch from where a balance is to another frequency."""
+    ends = sorted((start.frequency_hz, other_hz))
+    path = FrequencyPath((start.amplitude_m,))
+    return balance_branch_within(structure, spring, start, path, *ends, options, steps)
+
+
+def raised(structure, spring, frequency_hz, weak_m, strong_m, options=ENOUGH, steps=STEPS):
+    """The branch along the level of the drive, from one that hardly bends the response."""
+    start = balance(structure, spring, frequency_hz, weak_m, options)
+    path = AmplitudePath(frequency_hz)
+    return balance_branch_within(structure, spring, start, path, weak_m, strong_m, options, steps)
+
+
 def kinds(branch):
     return [event.kind for event in branch.events]
 
 
 def test_a_first_order_branch_folds_where_the_closed_form_says():
-    structure, spring = oscillator(0.04), PowerSpring(1.0, ((3, 0.5),))
+    zeta, alpha, force = 0.02, 0.5, 0.1
+    structure, spring = oscillator(2.0 * zeta), PowerSpring(1.0, ((3, alpha),))
     options = BalanceOptions(fewest=1, most=1)
     low, high = 0.8 / (2 * math.pi), 2.0 / (2 * math.pi)
-    start = balance(structure, spring, low, 0.1, options)
-    branch = harmonic_balance_branch(structure, spring, start, Parameter.FREQUENCY, high, options)
+    start = balance(structure, spring, low, force, options)
+    branch = along_frequency(structure, spring, start, high, options)
     assert branch.end is ArcEnd.REACHED_BOUND
-    folds = [e.frequency_hz for e in branch.events if e.kind is BifurcationKind.FOLD]
-    jumps = jump_frequencies(structure, spring, 0.1, low, high, 401)
-    assert sorted(folds) == pytest.approx(jumps, rel=1e-9)
+    folds = sorted(e.frequency_hz for e in branch.events if e.kind is BifurcationKind.FOLD)
+    assert len(folds) == 2
+    for frequency in folds:
+        omega = 2.0 * math.pi * frequency
+        # d/d(a^2) of a^2 ((1 - W^2 + 3/4 alpha a^2)^2 + (2 zeta W)^2) = 0, quadratic in a^2.
+        detuning = 1.0 - omega**2
+        squares = np.roots(
+            [27.0 / 16.0 * alpha**2, 3.0 * alpha * detuning, detuning**2 + (2 * zeta * omega) ** 2]
+        ).real
+        forces = np.sqrt(squares * ((detuning + 0.75 * alpha * squares) ** 2 + (2 * zeta * omega) ** 2))
+        assert np.min(np.abs(forces - force)) < 1e-9
+    inside = first_order_states(structure, spring, 0.5 * sum(folds), force)
+    assert [state.is_stable_to_amplitude for state in inside] == [True, False, True]
+    assert len(first_order_states(structure, spring, folds[0] * 0.999, force)) == 1
+    assert len(first_order_states(structure, spring, folds[1] * 1.001, force)) == 1
 
 
 def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_one_there():
@@ -49,7 +77,7 @@ def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_
     options = BalanceOptions(fewest=7, tolerance=1e-6)
     low, high = 1.1 / (2 * math.pi), 2.0 / (2 * math.pi)
     start = balance(structure, spring, low, 0.1, options)
-    branch = harmonic_balance_branch(structure, spring, start, Parameter.FREQUENCY, high, options)
+    branch = along_frequency(structure, spring, start, high, options)
     assert kinds(branch) == [BifurcationKind.FOLD, BifurcationKind.FOLD]
     first, second = (event.index for event in branch.events)
     assert np.all(branch.is_stable[: first + 1])
@@ -61,21 +89,25 @@ def test_between_its_folds_a_duffing_branch_is_unstable_and_a_multiplier_passes_
 def test_a_linear_branch_has_no_events_and_reaches_its_end():
     structure = structure_of(gong2025(contact="linear"))
     start = balance(structure, NoForce(), 50.0, 1e-6, BalanceOptions(fewest=1))
-    branch = harmonic_balance_branch(
-        structure, NoForce(), start, Parameter.FREQUENCY, 80.0, BalanceOptions(fewest=1)
-    )
+    branch = along_frequency(structure, NoForce(), start, 80.0, BalanceOptions(fewest=1))
     assert branch.end is ArcEnd.REACHED_BOUND
     assert branch.events == ()
     assert branch.frequencies_hz[[0, -1]] == pytest.approx([50.0, 80.0])
     assert np.all(branch.is_stable)
 
 
+def test_a_balance_that_has_not_converged_says_so():
+    # Chaos at 260 Hz and 5 um, with no more than 31 harmonics: whatever is found is not called a solution.
+    structure, spring = structure_of(gong2025()), spring_of(gong2025())
+    found = balance(structure, spring, 260.0, 5e-6, BalanceOptions(fewest=15, most=31))
+    assert found.outcome is not BalanceEnd.CONVERGED
+
+
 def test_raising_the_drive_finds_the_stops_at_the_amplitude_at_which_p_equals_the_gap():
     specimen = gong2025(damping_time_s=3e-5)
     structure, spring = structure_of(specimen), spring_of(specimen)
-    _, branch = raised_balance(
-        structure, spring, 100.0, 5e-6, BalanceOptions(fewest=15, most=15), ArcSteps(most_points=230)
-    )
+    options, steps = BalanceOptions(fewest=15, most=15), ArcSteps(most_points=230)
+    branch = raised(structure, spring, 100.0, 0.5e-6, 5e-6, options, steps)
     linear = balance(structure, NoForce(), 100.0, 1e-6)
     assert branch.events[0].kind is BifurcationKind.GRAZING
     assert branch.events[0].amplitude_m == pytest.approx(45e-6 / linear.response_ii[3], rel=1e-6)
@@ -85,23 +117,19 @@ def test_raising_the_drive_finds_the_stops_at_the_amplitude_at_which_p_equals_th
 
 def test_a_strong_power_law_is_reached_by_raising_the_drive():
     structure, spring = oscillator(0.1), PowerSpring(1.0, ((3, 1.0),))
-    found, branch = raised_balance(structure, spring, 2.0 / (2 * math.pi), 5.0)
-    assert found.outcome is BalanceEnd.CONVERGED
-    assert found.amplitude_m == pytest.approx(5.0)
-    assert branch.response_ii[-1] == pytest.approx(found.response_ii)
-    again = periodic_defect(0.1, 1.0, found, 2.0, 5.0)
-    assert again < 1e-3
+    branch = raised(structure, spring, 2.0 / (2 * math.pi), 0.1, 5.0)
+    assert branch.end is ArcEnd.REACHED_BOUND
+    assert branch.amplitudes_m[-1] == pytest.approx(5.0)
+    assert periodic_defect(0.1, 1.0, branch.states[-1], 2.0, 5.0) < 1e-3
 
 
-def periodic_defect(damping, cubic, found, omega, force):
+def periodic_defect(damping, cubic, start, omega, force):
     """How far one period of an independent integration takes the motion from where it began."""
 
     def rates(time, state):
         x, v = state
         return [v, -damping * v - x - cubic * x**3 + force * math.sin(omega * time)]
 
-    factors = 1j * omega * found.harmonics
-    start = [found.relative.sum().real, (factors * found.relative).sum().real]
     end = solve_ivp(rates, (0.0, 2 * math.pi / omega), start, rtol=1e-10, atol=1e-10).y[:, -1]
     return float(np.abs(end - start).max())
 
@@ -110,7 +138,7 @@ def test_a_mirrored_duffing_motion_loses_or_gains_stability_where_its_symmetry_b
     # x-double-dot + 0.2 x-dot + x^3 = B sin t with B from 0 to 6.
     structure, spring = oscillator(0.2, 1e-9), PowerSpring(1.0, ((3, 1.0),))
     options = BalanceOptions(fewest=15, tolerance=1e-8)
-    _, branch = raised_balance(structure, spring, 1.0 / (2 * math.pi), 6.0, options, ArcSteps(longest=0.1))
+    branch = raised(structure, spring, 1.0 / (2 * math.pi), 0.1, 6.0, options, ArcSteps(longest=0.1))
     broken = [event for event in branch.events if event.kind is BifurcationKind.SYMMETRY_BREAKING]
     assert broken
     before = branch.multipliers[broken[0].index, :2]
@@ -130,9 +158,7 @@ def test_the_two_mass_unilateral_stop_of_nlvib_doubles_its_period_and_loses_it_o
     options = BalanceOptions(HarmonicSet.ALL, fewest=21, most=21, tolerance=1e-2)
     start = balance(structure, spring, 0.8 / (2 * math.pi), 0.1, options)
     steps = ArcSteps(first=0.05, longest=0.3, most_points=1500)
-    branch = harmonic_balance_branch(
-        structure, spring, start, Parameter.FREQUENCY, 0.5 / (2 * math.pi), options, steps
-    )
+    branch = along_frequency(structure, spring, start, 0.5 / (2 * math.pi), options, steps)
     omega = 2 * math.pi * branch.frequencies_hz
     assert BifurcationKind.FOLD in kinds(branch)
     doublings = [e for e in branch.events if e.kind is BifurcationKind.PERIOD_DOUBLING]

@@ -9,11 +9,10 @@ from vibench.sim import (
     base_transmissibility,
     first_order_states,
     gong2025,
-    jump_frequencies,
     structure_of,
 )
 from vibench.sim.periodic._condensation import LinearStructure, condense
-from vibench.sim.periodic._first_order_balance import fold_amplitudes, fundamental_share
+from vibench.sim.periodic._first_order_balance import fundamental_share
 
 FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
 
@@ -86,27 +85,6 @@ def test_a_huge_drive_binds_the_two_masses(exponent):
     assert abs(states[0].displacements[0]) / 10.0 == pytest.approx(abs(bound[0]), rel=1e-3)
 
 
-def test_the_folds_of_the_duffing_oscillator_satisfy_their_closed_form():
-    zeta, alpha, force = 0.02, 0.5, 0.1
-    structure, spring = duffing(zeta), PowerSpring(1.0, ((3, alpha),))
-    jumps = jump_frequencies(structure, spring, force, 0.8 / (2 * math.pi), 3.0 / (2 * math.pi), 401)
-    assert len(jumps) == 2
-    for frequency in jumps:
-        omega = 2.0 * math.pi * frequency
-        # d/d(a^2) of a^2 ((1 - W^2 + 3/4 alpha a^2)^2 + (2 zeta W)^2) = 0, quadratic in a^2.
-        detuning = 1.0 - omega**2
-        squares = np.roots(
-            [27.0 / 16.0 * alpha**2, 3.0 * alpha * detuning, detuning**2 + (2 * zeta * omega) ** 2]
-        ).real
-        forces = np.sqrt(squares * ((detuning + 0.75 * alpha * squares) ** 2 + (2 * zeta * omega) ** 2))
-        assert np.min(np.abs(forces - force)) < 1e-9
-    low, high = jumps
-    inside = first_order_states(structure, spring, 0.5 * (low + high), force)
-    assert [state.is_stable_to_amplitude for state in inside] == [True, False, True]
-    assert len(first_order_states(structure, spring, low * 0.999, force)) == 1
-    assert len(first_order_states(structure, spring, high * 1.001, force)) == 1
-
-
 def test_the_duffing_resonance_lies_on_its_backbone():
     # On the backbone W^2 = 1 + 3/4 alpha a^2 the phase lags by a quarter turn and a = force / (2 zeta W).
     zeta, alpha, amplitude = 0.02, 0.5, 0.8
@@ -115,16 +93,6 @@ def test_the_duffing_resonance_lies_on_its_backbone():
         duffing(zeta), PowerSpring(1.0, ((3, alpha),)), omega / (2 * math.pi), 2 * zeta * omega * amplitude
     )
     assert states[-1].relative == pytest.approx(-amplitude, rel=1e-12)  # sin drive, then a quarter turn
-
-
-def test_between_its_fold_amplitudes_the_specimen_has_three_states():
-    structure = structure_of(gong2025())
-    for terms in [((5, FIT_FORCE),), ((201, FIT_FORCE),), tuple((n, FIT_FORCE / 3) for n in (3, 5, 7))]:
-        spring = PowerSpring(FIT_LENGTH, terms)
-        upper, lower = fold_amplitudes(structure, spring, 300.0)
-        assert len(first_order_states(structure, spring, 300.0, math.sqrt(upper * lower))) == 3
-        assert len(first_order_states(structure, spring, 300.0, 1.01 * upper)) == 1
-        assert len(first_order_states(structure, spring, 300.0, 0.99 * lower)) == 1
 
 
 def test_condensed_slopes_are_the_derivatives_by_frequency():

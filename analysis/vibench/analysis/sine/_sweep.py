@@ -304,26 +304,3 @@ class SweepSums:
 
 def _means(values: Reals, length: int) -> Reals:
     return np.asarray(values.reshape(-1, length).mean(axis=1))
-
-
-def sweep_response(
-    drive: Reals,
-    base: Reals,
-    response: Reals,
-    sample_rate_hz: float,
-    *,
-    low_hz: float,
-    high_hz: float,
-    interval_s: float = 0.1,
-    delay_s: float = 0.0,
-) -> SweepResponse:
-    """Analyse a sweep held in memory: drive [V], base acceleration [m/s2], response velocity [m/s].
-
-    See `SweepSums` for the parameters and for a sweep too long for memory.
-    """
-    sums = SweepSums(sample_rate_hz, low_hz=low_hz, high_hz=high_hz, interval_s=interval_s)
-    piece = 1 << 19
-    for first in range(0, drive.size, piece):
-        part = slice(first, first + piece)
-        sums.add(np.stack((drive[part], base[part], response[part])))
-    return sums.response(delay_s=delay_s)

@@ -27,10 +27,6 @@ from ._response import (
     steady_response as steady_response,
     whole_periods as whole_periods,
 )
-from ._response_curve import (
-    ResponseCurve as ResponseCurve,
-    response_curve as response_curve,
-)
 from ._sample_by_sample import (
     FollowedMotion as FollowedMotion,
     follow_samples as follow_samples,

@@ -1,11 +1,5 @@
-from ._balance_agreement import (
-    BalanceCheck as BalanceCheck,
-    check_balance as check_balance,
-)
 from ._balance_branch import (
     balance_branch_within as balance_branch_within,
-    balance_specimen as balance_specimen,
-    harmonic_balance_branch as harmonic_balance_branch,
     orbit_guess as orbit_guess,
 )
 from ._balance_solver import (
@@ -38,7 +32,6 @@ from ._drive_path import (
 from ._first_order_balance import (
     FirstOrderState as FirstOrderState,
     first_order_states as first_order_states,
-    jump_frequencies as jump_frequencies,
 )
 from ._floquet import (
     multipliers as multipliers,

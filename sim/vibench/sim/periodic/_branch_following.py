@@ -55,15 +55,6 @@ class Family(Curve, Protocol):
         ...
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """A branch, and where its last point lies in which family: to look closer, or to go on."""
-
-    branch: Branch
-    family: Family
-    last: Vector
-
-
 @dataclass
 class _Gathered:
     reports: list[OrbitReport]
@@ -104,7 +95,7 @@ def range_scale(low: float, high: float, value: float) -> float:
 
 def follow(
     family: Family, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
-) -> Followed:
+) -> Branch:
     """Follow a family from a point on it; the resolution rises where the error estimate asks for it.
 
     Parameters
@@ -124,14 +115,14 @@ def follow(
     while True:
         end, last = _follow_at(family, start, toward, bounds, steps, gathered)
         if end is not None:
-            return Followed(_branch(gathered, parameter, end), family, last.point)
+            return _branch(gathered, parameter, end)
         refined = family.refined(last.point, last.tangent)
         if refined is None:
-            return _lost(gathered, family, last)
+            return _lost(gathered, parameter)
         finer, guess, normal = refined
         point, iterations = correct(finer, guess, normal / np.linalg.norm(normal), steps.tolerance)
         if iterations == 0:
-            return _lost(gathered, family, last)
+            return _lost(gathered, parameter)
         family, start, toward = finer, point, float(last.tangent[-1])
 
 
@@ -139,19 +130,19 @@ NEARLY_GRAZING = 0.01
 """A branch lost with a contact this close to beginning or ending, over the gap, is lost by grazing."""
 
 
-def _lost(gathered: _Gathered, family: Family, last: ArcPoint) -> Followed:
+def _lost(gathered: _Gathered, parameter: Parameter) -> Branch:
     """End a branch that no step goes on from; at a rigid stop grazing does that, and is named."""
     if gathered.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
         gathered.add_event(BifurcationKind.GRAZING, gathered.reports[-1])
-    return Followed(_branch(gathered, family.path.parameter, ArcEnd.STEP_TOO_SHORT), family, last.point)
+    return _branch(gathered, parameter, ArcEnd.STEP_TOO_SHORT)
 
 
 def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
     """Follow a family from a point on it to both ends; a branch that closes on itself, once round."""
-    onward = follow(family, start, 1.0, bounds, steps).branch if start[-1] < bounds[1] else None
+    onward = follow(family, start, 1.0, bounds, steps) if start[-1] < bounds[1] else None
     if onward is not None and onward.end is ArcEnd.CLOSED:
         return replace(onward, begin=ArcEnd.CLOSED)
-    back = follow(family, start, -1.0, bounds, steps).branch if start[-1] > bounds[0] else None
+    back = follow(family, start, -1.0, bounds, steps) if start[-1] > bounds[0] else None
     if back is None or onward is None:
         whole = onward or back
         assert whole is not None

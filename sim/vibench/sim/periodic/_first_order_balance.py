@@ -156,68 +156,6 @@ def first_order_states(
     return states
 
 
-def fold_amplitudes(structure: LinearStructure, spring: PowerSpring, frequency_hz: float) -> Floats:
-    """Drive amplitudes at which two first-order solutions meet, by ascending abs(P), shape (0,) or (2,) [m].
-
-    (More than two are possible for sums with terms of both signs.) Closed form for one power law; the
-    turning points of the same sum of powers in general.
-    """
-    seen = condense(structure, 2.0 * math.pi * frequency_hz, FUNDAMENTAL)
-    compliance = complex(seen.compliance[0])
-    coefficients, exponents = _squared_balance(compliance, spring)
-    sizes = positive_zeros(coefficients * exponents, exponents)
-    strengths = [abs(1.0 + compliance * _describing(float(size), spring)) for size in sizes]
-    return np.asarray(sizes * np.array(strengths) * spring.length / abs(seen.linear), dtype=np.float64)
-
-
-def jump_frequencies(
-    structure: LinearStructure,
-    spring: PowerSpring,
-    amplitude_m: float,
-    start_hz: float,
-    stop_hz: float,
-    grid_points: int = 2001,
-) -> Floats:
-    """Frequencies at which the first-order response folds, where a swept response jumps; ascending [Hz].
-
-    The fold amplitude is a function of frequency known in closed form; its crossings with the amplitude
-    given are bracketed on a grid and then solved for. Two folds closer than a grid step can hide.
-
-    Parameters
-    ----------
-    structure, spring
-        The specimen without its stops, and what stands for them.
-    amplitude_m
-        Of the base [m].
-    start_hz, stop_hz
-        Range that is searched [Hz].
-    grid_points
-        Of the grid that brackets crossings.
-
-    Raises
-    ------
-    ValueError
-        When the range is not positive and ascending.
-
-    """
-    if not 0.0 < start_hz < stop_hz < math.inf:
-        msg = f"Frequencies {start_hz} to {stop_hz} Hz are not allowed: positive and ascending."
-        raise ValueError(msg)
-
-    def excess(frequency_hz: float, which: int) -> float:
-        return math.log(fold_amplitudes(structure, spring, frequency_hz)[which] / amplitude_m)
-
-    grid = np.linspace(start_hz, stop_hz, grid_points)
-    folds = [fold_amplitudes(structure, spring, float(f)) for f in grid]
-    found: list[float] = []
-    for k in range(len(grid) - 1):
-        if len(folds[k]) == 0 or len(folds[k]) != len(folds[k + 1]):
-            continue
-        crossed = np.flatnonzero((folds[k] - amplitude_m) * (folds[k + 1] - amplitude_m) < 0.0)
-        found += [float(brentq(excess, grid[k], grid[k + 1], args=(int(w),), rtol=1e-13)) for w in crossed]
-    return np.array(sorted(found), dtype=np.float64)
-
-
 def _describing(size: float, spring: PowerSpring) -> float:
     """N = F_1 / P [N/m] at abs(P) = size * length; infinite where it overflows."""
     with np.errstate(over="ignore"):

@@ -117,7 +117,7 @@ def periodic_branch(
     family, start = _family_at(orbit, path, value, scale)
     here, there = value / scale, stop / scale
     bounds = (min(here, there), max(here, there))
-    return follow(family, start, there - here, bounds, steps).branch
+    return follow(family, start, there - here, bounds, steps)
 
 
 def periodic_branch_within(

@@ -160,7 +160,7 @@ def phase_resonance_branch(
     guess = np.concatenate([state / family.scales, [0.0, 0.0]])
     start, _ = correct(family, guess, np.eye(8)[7], steps.tolerance)
     far = LENGTH_PER_DECADE * math.log10(high_m / low_m)
-    return follow(family, start, 1.0, (-1e-9, far), steps).branch
+    return follow(family, start, 1.0, (-1e-9, far), steps)
 
 
 def linear_phase_resonance_hz(

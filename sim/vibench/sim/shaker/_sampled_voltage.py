@@ -68,11 +68,6 @@ class SampledMotion:
     limited_steps: int
     """Steps in which the amplifier clipped or limited its current."""
 
-    def impacts_between(self, start_s: float, stop_s: float) -> float:
-        """Count the contacts begun between two times; blocks cut by them count in part."""
-        counted = np.interp([start_s, stop_s], self.impact_times_s, self.impacts)
-        return float(counted[1] - counted[0])
-
 
 def follow_voltage(
     table: DrivenTable,

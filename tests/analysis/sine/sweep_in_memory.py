@@ -1,0 +1,15 @@
+"""A sweep in three arrays, given to the sums in blocks as a recording gives it."""
+
+import numpy as np
+
+from vibench.analysis.sine import SweepSums
+
+BLOCK = 1 << 19
+
+
+def sweep_response(drive, base, response, rate_hz, *, low_hz, high_hz, interval_s=0.1, delay_s=0.0):
+    """Drive [V], base acceleration [m/s2] and response velocity [m/s] become a sweep's response."""
+    sums = SweepSums(rate_hz, low_hz=low_hz, high_hz=high_hz, interval_s=interval_s)
+    for first in range(0, drive.size, BLOCK):
+        sums.add(np.stack([row[first : first + BLOCK] for row in (drive, base, response)]))
+    return sums.response(delay_s=delay_s)
