@@ -47,6 +47,19 @@ def test_a_stranger_reads_the_overview_with_scale_and_axis(recorded):
         assert file["overview"].attrs["samples_per_bin"] == BIN_SAMPLES
 
 
+def test_the_labelled_curve_of_a_channel_is_nan_where_a_whole_bin_is_lost(tmp_path, make_header, make_block):
+    _, before = make_block(0, BIN_SAMPLES)
+    _, after = make_block(3 * BIN_SAMPLES + 5, 1000)
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.append(before)
+        writer.append(after)
+    with h5py.File(tmp_path / "a.h5", "r") as file:
+        values = file["view/m0_velocity/values"][:]
+        assert np.flatnonzero(np.isnan(values)).tolist() == [2, 3, 4, 5]
+        assert file["view/m0_velocity/time"] == file["view/drive_voltage/time"]
+        assert file["view/m0_velocity/time"].shape == values.shape
+
+
 def test_lost_samples_are_no_extreme_and_a_lost_bin_is_missing():
     counts = np.arange(4 * BIN_SAMPLES, dtype=np.int32)
     counts[5:9] = MISSING_COUNT
@@ -70,6 +83,8 @@ def test_a_recording_without_samples_has_an_empty_overview(tmp_path, make_header
         pass
     with open_recording(tmp_path / "a.h5") as recording:
         assert recording.read_overview("m0_velocity").low.size == 0
+    with h5py.File(tmp_path / "a.h5", "r") as file:
+        assert "default" not in file.attrs
 
 
 def test_a_file_without_an_overview_says_so(recorded):

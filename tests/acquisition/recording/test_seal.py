@@ -112,6 +112,10 @@ def change_identity(file):
     file.attrs["recording_id"] = np.bytes_(b"0" * 32)
 
 
+def change_view(file):
+    file["view/m0_velocity/values"][0] += 1
+
+
 def change_overview(file):
     file["overview/m0_velocity_low"][0] += 1
 
@@ -125,8 +129,8 @@ def take_a_table(file):
 
 
 CHANGES = (
-    change_scale, change_segment, change_time, change_plan, change_identity, change_overview, add_a_dataset,
-    take_a_table,
+    change_scale, change_segment, change_time, change_plan, change_identity, change_overview, change_view,
+    add_a_dataset, take_a_table,
 )  # fmt: skip
 
 

@@ -25,10 +25,11 @@ from ._attributes import decoded, encoded, read_attributes, write_attributes
 from ._counts import Counts
 from ._disk_room import claim_room, extend_room, release_room
 from ._layout import COUNT_DTYPE, DEFLATE_LEVEL, RecordingState, Table
-from ._overview import BIN_BYTES, OverviewSums, bins_of, write_overview
+from ._overview import BIN_BYTES, CountOverview, OverviewSums, bins_of, write_overview
 from ._preallocate import HEAD_BYTES, ITEM_BYTES
 from ._seal import SealDepth, SealKey, SealState, check_seal, write_seal
 from ._tables import Columns
+from ._view import VIEW_BYTES, VIEW_TIME_BYTES, write_view
 
 IN_FLIGHT_PER_WORKER = 4
 """Chunks that wait for a worker or for the disk: enough to keep both busy, little memory."""
@@ -142,7 +143,7 @@ def _largest_size(part: Path) -> int:
     with h5py.File(part, "r", locking=False) as source:
         samples = int(source[layout.N_VALID][0])
         channels = len(str(read_attributes(source)["roles"]).split())
-    bins = bins_of(samples) * (channels * BIN_BYTES + ITEM_BYTES)
+    bins = bins_of(samples) * (channels * (BIN_BYTES + VIEW_BYTES) + ITEM_BYTES + VIEW_TIME_BYTES)
     return HEAD_BYTES + samples * (channels * ITEM_BYTES + TIME_BYTES) + bins
 
 
@@ -158,7 +159,8 @@ def _copy(part: Path, tmp: Path, room: int, key: SealKey | None, written: Mappin
         digests: dict[str, str] = {}
         time_axis = _write_time(copy, samples, float(source.attrs["sample_rate_hz"]), digests)
         for role in str(read_attributes(source)["roles"]).split():
-            digests[f"/{role}"] = _copy_channel(source[role], copy, role, samples, time_axis)
+            digests[f"/{role}"], overview = _copy_channel(source[role], copy, role, samples, time_axis)
+            write_view(copy, role, overview, part.with_suffix("").stem)
             if written is not None and written[role] != digests[f"/{role}"]:
                 raise RecordingError(
                     f"{part} does not give back {role!r} as recorded; check disk and memory. It is kept"
@@ -216,15 +218,16 @@ def _write_time(
 
 def _copy_channel(
     source: h5py.Dataset, copy: h5py.File, role: str, samples: int, time_axis: h5py.Dataset
-) -> str:
+) -> tuple[str, CountOverview]:
     dataset = create_counts(copy, role, samples, layout.CHUNK_SAMPLES)
-    digest, overview = hashlib.sha256(), OverviewSums()
-    write_chunks(dataset, overview.summed(_hashed(_pieces(source, samples), digest)))
+    digest, sums = hashlib.sha256(), OverviewSums()
+    write_chunks(dataset, sums.summed(_hashed(_pieces(source, samples), digest)))
     write_attributes(dataset, {**read_attributes(source), "sha256": digest.hexdigest()})
     dataset.attrs["_FillValue"] = np.int32(layout.MISSING_COUNT)
     dataset.dims[0].attach_scale(time_axis)
-    write_overview(copy, role, overview.overview(), float(copy.attrs["sample_rate_hz"]))
-    return digest.hexdigest()
+    overview = sums.overview()
+    write_overview(copy, role, overview, float(copy.attrs["sample_rate_hz"]))
+    return digest.hexdigest(), overview
 
 
 def _pieces(dataset: h5py.Dataset, samples: int) -> Iterator[Counts]:

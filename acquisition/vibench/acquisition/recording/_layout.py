@@ -39,6 +39,7 @@ ROW = "row"
 CONFIGURATION = "configuration"
 RESULTS = "results"
 OVERVIEW = "overview"
+VIEW = "view"
 SEAL = "seal"
 BIN = "bin"
 SETTINGS = "settings"
@@ -128,6 +129,7 @@ RESERVED_NAMES = frozenset(
         CONFIGURATION,
         RESULTS,
         OVERVIEW,
+        VIEW,
         SEAL,
         *(table.name for table in TABLES),
     }

@@ -45,7 +45,8 @@ def _write_channel(
 ) -> None:
     data = _group(entry, channel.role, "NXdata")
     data.attrs.update({"signal": SIGNAL, "axes": [TIME], f"{TIME}_indices": 0})
-    data["title"] = f"{excerpt.name}: {channel.long_name or channel.role}"
+    # silx names no vertical axis: the unit stands in the title as well.
+    data["title"] = f"{excerpt.name}: {channel.long_name or channel.role} [{channel.unit}]"
     chunks = (min(BLOCK_SAMPLES, excerpt.samples),)
     stored = {"shape": (excerpt.samples,), "dtype": "f8", "chunks": chunks, "compression": "gzip"}
     values, time = data.create_dataset(SIGNAL, **stored), data.create_dataset(TIME, **stored)
