@@ -3,6 +3,7 @@
 import json
 import sys
 
+from vibench.acquisition import open_recording
 from vibench.acquisition.campaign import CampaignEstimate
 from vibench.cli.measure import estimate_text
 
@@ -23,14 +24,43 @@ def test_an_estimate_is_one_json_document_and_makes_nothing(vibench_here, tmp_pa
 def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
-    made = vibench("measure", plan, "--bench", bench, "--out", "out", "--notify", keep, cwd=tmp_path)
+    measure = ("measure", plan, "--bench", bench, "--out", "out", "--notify", keep)
+    made = vibench("--log-level", "debug", *measure, cwd=tmp_path)
     assert made.returncode == 0, made.stderr
+    assert "vibench.acquisition: " in made.stderr
+    assert "*IDN?" in made.stderr
+    assert "line-0p05vpp-200hz.h5, sample 5018: state: recording" in made.stderr
     told = json.loads((tmp_path / "told.json").read_text())
     assert (told["event"], told["why"], told["recorded"]) == ("ended", "carried_out", 2)
     listed = vibench("catalogue", "out", "--json", cwd=tmp_path)
     entries = json.loads(listed.stdout)["recordings"]
     assert [entry["path"] for entry in entries] == ["line-0p05vpp-200hz.h5", "line-0p05vpp-201hz.h5"]
     assert {entry["verdict"] for entry in entries} == {"good"}
+
+
+def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(vibench, tmp_path):
+    plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
+    knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
+    checked = vibench("bench", "check", "--bench", bench, "--knobs", knobs, cwd=tmp_path)
+    assert checked.returncode == 0, checked.stderr
+    knobs.write_text(knobs.read_text().replace('"simulated"', '"A. Student"'))
+    made = vibench(*campaign, "--out", "out", cwd=tmp_path)
+    assert made.returncode == 0, made.stderr
+    with open_recording(next(tmp_path.glob("out/*.h5"))) as recording:
+        assert recording.confirmations["operator"] == "A. Student"
+    knobs.write_text(knobs.read_text().replace('"10 dB"', '"20 dB"'))
+    refused = vibench(*campaign, "--out", "elsewhere", cwd=tmp_path)
+    assert refused.returncode == 1
+    assert "does not confirm Bruel & Kjaer 2706 gain at 10 dB" in refused.stderr
+    assert not list(tmp_path.glob("elsewhere/*.h5*"))
+
+
+def test_a_file_that_is_no_sheet_is_not_replaced_by_one(vibench, tmp_path):
+    plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
+    before = plan.read_text()
+    refused = vibench("bench", "check", "--bench", bench, "--knobs", plan, cwd=tmp_path)
+    assert refused.returncode == 1
+    assert plan.read_text() == before
 
 
 def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():

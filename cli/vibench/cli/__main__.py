@@ -5,9 +5,11 @@ Commands by name only: what a command needs is imported when it is called, not t
 
 import errno
 import importlib
+import logging
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from importlib.metadata import version
 from typing import Annotated, Any
 
@@ -222,8 +224,25 @@ def tell_version(*, asked: bool) -> None:
         raise typer.Exit
 
 
+class LogLevel(StrEnum):
+    """How much of what happens is written on standard error."""
+
+    WARNING = "warning"
+    INFO = "info"
+    """What is noted in recordings, too."""
+    DEBUG = "debug"
+    """What instruments are told and answer, too."""
+
+
 @app.callback()
 def vibench(
+    log_level: Annotated[
+        LogLevel,
+        typer.Option(
+            help="Tell on standard error: info, what is noted in recordings; debug, every message to an "
+            "instrument as well."
+        ),
+    ] = LogLevel.WARNING,
     _version: Annotated[
         bool,
         typer.Option(
@@ -235,6 +254,8 @@ def vibench(
     ] = False,
 ) -> None:
     """Hold the commands."""
+    logging.basicConfig(format="%(asctime)s %(name)s: %(message)s")
+    logging.getLogger("vibench").setLevel(log_level.upper())
 
 
 def main() -> None:

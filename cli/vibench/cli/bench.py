@@ -9,6 +9,7 @@ import typer
 from vibench.acquisition import (
     CheckFailed,
     CheckResult,
+    ConfigurationError,
     StopSwitch,
     Verdict,
     check_bench,
@@ -20,7 +21,7 @@ from vibench.acquisition import (
     stop_on_signal,
 )
 from vibench.acquisition.engine import BenchLock
-from vibench.acquisition.rig import Rig, load_rig
+from vibench.acquisition.rig import Rig, load_rig, save_knob_sheet
 
 from .bench_new import new_bench
 from .exit_code import ExitCode
@@ -58,6 +59,12 @@ def check(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", help="Folder that recordings would go to.")
     ] = Path(),
+    knobs: Annotated[
+        Path | None,
+        typer.Option(
+            "--knobs", metavar="SHEET.toml", help="Keep what is confirmed, for `vibench measure --knobs`."
+        ),
+    ] = None,
     last: Annotated[
         bool, typer.Option("--last", help="Show what the last check found; touch nothing.")
     ] = False,
@@ -67,7 +74,12 @@ def check(
 
     The result is kept: a real bench is armed only on a check that passed lately. Exit code 1 if it fails.
     """
-    result = _last(load_rig(bench_path(bench))) if last else _now(bench_path(bench), out)
+    if last and knobs is not None:
+        raise ConfigurationError(
+            "--last touches nothing, and --knobs keeps what is confirmed at a check. Nothing was done; leave "
+            "one of them out"
+        )
+    result = _last(load_rig(bench_path(bench))) if last else _now(bench_path(bench), out, knobs)
     if as_json:
         print_json(result.model_dump(mode="json"))
     else:
@@ -99,9 +111,11 @@ def new(
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _now(path: Path, out: Path) -> CheckResult:
+def _now(path: Path, out: Path, knobs: Path | None) -> CheckResult:
     rig, switch = load_rig(path), StopSwitch()
     with closing(BenchLock.of(rig)), open_bench(rig) as opened, stop_on_signal(switch):
+        if knobs is not None:
+            save_knob_sheet(opened.confirmations, knobs)
         return check_bench(opened, out, switch=switch)
 
 

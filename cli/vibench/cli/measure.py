@@ -35,7 +35,7 @@ from vibench.acquisition.engine import (
     serving,
 )
 from vibench.acquisition.plan import Campaign
-from vibench.acquisition.rig import Rig
+from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 
 from .engine_bars import Watching
 from .exit_code import ExitCode
@@ -132,6 +132,14 @@ def measure(
         bool, typer.Option("--accept-changed-bench", help="Resume on another bench than it was begun on.")
     ] = False,
     faults: FaultsPath = None,
+    knobs: Annotated[
+        Path | None,
+        typer.Option(
+            "--knobs",
+            metavar="SHEET.toml",
+            help="Settings confirmed before, by `vibench bench check --knobs`.",
+        ),
+    ] = None,
     check: Annotated[
         CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
     ] = CheckRule.FRESH,
@@ -174,7 +182,7 @@ def measure(
         changed_bench=ChangedBench.ACCEPT if accept_changed_bench else ChangedBench.REFUSE,
         check=check,
     )
-    with the_bench(rig, plan.name) as engine:
+    with the_bench(rig, plan.name, None if knobs is None else confirm_by_sheet(knobs)) as engine:
         point_results = engine.measure(request, messengers=messengers)
     if engine.switch.request is not None:
         raise typer.Exit(ExitCode.STOPPED)
@@ -183,11 +191,11 @@ def measure(
 
 
 @contextmanager
-def the_bench(rig: Rig, what: str) -> Iterator[Engine]:
+def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[Engine]:
     """Open a bench in this process, with bars on the terminal and a server for `vibench watch` and `stop`."""
     engine = Engine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
     with closing(engine):
-        engine.open(rig)
+        engine.open(rig, confirm)
         with serving(handler, what), Watching(handler.status):
             yield engine

@@ -12,6 +12,7 @@ import pyvisa
 from numpy.typing import NDArray
 
 from ..errors import InstrumentError, InstrumentLost
+from ..host import LOG
 from ._visa_link import Link
 
 Codes = NDArray[np.uint16]
@@ -128,7 +129,8 @@ class ScpiPort:
             self._link.write(message)
             reply = self._link.read_raw()
             self._reply_due = False
-            return reply
+        LOG.debug("%s answers %r", self._name, reply)
+        return reply
 
     def _settle(self) -> None:
         # Some firmware drops messages that come too soon after a command, and has no flag to wait for.
@@ -181,6 +183,7 @@ class ScpiPort:
 
     @contextmanager
     def _dialogue(self, doing: str) -> Iterator[None]:
+        LOG.debug("%s: %s", self._name, doing)
         try:
             yield
         except pyvisa.VisaIOError as error:

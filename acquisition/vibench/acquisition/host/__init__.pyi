@@ -16,6 +16,9 @@ from ._extras import (
 from ._follow_parent import (
     follow_parent as follow_parent,
 )
+from ._log import (
+    LOG as LOG,
+)
 from ._schema import (
     json_schema as json_schema,
     schema_line as schema_line,

@@ -19,6 +19,7 @@ import numpy as np
 from vibench.sim.operating_system import Buffer
 
 from ..errors import RecordingError
+from ..host import LOG
 from ..instruments import Block, Samples
 from . import _layout as layout
 from ._attributes import encoded
@@ -149,7 +150,9 @@ class RecordingWriter:
 
     def log(self, kind: str, text: str, sample: int | None = None) -> None:
         """Note an event, at a sample (the next one by default)."""
-        self._committer.put(self._journal.event(kind, text, self._samples if sample is None else sample))
+        place = self._samples if sample is None else sample
+        LOG.info("%s, sample %d: %s: %s", self.path.name, place, kind, text)
+        self._committer.put(self._journal.event(kind, text, place))
 
     def begin_segment(self, label: str, **numbers: Number) -> None:
         """Begin a named range at the next sample; the analysis finds it by its label and numbers."""

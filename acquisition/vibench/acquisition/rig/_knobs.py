@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import AwareDatetime, Field
 
-from ..errors import CheckFailed
+from ..errors import CheckFailed, ConfigurationError
 from ..host import FrozenModel, load_toml
 from ..instruments import Knob
 
@@ -68,7 +68,8 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
         wanted = "; ".join(_shown(knob) for knob in knobs)
         raise CheckFailed(
             f"these settings are made by hand and must be confirmed: {wanted}. Nobody sits at "
-            "this terminal and nothing was energised; confirm them at one, or give a valid knob sheet"
+            "this terminal and nothing was energised; confirm them at one (vibench bench check --knobs "
+            "SHEET.toml keeps the answers, and vibench measure --knobs SHEET.toml takes them for 36 hours)"
         )
     operator = input("Who confirms the settings made by hand? ") or "at the terminal"
     return confirm_by_asking(input, operator)(knobs)
@@ -111,16 +112,21 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Keep a sheet for later runs; an older one of that name is replaced."""
+    """Keep a sheet in place of an older one; ConfigurationError where another file has the name."""
+    if path.exists():
+        load_knob_sheet(path)
     knobs = "".join(
         f"\n[[knobs]]\ninstrument = {_quoted(knob.instrument)}\nsetting = {_quoted(knob.setting)}\n"
         f"value = {_quoted(knob.value)}\n"
         for knob in sheet.knobs
     )
-    path.write_text(
-        f"operator = {_quoted(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}",
-        encoding="utf-8",
-    )
+    text = f"operator = {_quoted(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}"
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(
+            f"{path} cannot be written ({error.strerror}); nothing was energised, give another place"
+        ) from error
 
 
 def load_knob_sheet(path: Path) -> KnobSheet:
