@@ -33,8 +33,9 @@ from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.daqmx import WallPace, catalogue_with, serve
 
 PRODUCTS = ("USB-4431", "USB-6211")
-PATIENCE_S = 6.0
-EDGES_S = (1.5, 2.5)
+PATIENCE_S = 15.0
+ENTER_S = 4.0
+EDGES_S = (1.5, 3.0)
 RAN = "runs"
 TOLD = "told: "
 LONGEST_SENTENCE = 90
@@ -82,7 +83,7 @@ def run_one(example: Path, product: str) -> None:
         grpc.insecure_channel(server.address) as channel,
     ):
         connect(GrpcSessionOptions(channel, ""))
-        builtins.input = lambda *_: time.sleep(PATIENCE_S / 2) or ""
+        builtins.input = lambda *_: time.sleep(ENTER_S) or ""
         threading.Thread(target=give, args=(server, time.monotonic()), daemon=True).start()
         try:
             runpy.run_path(str(example), run_name="__main__")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition import ConfigurationError
+from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.sim import base_transmissibility
 from vibench.sim.shaker import MOTION_COLUMNS
@@ -284,3 +284,22 @@ def test_a_closed_conversion_no_longer_costs_anything():
     sampler.close()
     world.advance(0.1)
     assert world.time_s == pytest.approx(0.1, abs=STEP_S)
+
+
+class Broken:
+    """A terminal whose voltage is no number from half a second on."""
+
+    def render(self, start_s, interval_s, count):
+        return np.where(start_s + interval_s * np.arange(count) < 0.5, 0.0, np.nan)
+
+
+def test_a_motion_that_is_lost_is_told_and_the_world_stands_still():
+    world = World(RIG, Broken())
+    conversion = world.sample(INPUTS, 51200.0)
+    assert np.all(np.isfinite(conversion.read(20000)))
+    for _ in range(2):
+        with pytest.raises(
+            AcquisitionError, match=r"motion was lost.*The virtual rig stands still: restart it"
+        ):
+            conversion.read(51200)
+    assert world.time_s < 0.6

@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import SettingRefused
-from ..instruments import Knob, Sweep, SweepSpacing
+from ..instruments import Knob, Spacing, Sweep
 from ._afg1022_channel import Afg1022Channel, agree_on_load
 from ._afg1022_modes import set_burst
 from ._afg1022x import AFG1022X
@@ -27,7 +27,7 @@ _TIME = Tolerance(absolute=1e-6, relative=1e-6)
 _OFF = frozenset({"0", "OFF"})
 _ON = frozenset({"1", "ON"})
 _SHAPES = {Shape.SINE: ("SIN", frozenset({"SIN"})), Shape.EDIT_MEMORY: ("ARB", frozenset({"ARB"}))}
-_SPACINGS = {SweepSpacing.LINEAR: "LIN", SweepSpacing.LOGARITHMIC: "LOG"}
+_SPACINGS = {Spacing.LINEAR: "LIN", Spacing.LOGARITHMIC: "LOG"}
 _SWITCHED = ("SWE", "BURS", "AM", "FM", "PM", "FSK", "PWM")
 _SAME_MEAN = 1e-4
 LONGEST_HOLD_S = 3600.0

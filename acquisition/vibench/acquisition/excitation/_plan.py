@@ -110,6 +110,11 @@ class AbstractExcitation(FrozenModel, ABC):
         return None
 
     @property
+    def own_sweep_s(self) -> float | None:
+        """Time of a sweep that the generator makes by itself [s]; None where it makes none."""
+        return None
+
+    @property
     def lead_in_s(self) -> float:
         """Time on the way to what is to be measured, along a branch [s]."""
         return 0.0

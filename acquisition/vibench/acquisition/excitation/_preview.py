@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import ConfigurationError
+from ..instruments import Sweep
 from ._steps import Play, Samples, Step, Stream, Tone, Waveform
 
 
@@ -78,6 +79,8 @@ def _sampled(steps: Iterable[Step], sample_rate_hz: float) -> Samples:
 
 def _values(play: Play, since_s: Samples, first: int, sample_rate_hz: float, cycles: float) -> Samples:
     match play:
+        case Sweep():
+            return np.asarray(np.sin(2 * np.pi * (play.cycles(since_s) + cycles)))
         case Tone(frequency_hz, level):
             return np.asarray(level * np.sin(2 * np.pi * (frequency_hz * since_s + cycles)))
         case Waveform(values, repetition_hz):
@@ -94,5 +97,7 @@ def _cycles_of(play: Play) -> float:
     match play:
         case Tone(frequency_hz, _):
             return frequency_hz
+        case Sweep():
+            return play.cycles(play.duration_s) / play.duration_s
         case Waveform() | Stream():
             return 0.0

@@ -2,25 +2,17 @@
 
 from collections.abc import Iterator
 from enum import StrEnum
-from math import ceil, expm1, log
+from math import ceil
 from typing import ClassVar, Literal, Self
 
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
+from ..instruments import Spacing, Sweep
 from ..recording import SegmentLabel
 from ._base_level import RelativeSetting
 from ._direction import Approach, Direction
 from ._plan import AbstractExcitation, Family, FrequencyHz
 from ._steps import Segment, Step, Tone
-
-
-class Spacing(StrEnum):
-    """How the frequency moves with time."""
-
-    LINEAR = "linear"
-    """The same number of hertz in every second."""
-    LOGARITHMIC = "logarithmic"
-    """The same time in every octave."""
 
 
 class Hold(StrEnum):
@@ -43,12 +35,21 @@ class Hold(StrEnum):
         return {Hold.ACCELERATION: 0, Hold.VELOCITY: 1, Hold.DISPLACEMENT: 2}[self]
 
 
+class SweptBy(StrEnum):
+    """What moves the frequency."""
+
+    COMPUTER = "computer"
+    """In steps, on any generator."""
+    GENERATOR = "generator"
+    """Its own sweep, without steps, where it makes one; it begins with a trigger."""
+
+
 MOST_SWEEP_STEPS = 1_000_000
 """A day in the usual steps of a tenth of a second."""
 
 
 class MovingSine(AbstractExcitation):
-    """A sine sweep, up or down, that the computer steps through: the generator has no sweep time to set.
+    """A sine sweep, up or down, that the computer steps through.
 
     Each step plays the mean frequency of the ideal sweep over its time, so that at the end of every
     step the phase is the ideal sweep's. What the generator really played, and when, is in the
@@ -94,7 +95,7 @@ class MovingSine(AbstractExcitation):
         return min(self.start_hz, self.stop_hz), max(self.start_hz, self.stop_hz)
 
     @property
-    def glide_step_s(self) -> float:
+    def glide_step_s(self) -> float | None:
         """The step of the sweep [s]."""
         return self.step_s
 
@@ -121,13 +122,12 @@ class MovingSine(AbstractExcitation):
 
     def cycles(self, time_s: float) -> float:
         """Cycles of the ideal sweep since its start, in closed form."""
-        match self.spacing:
-            case Spacing.LINEAR:
-                rate = (self.stop_hz - self.start_hz) / self.duration_s
-                return self.start_hz * time_s + 0.5 * rate * time_s**2
-            case Spacing.LOGARITHMIC:
-                rate = log(self.stop_hz / self.start_hz) / self.duration_s
-                return self.start_hz * expm1(rate * time_s) / rate
+        return self.course.cycles(time_s)
+
+    @property
+    def course(self) -> Sweep:
+        """The ideal sweep."""
+        return Sweep(self.start_hz, self.stop_hz, self.duration_s, self.spacing)
 
     def mean_steps(self) -> Iterator[tuple[float, float]]:
         """Give mean frequency [Hz] and duration [s] of each step, in the order of time."""
@@ -152,6 +152,27 @@ class SineSweep(MovingSine):
     """What stays constant; ``amplitude_vpp`` is then the setting at the highest frequency."""
     settle_s: NonNegativeFloat = 3.0
     """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
+    swept_by: SweptBy = SweptBy.COMPUTER
+    """What moves the frequency; ``step_s`` is the computer's."""
+
+    @model_validator(mode="after")
+    def _generator_holds_its_setting(self) -> Self:
+        if self.swept_by is SweptBy.GENERATOR and self.hold is not Hold.ACCELERATION:
+            raise ValueError(
+                f"hold = {self.hold.value!r} changes the amplitude on the way, and a generator that sweeps "
+                "by itself keeps its setting; use swept_by = 'computer', or hold = 'acceleration'"
+            )
+        return self
+
+    @property
+    def own_sweep_s(self) -> float | None:
+        """Time of a sweep that the generator makes [s]; None where the computer steps."""
+        return self.duration_s if self.swept_by is SweptBy.GENERATOR else None
+
+    @property
+    def glide_step_s(self) -> float | None:
+        """The step of the sweep [s]; a generator's own has none."""
+        return self.step_s if self.swept_by is SweptBy.COMPUTER else None
 
     @property
     def lowest_amplitude_vpp(self) -> float:
@@ -172,7 +193,14 @@ class SineSweep(MovingSine):
         return self.settle_s + self.duration_s
 
     def steps(self) -> Iterator[Step]:
-        """One step for every ``step_s``, all of one segment."""
+        """One step for every ``step_s``, all of one segment; or the whole sweep as one."""
+        if self.swept_by is SweptBy.GENERATOR:
+            segment = self.segment_with(self.hold.value)
+            return iter((Step(self.course, self.settle_s, self.duration_s, segment),))
+        return self.loudest_steps()
+
+    def loudest_steps(self) -> Iterator[Step]:
+        """One step for every ``step_s``, whatever moves the frequency."""
         segment = self.segment_with(self.hold.value)
         settle_s = self.settle_s
         for mean_hz, duration_s in self.mean_steps():

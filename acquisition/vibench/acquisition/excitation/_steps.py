@@ -7,6 +7,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from ..instruments import Sweep
 from ..recording import SegmentLabel
 
 Samples = NDArray[np.float64]
@@ -57,7 +58,7 @@ class Stream:
     source: SampleSource
 
 
-Play: TypeAlias = Tone | Waveform | Stream
+Play: TypeAlias = Tone | Waveform | Stream | Sweep
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from ._protocols import (
     FunctionGenerator as FunctionGenerator,
     GeneratorDescription as GeneratorDescription,
     IdleOutput as IdleOutput,
+    Spacing as Spacing,
     Sweep as Sweep,
-    SweepSpacing as SweepSpacing,
 )
 from ._values import (
     Block as Block,

@@ -2,26 +2,44 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from math import log
+from typing import Protocol, TypeVar
+
+import numpy as np
 
 from ._values import Block, Identity, Knob, Samples
 
+Time = TypeVar("Time", float, Samples)
 
-class SweepSpacing(StrEnum):
-    """How a frequency moves with time."""
+
+class Spacing(StrEnum):
+    """How the frequency moves with time."""
 
     LINEAR = "linear"
+    """The same number of hertz in every second."""
     LOGARITHMIC = "logarithmic"
+    """The same time in every octave."""
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """A sweep that a generator makes by itself."""
+    """A sweep that a generator makes by itself, or the course that a computer steps along."""
 
     start_hz: float
     stop_hz: float
     duration_s: float
-    spacing: SweepSpacing = SweepSpacing.LINEAR
+    spacing: Spacing = Spacing.LINEAR
+
+    def cycles(self, time_s: Time) -> Time:
+        """Cycles since its start, in closed form, at a time or at many."""
+        match self.spacing:
+            case Spacing.LINEAR:
+                rate = (self.stop_hz - self.start_hz) / self.duration_s
+                return self.start_hz * time_s + 0.5 * rate * time_s**2
+            case Spacing.LOGARITHMIC:
+                rate = log(self.stop_hz / self.start_hz) / self.duration_s
+                grown: Time = np.expm1(rate * time_s)
+                return self.start_hz * grown / rate
 
 
 @dataclass(frozen=True)

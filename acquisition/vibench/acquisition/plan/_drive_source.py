@@ -3,6 +3,7 @@
 from enum import StrEnum
 
 from ..excitation import Play, Stream, Tone, Waveform
+from ..instruments import Sweep
 from ..rig import OutputUse, Rig, generator_driver
 from ._measurement import Measurement
 
@@ -37,5 +38,5 @@ def _source_of(play: Play, use: OutputUse) -> DriveSource:
     match play, use:
         case (Stream(), _) | (Tone(), OutputUse.TONES_AND_STREAMS):
             return DriveSource.OUTPUT
-        case (Tone() | Waveform(), _):
+        case (Tone() | Waveform() | Sweep(), _):
             return DriveSource.GENERATOR

@@ -1,5 +1,6 @@
 """The safety envelope: what a plan would do to the rig, next to what the rig survives."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
@@ -68,7 +69,7 @@ class LimitCheck:
         """How much of the limit is used: above 1 is too much."""
         match self.side:
             case LimitSide.AT_MOST:
-                return self.value / self.limit
+                return self.value / self.limit if self.limit else math.inf
             case LimitSide.AT_LEAST:
                 return self.limit / self.value
 
@@ -184,6 +185,10 @@ def _generating(excitation: AbstractExcitation, rig: Rig) -> Iterator[LimitCheck
     yield LimitCheck(
         highest, excitation.highest_frequency_hz, can.highest_sine_hz, "Hz", range_of, "lower the frequency"
     )
+    if excitation.own_sweep_s is not None:
+        sweep, longest = "the generator's own sweep", f"what the {can.name} sweeps by itself"
+        remedy = 'set swept_by = "computer"'
+        yield LimitCheck(sweep, excitation.own_sweep_s, can.longest_sweep_s, "s", longest, remedy)
     if excitation.period_points is not None:
         fewest, most = can.memory_points
         memory = f"memory of the {can.name}"

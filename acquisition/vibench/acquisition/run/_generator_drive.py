@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import AcquisitionError, ConfigurationError
 from ..excitation import Play, Stream, Tone, Waveform
-from ..instruments import FunctionGenerator
+from ..instruments import FunctionGenerator, Sweep
 from ..plan import DriveSource, Measurement, Phase, RunState, half_cosine, stairs
 
 QUIET = 1.25
@@ -80,8 +80,8 @@ class GeneratorDrive:
 
     @property
     def can_hold(self) -> bool:
-        """Whether what is played goes on by itself: not where it needs a trigger every time."""
-        return self._dead_man is None
+        """Whether what is played stays by itself: not where it needs a trigger every time, or sweeps."""
+        return self._dead_man is None and not isinstance(self._play, Sweep)
 
     @property
     def setting_vpp(self) -> float:
@@ -112,6 +112,8 @@ class GeneratorDrive:
                 yield from self._ramp(phase.end_level, phase.duration_s)
             case _:
                 self._begin(phase.play)
+                if phase.state is RunState.RECORDING and isinstance(phase.play, Sweep):
+                    self._generator.trigger()
                 yield from self._pieces(phase.duration_s)
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
@@ -176,6 +178,8 @@ class GeneratorDrive:
                 self._change_tone(old, new)
             case _, Tone(frequency_hz, _):
                 self._generator.load_sine(frequency_hz, self._due_vpp)
+            case _, Sweep() as sweep:
+                self._generator.load_sweep(sweep, self._due_vpp)
             case _, Waveform(values, repetition_hz):
                 self._generator.load_waveform(values, repetition_hz, self._due_vpp)
             case _, Stream() | None:

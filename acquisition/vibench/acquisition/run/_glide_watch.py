@@ -1,11 +1,12 @@
 """How many cycles of a glide from tone to tone the recorded drive has more, or fewer, than its plan."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import pi
+from typing import Protocol
 
 import numpy as np
 
-from ..instruments import Block
+from ..instruments import Block, Samples, Sweep
 from ..rig import Channel, Role
 
 DELAY_SAMPLES = 40
@@ -13,12 +14,19 @@ DELAY_SAMPLES = 40
 of frequencies."""
 
 
+class Heard(Protocol):
+    """What takes blocks as they are read."""
+
+    def append(self, block: Block) -> None:
+        """Take the next one."""
+
+
 class GlideWatch:
     """Holds the phase of the recorded drive against that of the plan, in the last half of every tone."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
-        self._rate_hz = sample_rate_hz
+        self.sample_rate_hz = sample_rate_hz
         self._planned = 0.0
         self._due_s = 0.0
         self._began: tuple[float, float] | None = None
@@ -29,17 +37,29 @@ class GlideWatch:
         """Forget: another glide may begin."""
         self._began = None
 
-    def take(self, blocks: Sequence[Block], frequency_hz: float, duration_s: float) -> None:
-        """Take what was recorded while a tone of the glide should have played."""
+    def take(
+        self,
+        blocks: Sequence[Block],
+        frequency_hz: float,
+        duration_s: float,
+        course: Callable[[Samples], Samples] | None = None,
+    ) -> None:
+        """Take what was recorded while a tone of the glide should have played.
+
+        ``course`` gives the cycles since its beginning, of what is a tone in the mean only.
+        """
         if not blocks:
             return
         if self._began is None:
-            self._planned, self._due_s, self._more = 0.0, blocks[0].first_sample / self._rate_hz, 0.0
+            self._planned, self._due_s, self._more = 0.0, blocks[0].first_sample / self.sample_rate_hz, 0.0
         late = blocks[len(blocks) // 2 :]
         volts = np.concatenate([block.volts[self._row] for block in late])
         count = volts.size if len(blocks) > 1 else volts.size // 2
-        time_s = (late[-1].first_sample + late[-1].volts.shape[1] - count + np.arange(count)) / self._rate_hz
-        cycles = self._planned + frequency_hz * (time_s - self._due_s)
+        time_s = (
+            late[-1].first_sample + late[-1].volts.shape[1] - count + np.arange(count)
+        ) / self.sample_rate_hz
+        since_s = time_s - self._due_s
+        cycles = self._planned + (frequency_hz * since_s if course is None else course(since_s))
         turned = complex(np.sum(volts[-count:] * np.exp(-2j * pi * cycles)))
         angle = float(np.angle(turned)) / (2 * pi)
         if self._began is None:
@@ -59,5 +79,22 @@ class GlideWatch:
         """
         if self._began is None:
             return 0.0
-        delayed = DELAY_SAMPLES / self._rate_hz * abs(self._last_hz - self._began[1])
+        delayed = DELAY_SAMPLES / self.sample_rate_hz * abs(self._last_hz - self._began[1])
         return float(np.sign(self._more) * max(0.0, abs(self._more) - delayed))
+
+
+class SweepWatch:
+    """Holds a sweep that the generator makes by itself against its course, block by block."""
+
+    def __init__(self, glide: GlideWatch, sweep: Sweep) -> None:
+        self._glide = glide
+        self._sweep = sweep
+        self._time_s = 0.0
+
+    def append(self, block: Block) -> None:
+        """Take the next block as the part of the sweep that belongs to it."""
+        began_s, duration_s = self._time_s, block.volts.shape[1] / self._glide.sample_rate_hz
+        began = self._sweep.cycles(began_s)
+        self._time_s += duration_s
+        mean_hz = (self._sweep.cycles(self._time_s) - began) / duration_s
+        self._glide.take([block], mean_hz, duration_s, lambda t: self._sweep.cycles(began_s + t) - began)

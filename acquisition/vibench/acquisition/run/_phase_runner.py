@@ -6,14 +6,14 @@ from enum import Enum, auto
 
 from ..errors import DriveLate
 from ..excitation import Play, Tone
-from ..instruments import Block
+from ..instruments import Block, Sweep
 from ..plan import Phase, RunState
 from ..recording import HOLD_ROOM_S, EventKind
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import BLOCK_S, AcquisitionLoop
 from ._drive import Drive
 from ._ending import Progress
-from ._glide_watch import GlideWatch
+from ._glide_watch import GlideWatch, Heard, SweepWatch
 from ._limit_monitor import LimitMonitor
 from ._silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
 
@@ -108,6 +108,8 @@ class PhaseRunner:
             self._tell_lost_cycles()
             yield from self._read(0.0)
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
+        if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
+            yield from self._catch_up()  # its first sample is that of the trigger
         if phase.segment != self.loop.segment:
             self.loop.enter(None)  # a segment holds nothing of the time in which its successor is commanded
         waits = self._drive.perform(commanded)
@@ -116,14 +118,20 @@ class PhaseRunner:
             yield from self._catch_up()
         self.loop.enter(phase.segment)
         self._play = phase.play
-        heard = [] if into is None and self._may_glide(phase) else into
+        heard = self._heard(phase) if into is None else into
         while wait_s is not None:
             yield from self._read(wait_s, heard, self._lead_s if phase.state is RunState.RECORDING else 0.0)
             if pace is _Pace.OF_THE_COMMANDS:
                 yield from self._catch_up(into)
             wait_s = next(waits, None)
-        if heard is not None and isinstance(phase.play, Tone) and self._may_glide(phase):
+        if isinstance(heard, list) and isinstance(phase.play, Tone) and self._may_glide(phase):
             self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
+
+    def _heard(self, phase: Phase) -> Heard | None:
+        """Give what takes the blocks of a phase whose drive is held against the plan."""
+        if not self._may_glide(phase):
+            return None
+        return SweepWatch(self._glide, phase.play) if isinstance(phase.play, Sweep) else []
 
     def _may_glide(self, phase: Phase) -> bool:
         """Whether a phase may be a tone of a sweep that is recorded, command by command."""
@@ -192,7 +200,7 @@ class PhaseRunner:
             )
         return late_s
 
-    def _catch_up(self, into: list[Block] | None = None) -> Iterator[Progress]:
+    def _catch_up(self, into: Heard | None = None) -> Iterator[Progress]:
         for block in self.loop.catch_up():
             if into is not None:
                 into.append(block)
@@ -234,9 +242,7 @@ class PhaseRunner:
         while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
             yield from self._read(LISTEN_S)
 
-    def _read(
-        self, duration_s: float, into: list[Block] | None = None, lead_s: float = 0.0
-    ) -> Iterator[Progress]:
+    def _read(self, duration_s: float, into: Heard | None = None, lead_s: float = 0.0) -> Iterator[Progress]:
         for block in self.loop.read_for(duration_s, lead_s):
             if into is not None:
                 into.append(block)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import AcquisitionError, ConfigurationError
 from ..excitation import Play, Stream, Tone, Waveform
-from ..instruments import AnalogOutput, Samples
+from ..instruments import AnalogOutput, Samples, Sweep
 from ..plan import DriveSource, Measurement, Phase, half_cosine
 from ._acquisition_loop import BLOCK_S
 
@@ -130,10 +130,10 @@ class OutputSynthesizer:
             case Stream(source):
                 first, self._streamed = self._streamed, self._streamed + count
                 return source.samples(first, count, self._rate_hz)
-            case Waveform():
+            case Waveform() | Sweep():
                 raise ConfigurationError(
-                    "a repeated waveform was given to the analogue output, which streams. Nothing of it was "
-                    "played; play it by the function generator"
+                    "a repeated waveform, or a generator's own sweep, was given to the analogue output, "
+                    "which streams. Nothing of it was played; play it by the function generator"
                 )
 
 

@@ -12,6 +12,7 @@ from ..analogue import Sampler
 from ._errors import DaqmxRefusal
 from ._pace import Overflow
 from ._reference_trigger import TriggerWatch
+from ._timing import MOST_SAMPLES
 
 _ROUNDING_SAMPLES = 1e-5
 """Rig time is a sum of many durations: a sample is due although the sum falls this much of a period short."""
@@ -159,9 +160,13 @@ class Acquisition:
         self.acquired += count
 
     def _overrun(self, count: int) -> None:
-        if self._overflow is Overflow.GROW:
-            self._grow(self.available + count)
-        elif self._overwrite is OverwriteMode.DO_NOT_OVERWRITE_UNREAD_SAMPLES:
+        needed = self.available + count
+        if self._overflow is Overflow.GROW and self._ring.shape[0] * needed <= MOST_SAMPLES:
+            self._grow(needed)
+        elif (
+            self._overflow is Overflow.GROW
+            or self._overwrite is OverwriteMode.DO_NOT_OVERWRITE_UNREAD_SAMPLES
+        ):
             self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
 
     def _grow(self, needed: int) -> None:

@@ -16,7 +16,7 @@ from ._generation import Generation
 from ._reading import READ_ALL, Reading, default_samples, read
 from ._system import DaqmxSystem
 from ._tasks import Task
-from ._timing import StartsItself
+from ._timing import StartsItself, check_memory
 
 _STATUS_TAG = b"\x08"
 """Field 1, varint."""
@@ -97,6 +97,7 @@ def _write_stopped(task: Task, volts: NDArray[np.float64]) -> int:
     buffer, count = task.output_buffer, volts.shape[1]
     missing = buffer.written + count - buffer.size
     if missing > 0 and not buffer.is_sized:
+        check_memory(buffer.size + missing, len(task.outputs))
         buffer.grow(missing)
     elif missing > 0:
         detail = (

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from enum import Enum, auto
 from typing import Protocol
 
+from vibench.acquisition import AcquisitionError
+
 QUESTION_S = 0.1
 """Rig time that a question about progress takes when nothing else lets time pass [s].
 
@@ -159,7 +161,10 @@ class WallPace:
         pause_s = TICK_S
         while not self._closing.wait(pause_s):
             with rig.changed:
-                behind_s = self._step(rig)
+                try:
+                    behind_s = self._step(rig)
+                except AcquisitionError:
+                    return  # the world stands still; whoever asks is told
             pause_s = YIELD_S if behind_s > 0 else TICK_S
 
     def _step(self, rig: RigClock) -> float:

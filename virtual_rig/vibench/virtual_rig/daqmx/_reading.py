@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ._acquisition import Acquisition
 from ._errors import DaqmxRefusal
 from ._tasks import Task
+from ._timing import check_memory
 
 READ_ALL = -1
 
@@ -46,6 +47,7 @@ def read(task: Task, samples: int, timeout_s: float) -> Reading:
     if not task.inputs:
         task.require_channels()
         raise DaqmxRefusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
+    check_memory(samples, len(task.inputs))
     has_to_start = not task.is_running
     if has_to_start:
         _start_for_reading(task)

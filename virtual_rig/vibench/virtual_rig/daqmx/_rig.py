@@ -5,12 +5,19 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
+from nidaqmx.error_codes import DAQmxErrors
+
+from vibench.acquisition import AcquisitionError
+
 from ..analogue import AnalogueWorld
+from ._errors import DaqmxRefusal
 from ._pace import SLICE_S, Pace
 
 
 class Stream(Protocol):
     """A running acquisition or generation."""
+
+    failure: DaqmxRefusal | None
 
     def advance_to(self, now_s: float) -> None:
         """Do what is due at that rig time."""
@@ -52,7 +59,18 @@ class Rig:
         return self._epoch_s + rig_s
 
     def advance_to(self, until_s: float) -> None:
-        """Let rig time pass in slices: outputs are fed first, then inputs convert, then the rest passes."""
+        """Let rig time pass; a world that cannot go on ends all that runs, and what waits for it."""
+        try:
+            self._advance_to(until_s)
+        except AcquisitionError as error:
+            lost = DaqmxRefusal(DAQmxErrors.DEV_CANNOT_BE_ACCESSED, str(error))
+            for stream in (*self._acquisitions, *self._generations):
+                stream.failure = lost
+            self.changed.notify_all()
+            raise lost from error
+
+    def _advance_to(self, until_s: float) -> None:
+        """Go in slices: outputs are fed first, then inputs convert, then the rest passes."""
         reached_s = self.now_s
         for acquisition in self._acquisitions:
             acquisition.advance_to(reached_s)

@@ -19,7 +19,7 @@ from ._errors import DaqmxRefusal, member, unsupported_value
 from ._names import expand, join
 from ._reading import asked_available, available, default_samples
 from ._tasks import Task, TaskState
-from ._timing import ReferenceTrigger, check_samples
+from ._timing import ReferenceTrigger, check_memory, check_samples
 
 _DEFAULT_SAMPLES_TO_READ = "0x31E8"
 """Not named in the protocol: how many samples a read of "all" brings."""
@@ -294,6 +294,7 @@ def _set_input_buffer(task: Task, size: int) -> None:
 def set_output_buffer(task: Task, size: int) -> None:
     """Give the task an output buffer of that size, empty."""
     task.require_stopped()
+    check_memory(size, len(task.outputs))
     task.writing.buffer_size = size
     task.buffer = None
 

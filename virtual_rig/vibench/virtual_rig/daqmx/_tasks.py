@@ -20,7 +20,15 @@ from ._reference_trigger import TriggerWatch, verify_reference
 from ._rig import Rig
 from ._tdms_log import TdmsLog
 from ._terminals import SAMPLE_CLOCK, START_TRIGGER, awaited_terminal, terminal
-from ._timing import InputSettings, OutputSettings, Timing, actual_rate, input_buffer_size, kind_of
+from ._timing import (
+    InputSettings,
+    OutputSettings,
+    Timing,
+    actual_rate,
+    check_memory,
+    input_buffer_size,
+    kind_of,
+)
 
 _BREATH_S = 1e-4
 
@@ -215,6 +223,8 @@ class Task:
             _ = self.rate_hz
             if awaited := awaited_terminal(self.timing, self.clock_terminal):
                 self._reservations.require_terminal(awaited)
+            if self.inputs:
+                check_memory(self.buffer_size, len(self.inputs))
         verify_reference(self.timing, self.inputs, self._reservations.require_terminal)
 
     def _reserve(self) -> None:

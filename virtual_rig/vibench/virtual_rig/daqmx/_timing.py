@@ -16,12 +16,15 @@ from nidaqmx.constants import (
     SampleTimingType,
     Slope,
 )
+from nidaqmx.error_codes import DAQmxErrors
 
 from ._devices import AnalogInputs, AnalogOutputs, Conversion, Untimed
-from ._errors import unsupported_value
+from ._errors import DaqmxRefusal, unsupported_value
 
 DEFAULT_RATE_HZ = 1000.0
 DEFAULT_SAMPLES = 1000
+MOST_SAMPLES = 1 << 27
+"""Values that one buffer or one read may have: 1 GiB."""
 
 _DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
 """Up to that rate, that many samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
@@ -144,6 +147,13 @@ def input_buffer_size(timing: Timing, settings: InputSettings, rate_hz: float) -
         return timing.samples
     usual = next(size for limit_hz, size in _DEFAULT_BUFFERS if rate_hz <= limit_hz)
     return max(usual, timing.samples)
+
+
+def check_memory(samples: int, channels: int) -> None:
+    """Refuse more samples than the simulated computer has memory for (-50352)."""
+    if samples * channels > MOST_SAMPLES:
+        detail = f"{samples} samples of {channels} channels; there is room for {MOST_SAMPLES} values"
+        raise DaqmxRefusal(DAQmxErrors.PAL_MEMORY_FULL, detail)
 
 
 def check_samples(samples: int) -> int:

@@ -13,6 +13,9 @@ from ._output_signal import (
 from ._scpi_command import (
     Quirks as Quirks,
 )
+from ._scpi_message import (
+    LONGEST_MESSAGE as LONGEST_MESSAGE,
+)
 from ._scpi_socket import (
     ScpiSocket as ScpiSocket,
 )

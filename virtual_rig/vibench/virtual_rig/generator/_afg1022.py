@@ -34,6 +34,12 @@ SOUNDING_CHANNEL = 1
 """The channel whose terminal is wired; channel 2 keeps its settings and plays nothing."""
 
 
+LONGEST_REPLY = 1 << 20
+"""Bytes of the answers to one message; the longest that is of use has 17 kB."""
+MOST_SPELLINGS = 4096
+"""Of headers that are remembered."""
+
+
 @dataclass(frozen=True)
 class Reply:
     """What the instrument answers to one message; empty when nothing was asked."""
@@ -189,12 +195,22 @@ class AFG1022:
         """Carry out every unit of a message in order and collect the answers."""
         path = HeaderPath()
         answers: list[bytes] = []
+        room = LONGEST_REPLY
         for unit in units(message):
             header, path = (HeaderPath() if unit.starts_line else path).resolve(unit.header)
+            if unit.asks and room < 0:
+                continue
             try:
-                answers.extend(self._obey(header, unit))
+                answers.extend(found := self._obey(header, unit))
             except ScpiError as error:
                 self.status.report(error.code)
+                continue
+            room -= sum(map(len, found))
+            if (
+                found and room < 0
+            ):  # nobody fetches them while the message is carried out (IEEE 488.2, 6.3.1.7)
+                answers.clear()
+                self.status.report(ErrorCode.QUERY_DEADLOCKED)
         return answers
 
     def _obey(self, header: str, unit: Unit) -> list[bytes]:
@@ -217,6 +233,8 @@ class AFG1022:
         for command in self._commands:
             suffix = command.pattern.match(header)
             if suffix is not None:
+                if len(self._found) >= MOST_SPELLINGS:
+                    self._found.clear()
                 self._found[header] = command, suffix
                 return command, suffix
         return None, 1

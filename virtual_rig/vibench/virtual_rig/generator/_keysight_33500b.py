@@ -123,6 +123,8 @@ def _write_dac(generator: Generator, channel: int, parameters: Parameters) -> No
     values = _numbers(own, parameters[1:])
     if not POINTS[0] <= values.size <= POINTS[1] or np.any(np.abs(values) > _MIDDLE):
         raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+    if sum(map(len, own.waveforms.values())) + values.size > POINTS[1]:
+        raise ScpiError(ErrorCode.OUT_OF_MEMORY)
     own.waveforms[name] = (values + _MIDDLE).astype(np.uint16)
 
 

@@ -8,6 +8,8 @@ COMMA = ord(",")
 NEWLINE = ord("\n")
 BLOCK = ord("#")
 QUOTES = frozenset(b"\"'")
+LONGEST_MESSAGE = 1 << 22
+"""Bytes of one message (assumed); the longest that is of use is a waveform of a million points, 2 MB."""
 WHITE_SPACE = frozenset(b" \t\r")
 DIGITS = frozenset(b"0123456789")
 

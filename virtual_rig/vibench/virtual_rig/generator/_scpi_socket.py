@@ -11,11 +11,9 @@ from types import TracebackType
 from typing import Protocol
 
 from ._afg1022 import Reply
-from ._scpi_message import message_end
+from ._scpi_message import LONGEST_MESSAGE, message_end
 
 LOOPBACK = "127.0.0.1"
-LONGEST_MESSAGE = 1 << 20
-"""Bytes without an end of message after which a client is disconnected."""
 _RECEIVE_BYTES = 65536
 
 
@@ -87,7 +85,7 @@ def _server(device: ScpiDevice, address: tuple[str, int], closing: threading.Eve
         def handle(self) -> None:
             """Serve until the client leaves or sends no end of message."""
             pending = b""
-            while len(pending) < LONGEST_MESSAGE:
+            while len(pending) < LONGEST_MESSAGE:  # a client that never ends one is disconnected
                 try:
                     received = self.request.recv(_RECEIVE_BYTES)
                 except ConnectionError:

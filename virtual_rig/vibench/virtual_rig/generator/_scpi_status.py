@@ -23,9 +23,11 @@ class ErrorCode(IntEnum):
     SETTINGS_CONFLICT = -221
     DATA_OUT_OF_RANGE = -222
     ILLEGAL_PARAMETER_VALUE = -224
+    OUT_OF_MEMORY = -225
     QUEUE_OVERFLOW = -350
     QUERY_INTERRUPTED = -410
     QUERY_UNTERMINATED = -420
+    QUERY_DEADLOCKED = -430
 
     @property
     def text(self) -> str:
@@ -47,9 +49,11 @@ _TEXTS = {
     ErrorCode.SETTINGS_CONFLICT: "Settings conflict",
     ErrorCode.DATA_OUT_OF_RANGE: "Data out of range",
     ErrorCode.ILLEGAL_PARAMETER_VALUE: "Illegal parameter value",
+    ErrorCode.OUT_OF_MEMORY: "Out of memory",
     ErrorCode.QUEUE_OVERFLOW: "Queue overflow",
     ErrorCode.QUERY_INTERRUPTED: "Query INTERRUPTED",
     ErrorCode.QUERY_UNTERMINATED: "Query UNTERMINATED",
+    ErrorCode.QUERY_DEADLOCKED: "Query DEADLOCKED",
 }
 
 

@@ -9,12 +9,13 @@ import errno
 import os
 import struct
 import threading
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import NoReturn, Protocol
 
-from ..generator import BYTE, ErrorCode, Reply, StatusByte
+from ..generator import BYTE, LONGEST_MESSAGE, ErrorCode, Reply, StatusByte
 from ._device import BULK_IN, BULK_OUT, Identification, Setup
 
 VENDOR_ID = 0x0699
@@ -23,8 +24,8 @@ PRODUCT_ID = 0x0353
 HEADER = struct.Struct("<BBBxIBBxx")
 """Message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
 ALIGNMENT = 4
-LONGEST_MESSAGE = 1 << 20
-"""Bytes of a message after which the instrument stalls (assumed; the longest useful has 17 kB)."""
+MOST_NOTIFICATIONS = 16
+"""Status bytes that wait for the host; older ones are dropped."""
 NEVER_MS = 2**32 - 1
 
 
@@ -117,7 +118,7 @@ class _Flight:
     """The part of a transfer that did not fit into the host's buffer."""
     aborting: bool = False
     """An aborted transfer still owes its short packet."""
-    notifications: list[bytes] = field(default_factory=list)
+    notifications: deque[bytes] = field(default_factory=lambda: deque(maxlen=MOST_NOTIFICATIONS))
     stalled: set[int] = field(default_factory=set)
 
 
@@ -222,7 +223,7 @@ class UsbTmcInstrument:
             self._check_cable()
             if not self._flight.notifications:
                 _time_out()
-            return self._flight.notifications.pop(0)[:length]
+            return self._flight.notifications.popleft()[:length]
 
     def control(self, setup: Setup, data: bytes) -> bytes:  # noqa: ARG002 - no class request carries data
         """Answer a class request (4.2.1; USB488, 4.3)."""

@@ -1,0 +1,76 @@
+"""Numbers of samples that no computer holds are refused, and samples that nobody reads grow no further."""
+
+import numpy as np
+import pytest
+from nidaqmx.constants import AcquisitionType
+from nidaqmx.error_codes import DAQmxErrors
+from nidaqmx.errors import DaqError
+
+from vibench.acquisition import AcquisitionError
+from vibench.virtual_rig.daqmx import WallPace, _acquisition
+
+GIANT = 1 << 33
+
+
+def refused(call):
+    with pytest.raises(DaqError) as caught:
+        call()
+    return caught.value.error_code
+
+
+@pytest.fixture
+def task(daq):
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    return task
+
+
+def test_a_buffer_or_a_read_of_more_than_there_is_memory_for_is_refused(daq, task):
+    task.timing.cfg_samp_clk_timing(10_000, samps_per_chan=GIANT)
+    assert refused(task.start) == DAQmxErrors.PAL_MEMORY_FULL
+    task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS, samps_per_chan=1000)
+    interpreter = task._interpreter
+    assert refused(lambda: interpreter.read_analog_waveforms(task._handle, 1 << 30, 1.0, [], NoTiming)) == (
+        DAQmxErrors.PAL_MEMORY_FULL
+    )
+    task.in_stream.input_buf_size = 2**32 - 1
+    assert refused(task.start) == DAQmxErrors.PAL_MEMORY_FULL
+    output = daq.task()
+    output.ao_channels.add_ao_voltage_chan("Dev1/ao0", min_val=-1, max_val=1)
+    with pytest.raises(DaqError):
+        output.out_stream.output_buf_size = 2**32 - 1
+
+
+class NoTiming:
+    """How the client says that waveforms shall be samples only."""
+
+    value = 0
+
+
+def test_samples_that_nobody_reads_are_lost_at_last_where_none_are_lost_usually(daq, task, monkeypatch):
+    monkeypatch.setattr(_acquisition, "MOST_SAMPLES", 50_000)
+    task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS)
+    task.start()
+    daq.server.let_pass(4.0)
+    assert len(task.read(100)) == 100
+    daq.server.let_pass(8.0)
+    assert refused(lambda: task.read(100)) == DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE
+
+
+@pytest.mark.parametrize("pace", [None, WallPace(speed=5.0)])
+def test_a_world_that_cannot_go_on_is_told_to_whoever_reads_and_whoever_asks_later(connect, pace):
+    daq = connect(pace)
+
+    def stand_still(*_):
+        raise AcquisitionError("The specimen's motion was lost")
+
+    task = daq.task()
+    task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
+    task.timing.cfg_samp_clk_timing(10_000, sample_mode=AcquisitionType.CONTINUOUS)
+    task.start()
+    assert np.size(task.read(500)) == 500
+    daq.world.voltage = stand_still
+    for _ in range(2):
+        with pytest.raises(DaqError, match="motion was lost") as caught:
+            task.read(5000)
+        assert caught.value.error_code == DAQmxErrors.DEV_CANNOT_BE_ACCESSED

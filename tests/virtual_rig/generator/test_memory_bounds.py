@@ -1,0 +1,75 @@
+"""What a client sends or asks for without end grows the memory of a simulated generator no further."""
+
+import numpy as np
+import pytest
+
+from vibench.virtual_rig.generator import AFG1022, Keysight33500B
+from vibench.virtual_rig.generator._afg1022 import LONGEST_REPLY, MOST_SPELLINGS
+from vibench.virtual_rig.usb import UsbTmcInstrument
+from vibench.virtual_rig.usb._usbtmc import MOST_NOTIFICATIONS, Request, Setup
+
+
+@pytest.fixture
+def afg():
+    return AFG1022(lambda: 0.0)
+
+
+def asked(generator, message):
+    return generator.execute(message).data
+
+
+def test_a_message_of_endless_queries_is_carried_out_and_its_answers_are_dropped_as_deadlocked(afg):
+    query = b"DATA:DATA? EMEM"
+    one = len(asked(afg, query))
+    many = LONGEST_REPLY // one
+    assert len(asked(afg, b";:".join([query] * many))) >= many * (one - 1)
+    assert asked(afg, b";:".join([query] * 20 * many) + b";:FREQ 77") == b""
+    assert asked(afg, b"SYST:ERR?").startswith(b"-430")
+    assert asked(afg, b"SYST:ERR?").startswith(b"0,"), "told once"
+    assert float(asked(afg, b"FREQ?")) == 77
+    assert asked(afg, b"*IDN?").startswith(b"TEKTRONIX")
+
+
+def test_headers_are_not_remembered_in_every_spelling(afg):
+    header = b"SOURCE1:FREQUENCY:FIXED?"
+    letters = [place for place, byte in enumerate(header) if chr(byte).isalpha()]
+    for number in range(MOST_SPELLINGS + 50):
+        spelt = bytearray(header.lower())
+        for bit, place in enumerate(letters):
+            if number >> bit & 1:
+                spelt[place] = header[place]
+        assert asked(afg, bytes(spelt))
+    assert len(afg._found) <= MOST_SPELLINGS
+
+
+def test_waveforms_of_ever_new_names_end_when_the_memory_is_full():
+    generator = Keysight33500B(lambda: 0.0)
+    codes = np.zeros(400_000, dtype=">i2").tobytes()
+    told = []
+    for number in range(4):
+        asked(generator, b"DATA:ARB:DAC W%d,#6%d" % (number, len(codes)) + codes)
+        told.append(int(asked(generator, b"SYST:ERR?").split(b",")[0]))
+    assert told == [0, 0, -225, -225]
+    asked(generator, b"DATA:VOL:CLE")
+    asked(generator, b"DATA:ARB:DAC W9,#6%d" % len(codes) + codes)
+    assert asked(generator, b"DATA:ATTR:POIN? W9") == b"4.0E+05\n"
+
+
+def test_the_longest_waveform_that_it_tells_to_hold_arrives_through_usb():
+    generator = Keysight33500B(lambda: 0.0)
+    instrument = UsbTmcInstrument(generator)
+    codes = np.zeros(1_048_576, dtype=">i2").tobytes()
+    message = b"DATA:ARB:DAC LONGEST,#7%d" % len(codes) + codes
+    header = bytes([1, 1, 254, 0]) + len(message).to_bytes(4, "little") + bytes([1, 0, 0, 0])
+    instrument.bulk_out(header + message + bytes(-len(message) % 4))
+    assert float(asked(generator, b"DATA:ATTR:POIN? LONGEST")) == 1_048_576
+
+
+def test_status_bytes_that_nobody_fetches_are_dropped(afg):
+    instrument = UsbTmcInstrument(afg)
+    for tag in range(2, 2 + 3 * MOST_NOTIFICATIONS):
+        instrument.control(Setup(0xA1, Request.READ_STATUS_BYTE, tag, 0, 3), b"")
+    kept = [instrument.interrupt_in(2, 10) for _ in range(MOST_NOTIFICATIONS)]
+    assert kept[-1][0] == (1 + 3 * MOST_NOTIFICATIONS) | 0x80
+    with pytest.raises(TimeoutError):
+        instrument.interrupt_in(2, 10)
