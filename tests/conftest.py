@@ -3,6 +3,7 @@
 import os
 import tempfile
 
+import hypothesis
 import pytest
 
 import vibench.cli.blas_threads  # noqa: F401 - it is the import that counts, before any test imports numpy
@@ -10,6 +11,10 @@ import vibench.cli.blas_threads  # noqa: F401 - it is the import that counts, be
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("QT_SCALE_FACTOR", "1")
 os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
+
+# How long an example takes says how busy the computer is.
+hypothesis.settings.register_profile("busy", deadline=None)
+hypothesis.settings.load_profile("busy")
 
 # Tests keep their bench checks apart from those of whoever runs them; processes they start inherit it.
 _state_folder = tempfile.TemporaryDirectory(prefix="vibench_state_")

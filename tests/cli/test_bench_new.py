@@ -12,6 +12,7 @@ from vibench.acquisition.first_day._template import value_in, with_answer
 from vibench.acquisition.instruments import FoundDevice
 from vibench.acquisition.rig import load_rig
 from vibench.cli.__main__ import app
+from vibench.sim import UnreadableTomlError
 
 ROOT = Path(__file__).resolve().parents[2]
 LAB, VIRTUAL = (ROOT / "hardware_configs" / f"{name}.toml" for name in ("lab_rig", "virtual_rig"))
@@ -57,6 +58,28 @@ def test_wires_that_nobody_confirms_end_the_day_before_anything_plays(tmp_path):
     assert done.exit_code == 1
     assert "Nothing has played" in str(done.exception)
     assert not list(tmp_path.glob("*.md"))
+    assert f"--from {tmp_path / 'mine.toml'}" in str(done.exception)
+    (tmp_path / "answers.toml").write_text(ANSWERS)
+    again = new(
+        tmp_path / "again.toml", "--from", tmp_path / "mine.toml", "--answers", tmp_path / "answers.toml"
+    )
+    assert again.exit_code == 0, again.output
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe", b"operator = ", b"nonsense.key = 3"])
+def test_answers_that_cannot_be_read_or_have_no_place_are_told_in_a_sentence(tmp_path, content):
+    if content is not None:
+        (tmp_path / "answers.toml").write_bytes(content)
+    done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
+    assert isinstance(done.exception, (ConfigurationError, UnreadableTomlError))  # told in a sentence by main
+    assert not list(tmp_path.glob("mine*"))
+
+
+def test_a_place_that_is_no_folder_is_told_before_anything_is_asked(tmp_path):
+    (tmp_path / "answers.toml").write_text(ANSWERS)
+    done = new(tmp_path / "no" / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
+    assert isinstance(done.exception, ConfigurationError)
+    assert "is no folder" in str(done.exception)
 
 
 def test_a_gain_that_is_another_is_found_at_5_mv_and_nothing_louder_plays(tmp_path):

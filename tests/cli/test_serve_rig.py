@@ -13,7 +13,6 @@ from pathlib import Path
 import grpc
 import nidaqmx
 import pytest
-import pyvisa
 from nidaqmx import GrpcSessionOptions
 from nidaqmx.constants import AcquisitionType
 
@@ -80,11 +79,33 @@ def test_other_programs_set_its_generator_and_read_its_converter(served):
     assert max(volts) == pytest.approx(0.05, rel=0.01)
 
 
-def test_the_hint_for_a_socket_works_when_it_is_pasted(served):
-    (hint,) = re.findall(r"ResourceManager.*SOCKET.*", served)
-    with closing(eval(hint, {"ResourceManager": pyvisa.ResourceManager})) as generator:
-        assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
-        # A block without a length ends with its line on a stream.
+def hints(served):
+    """What stands indented below each title, as one would paste it."""
+    blocks = re.split(r"^The .*:\n", served, flags=re.MULTILINE)[1:]
+    return ["\n".join(line[2:] for line in block.splitlines() if line.startswith("  ")) for block in blocks]
+
+
+def test_the_hints_work_when_they_are_pasted(served):
+    converter, usb, stream = hints(served)
+    pasted = {}
+    exec(converter, pasted)
+    with pasted["task"] as task:
+        task.ai_channels.add_ai_voltage_chan("cDAQ1Mod1/ai0", min_val=-5, max_val=5)
+        task.timing.cfg_samp_clk_timing(51200, samps_per_chan=512)
+        assert len(task.read(512)) == 512
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    for hint in (usb, stream):
+        # The cable changes what pyvisa finds in its whole process: a process each.
+        program = f'{hint}\nprint(generator.query("*IDN?"))\ngenerator.close()'
+        words = [sys.executable, "-W", "ignore", "-c", program]
+        said = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
+        assert said.stdout.startswith("TEKTRONIX,AFG1022"), said.stderr
+
+
+def test_a_block_without_a_length_ends_with_its_line_on_a_stream(served):
+    pasted = {}
+    exec(hints(served)[2], pasted)
+    with closing(pasted["generator"]) as generator:
         generator.write_raw(b"DATA:DATA EMEM,#0abcd\n")
         assert generator.query("*IDN?").startswith("TEKTRONIX,AFG1022")
 

@@ -19,6 +19,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from vibench.acquisition import AcquisitionError, shortened
 from vibench.analysis import AnalysisError
+from vibench.sim import UnreadableTomlError
 from vibench.sim.study import StudyError
 
 from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
@@ -262,7 +263,7 @@ def main() -> None:
     """Run the command line. An error that a user can mend is one sentence and a non-zero exit."""
     try:
         app()
-    except (AcquisitionError, AnalysisError, StudyError) as error:
+    except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
     except OSError as error:

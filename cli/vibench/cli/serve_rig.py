@@ -51,20 +51,10 @@ def serve_rig(
         served = served.model_copy(update={"virtual": served.virtual.model_copy(update={"pace": pace.value})})
     with VirtualRig(served, address, scpi_port=scpi_port, disk=DiskFaults.REFUSED) as rig:
         console.print(bold(rig.rig.name), "is on. Stop it with Ctrl-C.\n")
-        console.print("The converter, for nidaqmx:")
-        console.print(f'  grpc.insecure_channel("{rig.daq_address}")  # GrpcSessionOptions(channel, "")')
-        console.print("The generator, for pyvisa in Python (one line before the resource manager):")
-        console.print(
-            f'  from vibench.virtual_rig import plug_in_remote; plug_in_remote("{rig.daq_address}")'
-        )
-        console.print(f'  ResourceManager("@py").open_resource("{rig.visa_resource}")')
-        console.print("The generator, for any other VISA program:")
-        console.print(f"  {rig.socket_resource}, every line ended by a newline; in Python:")
-        console.print(
-            f'  ResourceManager("@py").open_resource("{rig.socket_resource}", '
-            'read_termination="\\n", write_termination="\\n")',
-            soft_wrap=True,
-        )
+        for title, lines in _hints(rig):
+            console.print(title)
+            for line in lines:
+                console.print(f"  {line}", soft_wrap=True)
         if rig.token is not None:
             console.print("\nOther computers can reach it; it lets in whoever has the token:")
             console.print(
@@ -73,3 +63,28 @@ def serve_rig(
             console.print(f"  {TOKEN_KEY}: {rig.token}")
         stop.wait()
     console.print("The virtual rig is off.")
+
+
+def _hints(rig: VirtualRig) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Say how other programs reach it, in lines that work when they are pasted."""
+    opened = 'pyvisa.ResourceManager("@py").open_resource'
+    usb = f"from vibench.virtual_rig import plug_in_remote; plug_in_remote({rig.daq_address!r})"
+    ends = r'read_termination="\n", write_termination="\n"'
+    return (
+        (
+            "The converter, for nidaqmx:",
+            (
+                "import grpc, nidaqmx",
+                f'options = nidaqmx.GrpcSessionOptions(grpc.insecure_channel("{rig.daq_address}"), "")',
+                "task = nidaqmx.Task(grpc_options=options)",
+            ),
+        ),
+        (
+            "The generator, for pyvisa in Python:",
+            (usb, "import pyvisa", f'generator = {opened}("{rig.visa_resource}")'),
+        ),
+        (
+            f"The generator, for any other program: {rig.socket_resource}, lines that end in newlines:",
+            ("import pyvisa", f'generator = {opened}("{rig.socket_resource}", {ends})'),
+        ),
+    )

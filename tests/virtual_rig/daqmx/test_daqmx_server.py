@@ -114,3 +114,9 @@ def test_an_address_in_use_is_refused_in_a_sentence(daq):
 
 def test_the_default_address_is_this_computer_only(daq):
     assert daq.server.address.startswith("127.0.0.1:")
+
+
+@pytest.mark.parametrize("address", ["nonsense", "127.0.0.1:99999", "127.0.0.1:-5", ":80", "127.0.0.1:"])
+def test_what_is_no_address_is_refused_before_anything_listens(connect, address):
+    with pytest.raises(ConfigurationError, match="give HOST:PORT"):
+        connect(address=address)

@@ -62,6 +62,8 @@ def configured(
     """
     if target.exists():
         raise ConfigurationError(f"{target} is there already, and nothing is overwritten; give another name")
+    if not target.absolute().parent.is_dir():
+        raise ConfigurationError(f"{target.absolute().parent} is no folder; make it, or give another place")
     text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is that of the template
     for question in questions:
         choices = found_choices(question, seen)
@@ -75,7 +77,10 @@ def configured(
     text = _with_driver(_with_product(text, seen, note), note)
     text = schema_line(load_rig(template), shipped_folder("schemas")) + text
     draft = target.with_name(target.name + ".draft")
-    draft.write_text(text, encoding="utf-8")
+    try:
+        draft.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error
     try:
         load_toml(draft, Rig)
     except ConfigurationError:

@@ -49,11 +49,12 @@ def first_day(
 
     """
     folder = config.absolute().parent
-    pages = [*_head(bench, config, operator), *_wires(bench.rig, confirmed)]
+    again = f"begin again with --from {config} and the name of a new one"
+    pages = [*_head(bench, config, operator), *_wires(bench.rig, confirmed, again)]
     first = bench_report(bench, folder, switch, FIRST_VPP)
     pages += _chapter(f"Noise floor, and the first {1e3 * FIRST_VPP:g} mVpp", first)
     if first.verdict is Verdict.FAIL:
-        pages.append("The bench check was not played: mend what FAILs above, and begin again.")
+        pages.append(f"The bench check was not played: mend what FAILs above, and {again}.")
         return DayPage("\n".join(pages) + "\n", Verdict.FAIL)
     checked = check_bench(bench, folder, switch=switch)
     pages += _chapter("The bench check, at two per cent of the amplitude limit", checked.report)
@@ -76,15 +77,13 @@ def _head(bench: Bench, config: Path, operator: str) -> Iterator[str]:
         yield f"- {knob.instrument}, {knob.setting}: {knob.value}"
 
 
-def _wires(rig: Rig, confirmed: Confirmed) -> Iterator[str]:
+def _wires(rig: Rig, confirmed: Confirmed, again: str) -> Iterator[str]:
     yield "\n## Wires, both ends of each\n"
     for channel in channels_of(rig):
         pair = _pair(rig, channel)
         answer = confirmed(pair)
         if not answer:
-            raise CheckFailed(
-                f"not confirmed: {pair}. Nothing has played; plug it in, and begin again with the same file"
-            )
+            raise CheckFailed(f"not confirmed: {pair}. Nothing has played; plug it in, and {again}")
         yield f"- {pair}: {answer}"
 
 

@@ -28,6 +28,7 @@ from ._token import TokenRequired
 LOOPBACK = "127.0.0.1:0"
 """This computer only, on a free port: the server knows no passwords."""
 
+LAST_PORT = 65_535
 _WORKERS = 64
 """Every blocking read and every event listener holds one thread."""
 
@@ -57,6 +58,7 @@ class DaqServer:
         token: str | None,
     ) -> None:
         """See `serve`."""
+        _require_address(address)
         self.faults = Faults()
         self._refused: set[str] = set()
         """Calls that were refused the last time they were made."""
@@ -197,6 +199,16 @@ class _refusals_reported:  # noqa: N801 - reads as a verb where it is used
                 self._context.abort(grpc.StatusCode.UNKNOWN, str(refusal))
             case _:
                 return
+
+
+def _require_address(address: str) -> None:
+    """Refuse what is no ``host:port``: gRPC would take a port beyond the last for another one."""
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdecimal() or int(port) > LAST_PORT:
+        raise ConfigurationError(
+            f"{address!r} is no address to listen on; nothing was started, give HOST:PORT with a port up to "
+            f"{LAST_PORT}, as 127.0.0.1:31763; port 0 takes a free one"
+        )
 
 
 def _metadata(refusal: DaqmxRefusal) -> Metadata:
