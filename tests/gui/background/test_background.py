@@ -69,6 +69,32 @@ def test_closing_ends_a_process_that_does_not_answer(background, qtbot):
         os.kill(pids[0], 0)
 
 
+def large(path):
+    """Begin to hand over an answer that fills every pipe."""
+    Path(path).write_text("")
+    return bytes(300 << 20)
+
+
+def is_being_read(thread):
+    """Whether the thread that takes answers in has read the beginning of one, and waits for its end."""
+    frame = sys._current_frames().get(thread.ident)
+    while frame is not None and frame.f_code.co_name != "_recv":
+        frame = frame.f_back
+    return frame is not None and frame.f_locals.get("remaining", 0) > 1 << 20
+
+
+@pytest.mark.timeout(60)
+def test_closing_ends_a_process_that_is_handing_an_answer_over(background, qtbot, tmp_path):
+    """The end of an answer that never came was waited for: the window hung for ever."""
+    background.ask(large, lambda _: None, lambda _: None, str(tmp_path / "begun"))
+    qtbot.waitUntil((tmp_path / "begun").exists, timeout=20_000)
+    thread = background._pool._executor_manager_thread
+    while not is_being_read(thread):
+        assert thread.is_alive()
+    background.close()
+    assert not thread.is_alive()
+
+
 def for_ever(path):
     """Say who works, and do not end."""
     Path(path).write_text(str(os.getpid()))

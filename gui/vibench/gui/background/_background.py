@@ -148,9 +148,12 @@ class Background(QObject):
             # It offers no kill; and its thread, left alone, would outlive the pool that it works for.
             processes = list((pool._processes or {}).values())  # noqa: SLF001
             thread: Any = pool._executor_manager_thread  # noqa: SLF001
+            answers: Any = pool._result_queue  # noqa: SLF001
             pool.shutdown(wait=False, cancel_futures=True)
             for process in processes:
                 process.kill()
+            # Or the thread would wait for the rest of an answer that a process was just handing over.
+            answers._writer.close()  # noqa: SLF001
             if thread is not None:
                 thread.join()
 
