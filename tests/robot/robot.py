@@ -261,8 +261,8 @@ class Robot:
             QTest.mouseMove(plot.viewport(), at)
             button = self.random.choice((Qt.MouseButton.LeftButton, Qt.MouseButton.MiddleButton))
             QTest.mouseClick(plot.viewport(), button, Qt.KeyboardModifier.NoModifier, at)
-            for _text, act in self.random.sample(plot.actions_offered[:6], 2):
-                act()
+            for action in self.random.sample(plot.actions(), 2):
+                action.trigger()
 
     def drop_file(self):
         files = [*self.context.folder.rglob("*.*"), shipped("campaigns/quick.toml"), self.folder]

@@ -1,12 +1,15 @@
 """A plot says what will be in it while it is empty, and names its curves above the axes."""
 
+import numpy as np
+import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication
+from PySide6.QtWidgets import QLabel
 
 from vibench.gui.plots import LIMIT, LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
 from vibench.gui.plots._axis import thinned
-from vibench.gui.plots._saved_plot import write_plot
+from vibench.gui.plots._saved_plot import numbers_of, write_plot
 from vibench.gui.widgets import LIGHT
 
 
@@ -129,27 +132,71 @@ def test_values_are_read_under_the_pointer_and_differences_from_a_mark(plot, qap
     at = plot.mapFromScene(box.mapViewToScene(QPointF(1.02, 0.001)))
     qtbot.mouseMove(plot.viewport(), at)
     qapp.processEvents()
-    assert "mass: 4 mm/s" in plot.reading
+    assert "mass: 4 mm/s" in plot.reading.text
+    plot.activateWindow()
     plot.setFocus()
+    qtbot.waitUntil(plot.hasFocus)
     qtbot.keyClick(plot, Qt.Key.Key_D)
-    plot.read_at(QPointF(1.52, 0.003))
-    assert "Δ 0.5" in plot.reading
-    assert "2.00" in plot.reading.partition("Δ")[2]
+    plot.reading.show_at(QPointF(1.52, 0.003))
+    assert "Δ 0.5" in plot.reading.text
+    assert "2.00" in plot.reading.text.partition("Δ")[2]
     plot.leaveEvent(QEvent(QEvent.Type.Leave))
-    assert plot.reading == ""
+    assert plot.reading.text == ""
+
+
+def read_at_one(plot):
+    plot.show()
+    plot.reading.show_at(QPointF(1.0, 0.0))
+    return plot.reading.text
+
+
+def test_what_is_read_is_of_the_curve_that_is_there_now(plot):
+    """It stayed under the pointer while another curve was drawn, or none."""
+    curve = plot.curve(curve_style(0), "mass")
+    curve.setData([0.0, 1.0], [0.0, 0.004])
+    assert "mass: 4 mm/s" in read_at_one(plot)
+    curve.setData([0.0, 1.0], [0.0, 0.007])
+    assert "mass: 7 mm/s" in plot.reading.text
+    plot.wipe()
+    assert plot.reading.text == ""
+    assert [
+        each.text() for each in plot.findChildren(QLabel) if each.isVisible() and "mm/s" in each.text()
+    ] == []
+    plot.curve(curve_style(0), "other").setData([0.0, 1.0], [0.0, 0.001])
+    assert "other: 1 mm/s" in read_at_one(plot)
+
+
+def test_values_are_read_and_written_in_the_unit_that_the_axis_shows_now(plot):
+    """A plot that was taken for another channel read, and copied, in the unit of the first one."""
+    plot.curve(curve_style(0), "base").setData([0.0, 1.0], [0.0, 2.0])
+    plot.up.show_unit(PlotAxis("Acceleration", "m/s²"))
+    assert "base: 2 m/s²" in read_at_one(plot)
+    assert numbers_of(plot, ",").splitlines()[::2] == ["Curve,Time (s),Acceleration (m/s²)", "base,1,2"]
+
+
+def test_a_mark_stays_at_its_values_when_the_scale_turns(plot):
+    plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.001, 0.1])
+    plot.show()
+    plot.reading.show_at(QPointF(0.5, 0.01))
+    plot.reading.mark_or_unmark()
+    plot.turn_scale()
+    assert plot.reading.text == ""
+    plot.reading.show_at(QPointF(0.5, -1.0))
+    assert "+20.00 dB" in plot.reading.text
+    assert sorted(line.value() for line in plot.reading._lines[2:]) == [-2.0, 0.5]
 
 
 def test_picture_and_numbers_are_copied_and_saved_and_nothing_is_overwritten(plot, qapp, tmp_path):
     plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.5, 0.25])
     plot.show()
-    offered = dict(plot.actions_offered)
+    offered = {action.text(): action.trigger for action in plot.actions()}
     offered["Copy the numbers"]()
     assert QGuiApplication.clipboard().text().splitlines() == [
         "Curve\tTime (s)\tVelocity of the mass (mm/s)",
         "mass\t0\t500",
         "mass\t1\t250",
     ]
-    offered["Copy the picture\tCtrl+C"]()
+    offered["Copy the picture"]()
     assert QGuiApplication.clipboard().image().width() == plot.width()
     for ending in ("csv", "svg", "png"):
         write_plot(plot, tmp_path / f"a.{ending}")
@@ -170,15 +217,25 @@ def test_what_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):
     assert dark_pixels(plot) > before + 20
 
 
+def test_a_picture_made_of_pixels_lies_under_a_veil_as_well(plot, qapp):
+    plot.addItem(pg.ImageItem(np.full((4, 4, 4), 255, dtype=np.uint8)))
+    plot.show()
+    qapp.processEvents()
+    assert dark_pixels(plot) == 0
+    plot.setEnabled(False)
+    qapp.processEvents()
+    assert dark_pixels(plot) > 20
+
+
 def test_a_level_stays_at_its_value_when_the_scale_turns_and_hides_where_there_is_no_place_for_it(plot):
     zero, high = plot.level(LIMIT, 0.0), plot.level(LIMIT, 100.0)
-    plot._turn_scale()
+    plot.turn_scale()
     assert (zero.isVisible(), high.value()) == (False, 2.0)
     below = plot.level(LIMIT, -1.0)
-    plot._turn_scale()
+    plot.turn_scale()
     assert (zero.value(), high.value(), below.value()) == (0.0, 100.0, -1.0)
     assert zero.isVisible()
     assert below.isVisible()
     plot.wipe()
-    plot._turn_scale()
+    plot.turn_scale()
     assert plot.level(LIMIT, 10.0).value() == 1.0

@@ -69,6 +69,11 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         # Painted when it changes, and copied otherwise: its text is the dearest part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
+    @property
+    def axis(self) -> PlotAxis:
+        """What it shows."""
+        return self._axis
+
     def show_unit(self, axis: PlotAxis) -> None:
         """Change what the axis shows."""
         self._axis, self._factor = axis, axis.factor

@@ -4,17 +4,9 @@ from collections.abc import Callable
 from math import isfinite, log10
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEvent, QPointF, QRectF, Qt
-from PySide6.QtGui import (
-    QColor,
-    QContextMenuEvent,
-    QGuiApplication,
-    QKeyEvent,
-    QMouseEvent,
-    QPainter,
-    QResizeEvent,
-)
-from PySide6.QtWidgets import QMenu, QWidget
+from PySide6.QtCore import QEvent, QRectF, Qt
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QResizeEvent
+from PySide6.QtWidgets import QApplication, QWidget
 
 from ..widgets import Theme, paint_hint
 from ._axis import AxisItem, Blankness, Grid, PlotAxis, Scale
@@ -22,8 +14,8 @@ from ._band import Band
 from ._legend import LegendEntry, LegendLine
 from ._line_style import SIGNS, LineStyle, curve_pen, shade_of, straight_pen
 from ._logical_line import LogicalLine
+from ._plot_actions import add_actions
 from ._reading import Reading
-from ._saved_plot import save_plot
 from ._upright_marks import Rules, Stripes
 
 ROOM = 0.15
@@ -66,9 +58,8 @@ _UP_EM = 5
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     """One pair of axes. Values are given as they are; logarithms are taken here.
 
-    With the focus on it: A shows everything, L changes the upright axis between linear and logarithmic,
-    G reads values, D tells differences from there, Ctrl+C copies the picture; the context menu saves picture
-    and numbers. While it is disabled a veil says that it belongs to earlier inputs.
+    Keys while it has the focus, and the context menu, are in `add_actions`. While it is disabled a veil says
+    that it belongs to earlier inputs.
     """
 
     def __init__(
@@ -92,22 +83,24 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         # A width that followed the numbers would be known after painting, and everything painted again.
         self.up.setWidth(_UP_EM * self.fontMetrics().height())
         self.getPlotItem().hideButtons()
-        self._axes = (across, up)
         self._grid = Grid(self.across, self.up)
         self.addItem(self._grid, ignoreBounds=True)
         self.getPlotItem().setLogMode(across.scale is Scale.LOGARITHMIC, up.scale is Scale.LOGARITHMIC)
-        self._scales = [across.scale, up.scale]
+        self.scales = [across.scale, up.scale]
+        """How values are laid out now, across and up."""
         self._inked: list[tuple[LineStyle, Callable[[Theme], None]]] = []
         self._legend: LegendLine | None = None
         self._legend_entries: list[tuple[LineStyle, str, str]] = []
-        self._curves: list[pg.PlotDataItem] = []
+        self.named_curves: list[tuple[str, pg.PlotDataItem]] = []
+        """Every line and set of points, with its name in the legend, if it has one."""
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
-        self._theme = theme
-        self._named: list[tuple[str, pg.PlotDataItem]] = []
+        self.theme = theme
         self._levels: dict[pg.InfiniteLine, float] = {}
-        self._reading: Reading | None = None
         self._follows = False
+        self.reading = Reading(self)
+        add_actions(self)
+        self.scene().sigMouseMoved.connect(self.reading.follow)
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
         self.retheme(theme)
 
@@ -197,21 +190,19 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.getPlotItem().clear()
         self.addItem(self._grid, ignoreBounds=True)
         self._inked.clear()
-        self._named.clear()
+        self.named_curves.clear()
         self._levels.clear()
-        self._reading = None
+        self.reading.forget()
         self._legend_entries.clear()
-        self._curves.clear()
         self._look_for_points()
         self._relegend()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""
-        self._theme = theme
+        self.theme = theme
         self.setBackground(theme.base)
         self._grid.dress(theme)
-        if self._reading is not None:
-            self._reading.dress(theme)
+        self.reading.dress(theme)
         for axis in (self.across, self.up):
             axis.setPen(pg.mkPen(theme.line, width=self.devicePixelRatioF()))
             axis.setTextPen(pg.mkPen(theme.text))
@@ -228,6 +219,15 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         """Let the axes follow the data."""
         self.getPlotItem().enableAutoRange()
 
+    def turn_scale(self) -> None:
+        """Lay values out upright linearly, or logarithmically."""
+        is_linear = self.scales[1] is Scale.LINEAR
+        self.scales[1] = Scale.LOGARITHMIC if is_linear else Scale.LINEAR
+        self.getPlotItem().setLogMode(y=is_linear)
+        self._place_levels()
+        self.reading.rescale()
+        self.show_everything()
+
     def keep_in_view(
         self, across: tuple[float, float] | None = None, up: tuple[float, float] | None = None
     ) -> None:
@@ -243,8 +243,8 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     def event(self, event: QEvent) -> bool:
         """Come to a screen with other pixels: straight lines are given its width."""
-        if event.type() == QEvent.Type.DevicePixelRatioChange and getattr(self, "_theme", None) is not None:
-            self.retheme(self._theme)
+        if event.type() == QEvent.Type.DevicePixelRatioChange and getattr(self, "theme", None) is not None:
+            self.retheme(self.theme)
         return bool(super().event(event))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -263,12 +263,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             painter.resetTransform()
             inside = self.mapFromScene(self.getViewBox().sceneBoundingRect()).boundingRect()
         if self._is_empty:
-            paint_hint(painter, inside, self._hint, self._theme.muted)
-        elif not self.isEnabled() and any(_has_points(each) for each in self._curves):
-            veil = QColor(self._theme.base)
+            paint_hint(painter, inside, self._hint, self.theme.muted)
+        elif not self.isEnabled() and self._holds_something:
+            veil = QColor(self.theme.base)
             veil.setAlphaF(_VEIL)
             painter.fillRect(inside, veil)
-            paint_hint(painter, inside, OUT_OF_DATE, self._theme.text)
+            paint_hint(painter, inside, OUT_OF_DATE, self.theme.text)
 
     def changeEvent(self, event: QEvent) -> None:
         """Lay a veil over what belongs to other inputs, or take it away."""
@@ -277,129 +277,29 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.viewport().update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Act on A, L and Ctrl+C, while the plot has the focus."""
-        match event.key(), event.modifiers():
-            case Qt.Key.Key_A, Qt.KeyboardModifier.NoModifier:
-                self.show_everything()
-            case Qt.Key.Key_L, Qt.KeyboardModifier.NoModifier:
-                self._turn_scale()
-            case Qt.Key.Key_G, Qt.KeyboardModifier.NoModifier:
-                self.read_on_or_off()
-            case Qt.Key.Key_D, Qt.KeyboardModifier.NoModifier:
-                self.mark_or_unmark()
-            case Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier:
-                QGuiApplication.clipboard().setPixmap(self.grab())
-            case _:
-                # To the page: what it does with a key it does while a plot has the focus too.
-                event.ignore()
-                return
-        event.accept()
-
-    @property
-    def reading(self) -> str:
-        """What is read under the pointer; empty while nothing is."""
-        return "" if self._reading is None else self._reading.text
-
-    def read_at(self, drawn: QPointF) -> None:
-        """Tell the place, and the nearest curve there, in the coordinates that are drawn."""
-        if self._reading is None:
-            self._reading = Reading(
-                self, lambda line: self.addItem(line, ignoreBounds=True), lambda: self._named
-            )
-            self._reading.dress(self._theme)
-        self._reading.show_at(drawn, self._axes, self._scales)
-
-    def read_on_or_off(self) -> None:
-        """Read in the middle of the picture, where no pointer is; or no more."""
-        if self._reading is not None and self._reading.place is not None:
-            self._reading.hide()
-        else:
-            self.read_at(self.getViewBox().viewRect().center())
-
-    def mark_or_unmark(self) -> None:
-        """Tell differences from the place that is read, or from none."""
-        if self._reading is None or self._reading.place is None:
-            self.read_on_or_off()
-        if self._reading is not None:
-            self._reading.mark(self._scales)
-
-    def mouseMoveEvent(self, event: QMouseEvent) -> None:
-        """Read under the pointer."""
-        super().mouseMoveEvent(event)
-        place = self.mapToScene(event.position().toPoint())
-        if event.buttons() == Qt.MouseButton.NoButton and self.getViewBox().sceneBoundingRect().contains(
-            place
-        ):
-            self.read_at(self.getViewBox().mapSceneToView(place))
-        elif self._reading is not None:
-            self._reading.hide()
+        """Leave keys to the page: what it does with one it does while a plot has the focus too."""
+        event.ignore()
 
     def leaveEvent(self, event: QEvent) -> None:
         """Read no more."""
         super().leaveEvent(event)
-        if self._reading is not None:
-            self._reading.hide()
-
-    def contextMenuEvent(self, event: QContextMenuEvent) -> None:
-        """Offer what can be done with the picture and its numbers."""
-        menu = QMenu(self)
-        place = self.getViewBox().mapSceneToView(self.mapToScene(event.pos()))
-
-        def mark_here() -> None:
-            self.read_at(place)
-            self.mark_or_unmark()
-
-        for text, act in (*self.actions_offered, ("Differences from here\tD", mark_here)):
-            menu.addAction(text).triggered.connect(lambda _checked=False, act=act: act())
-        menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        menu.popup(event.globalPos())
-        event.accept()
-
-    @property
-    def actions_offered(self) -> tuple[tuple[str, Callable[[], object]], ...]:
-        """What the context menu holds."""
-        return (
-            ("Show everything\tA", self.show_everything),
-            ("Linear or logarithmic\tL", self._turn_scale),
-            ("Read values\tG", self.read_on_or_off),
-            ("Copy the picture\tCtrl+C", lambda: QGuiApplication.clipboard().setPixmap(self.grab())),
-            ("Copy the numbers", lambda: QGuiApplication.clipboard().setText(self.numbers("\t"))),
-            ("Save picture or numbers…", lambda: save_plot(self)),
-        )
-
-    def numbers(self, separator: str = ",") -> str:
-        """Give what is drawn as rows of curve, place across and value, in the units of the axes."""
-        across, up = self._axes
-        rows = [separator.join(("Curve", across.text, up.text))]
-        for number, (name, item) in enumerate(self._named):
-            if item.xData is not None and item.yData is not None:
-                called = (name or f"{self.accessibleName()} {number + 1}").replace(separator, ";")
-                rows += [
-                    f"{called}{separator}{x * across.factor:.9g}{separator}{y * up.factor:.9g}"
-                    for x, y in zip(item.xData.tolist(), item.yData.tolist(), strict=True)
-                ]
-        return "\n".join(rows) + "\n"
+        # The place at which the context menu was opened stays, for what is chosen there.
+        if QApplication.activePopupWidget() is None:
+            self.reading.hide()
 
     def _let_be(self, *_: object) -> None:
         """Follow the data no more: somebody looks at a part of the picture."""
         self._follows = False
 
-    def _turn_scale(self) -> None:
-        up = Scale.LINEAR if self._scales[1] is Scale.LOGARITHMIC else Scale.LOGARITHMIC
-        self._scales[1] = up
-        self.getPlotItem().setLogMode(y=up is Scale.LOGARITHMIC)
-        self._place_levels()
-        self.show_everything()
-
     def _place_levels(self) -> None:
-        is_logarithmic = self._scales[1] is Scale.LOGARITHMIC
+        is_logarithmic = self.scales[1] is Scale.LOGARITHMIC
         for item, value in self._levels.items():
             item.setVisible(isfinite(value) and (value > 0 or not is_logarithmic))
             if item.isVisible():
                 item.setValue(log10(value) if is_logarithmic else value)
 
     def _across(self, value: float) -> float:
-        return log10(value) if self._scales[0] is Scale.LOGARITHMIC else value
+        return log10(value) if self.scales[0] is Scale.LOGARITHMIC else value
 
     def _line(
         self, line_style: LineStyle, position: float, angle: float, label: str, at: float
@@ -419,21 +319,31 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
 
     def _line_style(self, line_style: LineStyle, paint: Callable[[Theme], None]) -> None:
         self._inked.append((line_style, paint))
-        paint(self._theme)
+        paint(self.theme)
 
     def _add(self, item: pg.PlotDataItem, name: str) -> None:
-        self._curves.append(item)
-        self._named.append((name, item))
+        self.named_curves.append((name, item))
         self.addItem(item)
         item.sigPlotChanged.connect(self._look_for_points)
+        item.sigPlotChanged.connect(self.reading.again)
         self._look_for_points()
+
+    @property
+    def _holds_points(self) -> bool:
+        return any(each.xData is not None and len(each.xData) > 0 for _, each in self.named_curves)
+
+    @property
+    def _holds_something(self) -> bool:
+        """Whether there is a curve, or a picture made of pixels."""
+        items = self.getPlotItem().items
+        return self._holds_points or any(getattr(each, "image", None) is not None for each in items)
 
     def _look_for_points(self, *_: object) -> None:
         """Write the hint, and no numbers, where there is nothing that they could be about.
 
         Best known before anything is painted: what is found out in painting has to be painted again.
         """
-        self._is_empty = bool(self._hint) and not any(_has_points(each) for each in self._curves)
+        self._is_empty = bool(self._hint) and not self._holds_points
         for axis in self._blanked:
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
@@ -443,7 +353,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             return
         self._legend.show_entries(
             tuple(
-                LegendEntry(sign, line_style.colour(self._theme), name)
+                LegendEntry(sign, line_style.colour(self.theme), name)
                 for line_style, sign, name in self._legend_entries
             )
         )
@@ -458,7 +368,3 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         height = self._legend.height_for(width)
         self._legend.setGeometry(left, 0, width, height)
         self.getPlotItem().layout.setRowFixedHeight(0, height)
-
-
-def _has_points(item: pg.PlotDataItem) -> bool:
-    return item.xData is not None and len(item.xData) > 0

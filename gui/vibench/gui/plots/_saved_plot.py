@@ -1,16 +1,20 @@
 """Writing a plot down: its picture as PNG or SVG, its numbers as CSV."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QRect
 from PySide6.QtGui import QPainter
 from PySide6.QtSvg import QSvgGenerator
-from PySide6.QtWidgets import QFileDialog, QGraphicsView, QMessageBox
+from PySide6.QtWidgets import QFileDialog, QMessageBox
+
+if TYPE_CHECKING:
+    from ._plot import Plot
 
 FILTERS = "PNG (*.png);;SVG (*.svg);;Numbers as CSV (*.csv)"
 
 
-def save_plot(plot: QGraphicsView) -> None:
+def save_plot(plot: "Plot") -> None:
     """Ask where to, and write picture or numbers there."""
     wish = f"{plot.accessibleName().lower().replace(' ', '_')}.png"
     options = QFileDialog.Option.DontConfirmOverwrite
@@ -27,7 +31,7 @@ def save_plot(plot: QGraphicsView) -> None:
         )
 
 
-def write_plot(plot: QGraphicsView, path: Path) -> None:
+def write_plot(plot: "Plot", path: Path) -> None:
     """Write picture or numbers, as the ending says; nothing is overwritten.
 
     Raises
@@ -39,7 +43,7 @@ def write_plot(plot: QGraphicsView, path: Path) -> None:
     path.open("xb").close()
     match path.suffix.lower():
         case ".csv":
-            path.write_text(plot.numbers(), encoding="utf-8")  # type: ignore[attr-defined] # a Plot
+            path.write_text(numbers_of(plot, ","), encoding="utf-8")
         case ".svg":
             _write_svg(plot, path)
         case _:
@@ -48,7 +52,21 @@ def write_plot(plot: QGraphicsView, path: Path) -> None:
                 raise OSError(0, "give an ending: .png, .svg or .csv")
 
 
-def _write_svg(plot: QGraphicsView, path: Path) -> None:
+def numbers_of(plot: "Plot", separator: str) -> str:
+    """Give what is drawn as rows of curve, place across and value, in the units of the axes."""
+    across, up = plot.across.axis, plot.up.axis
+    rows = [separator.join(("Curve", across.text, up.text))]
+    for number, (name, item) in enumerate(plot.named_curves):
+        if item.xData is not None and item.yData is not None:
+            called = (name or f"{plot.accessibleName()} {number + 1}").replace(separator, ";")
+            rows += [
+                f"{called}{separator}{x * across.factor:.9g}{separator}{y * up.factor:.9g}"
+                for x, y in zip(item.xData.tolist(), item.yData.tolist(), strict=True)
+            ]
+    return "\n".join(rows) + "\n"
+
+
+def _write_svg(plot: "Plot", path: Path) -> None:
     generator = QSvgGenerator()
     generator.setFileName(str(path))
     generator.setSize(plot.size())
