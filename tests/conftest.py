@@ -13,7 +13,9 @@ os.environ.setdefault("QT_SCALE_FACTOR", "1")
 os.environ.setdefault("PYQTGRAPH_QT_LIB", "PySide6")
 
 # How long an example takes says how busy the computer is.
-hypothesis.settings.register_profile("busy", deadline=None)
+hypothesis.settings.register_profile(
+    "busy", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
+)
 hypothesis.settings.load_profile("busy")
 
 # Tests keep their bench checks apart from those of whoever runs them; processes they start inherit it.
