@@ -10,12 +10,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from vibench.acquisition import open_recording
 from vibench.analysis import AnalysisError, Simulation, analyse_files, update_model
 from vibench.analysis.hidden_motion import Hidden
+from vibench.analysis.model import stretch_draws
 from vibench.analysis.model_updating import statistical_numbers
-from vibench.analysis.model_updating._chaos_statistics import chaos_statistics
+from vibench.analysis.model_updating._chaos_statistics import chaos_statistics, heard
 from vibench.sim import gong2025
 
 TRUE = gong2025(gap_m=51e-6)
@@ -42,6 +44,20 @@ def test_the_mean_gap_and_m1_are_told_and_what_is_flat_is_not_determined(buried)
     assert told[Hidden.M1].low < TRUE.masses[1] < told[Hidden.M1].high
     assert not told[Hidden.EXPONENT].is_determined
     assert "exponent" in told[Hidden.EXPONENT].not_determined
+
+
+def test_runs_of_the_true_specimen_have_the_statistics_of_the_recording(buried):
+    """The noise of the recorded voltage once shook the simulated table: up to thirty deviations off."""
+    rng, runs = np.random.default_rng(3), 14
+    with open_recording(buried.path) as recording:
+        rate_hz = recording.sample_rate_hz
+        draws = stretch_draws(recording, TRUE, *(round(each * rate_hz) for each in STRETCH_S))
+        seen = chaos_statistics(draws.measured, rate_hz, 260.0)
+        found = np.array([chaos_statistics(draws.draw(TRUE, rng), rate_hz, 260.0) for _ in range(runs)])
+    z = (seen - found.mean(axis=0)) / found.std(axis=0, ddof=1) / math.sqrt(1 + 1 / runs)
+    z = z[heard(seen, draws.noise_rms, rate_hz)]
+    assert z.size > 40
+    assert np.abs(z).max() < student.isf(0.005 / z.size, runs - 1)
 
 
 def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_drawn(buried, tmp_path):

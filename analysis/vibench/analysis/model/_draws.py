@@ -39,11 +39,12 @@ START_M = 5e-9
 """Standard deviation of each mass' place at the start."""
 CLOCK_TOLERANCE = 50e-6
 """Of the converter's clock, relative: what NI 9234 and its kind promise. It shifts resonances."""
-_LEAD_S, _FADE_S = 0.5, 0.2
-"""Simulated before a stretch, and raised from nothing within it [s]."""
-_NOISE = 0.4
-"""How far, as a logarithm, a channel's noise may be from what its quietest stretch shows: the converter's
-noise in the recorded voltage moves a simulated table too."""
+_LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
+"""Simulated before a stretch, raised from nothing within it, and lowered to nothing behind [s]."""
+_NOISE = 0.15
+"""How far, as a logarithm, a channel's noise may be from what its quietest stretch shows."""
+_SURELY = 20.0
+"""Power of a line over that of noise, which exceeds it once in 5e8 lines."""
 _MORE = 3
 _SEED = 17
 _MOST_BYTES = 2e9
@@ -264,8 +265,17 @@ class StretchDraws:
     fitted: FittedShaker | None
     noise: ChannelNoise
     volts: Reals
+    """Without the noise of its channel."""
+    first: int
+    """Sample of the recording with which it begins."""
     kept: slice
     """The stretch within ``volts``."""
+
+    @property
+    def measured(self) -> Reals:
+        """Base acceleration and m0's velocity of the recording, over the same samples as a draw's."""
+        start, stop = (self.first + each for each in (self.kept.start, self.kept.stop))
+        return np.stack([self.recording.read(role, start, stop) for role in (BASE, RESPONSE)])
 
     @property
     def noise_rms(self) -> Reals:
@@ -280,7 +290,8 @@ class StretchDraws:
         shaker = self.rig.table.shaker if self.fitted is None else self.fitted.drawn(rng)
         rig = replace(self.rig, table=replace(self.rig.table, shaker=shaker, specimen=specimen))
         rms = {role: each * np.exp(rng.uniform(-1, 1) * _NOISE) for role, each in self.noise.rms.items()}
-        _, base, velocity = _moved(rig, self.volts, self.recording, replace(self.noise, rms=rms), rng)
+        noise = ChannelNoise(rms, converter_v=0.0)
+        _, base, velocity = _moved(rig, self.volts, self.recording, noise, rng)
         return np.stack([base[self.kept], velocity[self.kept]])
 
 
@@ -289,12 +300,25 @@ def stretch_draws(
 ) -> StretchDraws:
     """Let the recorded voltage of samples ``start`` to ``stop`` move rig and specimens together.
 
+    Where the recording ends there, the stretch ends a little earlier.
+
     Raises UnusableData when samples were lost there, or nothing is known of the shaker.
     """
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
-    first = max(0, start - round(_LEAD_S * recording.sample_rate_hz))
-    volts = recorded_voltage(recording, rig, first, stop)
-    fade = min(volts.size, round(_FADE_S * recording.sample_rate_hz))
-    volts[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
+    rate = recording.sample_rate_hz
+    first, last = max(0, start - round(_LEAD_S * rate)), min(recording.samples, stop + round(_TAIL_S * rate))
+    stop = min(stop, last - round(_TAIL_S * rate))
+    volts = recorded_voltage(recording, rig, first, last)
+    for end, fade_s in ((volts, _FADE_S), (volts[::-1], _TAIL_S)):
+        fade = min(volts.size, round(fade_s * rate))
+        end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
-    return StretchDraws(recording, rig, fitted, noise, volts, slice(start - first, stop - first))
+    played = _above_noise(volts, noise.rms[rig.role])
+    return StretchDraws(recording, rig, fitted, noise, played, first, slice(start - first, stop - first))
+
+
+def _above_noise(volts: Reals, rms: float) -> Reals:
+    """Give what surely is voltage and no noise of its channel, which would shake a simulated table."""
+    spectrum = np.fft.rfft(volts)
+    spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * rms**2] = 0.0
+    return np.asarray(np.fft.irfft(spectrum, volts.size))

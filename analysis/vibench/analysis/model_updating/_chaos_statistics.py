@@ -89,9 +89,11 @@ def _displacement(velocity: Reals, rate_hz: float) -> Reals:
 
 def _spread(values: Reals) -> Reals:
     centred = values - values.mean()
-    rms = float(np.sqrt(np.mean(centred**2)))
+    squared = centred * centred
+    rms = float(np.sqrt(squared.mean()))
     tails = np.quantile(np.abs(centred), _SHARES) / rms
-    return np.array([np.log(rms), np.mean(centred**3) / rms**3, np.mean(centred**4) / rms**4, *np.log(tails)])
+    skewness, kurtosis = np.vdot(squared, centred) / rms**3, np.vdot(squared, squared) / rms**4
+    return np.array([np.log(rms), skewness / values.size, kurtosis / values.size, *np.log(tails)])
 
 
 def _harmonics(motion: Reals, rate_hz: float, drive_hz: float) -> Reals:

@@ -13,7 +13,6 @@ from vibench.sim import Hertz, HuntCrossley, LinearGap, Specimen
 from ..errors import InvalidRequest, UnusableData
 from ..hidden_motion import FoundParameter, Hidden, tracked_specimen, value_of, with_values
 from ..model import FittedShaker, StretchDraws, stretch_draws
-from ..recordings import BASE, RESPONSE
 from ..signals import Flags, Reals
 from ._chaos_statistics import chaos_statistics, heard
 from ._posterior import ROUNDS, Posterior, posterior
@@ -76,7 +75,7 @@ def statistical_numbers(
     if not np.isfinite(specimen.gaps_m).all():
         raise InvalidRequest("the specimen is described with a stop on one side only; statistics need two")
     draws = stretch_draws(recording, specimen, start, stop, fitted)
-    measured = np.stack([recording.read(role, start, stop) for role in (BASE, RESPONSE)]).astype(np.float64)
+    measured = draws.measured
     if np.isnan(measured).any():
         raise UnusableData("samples were lost, and statistics of what is left are those of another window")
     observed = chaos_statistics(measured, rate_hz, drive_hz)
