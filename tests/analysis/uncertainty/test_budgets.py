@@ -1,7 +1,7 @@
 """Budgets are what propagation of distributions gives, and say what nobody stated."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -9,9 +9,10 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.rig import StatedUncertainty, VibrometerConfig
 from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
+from vibench.analysis.model import RESPONSE_I, EnsembleCurve
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine import dwell_response
-from vibench.analysis.uncertainty import Cause, dwell_budgets, stated_of
+from vibench.analysis.uncertainty import Cause, dwell_budgets, stated_of, sweep_budgets
 from vibench.analysis.uncertainty._quantities import sd_of_largest
 
 DRAWS = 150
@@ -33,8 +34,21 @@ STATED = {
         ],
     },
 }
+DRAWN = np.array([0.97, 1.01, 1.0, 1.02, 0.98, 1.03])
+"""Largest values of draws over the measured."""
 BASE_NOISE, LASER_NOISE = 0.02, 2e-4
 """Over the largest acceleration; and of the velocity, over its largest."""
+
+
+@dataclass(frozen=True)
+class Laid:
+    """Draws of one quantity."""
+
+    curve: EnsembleCurve
+
+    def quantity(self, name):
+        """Give it by its name."""
+        return self.curve if name == self.curve.name else None
 
 
 @pytest.fixture(scope="module")
@@ -160,3 +174,40 @@ def test_the_scatter_of_a_maximum_is_told_from_one_window(bounded):
     true = np.std(values.max(axis=1))
     told = [sd_of_largest(each.reshape(50, -1).max(axis=1)) for each in values]
     assert np.median(told) == pytest.approx(true, rel=0.3)
+
+
+def test_a_colliding_sweep_has_chance_and_says_what_only_draws_tell(sweep_file):
+    (sweep,) = analyse_files([sweep_file], "sweep", Simulation.LEFT_OUT).results
+    (calm,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))
+    assert calm.share(Cause.CHANCE) == 0.0  # the resonance just before collisions begin
+    whole, collides = sweep.analysis.response, sweep.analysis.collisions.is_colliding
+    found = replace(
+        whole,
+        response_i=np.where(collides, whole.response_i, 1e-3),
+        response_ii=np.where(collides, whole.response_ii, 1e-3),
+    )
+    part = replace(sweep.analysis, response=found)
+    amplitude, first, second = sweep_budgets(part, None)
+    at = f"{found.frequency_hz[np.argmax(found.response_i)]:.4g} Hz"
+    assert amplitude.quantity.startswith("base amplitude A0, at ")
+    assert first.quantity == f"largest Response I, at {at}"
+    assert first.value == found.response_i.max()
+    assert Cause.CHANCE in first.not_stated
+    assert second.share(Cause.CHANCE) > 0.0
+    drawn = EnsembleCurve(RESPONSE_I, found.frequency_hz, found.response_i, np.outer(DRAWN, found.response_i))
+    told = sweep_budgets(part, Laid(drawn))[1]
+    # Square roots scatter half as much as what they are of, to the first order.
+    assert told.share(Cause.CHANCE) == pytest.approx(np.std(DRAWN, ddof=1), rel=0.01)
+    assert told.contributions[-1].source == f"{DRAWN.size} simulated draws"
+
+
+def test_steps_without_collisions_scatter_by_noise_alone(stepped_file):
+    (steps,) = analyse_files([stepped_file], "steps", Simulation.LEFT_OUT).results
+    first, second = budgets_of(steps)
+    assert [each.quantity.partition(",")[0] for each in (first, second)] == [
+        "largest Response I",
+        "largest Response II",
+    ]
+    assert first.share(Cause.CHANCE) == second.share(Cause.CHANCE) == 0.0
+    assert Cause.CHANCE not in first.not_stated
+    assert first.value >= second.value * (1 - 1e-3)

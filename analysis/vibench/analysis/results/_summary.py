@@ -40,7 +40,7 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
 
     Returns
     -------
-    A budget each for A0 and Responses I and II of a dwell, the largest Response II of a sweep or of steps,
+    A budget each for A0 and Responses I and II of a dwell, the largest of both of a sweep or of steps,
     and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008).
 
     """

@@ -1,6 +1,7 @@
 """The budgets of each kind of measurement: which causes act on its numbers, and how strongly."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,14 +10,22 @@ from ..chaos import MotionKind
 from ..frequency_response import NoiseAnalysis, NoiseResponse, Resonance
 from ..model import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOverlay
 from ..recordings import RecordingFacts
-from ..signals import Reals
-from ..sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
+from ..signals import Flags, Reals
+from ..sine import (
+    DwellAnalysis,
+    SteppedResponse,
+    SteppedSineAnalysis,
+    SweepAnalysis,
+    SweepResponse,
+)
 from ._budget import Budget, Cause, Contribution
 from ._stated import Stated, stated_of
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Parts of a window whose maxima tell how that of a whole one scatters."""
 _FEWEST_DRAWS = 5
+_PEAKED = 1.05
+"""Response I over Response II above which a step is no sine."""
 _FEWEST_PERIODS = 20.0
 """Of the drive in a part: its maximum is then one of many turns."""
 
@@ -107,17 +116,16 @@ def _ratio(stated: Stated) -> tuple[Contribution, ...]:
     return (*stated.response, *stated.base, *stated.timed(1))
 
 
-def _amplitude(value_m: float, sd_m: float, stated: Stated, scatter: Cause) -> Budget:
+def _amplitude(value_m: float, sd_m: float, stated: Stated, scatter: Cause, where: str = "") -> Budget:
     noise = Contribution(scatter, sd_m / value_m, "parts of the window")
-    return Budget("base amplitude A0", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), noise))
+    return Budget(f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), noise))
 
 
 def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
     """Scatter of the largest |x| over equal windows: that of the draws, else of the window's parts."""
-    drawn = None if laid is None else laid.quantity(RESPONSE_I)
-    if drawn is not None and int(drawn.count[0]) >= _FEWEST_DRAWS:
-        source = f"{int(drawn.count[0])} simulated draws"
-        return (Contribution(Cause.CHANCE, float(drawn.relative_sd[0]), source),)
+    drawn = _drawn(laid, RESPONSE_I, 0)
+    if drawn is not None:
+        return (drawn,)
     found = analysis.response
     motion = found.displacement.settled
     window = motion[-round(found.window_s * found.displacement.sample_rate_hz) :]
@@ -151,39 +159,55 @@ def sd_of_largest(maxima: Reals) -> float:
     return float(np.std(maxima, ddof=1) * count**-shape)
 
 
-def sweep_budgets(analysis: SweepAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Largest Response II of a sweep, with where it is."""
+def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Give base amplitude and largest Responses of a sweep, with where they are."""
     found = analysis.response
     top = int(np.argmax(found.response_ii))
-    collides = bool(analysis.collisions.is_colliding[top])
-    return _largest(
-        analysis.facts,
-        float(found.response_ii[top]),
-        float(found.sd_response_ii[top]),
-        f"{found.frequency_hz[top]:.4g} Hz",
-        Cause.CHANCE if collides else Cause.NOISE,
-    )
+    collides = analysis.collisions.is_colliding
+    stated = stated_of(analysis.facts.bench)
+    scatter = Cause.CHANCE if collides[top] else Cause.NOISE
+    at_top = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
+    amplitude = _amplitude(*at_top, stated, scatter, f", at {found.frequency_hz[top]:.4g} Hz")
+    return amplitude, *_largest(analysis.facts, found, collides, laid)
 
 
-def stepped_budgets(analysis: SteppedSineAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Largest Response II of the steps, with where it is."""
+def stepped_budgets(analysis: SteppedSineAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Give the largest Responses of the steps, with where they are."""
     found = analysis.response
     if not found.response_ii.size:
         return ()
-    top = int(np.argmax(found.response_ii))
-    return _largest(
-        analysis.facts,
-        float(found.response_ii[top]),
-        float(found.sd_response_ii[top]),
-        f"{found.frequency_hz[top]:.4g} Hz",
-        Cause.NOISE,
-    )
+    collides = found.response_i - found.noise_bias_i > _PEAKED * found.response_ii
+    return tuple(_largest(analysis.facts, found, collides, laid))
 
 
 def _largest(
-    facts: RecordingFacts, value: float, sd: float, where: str, scatter: Cause
-) -> tuple[Budget, ...]:
-    noise = Contribution(scatter, sd / value, "parts of the interval")
-    return (
-        Budget(f"largest {RESPONSE_II}, at {where}", value, "", (*_ratio(stated_of(facts.bench)), noise)),
-    )
+    facts: RecordingFacts,
+    found: SweepResponse | SteppedResponse,
+    collides: Flags,
+    laid: AbstractOverlay[Any] | None,
+) -> Iterator[Budget]:
+    stated = stated_of(facts.bench)
+    bias, sd = found.noise_bias_i, found.sd_response_ii
+    for name, values, scatter, source in (
+        (RESPONSE_I, found.response_i, bias, "noise that lifts a maximum"),
+        (RESPONSE_II, found.response_ii, sd, "parts of the interval"),
+    ):
+        top = int(np.argmax(values))
+        value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
+        own = Contribution(Cause.NOISE, float(scatter[top]) / value, source)
+        if collides[top]:
+            own = _drawn(laid, name, top) or (
+                Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
+                if name == RESPONSE_I
+                else replace(own, cause=Cause.CHANCE)
+            )
+        yield Budget(f"largest {name}, at {at}", value, "", (*_ratio(stated), own))
+
+
+def _drawn(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
+    """Give how one value scatters over draws of the twin of the measured kind of motion; None below five."""
+    curve = None if laid is None else laid.quantity(name)
+    if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
+        return None
+    source = f"{int(curve.count[place])} simulated draws"
+    return Contribution(Cause.CHANCE, float(curve.relative_sd[place]), source)
