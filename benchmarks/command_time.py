@@ -2,11 +2,12 @@
 
     python benchmarks/command_time.py
     python benchmarks/command_time.py --settle 0 0.1 --step 0.1 0.5
+    python benchmarks/command_time.py --bench virtual_rig_keysight
 
 On the virtual rig at the wall's pace, where commands take time while samples are converted. Told for each
 `generator.settle_s` and `step_s`: how many cycles of the drive the recorded sweep has more than its plan,
 and between them what the run said where it refused or ended the sweep. The check of the bench and a ramp
-are part of every run.
+are part of every run. Where the generator makes sweeps by itself, a last column has those.
 """
 
 import argparse
@@ -18,19 +19,18 @@ from scipy.signal import hilbert
 
 from vibench.acquisition import AcquisitionError, open_bench, open_recording
 from vibench.acquisition.plan import Measurement, SineSweep
-from vibench.acquisition.rig import Rig, load_rig
+from vibench.acquisition.rig import Rig, generator_driver, load_rig
 from vibench.acquisition.run import run_measurement
 
-RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
 SETTLES_S = (0.0, 0.02, 0.05, 0.1, 0.2)
 STEPS_S = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 LONGEST_SENTENCE = 60
 MARGIN_S = 0.15
 
 
-def bench(settle_s: float) -> Rig:
-    """Give the virtual rig at the wall's pace, with a generator that wants a pause after each command."""
-    rig = load_rig(RIG)
+def bench(name: str, settle_s: float) -> Rig:
+    """Give a virtual rig at the wall's pace, with a generator that wants a pause after each command."""
+    rig = load_rig(name)
     return rig.model_copy(
         update={
             "generator": rig.generator.model_copy(update={"settle_s": settle_s}),
@@ -39,10 +39,11 @@ def bench(settle_s: float) -> Rig:
     )
 
 
-def sweep(step_s: float) -> Measurement:
-    """150 to 310 Hz in 6 s."""
+def sweep(step_s: float | None) -> Measurement:
+    """150 to 310 Hz in 6 s, in steps or by the generator itself."""
+    moved = {"swept_by": "generator"} if step_s is None else {"step_s": step_s}
     excitation = SineSweep(
-        amplitude_vpp=0.2, start_hz=150.0, stop_hz=310.0, duration_s=6.0, step_s=step_s, settle_s=0.5
+        amplitude_vpp=0.2, start_hz=150.0, stop_hz=310.0, duration_s=6.0, settle_s=0.5, **moved
     )
     return Measurement(name="sweep", excitation=excitation, ramp_s=0.4, ramp_step_s=0.1)
 
@@ -59,12 +60,12 @@ def excess_cycles(path: Path, excitation: SineSweep) -> float:
     return played - excitation.cycles(excitation.duration_s)
 
 
-def told(settle_s: float, step_s: float) -> str:
+def told(name: str, settle_s: float, step_s: float | None) -> str:
     """Say what came of one sweep."""
     plan = sweep(step_s)
     with tempfile.TemporaryDirectory() as folder:
         try:
-            with open_bench(bench(settle_s)) as opened:
+            with open_bench(bench(name, settle_s)) as opened:
                 path = run_measurement(opened, plan, Path(folder) / "sweep.h5").path
         except AcquisitionError as error:
             return str(error)[:LONGEST_SENTENCE]
@@ -78,11 +79,16 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     asked.add_argument("--settle", type=float, nargs="+", default=SETTLES_S)
     asked.add_argument("--step", type=float, nargs="+", default=STEPS_S)
+    asked.add_argument("--bench", default="virtual_rig", help="a bench that comes with vibench, or a file")
     given = asked.parse_args()
-    print("| settle_s \\ step_s | " + " | ".join(f"{step_s:g} s" for step_s in given.step) + " |")
-    print("|" + "---|" * (len(given.step) + 1))
+    generator = load_rig(given.bench).generator
+    sweeps_itself = generator_driver(generator).describe(generator).longest_sweep_s > 0
+    steps = [*given.step, None] if sweeps_itself else given.step
+    titles = ["its own" if step_s is None else f"{step_s:g} s" for step_s in steps]
+    print("| settle_s \\ step_s | " + " | ".join(titles) + " |")
+    print("|" + "---|" * (len(steps) + 1))
     for settle_s in given.settle:
-        cells = [told(settle_s, step_s) for step_s in given.step]
+        cells = [told(given.bench, settle_s, step_s) for step_s in steps]
         print(f"| {settle_s:g} s | " + " | ".join(cells) + " |", flush=True)
 
 

@@ -8,15 +8,19 @@ from vibench.acquisition.engine._state import HUNG_FACTOR
 from .conftest import campaign, until, until_state
 
 
-def test_a_pulse_keeps_a_run_going_that_nobody_else_asks_about(engine, shipped_rig, tmp_path):
-    process = engine()
+def running(process, rig, folder):
+    """A client whose run plays, and what beats for it."""
     client = process.client
-    client.open(shipped_rig)
+    client.open(rig)
     until_state(client, EngineState.READY)
-    client.arm(campaign("beaten"), tmp_path)
+    client.arm(campaign("beaten"), folder)
     client.start()
     until(client, lambda status: status.samples > 0)
-    heartbeat = Heartbeat(process.address)
+    return client, Heartbeat(process.address)
+
+
+def test_a_pulse_keeps_a_run_going_that_nobody_else_asks_about(engine, shipped_rig, tmp_path):
+    client, heartbeat = running(engine(), shipped_rig, tmp_path)
     clock = Event()
     for _ in range(40):
         heartbeat.beat()
@@ -30,14 +34,7 @@ def test_a_pulse_keeps_a_run_going_that_nobody_else_asks_about(engine, shipped_r
 
 def test_a_pulse_that_tells_of_a_dead_window_ends_the_run(engine, shipped_rig, tmp_path):
     """The thread that beats lives; the window's own has done nothing for longer than it may."""
-    process = engine()
-    client = process.client
-    client.open(shipped_rig)
-    until_state(client, EngineState.READY)
-    client.arm(campaign("hung"), tmp_path)
-    client.start()
-    until(client, lambda status: status.samples > 0)
-    heartbeat = Heartbeat(process.address)
+    client, heartbeat = running(engine(), shipped_rig, tmp_path)
     clock = Event()
     for number in range(200):
         heartbeat.beat(0.05 * number)

@@ -1,7 +1,6 @@
 """How many cycles of a glide from tone to tone the recorded drive has more, or fewer, than its plan."""
 
 from collections.abc import Callable, Sequence
-from math import pi
 from typing import Protocol
 
 import numpy as np
@@ -14,6 +13,10 @@ DELAY_SAMPLES = 40
 of frequencies."""
 
 
+CLEAR = 0.3
+"""Share of the amplitude beyond which a sample is above or below zero for sure."""
+
+
 class Heard(Protocol):
     """What takes blocks as they are read."""
 
@@ -22,27 +25,33 @@ class Heard(Protocol):
 
 
 class GlideWatch:
-    """Holds the phase of the recorded drive against that of the plan, in the last half of every tone."""
+    """Counts the cycles of the recorded drive by its rising edges, and holds them against the plan."""
 
     def __init__(self, channels: tuple[Channel, ...], sample_rate_hz: float) -> None:
         self._row = [channel.role for channel in channels].index(Role.DRIVE_VOLTAGE)
         self.sample_rate_hz = sample_rate_hz
-        self._planned = 0.0
-        self._due_s = 0.0
-        self._began: tuple[float, float] | None = None
-        self._last_hz = 0.0
-        self._more = 0.0
+        self.begin()
 
     def begin(self) -> None:
         """Forget: another glide may begin."""
-        self._began = None
+        self._first: tuple[float, float] | None = None
+        """Planned cycles at the first edge, and the frequency there [Hz]."""
+        self._last_hz = 0.0
+        self._next_sample = -1
+        self._planned = 0.0
+        self._due_s = 0.0
+        self._edges = 0
+        self._more = 0.0
+        self._offset_v = 0.0
+        self._before: tuple[float, float] | None = None
+        """Time and voltage of the last sample that was clearly above or below zero."""
 
     def take(
         self,
         blocks: Sequence[Block],
         frequency_hz: float,
         duration_s: float,
-        course: Callable[[Samples], Samples] | None = None,
+        course: Callable[[float], float] | None = None,
     ) -> None:
         """Take what was recorded while a tone of the glide should have played.
 
@@ -50,36 +59,42 @@ class GlideWatch:
         """
         if not blocks:
             return
-        if self._began is None:
-            self._planned, self._due_s, self._more = 0.0, blocks[0].first_sample / self.sample_rate_hz, 0.0
-        late = blocks[len(blocks) // 2 :]
-        volts = np.concatenate([block.volts[self._row] for block in late])
-        count = volts.size if len(blocks) > 1 else volts.size // 2
-        time_s = (
-            late[-1].first_sample + late[-1].volts.shape[1] - count + np.arange(count)
-        ) / self.sample_rate_hz
-        since_s = time_s - self._due_s
-        cycles = self._planned + (frequency_hz * since_s if course is None else course(since_s))
-        turned = complex(np.sum(volts[-count:] * np.exp(-2j * pi * cycles)))
-        angle = float(np.angle(turned)) / (2 * pi)
-        if self._began is None:
-            self._began = angle, frequency_hz
-        more = angle - self._began[0]
-        # No tone is off by half a cycle more than the one before.
-        self._more += (more - self._more + 0.5) % 1.0 - 0.5
+        if blocks[0].first_sample != self._next_sample:
+            self.begin()
+            self._due_s = blocks[0].first_sample / self.sample_rate_hz
+        self._next_sample = blocks[-1].first_sample + blocks[-1].volts.shape[1]
+        for block in blocks:
+            for edge_s in self._rises(block, frequency_hz):
+                since_s = edge_s - self._due_s
+                planned = self._planned + (frequency_hz * since_s if course is None else course(since_s))
+                if self._first is None:
+                    self._first = planned, frequency_hz
+                self._edges += 1
+                self._more = self._edges - 1 - (planned - self._first[0])
         self._planned += frequency_hz * duration_s
         self._due_s += duration_s
         self._last_hz = frequency_hz
 
+    def _rises(self, block: Block, frequency_hz: float) -> Samples:
+        """Give the times at which the drive rises through zero [s]; noise around zero makes none."""
+        volts, rate_hz = block.volts[self._row], self.sample_rate_hz
+        low, high = float(volts.min()), float(volts.max())
+        if volts.size * frequency_hz >= rate_hz:
+            self._offset_v = 0.5 * (low + high)
+        clear = np.flatnonzero(np.abs(volts - self._offset_v) > CLEAR * 0.5 * (high - low))
+        before_s, before_v = self._before or (0.0, np.nan)
+        time_s = np.append(before_s, (block.first_sample + clear) / rate_hz)
+        v = np.append(before_v, volts[clear] - self._offset_v)
+        self._before = float(time_s[-1]), float(v[-1])
+        at = np.flatnonzero((v[:-1] < 0) & (v[1:] > 0))
+        return np.asarray(time_s[at] - v[at] * (time_s[at + 1] - time_s[at]) / (v[at + 1] - v[at]))
+
     @property
     def more_cycles(self) -> float:
-        """Cycles that the drive has more than planned; a jump of more than half a one is taken for less.
-
-        0 within what a converter's delay makes of it.
-        """
-        if self._began is None:
+        """Cycles that the drive has more than planned; 0 within what a converter's delay makes of it."""
+        if self._first is None:
             return 0.0
-        delayed = DELAY_SAMPLES / self.sample_rate_hz * abs(self._last_hz - self._began[1])
+        delayed = DELAY_SAMPLES / self.sample_rate_hz * abs(self._last_hz - self._first[1])
         return float(np.sign(self._more) * max(0.0, abs(self._more) - delayed))
 
 

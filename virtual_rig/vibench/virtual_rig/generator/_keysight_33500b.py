@@ -9,6 +9,7 @@ from dataclasses import replace
 from enum import Enum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _channel_commands as channel_commands
 from ._afg1022 import AFG1022
@@ -27,7 +28,7 @@ from ._phase_course import Spacing
 from ._scpi_command import Command, Generator, Number, Parameters, Quirks, choice, none, only, switch
 from ._scpi_header import HeaderPattern
 from ._scpi_status import ErrorCode, ScpiError
-from ._scpi_value import as_number, block, text
+from ._scpi_value import NO_UNITS, Limit, as_number, block, integer, number_or_limit, text
 
 TOP_CODE = 65_534
 """Codes -32767 to 32767, counted from zero."""
@@ -35,8 +36,8 @@ _MIDDLE = 32_767
 POINTS = (8, 1_048_576)
 HIGHEST_RATE_HZ = 250e6
 MOST_BURST_CYCLES = 100_000_000
-LONGEST_SWEEP_S = 250_000.0
-LONGEST_HOLD_S = 3600.0
+SWEEP_S = 1e-3, 250_000.0
+HOLD_S = 0.0, 3600.0
 DEFAULT_SERIAL = "MY52000001"
 _QUIRKS = Quirks(
     first_identity_after_clear_is_empty=False,
@@ -128,14 +129,14 @@ def _write_dac(generator: Generator, channel: int, parameters: Parameters) -> No
     own.waveforms[name] = (values + _MIDDLE).astype(np.uint16)
 
 
-def _numbers(own: Keysight33500B, parameters: Parameters) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def _numbers(own: Keysight33500B, parameters: Parameters) -> NDArray[np.float64]:
     if parameters[0].startswith(b"#"):
         order = ">i2" if own.order is _Order.NORMAL else "<i2"
         data = block(parameters[0])
         if len(data) % 2:
             raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
-        return np.frombuffer(data, dtype=order).astype(np.int64)
-    return np.array([int(text(each)) for each in parameters], dtype=np.int64)
+        return np.frombuffer(data, dtype=order).astype(np.float64)
+    return np.array([float(integer(each)) for each in parameters])
 
 
 def _select(generator: Generator, channel: int, parameters: Parameters) -> None:
@@ -183,8 +184,8 @@ def _set_rate(own: Keysight33500B, channel: int, rate_hz: float) -> None:
 
 
 def _write_rate(generator: Generator, channel: int, parameters: Parameters) -> None:
-    rate_hz = float(text(only(parameters)))
-    if not 0 < rate_hz <= HIGHEST_RATE_HZ:
+    rate_hz = number_or_limit(only(parameters), NO_UNITS)
+    if isinstance(rate_hz, Limit) or not 0 < rate_hz <= HIGHEST_RATE_HZ:
         raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
     _set_rate(_own(generator), channel, rate_hz)
 
@@ -206,14 +207,17 @@ def _write_filter(generator: Generator, _: int, parameters: Parameters) -> None:
 
 
 def _sweep_number(
-    node: str, get: Callable[[OwnSweep], float], put: Callable[[OwnSweep, float], OwnSweep], longest_s: float
+    node: str,
+    get: Callable[[OwnSweep], float],
+    put: Callable[[OwnSweep, float], OwnSweep],
+    range_s: tuple[float, float],
 ) -> Command:
     return Number(
         f"[SOURce#:]SWEep:{node}",
         {"": 1.0, "S": 1.0, "MS": 1e-3},
         lambda s: get(_sweep(s)),
         lambda s, value: replace(s, sweep=put(_sweep(s), value)),
-        lambda _: (0.0, longest_s),
+        lambda _: range_s,
         default=1.0,
         decimals=6,
     ).command()
@@ -257,8 +261,8 @@ _COMMANDS = (
         lambda s: s.mode is RunMode.SWEEP,
         lambda s, on: with_mode(RunMode.SWEEP, s, on),
     ),
-    _sweep_number("TIME", lambda s: s.sweep_s, lambda s, value: replace(s, sweep_s=value), LONGEST_SWEEP_S),
-    _sweep_number("HTIMe", lambda s: s.hold_s, lambda s, value: replace(s, hold_s=value), LONGEST_HOLD_S),
+    _sweep_number("TIME", lambda s: s.sweep_s, lambda s, value: replace(s, sweep_s=value), SWEEP_S),
+    _sweep_number("HTIMe", lambda s: s.hold_s, lambda s, value: replace(s, hold_s=value), HOLD_S),
     choice(
         "[SOURce#:]SWEep:SPACing",
         _Spacing,

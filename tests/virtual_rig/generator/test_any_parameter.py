@@ -1,0 +1,41 @@
+"""Whatever stands behind a header of a simulated generator is obeyed or queued as an error."""
+
+import numpy as np
+import pytest
+
+from vibench.virtual_rig.generator import AFG1022, Keysight33500B
+
+PARAMETERS = (
+    *(
+        b"",
+        b"abc",
+        b"1e400",
+        b"-1e400",
+        b"nan",
+        b"inf",
+        b"MAX",
+        b"MIN",
+        b"DEF",
+        b"ON",
+        b"2",
+        b"-1",
+        b"1 Hz",
+        b"1e3 kHz",
+    ),
+    *(b"#", b"#0", b"#9", b"#15", b"#1", b"#215abc", b"'x", b'"x"', b"\xff\xfe", b"9" * 400, b"1e999999999"),
+    *(b"1,2", b"1,abc,3", b"W,1,2,3,4,5,6,7,1e300", b"W,1.5,2,3,4,5,6,7,8", b"W,#216abcdefghijklmnop"),
+    *(b"USER0", b"EMEM", b"EMEM,5", b"EMEM,#14abcd", b"EMEM,99999999", b"USER1,EMEM"),
+)
+
+
+@pytest.mark.parametrize("kind", [AFG1022, Keysight33500B])
+def test_every_command_takes_any_parameter(kind):
+    generator = kind(lambda: 0.0)
+    for command in generator._commands:
+        header = command.pattern.text.translate(str.maketrans("#", "1", "[]")).encode()
+        for mark in (b"", b"?"):
+            for parameter in PARAMETERS:
+                generator.execute(header + mark + b" " + parameter)
+    assert np.all(np.isfinite(generator.render(0.0, 1e-5, 100)))
+    generator.execute(b"*CLS")
+    assert generator.execute(b"SYST:ERR?").data.startswith(b"0,")
