@@ -10,7 +10,7 @@ from typing import Self
 
 from ..errors import AcquisitionError
 from ..host import chosen
-from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
+from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity, RealTimeController
 from ..rig import (
     CalibrationRule,
     Channel,
@@ -21,6 +21,7 @@ from ..rig import (
     check_calibrations,
     confirm_at_terminal,
     confirm_simulated,
+    controller_driver,
     digitizer_driver,
     generator_driver,
     load_rig,
@@ -50,6 +51,7 @@ class Bench:
         generator: FunctionGenerator,
         digitizer: Digitizer,
         output: AnalogOutput | None,
+        controller: RealTimeController | None,
         confirmations: KnobSheet,
         power: RigPower,
         closing: ExitStack,
@@ -58,6 +60,7 @@ class Bench:
         self.generator = generator
         self.digitizer = digitizer
         self.output = output
+        self.controller = controller
         self.confirmations = confirmations
         self.last_check: CheckResult | None = None
         """The check that this bench was admitted on; see `vibench.acquisition.check`."""
@@ -71,9 +74,10 @@ class Bench:
 
     @property
     def identities(self) -> dict[str, Identity]:
-        """Who answered: ``"generator"``, ``"digitizer"``, and ``"output"`` where there is one."""
+        """Who answered: ``"generator"``, ``"digitizer"``, and ``"output"``, ``"controller"`` if any."""
+        more = {"output": self.output, "controller": self.controller}
         identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
-        return identities if self.output is None else {**identities, "output": self.output.identity}
+        return identities | {name: each.identity for name, each in more.items() if each is not None}
 
     @property
     def kind(self) -> BenchKind:
@@ -145,6 +149,7 @@ def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: 
     digitizer = digitizer_driver(connected).open(connected)
     closing.callback(digitizer.close)
     output = _output(connected, digitizer, closing)
+    controller = _controller(connected, closing)
     generator = generator_driver(connected.generator).open(connected.generator)
     closing.callback(generator.close)
     closing.callback(generator.stop)  # the last to enter is the first to happen
@@ -153,7 +158,7 @@ def _opened(rig: Rig, confirm: Confirm | None, power: RigPower | None, closing: 
     usual = confirm_simulated if _kind(rig, digitizer) is BenchKind.SIMULATED else confirm_at_terminal
     ask: Callable[..., KnobSheet] = confirm or usual
     sheet = ask((*rig.knobs, *generator.unconfirmed))
-    return Bench(rig, generator, digitizer, output, sheet, power, closing)
+    return Bench(rig, generator, digitizer, output, controller, sheet, power, closing)
 
 
 def _output(rig: Rig, digitizer: Digitizer, closing: ExitStack) -> AnalogOutput | None:
@@ -163,6 +168,14 @@ def _output(rig: Rig, digitizer: Digitizer, closing: ExitStack) -> AnalogOutput 
     output = output_driver(rig).open(physical, config, digitizer)
     closing.callback(output.close)
     return output
+
+
+def _controller(rig: Rig, closing: ExitStack) -> RealTimeController | None:
+    if rig.controller is None:
+        return None
+    controller = controller_driver(rig.controller).open(rig.controller)
+    closing.callback(controller.close)  # silences it
+    return controller
 
 
 def _kind(rig: Rig, digitizer: Digitizer) -> BenchKind:

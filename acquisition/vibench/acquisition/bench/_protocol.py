@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Protocol
 
-from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity
+from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity, RealTimeController
 from ..rig import Channel, KnobSheet, Rig
 from ._result import CheckResult
 
@@ -22,6 +22,10 @@ class RunBench(Protocol):
     @property
     def output(self) -> AnalogOutput | None:
         """What plays signals that never repeat; None where the rig has no analogue output."""
+
+    @property
+    def controller(self) -> RealTimeController | None:
+        """What closes a fast loop; None where the rig has no such controller."""
 
     @property
     def digitizer(self) -> Digitizer:

@@ -28,8 +28,12 @@ class RigPower:
         if self._virtual is None:
             return self.rig
         rig, virtual = self.rig, self._virtual
+        controller = rig.controller and rig.controller.model_copy(
+            update={"resource": virtual.controller_resource}
+        )
         return rig.model_copy(
             update={
+                "controller": controller,
                 "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
                 "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
             }

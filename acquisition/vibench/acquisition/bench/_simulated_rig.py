@@ -28,6 +28,10 @@ class SimulatedRig(Protocol):
         """VISA name of the generator."""
 
     @property
+    def controller_resource(self) -> str:
+        """VISA name of the real-time controller; empty without one."""
+
+    @property
     def played_faults(self) -> Sequence[PlayedFault]:
         """What a script has done to the rig so far."""
 

@@ -6,7 +6,7 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from ..instruments import Block, Samples
+from ..instruments import Block, LoopBlock, Samples
 from ..plan import Phase
 from ..recording import FeedbackNote
 
@@ -27,6 +27,8 @@ class PhaseSamples:
     first_sample: int
     volts: Samples
     """Shape (channels, samples) [V]."""
+    coefficients: tuple[LoopBlock, ...] = ()
+    """What a real-time controller measured meanwhile."""
 
 
 Result = TypeVar("Result")

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..plan import Measurement
 from ..rig import Channel, Rig
+from ._continuation_controller import follow_branch
 from ._control_action import Controller
 from ._dwell_controller import hold_dwell
 from ._feedback_channels import feedback_channels_of
@@ -22,6 +23,7 @@ CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = Mapping
         "held_sweep": hold_sweep,
         "resonance_tracking": track_resonance,
         "held_noise": equalise_noise,
+        "branch_continuation": follow_branch,
     }
 )
 """Controller of each kind with feedback: of the loop, and of a plan of its kind."""

@@ -57,7 +57,7 @@ class SineLoop:
 
     def listen_to_silence(self) -> Controller[None]:
         """Listen to silence: what the response shows then is noise."""
-        samples = yield from self._run_phase(Phase(RunState.ARMED, None, HUSH_S))
+        samples = yield from self.run_phase(Phase(RunState.ARMED, None, HUSH_S))
         _, _, response = self.channels.rows(samples)
         # The first half lets the bench check ring out.
         self._silence = response[len(response) // 2 :]
@@ -83,15 +83,15 @@ class SineLoop:
 
     def ramp_up(self) -> Controller[None]:
         """Begin to play."""
-        yield from self._run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
+        yield from self.run_phase(ramp(RunState.RAMPING_UP, self._tone, self.measurement))
 
     def ramp_down(self) -> Controller[None]:
         """End the play."""
-        yield from self._run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self.measurement))
+        yield from self.run_phase(ramp(RunState.RAMPING_DOWN, self._tone, self.measurement))
 
     def listen(self, state: RunState, duration_s: float, segment: Segment | None = None) -> Controller[None]:
         """Play on for a while, and look."""
-        samples = yield from self._run_phase(Phase(state, self._tone, duration_s, segment))
+        samples = yield from self.run_phase(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
         self._scope.add(samples.first_sample, *self.channels.rows(samples))
 
@@ -100,7 +100,8 @@ class SineLoop:
         if self._notes:
             yield ControlAction(None, self._taken_notes())
 
-    def _run_phase(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
+    def run_phase(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
+        """Have a phase carried out, with what is to be noted at its first sample."""
         return (yield ControlAction(phase, self._taken_notes()))
 
     def _taken_notes(self) -> tuple[FeedbackNote, ...]:

@@ -20,6 +20,9 @@ from ._generator_limits import (
 from ._keysight_33500b import (
     Keysight33500B as Keysight33500B,
 )
+from ._line_controller import (
+    LineController as LineController,
+)
 from ._no_generator import (
     FILE_GENERATOR as FILE_GENERATOR,
     NO_GENERATOR as NO_GENERATOR,

@@ -3,6 +3,9 @@ from ._base_level import (
     RelativeSetting as RelativeSetting,
     RmsSetting as RmsSetting,
 )
+from ._branch_continuation import (
+    BranchContinuation as BranchContinuation,
+)
 from ._direction import (
     Approach as Approach,
     Direction as Direction,
@@ -71,6 +74,7 @@ from ._stepped_sine import (
     SteppedSine as SteppedSine,
 )
 from ._steps import (
+    LoopTone as LoopTone,
     Play as Play,
     Samples as Samples,
     SampleSource as SampleSource,

@@ -7,6 +7,7 @@ from typing import Annotated, TypeAlias, TypeVar, get_args
 
 from pydantic import Field
 
+from ._branch_continuation import BranchContinuation
 from ._dwell import Dwell
 from ._held_dwell import HeldDwell
 from ._held_noise import HeldNoise
@@ -33,7 +34,8 @@ Excitation: TypeAlias = Annotated[
     | HeldSweep
     | HeldDwell
     | ResonanceTracking
-    | HeldNoise,
+    | HeldNoise
+    | BranchContinuation,
     Field(discriminator="kind"),
 ]
 Row = TypeVar("Row")

@@ -7,7 +7,7 @@ from typing import Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instruments import Sweep
+from ..instruments import LoopProgram, Sweep
 from ..recording import SegmentLabel
 
 Samples = NDArray[np.float64]
@@ -20,6 +20,14 @@ class Tone:
     frequency_hz: float
     level: float = 1.0
     """Its amplitude as a fraction of the amplitude setting: above 0, and at most 1 but for a lead-in."""
+
+
+@dataclass(frozen=True)
+class LoopTone(Tone):
+    """A sine in front of a fast loop: a real-time controller plays it, with all that holds the motion."""
+
+    program: LoopProgram | None = None
+    """What the controller is told; None for a sine that is only planned."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,3 +1,14 @@
+from ._fast_loop import (
+    LOOP_PROTOCOL as LOOP_PROTOCOL,
+    LoopBlock as LoopBlock,
+    LoopFacts as LoopFacts,
+    LoopFeedback as LoopFeedback,
+    LoopInput as LoopInput,
+    LoopProgram as LoopProgram,
+    LoopReport as LoopReport,
+    LoopRequest as LoopRequest,
+    LoopState as LoopState,
+)
 from ._plug_in import (
     PlugInKind as PlugInKind,
     plug_in as plug_in,
@@ -9,6 +20,7 @@ from ._protocols import (
     FunctionGenerator as FunctionGenerator,
     GeneratorDescription as GeneratorDescription,
     IdleOutput as IdleOutput,
+    RealTimeController as RealTimeController,
     Spacing as Spacing,
     Sweep as Sweep,
 )

@@ -13,6 +13,7 @@ class PlugInKind(StrEnum):
     GENERATOR = "vibench.generators"
     DIGITIZER = "vibench.digitizers"
     OUTPUT = "vibench.outputs"
+    CONTROLLER = "vibench.controllers"
     SENSOR = "vibench.sensors"
 
 
@@ -32,6 +33,7 @@ OURS = tuple(
         (PlugInKind.OUTPUT, "daqmx", f"{_DRIVERS}:DaqmxOutput"),
         (PlugInKind.DIGITIZER, "soundcard", f"{_DRIVERS}:SoundCardDigitizer"),
         (PlugInKind.OUTPUT, "soundcard", f"{_DRIVERS}:SoundCardOutput"),
+        (PlugInKind.CONTROLLER, "lines", f"{_DRIVERS}:LineController"),
         (PlugInKind.SENSOR, "wire", f"{_SENSORS}:wire"),
         (PlugInKind.SENSOR, "accelerometer", f"{_SENSORS}:accelerometer"),
         (PlugInKind.SENSOR, "vibrometer", f"{_SENSORS}:vibrometer"),

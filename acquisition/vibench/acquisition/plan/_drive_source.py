@@ -2,7 +2,7 @@
 
 from enum import StrEnum
 
-from ..excitation import Play, Stream, Tone, Waveform
+from ..excitation import LoopTone, Play, Stream, Tone, Waveform
 from ..instruments import Sweep
 from ..rig import OutputUse, Rig, generator_driver
 from ._measurement import Measurement
@@ -13,13 +13,15 @@ class DriveSource(StrEnum):
 
     GENERATOR = "function generator"
     OUTPUT = "analogue output"
+    CONTROLLER = "real-time controller"
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
     """Say what plays a measurement on a rig; a stream needs an output, also where there is none."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
-    return DriveSource.OUTPUT if DriveSource.OUTPUT in drive_sources else DriveSource.GENERATOR
+    others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
+    return next((each for each in others if each in drive_sources), DriveSource.GENERATOR)
 
 
 LEAST_SHARE = 1e-4
@@ -28,6 +30,8 @@ LEAST_SHARE = 1e-4
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:
     """Give the least setting of what plays a measurement, peak to peak [V]."""
+    if rig.controller is not None and drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
+        return LEAST_SHARE * 2 * rig.controller.limit_v
     output = rig.daq.output
     if output is not None and drive_source_of(measurement, rig) is DriveSource.OUTPUT:
         return LEAST_SHARE * 2 * output.limit_v / rig.generator.terminal_factor()
@@ -36,6 +40,8 @@ def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:
 
 def _source_of(play: Play, use: OutputUse) -> DriveSource:
     match play, use:
+        case (LoopTone(), _):
+            return DriveSource.CONTROLLER
         case (Stream(), _) | (Tone(), OutputUse.TONES_AND_STREAMS):
             return DriveSource.OUTPUT
         case (Tone() | Waveform() | Sweep(), _):

@@ -141,6 +141,15 @@ def _settings(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     )
     if source is DriveSource.GENERATOR:
         yield from _generating(excitation, rig)
+    if source is DriveSource.CONTROLLER and rig.controller is not None:
+        yield LimitCheck(
+            "the real-time controller's output (peak)",
+            0.5 * excitation.highest_amplitude_vpp,
+            rig.controller.limit_v,
+            "V",
+            rig.controller.source,
+            "lower amplitude_vpp",
+        )
     yield from _held_levels(measurement, rig)
     yield LimitCheck(
         "the highest frequency",

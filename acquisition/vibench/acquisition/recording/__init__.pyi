@@ -6,6 +6,9 @@ from ._disk_trouble import (
     troubled_disks as troubled_disks,
 )
 from ._feedback_note import (
+    BranchEnd as BranchEnd,
+    BranchEndNote as BranchEndNote,
+    BranchPointNote as BranchPointNote,
     DwellNote as DwellNote,
     ExcursionNote as ExcursionNote,
     FeedbackNote as FeedbackNote,

@@ -221,6 +221,46 @@ class NoiseNote(AbstractNote):
     """Of the base's acceleration; 3 of Gaussian noise."""
 
 
+class BranchEnd(StrEnum):
+    """Why a branch was left."""
+
+    RANGE = "its frequency left the range"
+    POINTS = "it has as many points as were asked for"
+    LOST = "no further point was found, however short the step"
+
+
+class BranchPointNote(AbstractNote):
+    """One motion of a branch, as a fast loop held it; amplitudes are peaks of fundamentals."""
+
+    kind: Literal["branch_point"] = "branch_point"
+    point: int
+    """From 0."""
+    frequency_hz: SixFigures
+    base_m: SixFigures
+    m0_m: SixFigures
+    phase_deg: SixFigures
+    """Of m0 over the base, as displacements."""
+    residue: SixFigures
+    """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
+    residue_acceleration: SixFigures
+    """The same of its acceleration."""
+    reference_v: SixFigures
+    """First coefficient of what the controller was told [V]."""
+    tries: int
+    multiplier: SixFigures | None = None
+    """Largest Floquet multiplier of the motion under a base that moves as it does, told from noise."""
+    multiplier_u: SixFigures | None = None
+    """Its standard uncertainty."""
+
+
+class BranchEndNote(AbstractNote):
+    """How a branch ended."""
+
+    kind: Literal["branch_end"] = "branch_end"
+    points: int
+    end: BranchEnd
+
+
 FeedbackNote: TypeAlias = (
     SettledNote
     | SegmentNote
@@ -231,9 +271,13 @@ FeedbackNote: TypeAlias = (
     | JumpNote
     | ResonanceNote
     | NoiseNote
+    | BranchPointNote
+    | BranchEndNote
 )
 _NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
-_KINDS = frozenset({"settled", "achieved", "level", "jump", "resonance", "spectrum"})
+_KINDS = frozenset(
+    {"settled", "achieved", "level", "jump", "resonance", "spectrum", "branch_point", "branch_end"}
+)
 
 
 def feedback_note(event: Event) -> FeedbackNote | None:

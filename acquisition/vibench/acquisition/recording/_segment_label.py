@@ -15,6 +15,8 @@ class SegmentLabel(StrEnum):
     SEARCH = "search"
     """A frequency that was added to localise a jump."""
     RESONANCE = "resonance"
+    BRANCH = "branch"
+    """A point of a branch that a fast loop holds."""
     CHECK = "check"
     """The small sine before the first ramp."""
     LEAD_IN = "lead_in"

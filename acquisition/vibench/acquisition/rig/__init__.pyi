@@ -11,6 +11,7 @@ from ._configuration import (
     HIGH_Z as HIGH_Z,
     AccelerometerConfig as AccelerometerConfig,
     ChannelConfig as ChannelConfig,
+    ControllerConfig as ControllerConfig,
     DaqConfig as DaqConfig,
     GeneratorConfig as GeneratorConfig,
     Rig as Rig,
@@ -21,7 +22,9 @@ from ._configuration import (
     with_faults as with_faults,
 )
 from ._drivers import (
+    ControllerDriver as ControllerDriver,
     GeneratorDriver as GeneratorDriver,
+    controller_driver as controller_driver,
     digitizer_driver as digitizer_driver,
     generator_driver as generator_driver,
     output_driver as output_driver,

@@ -255,6 +255,32 @@ class SpecimenConfig(SpecimenTable):
     """Largest displacement of a mass that the springs bear."""
 
 
+class ControllerConfig(FrozenModel):
+    """A real-time controller: sensors of base and m0 at its inputs, its output at the amplifier's input.
+
+    Its output takes the place of the generator's while it plays.
+    """
+
+    driver: str = "lines"
+    """Name of an entry point of ``vibench.controllers``."""
+    resource: str = Field(default="", pattern=r"^$|^TCPIP.*::SOCKET$")
+    """VISA resource name of its socket; empty on a virtual rig, which knows it."""
+    visa_library: str = "@py"
+    """``"@py"`` for pyvisa-py, empty for the system's VISA."""
+    options: Options = Field(default_factory=dict)
+    """What else the driver wants to know."""
+    rate_hz: float = Field(ge=1_000, le=25_600)
+    """Samples a second; 1 to 20 kHz are usual."""
+    latency_s: float = Field(ge=0, le=5e-3)
+    """From a sample to the voltage that answers it, as measured [s]."""
+    limit_v: PositiveFloat
+    """Largest output, peak [V]."""
+    watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
+    """Told nothing for so long, it ramps down by itself [s]."""
+    source: str = Field(min_length=1)
+    """Where rate, latency and limit come from."""
+
+
 class Rig(FrozenModel):
     """A whole bench as its configuration file describes it."""
 
@@ -266,6 +292,8 @@ class Rig(FrozenModel):
     accelerometer: AccelerometerConfig
     daq: DaqConfig
     specimen: SpecimenConfig
+    controller: ControllerConfig | None = None
+    """Present where a real-time controller can play in the generator's place."""
     calibration_valid_days: PositiveInt = 730
     check_valid_h: PositiveFloat = 12.0
     """How long a bench check that passed allows to arm [h]."""
@@ -281,6 +309,20 @@ class Rig(FrozenModel):
             f"virtual.grid_rate_hz = {self.virtual.grid_rate_hz:g} carries {fastest_hz:g} samples a second "
             f"at most, and daq.sample_rate_hz is {self.daq.sample_rate_hz:g}; lower that, or "
             "make the grid finer"
+        )
+
+    @model_validator(mode="after")
+    def _grid_carries_the_controller(self) -> Self:
+        if self.virtual is None or self.controller is None:
+            return self
+        steps = self.virtual.grid_rate_hz / self.controller.rate_hz
+        if steps == round(steps):
+            return self
+        raise ValueError(
+            f"controller.rate_hz = {self.controller.rate_hz:g} takes {steps:.4g} of the "
+            f"{self.virtual.grid_rate_hz:g} steps a second of the virtual rig from sample to sample; give a "
+            f"rate that takes a whole number of them, {self.virtual.grid_rate_hz / max(round(steps), 1):g} "
+            "for example"
         )
 
     @property
@@ -331,6 +373,8 @@ def _require_plug_ins(rig: Rig, path: Path) -> None:
             if channel.sensor is not None
         ),
     ]
+    if rig.controller is not None:
+        asked.append(("controller.driver", PlugInKind.CONTROLLER, rig.controller.driver))
     if rig.daq.output is not None:
         asked.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
     for key, kind, name in asked:

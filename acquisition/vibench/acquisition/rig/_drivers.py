@@ -8,9 +8,10 @@ from ..instruments import (
     FunctionGenerator,
     GeneratorDescription,
     PlugInKind,
+    RealTimeController,
     plug_in,
 )
-from ._configuration import GeneratorConfig, Rig
+from ._configuration import ControllerConfig, GeneratorConfig, Rig
 from ._output import OutputConfig
 
 
@@ -52,6 +53,18 @@ class OutputDriver(Protocol):
             What the digitizer's driver of the same name has opened; both start together.
 
         """
+
+
+class ControllerDriver(Protocol):
+    """What an entry point of ``vibench.controllers`` is."""
+
+    def open(self, config: ControllerConfig) -> RealTimeController:
+        """Connect to a controller, silent; raises InstrumentError where none answers, or another one."""
+
+
+def controller_driver(config: ControllerConfig) -> ControllerDriver:
+    """Find the driver of a real-time controller; raises ConfigurationError where none is installed."""
+    return cast("ControllerDriver", plug_in(PlugInKind.CONTROLLER, config.driver))
 
 
 def generator_driver(config: GeneratorConfig) -> GeneratorDriver:

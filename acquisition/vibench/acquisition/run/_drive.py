@@ -6,8 +6,10 @@ from typing import Protocol
 from ..bench import RunBench
 from ..errors import ConfigurationError
 from ..excitation import Tone
+from ..instruments import LoopBlock
 from ..plan import DriveSource, Measurement, Phase, drive_source_of, known_phases
 from ._generator_drive import DeadMan, GeneratorDrive
+from ._loop_drive import LoopDrive
 from ._stream_drive import StreamDrive
 
 
@@ -25,6 +27,10 @@ class Drive(Protocol):
     @property
     def pause_s(self) -> float:
         """Silence between saying what comes after all that was told, and hearing it [s]."""
+
+    @property
+    def coefficients(self) -> tuple[LoopBlock, ...]:
+        """What a real-time controller has measured since the phase began; nothing of other drives."""
 
     @property
     def is_commanded(self) -> bool:
@@ -66,17 +72,26 @@ def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
 
     Raises ConfigurationError when it needs an analogue output and the bench has none.
     """
-    match drive_source_of(measurement, bench.rig), bench.output:
-        case DriveSource.GENERATOR, _:
-            return GeneratorDrive(bench.generator, measurement, _dead_man(bench, measurement))
+    source = drive_source_of(measurement, bench.rig)
+    match source, bench.output, bench.controller:
+        case DriveSource.CONTROLLER, _, None:
+            raise ConfigurationError(
+                f"{measurement.name} needs a real-time controller, and this bench has none. Nothing was "
+                "played; add [controller] to the hardware configuration"
+            )
+        case DriveSource.CONTROLLER, _, controller if controller is not None:
+            return LoopDrive(controller, measurement)
+    match source, bench.output:
         case DriveSource.OUTPUT, None:
             raise ConfigurationError(
                 "streamed noise needs an analogue output, and this bench has none: its function generator "
                 "repeats one waveform. Nothing was played; add [daq.output] to the hardware configuration, "
                 "or use multisine_noise with more realisations"
             )
-        case DriveSource.OUTPUT, output:
+        case DriveSource.OUTPUT, output if output is not None:
             return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())
+        case _:
+            return GeneratorDrive(bench.generator, measurement, _dead_man(bench, measurement))
 
 
 def _dead_man(bench: RunBench, measurement: Measurement) -> DeadMan | None:

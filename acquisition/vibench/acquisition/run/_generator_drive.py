@@ -63,6 +63,7 @@ class GeneratorDrive:
 
     drive_source = DriveSource.GENERATOR
     is_commanded = True
+    coefficients = ()
     pause_s = 0.0
     """A generator need not know what is coming."""
 

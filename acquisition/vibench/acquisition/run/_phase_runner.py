@@ -6,7 +6,7 @@ from enum import Enum, auto
 
 from ..errors import DriveLate
 from ..excitation import Play, Tone
-from ..instruments import Block, Sweep
+from ..instruments import Block, LoopBlock, Sweep
 from ..plan import Phase, RunState
 from ..recording import HOLD_ROOM_S, EventKind
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
@@ -93,6 +93,11 @@ class PhaseRunner:
         self._late_steps = 0
         self._lost_cycles = 0.0
         self._glided_hz = 0.0
+
+    @property
+    def coefficients(self) -> tuple[LoopBlock, ...]:
+        """What a real-time controller has measured since the last phase began."""
+        return self._drive.coefficients
 
     def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
         """Play a phase; its samples go ``into`` a list as well, if one is given.

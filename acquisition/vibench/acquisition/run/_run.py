@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from ..bench import RunBench
@@ -318,6 +319,6 @@ def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[P
             blocks: list[Block] = []
             if action.phase is not None:
                 yield from runner.run_phase(action.phase, blocks)
-            action = controller.send(phase_samples(blocks))
+            action = controller.send(replace(phase_samples(blocks), coefficients=runner.coefficients))
     except StopIteration:
         pass

@@ -152,6 +152,7 @@ class StreamDrive:
     """
 
     drive_source = DriveSource.OUTPUT
+    coefficients = ()
     is_commanded = False
     can_hold = False
 

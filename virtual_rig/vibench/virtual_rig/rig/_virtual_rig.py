@@ -1,6 +1,6 @@
 """The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from enum import Enum, auto
 from pathlib import Path
@@ -8,9 +8,11 @@ from types import MappingProxyType, TracebackType
 from typing import Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
+from vibench.acquisition.instruments import LoopFacts
 from vibench.acquisition.recording import DiskTrouble, troubled_disks
 from vibench.acquisition.rig import Rig, VirtualConfig
 
+from ..controller import VirtualController
 from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue_with, serve, token_for
 from ..generator import AFG1022, Keysight33500B, Panel, Quirks, ScpiSocket, Terminal
 from ..usb import UsbTmcInstrument, plug_in, unplug, usb_service
@@ -88,7 +90,9 @@ class VirtualRig:
             terminal=_terminal(rig, virtual),
         )
         """What is behind the USB cable."""
-        self.world = World(rig, self.generator)
+        self.controller = _controller(rig, virtual, lambda: self.world.time_s)
+        """What closes a fast loop; None where the rig has none."""
+        self.world = World(rig, self.generator, loop=self.controller)
         """What is behind the terminals."""
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self._running: _Running | None = None
@@ -107,6 +111,12 @@ class VirtualRig:
     def socket_resource(self) -> str:
         """VISA name of the generator for programs that cannot use the USB bus in memory."""
         return self._switched_on.socket.resource_name
+
+    @property
+    def controller_resource(self) -> str:
+        """VISA name of the real-time controller's socket; empty without one."""
+        socket = self._switched_on.controller
+        return "" if socket is None else socket.resource_name
 
     @property
     def faults(self) -> RigFaults:
@@ -132,11 +142,14 @@ class VirtualRig:
             starting.callback(unplug, self._usb)
             daq = starting.enter_context(self._serve())
             socket = starting.enter_context(self._socket())
+            controller = (
+                None if self.controller is None else starting.enter_context(ScpiSocket(self.controller))
+            )
             disk = DiskTrouble(lambda: self.let_pass(REFUSED_S))
             starting.enter_context(troubled_disks(disk))
             play = FaultPlay(self.world, RigFaults(self.world, self.generator, self._usb, daq, disk))
             play.begin(self._script)
-            self._running = _Running(daq, socket, play, starting.pop_all())
+            self._running = _Running(daq, socket, controller, play, starting.pop_all())
         return self
 
     def __exit__(
@@ -177,11 +190,34 @@ class VirtualRig:
 class _Running:
     """What exists only while the rig is switched on."""
 
-    def __init__(self, daq: DaqServer, socket: ScpiSocket, play: FaultPlay, closing: ExitStack) -> None:
+    def __init__(
+        self,
+        daq: DaqServer,
+        socket: ScpiSocket,
+        controller: ScpiSocket | None,
+        play: FaultPlay,
+        closing: ExitStack,
+    ) -> None:
         self.daq = daq
         self.socket = socket
+        self.controller = controller
         self.play = play
         self.closing = closing
+
+
+def _controller(rig: Rig, virtual: VirtualConfig, clock: Callable[[], float]) -> VirtualController | None:
+    told = rig.controller
+    if told is None:
+        return None
+    facts = LoopFacts(
+        name="simulated controller",
+        serial="virtual",
+        rate_hz=told.rate_hz,
+        latency_s=told.latency_s,
+        limit_v=told.limit_v,
+        watchdog_s=told.watchdog_s,
+    )
+    return VirtualController(facts, clock, virtual.grid_rate_hz, virtual.seed)
 
 
 def _pace(virtual: VirtualConfig) -> Pace:

@@ -23,12 +23,13 @@ from vibench.acquisition.rig import (
 from vibench.sim import Specimen
 from vibench.sim.shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
 
-from ..analogue import Input
+from ..analogue import FastLoop, Input
 from ._analogue_output import AnalogueOutput
 from ._conversion import Conversion, converter_input
 from ._decimation import history_steps
 from ._disturbance import Disturbance, RandomDropouts
 from ._input_stage import InputStage
+from ._loop_cables import LoopCables
 from ._noise import NoiseStream
 from ._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
 from ._time_grid import PPM, USUAL_GRID, TimeGrid
@@ -83,8 +84,14 @@ class World:
     `time_s` never waits, so an instrument may ask for it while it is being rendered.
     """
 
-    def __init__(self, rig: Rig, terminal: TerminalVoltage, specimen: Specimen | None = None) -> None:
-        """``specimen`` defaults to the one the rig describes."""
+    def __init__(
+        self,
+        rig: Rig,
+        terminal: TerminalVoltage,
+        specimen: Specimen | None = None,
+        loop: FastLoop | None = None,
+    ) -> None:
+        """``specimen`` defaults to the one the rig describes; ``loop``: a controller beside the generator."""
         virtual = virtual_section(rig)
         self._grid = grid = TimeGrid(virtual.grid_rate_hz)
         noise = partial(NoiseStream, virtual.seed)
@@ -111,6 +118,7 @@ class World:
         self._cables = dict(self._plan)
         self._amplifier_input = amplifier_input(rig)
         self._outputs: dict[str, AnalogueOutput] = {}
+        self._loop = None if loop is None else LoopCables(loop)
         self._conversions: list[Conversion] = []
         self._history = np.zeros((len(Signal), _history_steps(grid)))
         self._schedule = EventSchedule(grid)
@@ -269,16 +277,28 @@ class World:
             if channel == self._amplifier_input:
                 drive += played
         noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
-        motion = self._moved(drive, noise)
         signals = np.empty((len(Signal), steps))
-        signals[Signal.DRIVE] = drive
-        signals[Signal.AMPLIFIER] = motion.amplifier_voltage
-        signals[Signal.BASE_ACCELERATION] = self._accelerometer.show(motion.base_acceleration, first)
-        signals[Signal.M0_VELOCITY] = self.vibrometer.show(motion.m0_velocity, first)
+        loop = self._loop if self._loop is not None and self._loop.is_on else None
+        begin = 0
+        while begin < steps:
+            end = steps if loop is None else min(begin + loop.until_sample(first + begin), steps)
+            if loop is not None:
+                drive[begin:end] += loop.played(first + begin, end - begin)
+            self._show(drive[begin:end], noise[begin:end], first + begin, signals[:, begin:end])
+            if loop is not None:
+                loop.take(signals[:, begin:end])
+            begin = end
         self._step = first + steps
         self._remember(signals)
         for conversion in self._conversions:
             conversion.take(signals, first)
+
+    def _show(self, drive: FloatArray, noise: FloatArray, first: int, signals: FloatArray) -> None:
+        motion = self._moved(drive, noise)
+        signals[Signal.DRIVE] = drive
+        signals[Signal.AMPLIFIER] = motion.amplifier_voltage
+        signals[Signal.BASE_ACCELERATION] = self._accelerometer.show(motion.base_acceleration, first)
+        signals[Signal.M0_VELOCITY] = self.vibrometer.show(motion.m0_velocity, first)
 
     def _moved(self, drive: FloatArray, noise: FloatArray) -> ShakenMotion:
         try:

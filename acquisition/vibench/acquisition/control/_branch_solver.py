@@ -1,0 +1,172 @@
+"""A branch as equations: what is played, what of the base is wrong, how the one follows from the other."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+Coefficients = NDArray[np.complex128]
+
+_LEARNT = 1e-4
+"""A change shorter than this tells nothing but noise."""
+_REFERENCE_STEP = 0.15
+"""Change of the first coefficient, over itself, that counts as one step."""
+_RATIO_STEP = 1.0
+"""Change of m0 over the base that counts as one step."""
+_RATIO = 2
+"""Rows of m0 over the base, behind what is wrong of the base."""
+_NEW = 0.3
+"""Part of a step that must have been gone for a point to be a new one."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopSetting:
+    """What a controller is told: the unknowns of the equations."""
+
+    frequency_hz: float
+    reference_v: Coefficients
+    """From the first harmonic on, shape (harmonics,); the first is real, which anchors the phase [V]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A setting and what it made of base and m0, as numbers of the equations."""
+
+    unknowns: Vector
+    residual: Vector
+    """What of the base is wrong, over its level."""
+    ratio: complex
+    """Fundamental of m0 over that of the base."""
+
+    @property
+    def place(self) -> Vector:
+        """Where it lies in the space in which the branch is an arc: frequency and ratio, in steps."""
+        return np.array([self.unknowns[0], self.ratio.real / _RATIO_STEP, self.ratio.imag / _RATIO_STEP])
+
+
+@dataclass(frozen=True, eq=False)
+class Foreseen:
+    """Where the next point should lie, and the way there."""
+
+    unknowns: Vector
+    place: Vector
+    along: Vector
+    """Of length one."""
+    length: float
+
+
+class BranchSolver:
+    """Newton's method whose derivative is learnt (Broyden, Math. Comp. 19 (1965) 577), along an arc.
+
+    The equations: the base's fundamental has its amplitude, each harmonic is zero; all over that amplitude.
+    Unknowns are frequency and coefficients, so that there is one more than equations. The arc runs through
+    frequency and ratio of m0 to base: at a fold of a light damping the coefficients hardly change, and m0
+    turns by half a turn.
+
+    Parameters
+    ----------
+    start
+        Where the branch begins.
+    gains
+        Base displacement over volts at each harmonic there, by the model [m/V], shape (harmonics,).
+    bend
+        Relative change of the first gain's magnitude by the frequency, by the model [1/Hz].
+    level_m
+        Amplitude of the base's displacement, at the start.
+    step_hz
+        A step of one.
+
+    """
+
+    def __init__(
+        self, start: LoopSetting, gains: Coefficients, bend: float, level_m: float, step_hz: float
+    ) -> None:
+        self._step_hz = step_hz
+        self._volts = level_m / np.abs(gains)
+        size = 2 * len(gains) - 1
+        self._slope = np.zeros((size + _RATIO, size + 1))
+        self._slope[0, :2] = bend * step_hz, _REFERENCE_STEP
+        for k in range(1, len(gains)):
+            turn = gains[k] / abs(gains[k])
+            rows, columns = slice(2 * k - 1, 2 * k + 1), slice(2 * k, 2 * k + 2)
+            self._slope[rows, columns] = [[turn.real, -turn.imag], [turn.imag, turn.real]]
+        self._last: Seen | None = None
+        self._begin = self._packed(start)
+
+    def first(self) -> Foreseen:
+        """Give the start, whose frequency stays."""
+        along = np.array([1.0, 0.0, 0.0])
+        return Foreseen(self._begin, along * self._begin[0], along, 0.0)
+
+    def next(self, points: tuple[Seen, ...], length: float, way: float) -> Foreseen:
+        """Go on from the last point by ``length``, from the first one up (1) or down (-1) in frequency."""
+        here = points[-1]
+        if len(points) == 1:
+            along = np.array([way, 0.0, 0.0])
+            level = -self._slope[0, 0] / self._slope[0, 1]
+            moved = np.concatenate([[way, way * level], np.zeros(len(here.unknowns) - 2)])
+        else:
+            chord = here.place - points[-2].place
+            along = chord / np.linalg.norm(chord)
+            moved = (here.unknowns - points[-2].unknowns) / np.linalg.norm(chord)
+        return Foreseen(here.unknowns + length * moved, here.place + length * along, along, length)
+
+    def setting(self, unknowns: Vector) -> LoopSetting:
+        """Give what is played."""
+        volts = np.exp(_REFERENCE_STEP * unknowns[1]) * self._volts[0]
+        rest = (unknowns[2::2] + 1j * unknowns[3::2]) * self._volts[1:]
+        return LoopSetting(
+            float(unknowns[0]) * self._step_hz, np.concatenate([[volts], rest]).astype(np.complex128)
+        )
+
+    def learn(self, seen: Seen) -> None:
+        """Take what was measured into the derivative."""
+        if self._last is not None:
+            moved = seen.unknowns - self._last.unknowns
+            changed = _outputs(seen) - _outputs(self._last)
+            length = float(moved @ moved)
+            if length > _LEARNT**2:
+                self._slope += np.outer(changed - self._slope @ moved, moved) / length
+        self._last = seen
+
+    def corrected(self, seen: Seen, foreseen: Foreseen) -> Vector:
+        """Give the next try: nearer to the branch, in the plane across the arc through what was foreseen."""
+        along = foreseen.along
+        row = along[1:] @ self._slope[-_RATIO:]
+        row[0] += along[0]
+        table = np.vstack([self._slope[:-_RATIO], row])
+        wanted = -np.append(seen.residual, along @ (seen.place - foreseen.place))
+        step = np.linalg.lstsq(table, wanted, rcond=1e-3)[0]
+        length = float(np.hypot(*step[:2]))
+        return np.asarray(seen.unknowns + step * min(1.0, 1.0 / max(length, 1e-12)))
+
+    def _packed(self, setting: LoopSetting) -> Vector:
+        rest = setting.reference_v[1:] / self._volts[1:]
+        parts = np.column_stack([rest.real, rest.imag]).ravel()
+        first = np.log(setting.reference_v[0].real / self._volts[0]) / _REFERENCE_STEP
+        return np.concatenate([[setting.frequency_hz / self._step_hz, first], parts])
+
+
+def is_new(seen: Seen, foreseen: Foreseen) -> bool:
+    """Whether enough of the way was gone, and not back."""
+    return bool(foreseen.along @ (foreseen.place - seen.place) <= (1 - _NEW) * foreseen.length)
+
+
+def residual_of(base_m: Coefficients, level_m: float) -> Vector:
+    """Give what of the base is wrong, over its level: amplitude of the fundamental, then each harmonic.
+
+    Parameters
+    ----------
+    base_m
+        Displacement of the base from the first harmonic on, phases against the first coefficient [m].
+    level_m
+        What it should be [m].
+
+    """
+    rest = base_m[1:] / level_m
+    return np.concatenate([[abs(base_m[0]) / level_m - 1.0], np.column_stack([rest.real, rest.imag]).ravel()])
+
+
+def _outputs(seen: Seen) -> Vector:
+    return np.append(seen.residual, seen.place[1:])

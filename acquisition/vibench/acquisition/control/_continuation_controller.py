@@ -1,0 +1,207 @@
+"""Following a branch with a fast loop: predicted along the arc, corrected until the base is a sine."""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from math import degrees, pi
+
+import numpy as np
+
+from ..excitation import BranchContinuation, LoopTone, Segment
+from ..instruments import LoopBlock, LoopProgram
+from ..plan import HUSH_S, Phase, RunState, ramp
+from ..recording import BranchEnd, BranchEndNote, BranchPointNote
+from ._branch_solver import BranchSolver, Foreseen, LoopSetting, Seen, Vector, is_new, residual_of
+from ._closed_loop_check import require_answer
+from ._control_action import ControlAction, Controller, PhaseSamples
+from ._fast_loop import Coefficients, FastLoop, fast_loop
+from ._sine_loop import SineLoop
+
+_BLOCK_PERIODS = 10
+_GLIDE_S = 0.1
+_MOST_TRIES = 8
+_FIRST_TRIES = 30
+"""Of the first point, which the model without stops may be far from."""
+_SHORTEST_STEP = 1 / 64
+"""Of the plan's step."""
+_GROWTH, _EASY = 1.5, 3
+"""A step grows by this factor where a point took so many tries or fewer."""
+_MOST_LOOKS = 6
+"""Looks at one setting until two in a row agree."""
+_CLOSER, _CLOSE = 0.3, 0.7
+"""Parts of the tolerance that a point must keep when it is found: at a fold the branch turns with the level."""
+_BEND_HZ = 0.05
+_HIGHEST = 9
+"""Harmonic that is looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopLook:
+    """What base and m0 did under a setting."""
+
+    base_m: Coefficients
+    """From the first harmonic on."""
+    m0_m: Coefficients
+    spread: float
+    """Between the blocks it is the mean of, over the fundamental of the base."""
+
+
+class BranchPlayer:
+    """Plays settings, and looks at what they make of base and m0."""
+
+    def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
+        self.plan = plan
+        self.fast = fast
+        self._loop = loop
+        self._feedback = fast.feedback
+
+    def tone(self, setting: LoopSetting, dither_v: float = 0.0) -> LoopTone:
+        """Give what the controller is told."""
+        program = LoopProgram(
+            frequency_hz=setting.frequency_hz,
+            reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
+            feedback=self._feedback,
+            glide_s=_GLIDE_S,
+            dither_v=dither_v,
+            block_periods=_BLOCK_PERIODS,
+            harmonics=max(_HIGHEST, self.plan.harmonics),
+        )
+        level = 2 * abs(setting.reference_v[0]) / self._loop.most_vpp
+        return LoopTone(setting.frequency_hz, min(float(level), 1.0), program)
+
+    def looked(self, setting: LoopSetting) -> Generator[ControlAction, PhaseSamples, LoopLook]:
+        """Play a setting until two looks in a row agree."""
+        tone = self.tone(setting)
+        look_s = self.plan.look_periods / setting.frequency_hz
+        samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
+        look = self._look(samples.coefficients, setting)
+        for _ in range(_MOST_LOOKS - 1):
+            if look.spread <= 0.5 * self.plan.tolerance:
+                break
+            samples = yield from self.run(Phase(RunState.SETTLING, tone, look_s))
+            look = self._look(samples.coefficients, setting)
+        acceleration = abs(look.base_m[0]) * (2 * pi * setting.frequency_hz) ** 2
+        require_answer(
+            self.fast.rig, setting.frequency_hz, 2 * abs(setting.reference_v[0]) * 0.1, acceleration
+        )
+        return look
+
+    def recorded(
+        self, setting: LoopSetting, segment: Segment
+    ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
+        """Record a setting that has been played."""
+        tone = self.tone(setting)
+        samples = yield from self.run(Phase(RunState.RECORDING, tone, self.plan.record_s, segment))
+        return self._look(samples.coefficients, setting)
+
+    def run(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
+        """Have a phase played, with what is to be noted."""
+        return (yield from self._loop.run_phase(phase))
+
+    def _look(self, blocks: tuple[LoopBlock, ...], setting: LoopSetting) -> LoopLook:
+        count = max(2, self.plan.look_periods // _BLOCK_PERIODS)
+        steady = [block for block in blocks if block.steady][-count:]
+        if not steady:
+            steady = list(blocks[-1:])
+        base, m0 = self.fast.motions(steady, setting.frequency_hz)
+        seen = np.column_stack([base[:, 0], m0[:, 0]])
+        spread = np.ptp(seen.real, axis=0).sum() + np.ptp(seen.imag, axis=0).sum()
+        scale = np.abs(seen.mean(axis=0)).max()
+        return LoopLook(base.mean(axis=0), m0.mean(axis=0), float(spread / scale))
+
+
+def follow_branch(loop: SineLoop, plan: BranchContinuation) -> Controller[None]:
+    """Begin from rest, follow the branch until it ends or leaves its range, ramp down."""
+    fast = fast_loop(loop.rig)
+    player = BranchPlayer(loop, plan, fast)
+    start_m = _level_m(plan, plan.start_hz)
+    gains = fast.gains(plan.start_hz, plan.harmonics)
+    beside = abs(fast.gains(plan.start_hz + _BEND_HZ, 1)[0])
+    first = np.zeros(plan.harmonics, dtype=np.complex128)
+    first[0] = start_m / abs(gains[0])
+    start = LoopSetting(plan.start_hz, first)
+    bend = float(np.log(beside / abs(gains[0]))) / _BEND_HZ
+    solver = BranchSolver(start, gains, bend, start_m, plan.step_hz)
+    yield from player.run(Phase(RunState.ARMED, None, HUSH_S))
+    tone = player.tone(start)
+    yield from player.run(ramp(RunState.RAMPING_UP, tone, loop.measurement))
+    points, end = yield from _followed(loop, player, solver)
+    loop.note(BranchEndNote(points=points, end=end))
+    yield from player.run(ramp(RunState.RAMPING_DOWN, tone, loop.measurement))
+    yield from loop.say()
+
+
+def _followed(
+    loop: SineLoop, player: BranchPlayer, solver: BranchSolver
+) -> Controller[tuple[int, BranchEnd]]:
+    plan = player.plan
+    way = 1.0 if plan.begin == "up" else -1.0
+    points: tuple[Seen, ...] = ()
+    number, length = 0, 1.0
+    found = yield from _corrected(player, solver, solver.first(), _FIRST_TRIES)
+    while True:
+        if found is None:
+            length *= 0.5
+            if length < _SHORTEST_STEP or not points:
+                return number, BranchEnd.LOST
+            yield from player.looked(solver.setting(points[-1].unknowns))
+        else:
+            seen, tries = found
+            setting = solver.setting(seen.unknowns)
+            if points and not plan.low_hz <= setting.frequency_hz <= plan.high_hz:
+                return number, BranchEnd.RANGE
+            points = (*points[-1:], seen)
+            yield from _recorded(loop, player, setting, number, tries)
+            number += 1
+            if number == plan.most_points:
+                return number, BranchEnd.POINTS
+            if tries <= _EASY:
+                length = min(length * _GROWTH, 1.0)
+        found = yield from _corrected(player, solver, solver.next(points, length, way))
+
+
+def _corrected(
+    player: BranchPlayer, solver: BranchSolver, foreseen: Foreseen, most: int = _MOST_TRIES
+) -> Controller[tuple[Seen, int] | None]:
+    """Find the point of the branch beside a foreseen one; gives it and how many settings were tried."""
+    plan, unknowns = player.plan, foreseen.unknowns
+    for tries in range(1, most + 1):
+        setting = solver.setting(unknowns)
+        look = yield from player.looked(setting)
+        residual = residual_of(look.base_m[: plan.harmonics], _level_m(plan, setting.frequency_hz))
+        seen = Seen(unknowns, residual, complex(look.m0_m[0] / look.base_m[0]))
+        solver.learn(seen)
+        if _is_sine(residual, plan.tolerance) and is_new(seen, foreseen):
+            return seen, tries
+        unknowns = solver.corrected(seen, foreseen)
+    return None
+
+
+def _recorded(
+    loop: SineLoop, player: BranchPlayer, setting: LoopSetting, number: int, tries: int
+) -> Controller[None]:
+    look = yield from player.recorded(setting, player.plan.segment(number, setting.frequency_hz))
+    orders = np.arange(2, len(look.base_m) + 1)
+    share = np.abs(look.base_m[1:] / look.base_m[0])
+    loop.note(
+        BranchPointNote(
+            point=number,
+            frequency_hz=setting.frequency_hz,
+            base_m=float(abs(look.base_m[0])),
+            m0_m=float(abs(look.m0_m[0])),
+            phase_deg=degrees(float(np.angle(look.m0_m[0] / look.base_m[0]))),
+            residue=float(np.linalg.norm(share)),
+            residue_acceleration=float(np.linalg.norm(share * orders**2)),
+            reference_v=float(abs(setting.reference_v[0])),
+            tries=tries,
+        )
+    )
+
+
+def _is_sine(residual: Vector, tolerance: float) -> bool:
+    """Whether the base moves as it should: its fundamental, and each harmonic."""
+    harmonics = np.hypot(residual[1::2], residual[2::2])
+    return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
+
+
+def _level_m(plan: BranchContinuation, frequency_hz: float) -> float:
+    return plan.base_level.acceleration_at(frequency_hz) / (2 * pi * frequency_hz) ** 2

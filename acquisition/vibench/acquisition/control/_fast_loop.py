@@ -1,0 +1,87 @@
+"""The law of a fast loop for a rig, and what its coefficients mean: volts there, motions here."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.sim.feedback import LinearLaw, LoopTiming, SampledPlant, designed_law, loop_transfer
+
+from ..errors import ConfigurationError
+from ..instruments import LoopBlock, LoopFeedback
+from ..rig import ControllerConfig, Rig, amplifier_of, shaker_of, specimen_of
+
+Coefficients = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class FastLoop:
+    """The plant of a rig as its configuration describes it, and the law that was designed from it."""
+
+    rig: Rig
+    plant: SampledPlant
+    law: LinearLaw
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples a second."""
+        return self.plant.timing.rate_hz
+
+    @property
+    def feedback(self) -> LoopFeedback:
+        """The law as a controller takes it: of volts."""
+        units = np.array(_units_per_volt(self.rig))
+        return LoopFeedback(
+            step=_rows(self.law.step),
+            inlet=_rows(self.law.inlet * units),
+            output=_rows(self.law.output)[0],
+            direct=_rows(self.law.direct * units)[0],
+        )
+
+    def gains(self, frequency_hz: float, harmonics: int) -> Coefficients:
+        """Give base displacement over volts at each harmonic, by the model [m/V], shape (harmonics,)."""
+        orders = range(1, harmonics + 1)
+        return np.array([loop_transfer(self.plant, self.law, k * frequency_hz) for k in orders])
+
+    def motions(self, blocks: Sequence[LoopBlock], frequency_hz: float) -> tuple[Coefficients, Coefficients]:
+        """Displacements of base and m0 in each block, from the first harmonic on [m], shape (blocks, orders).
+
+        A sample is the mean since the one before: half a step late, and a little small.
+        """
+        orders = np.arange(1, len(blocks[0].base))
+        turning = 2j * pi * frequency_hz * orders
+        late = np.exp(0.5 * turning / self.rate_hz) / np.sinc(frequency_hz * orders / self.rate_hz)
+        per_base, per_m0 = _units_per_volt(self.rig)
+        base = np.array([[complex(*pair) for pair in block.base[1:]] for block in blocks])
+        m0 = np.array([[complex(*pair) for pair in block.m0[1:]] for block in blocks])
+        delay = np.exp(turning * self.rig.vibrometer.delay_s)
+        return per_base * base * late / turning**2, per_m0 * m0 * late * delay / turning
+
+
+def fast_loop(rig: Rig) -> FastLoop:
+    """Design the law of a rig's controller; raises ConfigurationError where it has none."""
+    plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), loop_timing(rig))
+    return FastLoop(rig, plant, designed_law(plant))
+
+
+def loop_timing(rig: Rig) -> LoopTiming:
+    """Give rate and latency of a rig's controller; raises ConfigurationError where it has none."""
+    match rig.controller:
+        case ControllerConfig(rate_hz=rate_hz, latency_s=latency_s):
+            return LoopTiming(rate_hz, latency_s)
+        case _:
+            raise ConfigurationError(
+                "a branch is followed by a real-time controller, and this bench has none. Nothing was "
+                "played; add [controller] to the hardware configuration"
+            )
+
+
+def _units_per_volt(rig: Rig) -> tuple[float, float]:
+    """Give base acceleration and m0 velocity per volt of their sensors [m/s2 per V, m/s per V]."""
+    return 1 / rig.accelerometer.sensitivity_v_per_m_per_s2, rig.vibrometer.range_mm_per_s_per_v * 1e-3
+
+
+def _rows(table: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(map(float, row)) for row in table)

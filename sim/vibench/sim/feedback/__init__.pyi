@@ -1,0 +1,13 @@
+from ._law import (
+    LawWeights as LawWeights,
+    LinearLaw as LinearLaw,
+    designed_law as designed_law,
+)
+from ._loop import (
+    loop_multipliers as loop_multipliers,
+    loop_transfer as loop_transfer,
+)
+from ._plant import (
+    LoopTiming as LoopTiming,
+    SampledPlant as SampledPlant,
+)

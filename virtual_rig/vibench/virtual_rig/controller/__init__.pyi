@@ -1,0 +1,3 @@
+from ._virtual_controller import (
+    VirtualController as VirtualController,
+)
