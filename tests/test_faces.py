@@ -34,6 +34,7 @@ FOR_PEOPLE = (
 )
 FOR_OUR_PROGRAMS = (
     "vibench.acquisition.first_day",
+    "vibench.sim.feedback",
     "vibench.sim.kernels",
     "vibench.sim.shaker",
     "vibench.sim.hdf5_files",

@@ -339,6 +339,7 @@ class LoopbackBench:
         self.generator = LoopbackGenerator(self.world)
         self.digitizer = LoopbackDigitizer(self.world, self.channels)
         self.output = None
+        self.controller = None
         self.identities = {"generator": self.generator.identity, "digitizer": self.digitizer.identity}
         self.confirmations = KnobSheet(operator="test", confirmed=datetime.now(UTC), knobs=rig.knobs)
         self.last_check = None

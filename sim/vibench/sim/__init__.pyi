@@ -73,6 +73,7 @@ from .periodic import (
     PhaseReference as PhaseReference,
     PowerSpring as PowerSpring,
     RestoringForce as RestoringForce,
+    ShootingEnd as ShootingEnd,
     first_order_states as first_order_states,
     periodic_branch as periodic_branch,
     periodic_branch_within as periodic_branch_within,

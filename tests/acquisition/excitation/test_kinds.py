@@ -9,6 +9,7 @@ from vibench.acquisition.excitation import (
     EXCITATION_KINDS,
     Approach,
     BaseLevel,
+    BranchContinuation,
     Direction,
     Dwell,
     Excitation,
@@ -54,6 +55,7 @@ EXAMPLES = (
     HeldNoise(
         amplitude_vpp=1, realisations=2, spectrum=(SpectrumPoint(frequency_hz=20, density=0.01),), **BAND
     ),
+    BranchContinuation(amplitude_vpp=1, base_level=HELD, start_hz=94, low_hz=90, high_hz=118),
 )
 by_kind = {each.kind: each for each in EXAMPLES}
 every_kind = pytest.mark.parametrize("excitation", EXAMPLES, ids=list(by_kind))
@@ -99,6 +101,7 @@ def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
         ("held_dwell", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
         ("resonance_tracking", HeldAcceleration(0.6)),
         ("held_noise", RmsSetting()),
+        ("branch_continuation", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
     ],
 )
 def test_a_kind_says_what_decides_the_motion_of_the_base(kind, level):

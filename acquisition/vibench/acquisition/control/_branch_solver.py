@@ -54,6 +54,7 @@ class Foreseen:
     along: Vector
     """Of length one."""
     length: float
+    """0 at the first point."""
 
 
 class BranchSolver:
@@ -130,6 +131,12 @@ class BranchSolver:
                 self._slope += np.outer(changed - self._slope @ moved, moved) / length
         self._last = seen
 
+    def probe(self, column: int, here: Seen, beside: Seen) -> None:
+        """Take what one unknown does, alone, from two looks."""
+        moved = beside.unknowns[column] - here.unknowns[column]
+        self._slope[:, column] = (_outputs(beside) - _outputs(here)) / moved
+        self._last = beside
+
     def corrected(self, seen: Seen, foreseen: Foreseen) -> Vector:
         """Give the next try: nearer to the branch, in the plane across the arc through what was foreseen."""
         along = foreseen.along
@@ -150,7 +157,8 @@ class BranchSolver:
 
 def is_new(seen: Seen, foreseen: Foreseen) -> bool:
     """Whether enough of the way was gone, and not back."""
-    return bool(foreseen.along @ (foreseen.place - seen.place) <= (1 - _NEW) * foreseen.length)
+    short = float(foreseen.along @ (foreseen.place - seen.place))
+    return foreseen.length == 0.0 or short <= (1 - _NEW) * foreseen.length
 
 
 def residual_of(base_m: Coefficients, level_m: float) -> Vector:

@@ -10,7 +10,15 @@ from ..excitation import BranchContinuation, LoopTone, Segment
 from ..instruments import LoopBlock, LoopProgram
 from ..plan import HUSH_S, Phase, RunState, ramp
 from ..recording import BranchEnd, BranchEndNote, BranchPointNote
-from ._branch_solver import BranchSolver, Foreseen, LoopSetting, Seen, Vector, is_new, residual_of
+from ._branch_solver import (
+    BranchSolver,
+    Foreseen,
+    LoopSetting,
+    Seen,
+    Vector,
+    is_new,
+    residual_of,
+)
 from ._closed_loop_check import require_answer
 from ._control_action import ControlAction, Controller, PhaseSamples
 from ._fast_loop import Coefficients, FastLoop, fast_loop
@@ -26,9 +34,15 @@ _SHORTEST_STEP = 1 / 64
 _GROWTH, _EASY = 1.5, 3
 """A step grows by this factor where a point took so many tries or fewer."""
 _MOST_LOOKS = 6
-"""Looks at one setting until two in a row agree."""
+_AGREED = 0.25
+"""Looks at one setting until its blocks agree to this part of the tolerance."""
+_PROBES = (-0.05, -0.05)
+"""Changes of frequency and first coefficient by which both are probed, in steps."""
+_BELOW, _INSIDE = 5.0, 0.15
+"""Steps of the first coefficient below the model's from which it is raised; least part of a bracket that is
+cut off."""
 _CLOSER, _CLOSE = 0.3, 0.7
-"""Parts of the tolerance that a point must keep when it is found: at a fold the branch turns with the level."""
+"""Parts of the tolerance that a point must keep when it is found: a fold moves with the level."""
 _BEND_HZ = 0.05
 _HIGHEST = 9
 """Harmonic that is looked at."""
@@ -75,7 +89,7 @@ class BranchPlayer:
         samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
         look = self._look(samples.coefficients, setting)
         for _ in range(_MOST_LOOKS - 1):
-            if look.spread <= 0.5 * self.plan.tolerance:
+            if look.spread <= _AGREED * self.plan.tolerance:
                 break
             samples = yield from self.run(Phase(RunState.SETTLING, tone, look_s))
             look = self._look(samples.coefficients, setting)
@@ -137,13 +151,13 @@ def _followed(
     way = 1.0 if plan.begin == "up" else -1.0
     points: tuple[Seen, ...] = ()
     number, length = 0, 1.0
-    found = yield from _corrected(player, solver, solver.first(), _FIRST_TRIES)
+    found = yield from _begun(player, solver)
     while True:
         if found is None:
             length *= 0.5
             if length < _SHORTEST_STEP or not points:
                 return number, BranchEnd.LOST
-            yield from player.looked(solver.setting(points[-1].unknowns))
+            yield from _probed(player, solver, points[-1])
         else:
             seen, tries = found
             setting = solver.setting(seen.unknowns)
@@ -159,21 +173,58 @@ def _followed(
         found = yield from _corrected(player, solver, solver.next(points, length, way))
 
 
+def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen, int] | None]:
+    """Raise what is played until the base has its level: the first motion that is met from rest."""
+    foreseen = solver.first()
+    unknowns = foreseen.unknowns.copy()
+    unknowns[1] -= _BELOW
+    low: Seen | None = None
+    high: Seen | None = None
+    for tries in range(1, _FIRST_TRIES + 1):
+        seen = yield from _seen(player, solver, unknowns)
+        if _is_sine(seen.residual, player.plan.tolerance):
+            return seen, tries
+        low, high = (seen, high) if seen.residual[0] < 0 else (low, seen)
+        unknowns = solver.corrected(seen, foreseen)
+        if low is None or high is None:
+            unknowns[1] = seen.unknowns[1] + (1.0 if low is not None else -1.0)
+        else:
+            share = -low.residual[0] / (high.residual[0] - low.residual[0])
+            first = low.unknowns[1], high.unknowns[1]
+            unknowns[1] = first[0] + min(max(share, _INSIDE), 1 - _INSIDE) * (first[1] - first[0])
+    return None
+
+
+def _probed(player: BranchPlayer, solver: BranchSolver, last: Seen) -> Controller[None]:
+    """Go back to the last point, and learn anew what frequency and first coefficient do."""
+    here = yield from _seen(player, solver, last.unknowns)
+    for column, moved in enumerate(_PROBES):
+        unknowns = last.unknowns.copy()
+        unknowns[column] += moved
+        beside = yield from _seen(player, solver, unknowns)
+        solver.probe(column, here, beside)
+
+
 def _corrected(
-    player: BranchPlayer, solver: BranchSolver, foreseen: Foreseen, most: int = _MOST_TRIES
+    player: BranchPlayer, solver: BranchSolver, foreseen: Foreseen
 ) -> Controller[tuple[Seen, int] | None]:
     """Find the point of the branch beside a foreseen one; gives it and how many settings were tried."""
-    plan, unknowns = player.plan, foreseen.unknowns
-    for tries in range(1, most + 1):
-        setting = solver.setting(unknowns)
-        look = yield from player.looked(setting)
-        residual = residual_of(look.base_m[: plan.harmonics], _level_m(plan, setting.frequency_hz))
-        seen = Seen(unknowns, residual, complex(look.m0_m[0] / look.base_m[0]))
-        solver.learn(seen)
-        if _is_sine(residual, plan.tolerance) and is_new(seen, foreseen):
+    unknowns = foreseen.unknowns
+    for tries in range(1, _MOST_TRIES + 1):
+        seen = yield from _seen(player, solver, unknowns)
+        if _is_sine(seen.residual, player.plan.tolerance) and is_new(seen, foreseen):
             return seen, tries
         unknowns = solver.corrected(seen, foreseen)
     return None
+
+
+def _seen(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[Seen]:
+    plan, setting = player.plan, solver.setting(unknowns)
+    look = yield from player.looked(setting)
+    residual = residual_of(look.base_m[: plan.harmonics], _level_m(plan, setting.frequency_hz))
+    seen = Seen(unknowns, residual, complex(look.m0_m[0] / look.base_m[0]))
+    solver.learn(seen)
+    return seen
 
 
 def _recorded(

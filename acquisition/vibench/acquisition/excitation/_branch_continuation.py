@@ -73,8 +73,8 @@ class BranchContinuation(AbstractFeedback):
 
     @property
     def highest_frequency_hz(self) -> float:
-        """The highest harmonic that is controlled [Hz]."""
-        return self.harmonics * self.high_hz
+        """The upper end of the range [Hz]."""
+        return self.high_hz
 
     @property
     def playing_s(self) -> float:

@@ -36,6 +36,9 @@ from ._excitation import (
 from ._exponent_spectrum import (
     exponent_spectrum_figure as exponent_spectrum_figure,
 )
+from ._held_branch import (
+    held_branch_figure as held_branch_figure,
+)
 from ._hidden_motion import (
     hidden_impacts_figure as hidden_impacts_figure,
     hidden_motion_figure as hidden_motion_figure,

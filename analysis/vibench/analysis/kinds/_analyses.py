@@ -8,7 +8,7 @@ from vibench.acquisition.plan import Family, rows_by_kind
 from ._analysis_kind import AnalysisKind
 from ._dwell import DWELL
 from ._noise import REPEATED_NOISE, STREAMED_NOISE
-from ._stepped import RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE
+from ._stepped import BRANCH_CONTINUATION, RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE
 from ._sweep import SWEEP
 
 ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
@@ -23,6 +23,7 @@ ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
         "settled_sine": SETTLED_SINE,
         "stepped_level": STEPPED_LEVEL,
         "resonance_tracking": RESONANCE_TRACKING,
+        "branch_continuation": BRANCH_CONTINUATION,
     },
 )
 """By the word in a plan; families in the order in which a report shows them."""

@@ -1,11 +1,13 @@
 """Stepped sines: responses frequency by frequency or level by level, and what JSON says of them."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import nan
 
 from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison import stepped_traces
+from ..errors import UnusableData
 from ..frequency_response import FrequencyResponseRequest
 from ..model import Draw, Quantity, SimulatedChannels, SteppedSineOverlay, stepped_overlay, stepped_quantities
 from ..recordings import Channels, RecordingFacts, Stretch, measurement_checks
@@ -72,3 +74,16 @@ STEPPED_LEVEL = _stepped(
 # With feedback the setting is not the plan's, and is known of no step.
 SETTLED_SINE = _stepped(lambda *_: nan)
 RESONANCE_TRACKING = _stepped(lambda *_: nan, SegmentLabel.RESONANCE)
+
+
+def _undrawn(_: SteppedSineAnalysis, __: SimulatedChannels) -> Draw[SteppedResponse]:
+    raise UnusableData(
+        "the motions of a branch were held by a fast loop, and under the recorded voltage alone the model "
+        "leaves them; nothing was simulated, compare them with the model's branch"
+    )
+
+
+# A branch folds: it is no curve over frequency.
+BRANCH_CONTINUATION = replace(
+    _stepped(lambda *_: nan, SegmentLabel.BRANCH), draw=_undrawn, curves=lambda *_: iter(())
+)

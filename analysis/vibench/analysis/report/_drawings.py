@@ -18,6 +18,7 @@ from ..figures import (
     distortion_figure,
     dwells_figure,
     excitation_figure,
+    held_branch_figure,
     hysteresis_figure,
     portraits_figure,
     stepped_sine_figure,
@@ -32,6 +33,7 @@ from ..recordings import AbstractAnalysis
 from ..results import CampaignResults
 from ..sine import tracked_resonances
 from ._findings import (
+    branch_findings,
     dwell_findings,
     level_findings,
     noise_findings,
@@ -127,6 +129,9 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
         "stepped_level": Drawing(_stepped_figures(STEPPED_LEVELS), level_findings),
         "resonance_tracking": Drawing(_tracked_figures, tracked_findings),
+        "branch_continuation": Drawing(
+            lambda branches: (held_branch_figure(each.analysis) for each in branches), branch_findings
+        ),
     },
 )
 """By the word in a plan."""

@@ -11,7 +11,7 @@ from ..figures import agreement_text, regions_text, stepped_level_caption, verdi
 from ..kinds import DwellResult, NoiseResult, SteppedSineResult, SweepResult
 from ..model import CLOCK_TOLERANCE, PREDICTION_S, WINDOW_S
 from ..results import CampaignResults
-from ..sine import feedback_sentences
+from ..sine import branch_sentences, feedback_sentences
 
 
 def noise_findings(result: NoiseResult) -> Iterator[str]:
@@ -53,6 +53,11 @@ def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
 def level_findings(result: SteppedSineResult) -> Iterator[str]:
     """Say between which levels the motion jumps."""
     yield stepped_level_caption(result.analysis.response)
+
+
+def branch_findings(result: SteppedSineResult) -> Iterator[str]:
+    """Say how far a branch was followed, and where it turned."""
+    yield from branch_sentences(result.analysis.facts.feedback)
 
 
 def tracked_findings(result: SteppedSineResult) -> Iterator[str]:

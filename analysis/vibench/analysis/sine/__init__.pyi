@@ -23,6 +23,11 @@ from ._dwell_motion import (
     dwell_motion as dwell_motion,
     irregular_motion as irregular_motion,
 )
+from ._held_branch import (
+    HeldBranch as HeldBranch,
+    branch_sentences as branch_sentences,
+    held_branch as held_branch,
+)
 from ._hysteresis import (
     Hysteresis as Hysteresis,
     hysteresis as hysteresis,

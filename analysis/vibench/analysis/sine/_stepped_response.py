@@ -5,7 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.plan import ResonanceTracking, SettledSine, SteppedLevel, SteppedSine
+from vibench.acquisition.plan import (
+    BranchContinuation,
+    ResonanceTracking,
+    SettledSine,
+    SteppedLevel,
+    SteppedSine,
+)
 from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import NotEnoughData
@@ -18,7 +24,7 @@ from ..signals import Reals
 from ..tables import Labelled
 from ._dwell import DwellResponse, dwell_response
 
-Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking
+Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | BranchContinuation
 """What is recorded frequency by frequency, or level by level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end; read beyond the step, where there is more."""

@@ -17,11 +17,11 @@ class LawWeights:
     """Motion of p that is worth a tenth of a volt of control."""
     push_n: float = 3e-3
     """Force between m1 and m2 that the filter expects without knowing it, rms over a step [N]."""
-    volt: float = 2e-3
+    volt: float = 1e-2
     """Unknown voltage, likewise [V]."""
     acceleration: float = 0.2
     """Noise of a sample of the base's acceleration [m/s2]."""
-    velocity: float = 2e-5
+    velocity: float = 1e-4
     """Noise of a sample of m0's velocity [m/s]."""
 
 

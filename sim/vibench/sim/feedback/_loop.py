@@ -8,7 +8,7 @@ from ._law import LinearLaw
 from ._plant import SampledPlant
 
 
-def loop_multipliers(plant: SampledPlant, law: LinearLaw, slopes: ArrayLike) -> Floats:
+def loop_multipliers(plant: SampledPlant, law: LinearLaw, slopes: ArrayLike, periods: int = 1) -> Floats:
     """Give the largest multiplier over a period of each motion, with the law acting.
 
     Parameters
@@ -18,8 +18,9 @@ def loop_multipliers(plant: SampledPlant, law: LinearLaw, slopes: ArrayLike) -> 
     law
         Designed for the same latency, or another.
     slopes
-        Slope dF/dp of the stops' force along each motion, once a sample over one period, shape (motions,
-        samples) [N/m]; less the stiffness that the plant has already.
+        Slope dF/dp of the stops' force along each motion, once a sample, shape (motions, samples) [N/m].
+    periods
+        Over how many periods the slopes go; as many as take a whole number of samples, or nearly so.
 
     Returns
     -------
@@ -33,7 +34,7 @@ def loop_multipliers(plant: SampledPlant, law: LinearLaw, slopes: ArrayLike) -> 
     moved = np.broadcast_to(np.eye(len(both)), (len(slopes), *both.shape)).copy()
     for slope in (slopes - plant.stiffness).T * plant.timing.step_s:
         moved = both @ moved + pushed[:, None] * (slope[:, None] * (pulled @ moved))[:, None, :]
-    return np.asarray(np.abs(np.linalg.eigvals(moved)).max(axis=1))
+    return np.asarray(np.abs(np.linalg.eigvals(moved)).max(axis=1) ** (1.0 / periods))
 
 
 def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> complex:

@@ -1,0 +1,169 @@
+"""Control-based continuation: on a curve that folds, and on the whole virtual rig."""
+
+from contextlib import ExitStack
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
+from vibench.acquisition.control._branch_solver import BranchSolver, LoopSetting, Seen, is_new
+from vibench.acquisition.excitation import BaseLevel
+from vibench.acquisition.plan import BranchContinuation, Measurement, RunState
+from vibench.acquisition.recording import BranchEnd, BranchEndNote, BranchPointNote, feedback_note
+from vibench.acquisition.rig import ControllerConfig, confirm_simulated, specimen_of
+from vibench.sim.periodic import balance, harmonic_balance_branch, spring_of, structure_of
+from vibench.virtual_rig import VirtualRig
+
+LEVEL_M = 3e-6
+K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
+
+
+def hardening(rig, latency_s=3e-4, **virtual):
+    """The rig with a controller, and a spring of p^3 in the stops' place: 0.1 k1 p at 100 µm."""
+    specimen = rig.specimen.model_copy(
+        update={"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * K1 * 1e-4 / 1e-9}
+    )
+    controller = ControllerConfig(rate_hz=10_240, latency_s=latency_s, limit_v=5, source="test")
+    changed = {"specimen": specimen, "controller": controller}
+    return rig.model_copy(update=changed | {"virtual": rig.virtual.model_copy(update=virtual)})
+
+
+def continuation(**more):
+    given = {"start_hz": 94, "low_hz": 90, "high_hz": 118, "record_s": 0.3} | more
+    return BranchContinuation(amplitude_vpp=4, base_level=BaseLevel(displacement_m=LEVEL_M), **given)
+
+
+def measurement(plan):
+    return Measurement(name="branch", excitation=plan, ramp_s=0.4)
+
+
+def followed(rig, plan, path, true=None):
+    """Follow a branch on a rig; ``true``: what is really there, where the rig's configuration is wrong."""
+    with ExitStack() as stack:
+        if true is not None:
+            virtual = stack.enter_context(VirtualRig(true))
+            rig = rig.model_copy(
+                update={
+                    "virtual": None,
+                    "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
+                    "controller": rig.controller.model_copy(update={"resource": virtual.controller_resource}),
+                }
+            )
+        bench = stack.enter_context(open_bench(rig, confirm=confirm_simulated))
+        outcome = run_measurement(bench, measurement(plan), path)
+    assert outcome.state is RunState.FINISHED
+    with open_recording(outcome.path) as recording:
+        notes = [feedback_note(event) for event in recording.events]
+    return [each for each in notes if isinstance(each, BranchPointNote)], [each for each in notes if each]
+
+
+def hardening_resonator(setting):
+    """Level of the base, and m0 over it, of a resonator that a law damps: B = P (0.12 |P|^2 - d + 0.4 i)."""
+    detuning = setting.frequency_hz - 100.0
+    size = np.linspace(1e-3, 9, 200_001)
+    stiff = 0.12 * size**2 - detuning
+    # The law adds damping to what is told, and so unfolds it.
+    told = size * np.hypot(stiff, 2.4)
+    at = int(np.searchsorted(told, abs(setting.reference_v[0])))
+    base = size[at] * complex(stiff[at], 0.4)
+    return abs(base), size[at] / base
+
+
+def test_the_solver_follows_a_curve_through_both_folds():
+    level = 2.0
+    start = LoopSetting(98.0, np.array([level + 0j]))
+    solver = BranchSolver(start, np.array([1.0 + 0j]), 0.0, level, step_hz=0.25)
+
+    def seen(unknowns):
+        found, ratio = hardening_resonator(solver.setting(unknowns))
+        one = Seen(unknowns, np.array([found / level - 1]), ratio)
+        solver.learn(one)
+        return one
+
+    def corrected(foreseen):
+        one = seen(foreseen.unknowns)
+        for _ in range(12):
+            if abs(one.residual[0]) < 2e-3 and is_new(one, foreseen):
+                return one
+            one = seen(solver.corrected(one, foreseen))
+        return None
+
+    points, length = [corrected(solver.first())], 1.0
+    while len(points) < 80 and length > 1e-2:
+        one = corrected(solver.next(tuple(points[-2:]), length, 1.0))
+        if one is None:
+            length /= 2
+            here = seen(points[-1].unknowns)
+            for column in (0, 1):
+                beside = points[-1].unknowns.copy()
+                beside[column] -= 0.05
+                solver.probe(column, here, seen(beside))
+        else:
+            points.append(one)
+            length = min(1.5 * length, 1.0)
+    hertz = 0.25 * np.array([each.unknowns[0] for each in points])
+    assert all(abs(each.residual[0]) < 2e-3 for each in points)
+    # The tip: |P| = 2 / 0.4, at a detuning of 0.12 |P|^2 = 3 Hz; there and back.
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(hertz)))) + 1
+    assert len(turns) == 2
+    assert hertz[turns[0]] == pytest.approx(103.0, abs=0.1)
+    assert turns[1] > turns[0] + 6
+    assert hertz[-1] > hertz[turns[0]] > hertz[turns[1]]
+
+
+def model_of(rig):
+    """Branch of the rig's specimen, and what lies between its folds."""
+    structure, spring = structure_of(specimen_of(rig)), spring_of(specimen_of(rig))
+    branch = harmonic_balance_branch(
+        structure, spring, balance(structure, spring, 90.0, LEVEL_M), "frequency", 120.0
+    )
+    return branch, [each for each in branch.events if each.kind.value == "fold"]
+
+
+def test_a_branch_is_begun_from_rest_and_its_base_is_a_sine_of_the_level(rig, tmp_path):
+    hard = hardening(rig)
+    points, notes = followed(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
+    branch, _ = model_of(hard)
+    assert [each.point for each in points] == [0, 1]
+    assert notes[-1] == BranchEndNote(points=2, end=BranchEnd.POINTS)
+    for each in points:
+        assert each.base_m == pytest.approx(LEVEL_M, rel=0.004)
+        assert each.residue < 0.005
+        m0 = LEVEL_M * np.interp(each.frequency_hz, branch.frequencies_hz[:60], branch.response_ii[:60, 0])
+        assert each.m0_m == pytest.approx(m0, rel=0.01)
+
+
+def test_a_bench_without_a_controller_says_so(rig, tmp_path):
+    with open_bench(rig) as bench, pytest.raises(ConfigurationError, match=r"add \[controller\]"):
+        run_measurement(bench, measurement(continuation()), tmp_path / "none.h5")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [1.0, 10.0])
+def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tmp_path, noise):
+    """Four minutes of rig time: at least 15 unstable points, folds within 0.3 Hz, m0 within 2 %."""
+    true = hardening(
+        rig,
+        accelerometer_noise_m_per_s2=noise * 5e-3,
+        vibrometer_noise_m_per_s_per_rthz=noise * 2e-8,
+    )
+    # The host believes in a coil that pushes by 10 % more, and brakes by as much more.
+    believed = true.model_copy(
+        update={"shaker": true.shaker.model_copy(update={"force_constant_n_per_a": 1.1 * 6.78})}
+    )
+    points, notes = followed(believed, continuation(most_points=110), tmp_path / "branch.h5", true)
+    branch, folds = model_of(true)
+    hertz = np.array([each.frequency_hz for each in points])
+    top, bottom = np.flatnonzero(np.diff(np.sign(np.diff(hertz)))) + 1
+    assert isinstance(notes[-1], BranchEndNote)
+    assert notes[-1].end is BranchEnd.RANGE
+    assert hertz[top] == pytest.approx(folds[0].frequency_hz, abs=0.3)
+    assert hertz[bottom] == pytest.approx(folds[1].frequency_hz, abs=0.3)
+    assert bottom - top - 1 >= 15
+    unstable = slice(folds[0].index + 1, folds[1].index + 1)
+    f, ratio = branch.frequencies_hz[unstable][::-1], branch.response_ii[unstable, 0][::-1]
+    for each in points[top + 1 : bottom]:
+        assert each.base_m == pytest.approx(LEVEL_M, rel=0.005)
+        assert each.residue < 0.005
+        if f[0] + 0.2 < each.frequency_hz < f[-1] - 0.2:
+            assert each.m0_m == pytest.approx(LEVEL_M * np.interp(each.frequency_hz, f, ratio), rel=0.02)

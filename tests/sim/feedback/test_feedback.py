@@ -1,0 +1,140 @@
+"""The sampled plant against the compiled one, multipliers against those of the branch, the law's purpose."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from vibench.sim import Harmonic, gong2025, integrate
+from vibench.sim.feedback import (
+    LinearLaw,
+    LoopTiming,
+    SampledPlant,
+    designed_law,
+    loop_multipliers,
+    loop_transfer,
+)
+from vibench.sim.model import PowerLaw
+from vibench.sim.periodic import balance, harmonic_balance_branch, spring_of, structure_of
+from vibench.sim.shaker import Amplifier, LoadedShaker, Shaker
+
+RATE_HZ = 10_240.0
+PERIODS = 10
+K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
+HARDENING = replace(gong2025(), contact=PowerLaw(1e-4, ((3, 0.1 * K1 * 1e-4),)))
+LINEAR = gong2025(contact="linear")
+NO_LAW = LinearLaw(np.zeros((1, 1)), np.zeros((1, 2)), np.zeros((1, 1)), np.zeros((1, 2)))
+
+
+def shaker(mass_kg=0.127):
+    return Shaker(
+        moving_mass_kg=mass_kg,
+        suspension_stiffness_n_per_m=9932.0,
+        suspension_damping_ns_per_m=21.51,
+        force_constant_n_per_a=6.78,
+        coil_resistance_ohm=2.6,
+        coil_inductance_h=1e-4,
+    )
+
+
+def plant(latency_s=3e-4, specimen=HARDENING, mass_kg=0.127, gain=3.16):
+    return SampledPlant(Amplifier(gain=gain), shaker(mass_kg), specimen, LoopTiming(RATE_HZ, latency_s))
+
+
+@cache
+def branch():
+    structure, spring = structure_of(HARDENING), spring_of(HARDENING)
+    start = balance(structure, spring, 90.0, 3e-6)
+    return harmonic_balance_branch(structure, spring, start, "frequency", 120.0)
+
+
+@cache
+def slopes(index):
+    """Slope of the spring's force along a motion of the branch, once a sample, in the middle of a step."""
+    found = branch()
+    frequency_hz = found.frequencies_hz[index]
+    count = round(PERIODS * RATE_HZ / frequency_hz)
+    drive = Harmonic(frequency_hz, found.amplitudes_m[index])
+    motion = integrate(
+        HARDENING,
+        drive,
+        1.5 / frequency_hz,
+        initial_state=found.states[index],
+        sample_rate_hz=400 * frequency_hz,
+    )
+    p = (motion.states[:, 1] - motion.states[:, 2])[:400]
+    middle = (np.arange(count) + 0.5) * PERIODS / count
+    wave = np.interp(middle % 1.0, np.arange(401) / 400, np.append(p, p[0]))
+    return spring_of(HARDENING).stiffness(wave, wave)
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.7 / RATE_HZ, 3.1 / RATE_HZ, 10 / RATE_HZ])
+def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
+    model = plant(latency_s, LINEAR)
+    fine = 40
+    volts = np.random.default_rng(3).normal(0, 0.05, 300)
+    late = round(latency_s * RATE_HZ * fine)
+    held = np.concatenate([np.zeros(late), np.repeat(volts, fine)])[: volts.size * fine]
+    compiled = LoadedShaker(model.amplifier, model.shaker, LINEAR, 1 / (RATE_HZ * fine))
+    motion = compiled.move(held)
+    seen = np.stack([motion.base_acceleration, motion.m0_velocity]).reshape(2, -1, fine).mean(axis=2)
+    step, volt = model.step
+    state, shown = np.zeros(model.size), []
+    for each in volts:
+        shown.append(model.shown @ state)
+        state = step @ state + volt * each
+    for row, expected in zip(np.transpose(shown)[:, 1:], seen[:, :-1], strict=True):
+        assert np.abs(row - expected).max() < 4e-3 * np.abs(expected).max()
+
+
+def test_under_a_table_too_heavy_to_move_the_multipliers_are_those_of_the_branch():
+    found = branch()
+    unmoved = plant(mass_kg=1e7)
+    for index in range(40, len(found.frequencies_hz), 60):
+        exact = abs(found.multipliers[index, 0])
+        # The table's own multiplier is one: it stays where it is.
+        seen = loop_multipliers(unmoved, NO_LAW, [slopes(index)], PERIODS)[0]
+        assert seen == pytest.approx(max(exact, 1.0), rel=0.005)
+
+
+def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_the_model_is_wrong():
+    found = branch()
+    unstable = np.flatnonzero(~found.is_stable)
+    assert unstable.size > 100
+    law = designed_law(plant())
+    softer = replace(HARDENING, stiffnesses=tuple(0.9 * each for each in HARDENING.stiffnesses))
+    wrong = (plant(), plant(gain=3.48), plant(gain=2.84), plant(specimen=softer))
+    for index in (*unstable[[0, 70, -1]], 10, len(found.frequencies_hz) - 1):
+        for each in wrong:
+            assert loop_multipliers(each, law, [slopes(index)], PERIODS)[0] < 0.99
+
+
+def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
+    found = branch()
+    unstable = np.flatnonzero(~found.is_stable)[[0, 70, -1]]
+    largest = [
+        max(loop_multipliers(each, designed_law(each), [slopes(index)], PERIODS)[0] for index in unstable)
+        for each in map(plant, (1e-4, 5e-4, 1.5e-3))
+    ]
+    assert largest[0] < 0.95
+    assert largest[1] < 0.95
+    assert largest[2] > 1.1
+
+
+def test_what_is_played_moves_the_base_as_the_transfer_says():
+    model = plant(specimen=LINEAR)
+    law = designed_law(model)
+    step, volt = model.step
+    state, memory, shown, turns = np.zeros(model.size), np.zeros(len(law.step)), [], []
+    for k in range(20_000):
+        seen = model.shown @ state
+        played = np.cos(2 * np.pi * 130.0 * k / RATE_HZ)
+        answer = (law.output @ memory + law.direct @ seen)[0] + played
+        memory = law.step @ memory + law.inlet @ seen
+        shown.append(state[0])
+        turns.append(np.exp(-2j * np.pi * 130.0 * k / RATE_HZ))
+        state = step @ state + volt * answer
+    tail = slice(-10_240, None)
+    found = 2 * np.mean(np.array(shown[tail]) * np.array(turns[tail]))
+    assert found == pytest.approx(loop_transfer(model, law, 130.0), rel=1e-3)
