@@ -11,7 +11,7 @@ from vibench.acquisition.excitation import BaseLevel
 from vibench.acquisition.plan import BranchContinuation, Measurement, RunState
 from vibench.acquisition.recording import BranchEnd, BranchEndNote, BranchPointNote, feedback_note
 from vibench.acquisition.rig import ControllerConfig, confirm_simulated, specimen_of
-from vibench.sim.periodic import balance, harmonic_balance_branch, spring_of, structure_of
+from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
 from vibench.virtual_rig import VirtualRig
 
 LEVEL_M = 3e-6
@@ -114,9 +114,8 @@ def test_the_solver_follows_a_curve_through_both_folds():
 def model_of(rig):
     """Branch of the rig's specimen, and what lies between its folds."""
     structure, spring = structure_of(specimen_of(rig)), spring_of(specimen_of(rig))
-    branch = harmonic_balance_branch(
-        structure, spring, balance(structure, spring, 90.0, LEVEL_M), "frequency", 120.0
-    )
+    start = balance(structure, spring, 90.0, LEVEL_M)
+    branch = balance_branch_within(structure, spring, start, FrequencyPath((LEVEL_M,)), 89.0, 120.0)
     return branch, [each for each in branch.events if each.kind.value == "fold"]
 
 

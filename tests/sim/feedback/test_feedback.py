@@ -16,7 +16,7 @@ from vibench.sim.feedback import (
     loop_transfer,
 )
 from vibench.sim.model import PowerLaw
-from vibench.sim.periodic import balance, harmonic_balance_branch, spring_of, structure_of
+from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
 from vibench.sim.shaker import Amplifier, LoadedShaker, Shaker
 
 RATE_HZ = 10_240.0
@@ -46,7 +46,7 @@ def plant(latency_s=3e-4, specimen=HARDENING, mass_kg=0.127, gain=3.16):
 def branch():
     structure, spring = structure_of(HARDENING), spring_of(HARDENING)
     start = balance(structure, spring, 90.0, 3e-6)
-    return harmonic_balance_branch(structure, spring, start, "frequency", 120.0)
+    return balance_branch_within(structure, spring, start, FrequencyPath((3e-6,)), 89.0, 120.0)
 
 
 @cache
