@@ -95,7 +95,7 @@ def test_under_a_table_too_heavy_to_move_the_multipliers_are_those_of_the_branch
         exact = abs(found.multipliers[index, 0])
         # The table's own multiplier is one: it stays where it is.
         seen = loop_multipliers(unmoved, NO_LAW, [slopes(index)], PERIODS)[0]
-        assert seen == pytest.approx(max(exact, 1.0), rel=0.005)
+        assert seen == pytest.approx(max(exact, 1.0), rel=0.01)
 
 
 def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_the_model_is_wrong():
