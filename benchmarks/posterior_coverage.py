@@ -28,7 +28,7 @@ from vibench.analysis.model_updating import statistical_numbers
 from vibench.sim import Hertz, Specimen, gong2025
 
 WORLD = Path(__file__).parents[1] / "tests" / "analysis" / "hidden_motion" / "shaken_world.py"
-RECORDED_S, BEGIN_S = 1.8, 0.5
+RECORDED_S, BEGIN_S, RATE_HZ = 1.8, 0.5, 25_600.0
 FEWEST_IMPACTS = 100
 CONFIDENCE_Z = 1.96
 
@@ -71,6 +71,7 @@ def drawn(seed: int, index: int, world: object) -> tuple[str, dict[Hidden, bool 
                 duration_s=RECORDED_S,
                 seed=int(rng.integers(1 << 30)),
                 noise=noise,
+                rate_hz=RATE_HZ,
                 specimen=true,
             )
             if shaken.touches.size < FEWEST_IMPACTS:

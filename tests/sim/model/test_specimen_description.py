@@ -1,6 +1,7 @@
 """A specimen is data: one file says all its numbers, and whoever reads them builds the same specimen."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from vibench.sim import (
     SpecimenDescription,
     SpecimenTable,
     UnknownSpecimenError,
+    base_transmissibility,
     gong2025,
     load_specimen,
     shipped_specimens,
@@ -43,6 +45,7 @@ def test_the_papers_specimen_is_one_file_among_others_and_the_same_to_the_last_b
         "hardening",
         "rigid_stops",
         "linear_gap",
+        "two_masses",
     } <= shipped_specimens().keys()
 
 
@@ -61,6 +64,27 @@ def test_every_shipped_specimen_can_be_moved(name):
         load_specimen(name).specimen(), Harmonic(130.0, 20e-6), duration_s=0.1, window_s=0.05
     )
     assert math.isfinite(response.response_i)
+
+
+def test_two_masses_are_those_of_their_own_equations_in_and_out_of_contact():
+    specimen = load_specimen("two_masses").specimen()
+    (_, m1, m2), (_, k1, k2), (_, c1, c2) = specimen.masses, specimen.stiffnesses, specimen.dampings
+    frequency_hz = np.linspace(20.0, 600.0, 59)
+    s = 2j * np.pi * frequency_hz
+    spring, base = k1 + c1 * s, k2 + c2 * s
+    # y and z over the table's displacement, by Cramer's rule.
+    own = (m1 * s**2 + spring) * (m2 * s**2 + spring + base) - spring**2
+    y, z = spring * base / own, (m1 * s**2 + spring) * base / own
+    moved = base_transmissibility(specimen, frequency_hz)
+    np.testing.assert_allclose(moved[:, 1:], np.stack([y, z, y - z], axis=1), rtol=1e-3)
+    near = np.abs(moved[:, 0] - 1.0)
+    assert near.max() < 1e-3
+    drive = Harmonic(200.0, 20e-6)
+    firmer = replace(specimen, stiffnesses=(100.0 * specimen.stiffnesses[0], k1, k2))
+    one, other = (steady_response(each, drive, duration_s=2.0, window_s=0.5) for each in (specimen, firmer))
+    assert one.impacts == other.impacts > 100
+    assert one.relative_i == pytest.approx(other.relative_i, rel=1e-4)
+    assert one.relative_ii == pytest.approx(other.relative_ii, rel=1e-3)
 
 
 def test_a_file_says_every_number_itself(tmp_path):

@@ -23,7 +23,8 @@ class SpecimenChoice(FrozenModel):
     """A described specimen, with another contact, damping or gap where one is given."""
 
     specimen: SpecimenName = USUAL_SPECIMEN
-    """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, or the path of a specimen's file."""
+    """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, two_masses, or the path of a
+    specimen's file."""
     model: ContactWord = ""
     """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...; empty for
     the specimen's own."""

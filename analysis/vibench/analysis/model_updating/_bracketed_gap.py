@@ -9,8 +9,8 @@ from vibench.sim import Specimen, base_transmissibility
 
 from ..errors import NotEnoughData
 from ..sine import DwellAnalysis
+from ._collision_numbers import CALM, COLLIDING, peakedness
 from ._parameters import FittedValue, Parameter
-from ._tracked_gaps import CALM, COLLIDING, peakedness
 
 _RELATIVE = 3
 """Column of p in `base_transmissibility`."""

@@ -14,12 +14,12 @@ from ..results import UNOBSERVED, CampaignResults
 from ..tables import named, plain, plus_minus
 from ..uncertainty import stated_of
 from ._bracketed_gap import bracketed_gap
+from ._collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
 from ._gap_fit import fit_gap
 from ._parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
 from ._specimen_fit import SpecimenFit, fit_specimen
 from ._suspects import Assumption, Suspect
 from ._table import TableFit, fitted_table
-from ._tracked_gaps import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
 
 _NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
 
