@@ -74,12 +74,12 @@ class CollisionNumbers:
         return found if len(found) == len(_SIDES) else ()
 
     def on(self, specimen: Specimen) -> Specimen:
-        """Give a specimen the gaps that are told; where only their mean is, both as far apart as they are."""
+        """Give a specimen the gaps that are told; a mean, which is told better, keeps their ratio."""
         mean = next((each for each in self.told if each.what is Hidden.MEAN_GAP), None)
-        if self.gaps:
-            lower, upper = (each.value for each in self.gaps)
-        elif mean is not None:
+        if mean is not None:
             lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
+        elif self.gaps:
+            lower, upper = (each.value for each in self.gaps)
         else:
             return specimen
         return replace(specimen, gap_m=upper, lower_gap_m=lower)
@@ -87,7 +87,7 @@ class CollisionNumbers:
     @property
     def sentences(self) -> tuple[str, ...]:
         """Say each number."""
-        how = {Way.TRACKED: "Tracked", Way.STATISTICS: "From statistics of the motion:"}[self.way]
+        how = {Way.TRACKED: "Tracked", Way.STATISTICS: "From statistics,"}[self.way]
         rows = (each.row for each in self.parameters)
         return tuple(f"{how} {label}: {said}; described as {known}." for label, said, known in rows)
 

@@ -165,7 +165,7 @@ def _told(found: Posterior, specimen: Specimen) -> Iterator[FoundParameter]:
         flat = high - low > _TOLD * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
         value = value_of(described, what)
         middle, low, high = (value * float(np.exp(each)) for each in (middle, low, high))
-        why = f"statistics of the motion tell {what.value} no better than it was assumed" if flat else ""
+        why = "the motion's statistics tell it no better than it was assumed" if flat else ""
         yield FoundParameter(what, middle, low, high, value, why)
     nan, why = float("nan"), "statistics are compared with runs of the described exponent"
     yield FoundParameter(Hidden.EXPONENT, nan, nan, nan, described.exponent, why)
