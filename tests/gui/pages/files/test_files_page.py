@@ -226,6 +226,11 @@ def test_the_spectrogram_of_what_is_in_sight_shows_the_drive_and_the_impact(open
         at_s = box.left() + (struck + 0.5) / shown.image.shape[1] * box.width()
         assert at_s == pytest.approx(IMPACT_S, abs=0.1)
     assert "dB re 1 (m/s)²/Hz" in view.image.bar.axis.labelText
+    assert view.plot.isEnabled()
+    view.channel.setCurrentIndex(0)
+    assert not view.plot.isEnabled(), "a picture of another channel"
+    waited(lambda: not view.is_busy)
+    assert view.plot.isEnabled()
     page.pictures.setCurrentWidget(page.time_histories)
 
 

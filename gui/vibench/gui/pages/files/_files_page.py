@@ -60,7 +60,8 @@ class FilesPage(Page):
     def shown(self) -> tuple[Shown, ...]:
         """The pictures, of the recording that is named above them."""
         wanted = None if self._opened is None else self._opened.path
-        return (Shown(self.pictures, self._pictured_path, wanted),)
+        inside = self.pictures.spectrogram.shown, self.pictures.hidden_motion.shown
+        return Shown(self.pictures, self._pictured_path, wanted), *inside
 
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:

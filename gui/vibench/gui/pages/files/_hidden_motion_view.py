@@ -18,6 +18,7 @@ from vibench.sim import shipped_specimens
 
 from ...background import Background, LatestRequest
 from ...forms import Choice
+from ...page import Shown
 from ...plots import LIMIT, TIME, Dash, Plot, PlotAxis, curve_style
 from ...widgets import Theme
 
@@ -54,6 +55,9 @@ class HiddenMotionView(QWidget):
         self.find_numbers.toggled.connect(self._ask_otherwise)
         self._recording: Recording | None = None
         self._view_s = (0.0, 0.0)
+        self._asked: HiddenViewRequest | None = None
+        self._of: HiddenViewRequest | None = None
+        """What the picture is of; None while there is none."""
         self._latest_request = LatestRequest(background, hidden_view, self._show, self._fail, _WAIT_MS, self)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 4, 0, 0)
@@ -70,6 +74,11 @@ class HiddenMotionView(QWidget):
     def is_busy(self) -> bool:
         """Whether a picture is still to come."""
         return self._latest_request.is_busy
+
+    @property
+    def shown(self) -> Shown:
+        """The picture, of the stretch in sight and what is chosen above it."""
+        return Shown(self.plot, self._of, self._asked)
 
     def show_recording(self, recording: Recording | None) -> None:
         """Picture another recording from now on, or none."""
@@ -102,9 +111,9 @@ class HiddenMotionView(QWidget):
         self.said.setText("working it out…")
         numbers = Numbers.FOUND if self.find_numbers.isChecked() else Numbers.AS_DESCRIBED
         specimen = self.specimen.currentData()
-        self._latest_request.ask(
-            HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
-        )
+        self._asked = HiddenViewRequest(Path(self._recording.path), low_s, high_s, specimen, numbers)
+        self.plot.setEnabled(self._of in (None, self._asked))
+        self._latest_request.ask(self._asked)
 
     def _ask_otherwise(self, _is_on: bool) -> None:  # noqa: FBT001 - a signal's
         self._ask()
@@ -119,6 +128,8 @@ class HiddenMotionView(QWidget):
         self._ask()
 
     def _show(self, found: HiddenView) -> None:
+        self._of = found.request
+        self.plot.setEnabled(self._of == self._asked)
         self.plot.with_hint("")
         self.tracked.setData(found.time_s, found.p, connect="finite")
         self.free.setData(found.time_s, found.free_p, connect="finite")
@@ -131,6 +142,8 @@ class HiddenMotionView(QWidget):
         self._clear(str(error))
 
     def _clear(self, hint: str) -> None:
+        self._of = None
+        self.plot.setEnabled(True)
         for curve in (self.tracked, self.free):
             curve.setData([], [])
         for line in self._stops:

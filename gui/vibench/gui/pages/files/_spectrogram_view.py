@@ -21,6 +21,7 @@ from vibench.analysis.live import (
 
 from ...background import Background, LatestRequest
 from ...forms import Choice
+from ...page import Shown
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
 from ...widgets import Theme
 from ._file_words import role_text, unit_text
@@ -60,6 +61,8 @@ class SpectrogramView(QWidget):
         self._view_s = (0.0, 0.0)
         self._recording: Recording | None = None
         self._asked: SpectrogramRequest | None = None
+        self._of: SpectrogramRequest | None = None
+        """What the picture is of; None while there is none."""
         self._latest_request = LatestRequest(
             background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self
         )
@@ -87,10 +90,16 @@ class SpectrogramView(QWidget):
         """The picture in use."""
         return self._images[self._spacing]
 
+    @property
+    def shown(self) -> Shown:
+        """The picture, of what the choices above it say."""
+        return Shown(self.plot, self._of, self._asked)
+
     def show_recording(self, recording: Recording | None) -> None:
         """Picture another recording from now on, or none."""
         self._recording = recording
         self._latest_request.drop()
+        self._asked = self._of = None
         for image in self._images.values():
             image.clear("Choose a recording in the list above.")
         roles = () if recording is None else recording.roles
@@ -140,10 +149,14 @@ class SpectrogramView(QWidget):
             spacing=self._spacing,
             resolution_hz=self.line_width.currentData(),
         )
+        self._asked = asked
+        self.plot.setEnabled(self._of in (None, asked))
         self.said.setText("working it out…")
         self._latest_request.ask(asked)
 
     def _show(self, found: DensityPicture) -> None:
+        self._of = found.request
+        self.plot.setEnabled(self._of == self._asked)
         self._images[found.request.spacing].show_picture(found)
         self.said.setText(
             f"Hann windows of {1e3 * found.segment_s:.3g} ms, lines {found.resolution_hz:.3g} Hz wide, "
@@ -151,6 +164,8 @@ class SpectrogramView(QWidget):
         )
 
     def _fail(self, error: BaseException) -> None:
+        self._of = None
+        self.plot.setEnabled(True)
         self.image.clear(str(error))
         self.said.setText("")
 
