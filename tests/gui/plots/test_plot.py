@@ -184,6 +184,13 @@ def test_a_mark_stays_at_its_values_when_the_scale_turns(plot):
     plot.reading.show_at(QPointF(0.5, -1.0))
     assert "+20.00 dB" in plot.reading.text
     assert sorted(line.value() for line in plot.reading._lines[2:]) == [-2.0, 0.5]
+    plot.turn_scale()
+    plot.reading.show_at(QPointF(0.5, -0.01))
+    plot.reading.mark_or_unmark()
+    plot.turn_scale()
+    plot.reading.show_at(QPointF(0.5, -1.0))
+    assert "Δ" in plot.reading.text
+    assert "dB" not in plot.reading.text
 
 
 def test_picture_and_numbers_are_copied_and_saved_and_nothing_is_overwritten(plot, qapp, tmp_path):

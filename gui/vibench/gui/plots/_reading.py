@@ -72,7 +72,7 @@ class Reading:
         if self._marked is not None:
             changes = [now - then for now, then in zip(self.place, self._marked, strict=True)]
             said.append("Δ " + ", ".join(map(_shown, changes, axes)))
-            if scales[1] is Scale.LOGARITHMIC:
+            if scales[1] is Scale.LOGARITHMIC and self._marked[1] > 0.0:
                 said.append(f"{20 * log10(up / self._marked[1]):+.2f} dB")
         self._tell("   ".join(said))
 
