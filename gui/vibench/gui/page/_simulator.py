@@ -1,12 +1,13 @@
 """The window's end of the process that simulates: asks, receives, and drops what nobody wants any more."""
 
 import sys
+from collections.abc import Callable
 from multiprocessing import get_context
 from multiprocessing.context import SpawnProcess
 
-from PySide6.QtCore import QObject, QTimer, Signal
+from PySide6.QtCore import QObject, QTimer
 
-from vibench.analysis.simulation import Asked, Begin, Cancel, Ended, Grown, Order, serve
+from vibench.analysis.simulation import Asked, Begin, Cancel, Ended, Grown, Order, PartialResult, serve
 
 if sys.platform == "win32":
     from multiprocessing.connection import PipeConnection as Connection
@@ -19,17 +20,31 @@ MOST_AT_ONCE = 200
 
 
 class Simulator(QObject):
-    """One process for as long as the window lives: compiling once is enough."""
+    """One process for as long as the page lives: compiling once is enough.
 
-    grown = Signal(object)
-    """Pieces of the answer to the last request."""
-    ended = Signal()
-    """The last request has its whole answer."""
-    died = Signal(str)
-    """The process ended by itself; the next request begins another."""
+    Parameters
+    ----------
+    page
+        What asks.
+    grown
+        Told pieces of the answer to the last request.
+    ended
+        Told when the last request has its whole answer.
+    died
+        Told when the process ended by itself; the next request begins another.
 
-    def __init__(self, parent: QObject | None = None) -> None:
-        super().__init__(parent)
+    """
+
+    def __init__(
+        self,
+        page: QObject,
+        grown: Callable[[tuple[PartialResult, ...]], None],
+        ended: Callable[[], None],
+        died: Callable[[str], None],
+    ) -> None:
+        super().__init__(page)
+        self._grown, self._ended, self._died = grown, ended, died
+        page.destroyed.connect(self.close)
         self._process: SpawnProcess | None = None
         self._connection: Connection[Order, Grown | Ended] | None = None
         self._number = 0
@@ -97,7 +112,7 @@ class Simulator(QObject):
             was_busy = self._is_busy
             self.close()
             if was_busy:
-                self.died.emit("The process that simulates has ended.")
+                self._died("The process that simulates has ended.")
             return
         if not self._is_busy and not connection.poll():
             self._timer.stop()
@@ -107,7 +122,7 @@ class Simulator(QObject):
             return
         match message:
             case Grown():
-                self.grown.emit(message.parts)
+                self._grown(message.parts)
             case Ended():
                 self._is_busy = False
-                self.ended.emit()
+                self._ended()

@@ -39,7 +39,7 @@ class MapsPage(Page):
         self.form: JudgedForm[MapRequest] = JudgedForm(MapRequest, "map", frozenset({"described"}))
         self.map = MapPlot(context.theme)
         self.motion = MotionView(context.theme)
-        self.simulator = Simulator(self)
+        self.simulator = Simulator(self, self._grow, self._end, self._die)
         self.picture: MapPicture | None = None
         self._asked: MapRequest | None = None
         self._point: tuple[float, float] | None = None
@@ -50,10 +50,6 @@ class MapsPage(Page):
         self._is_stale = False
         self._build()
         self.form.changed.connect(self._judge)
-        self.simulator.grown.connect(self._grow)
-        self.simulator.ended.connect(self._end)
-        self.simulator.died.connect(self._die)
-        self.destroyed.connect(self.simulator.close)
         self.map.picked.connect(self.pick)
         context.comparison_wanted.connect(self.add_recordings)
         self._judge()

@@ -70,16 +70,12 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self.context, self.kind, self.picture = context, kind, picture
         self.setAccessibleName(kind.name.capitalize())
         self.form: JudgedForm[Request] = JudgedForm(kind.request, kind.name, kind.hidden)
-        self.simulator = Simulator(self)
+        self.simulator = Simulator(self, self._grow, self._end, self._die)
         self.answer: Answer | None = None
         self._course: _Course | None = None
         self._is_stale = False
         self._build()
         self.form.changed.connect(self._judge)
-        self.simulator.grown.connect(self._grow)
-        self.simulator.ended.connect(self._end)
-        self.simulator.died.connect(self._die)
-        self.destroyed.connect(self.simulator.close)
         self._judge()
 
     @property

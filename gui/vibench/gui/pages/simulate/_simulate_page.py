@@ -44,7 +44,7 @@ class SimulatePage(Page):
             SimulationRequest, "simulation", frozenset({"described"})
         )
         self.plots = AnswerPlots(context.theme)
-        self.simulator = Simulator(self)
+        self.simulator = Simulator(self, self._grow, self._end, self._die)
         self._progress: SimulationProgress | None = None
         self._request: SimulationRequest | None = None
         """What the curves are of."""
@@ -56,10 +56,6 @@ class SimulatePage(Page):
         self._views = (self.branches, self.spectrum, self.chain)
         self._build()
         self.form.changed.connect(self._say_cost)
-        self.simulator.grown.connect(self._grow)
-        self.simulator.ended.connect(self._end)
-        self.simulator.died.connect(self._die)
-        self.destroyed.connect(self.simulator.close)
         context.scene_wanted.connect(self.show_scene)
         with suppress(ValueError):  # of another version, or written by somebody
             self.form.form.show_content(dict(json.loads(context.settings.text(Remembered.SCENES))))
