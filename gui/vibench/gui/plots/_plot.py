@@ -211,9 +211,12 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._relegend()
 
     @property
-    def lines_across(self) -> int:
-        """How many upright lines fill the picture; on a fine screen each is some of its pixels wide."""
-        return int(self.getViewBox().width())
+    def columns(self) -> int:
+        """How many columns of extremes fill the picture.
+
+        A few more than it has pixels of the layout: with fewer, a pixel between two columns would stay empty.
+        """
+        return int(1.02 * self.getViewBox().width()) + 2
 
     def show_everything(self) -> None:
         """Let the axes follow the data."""

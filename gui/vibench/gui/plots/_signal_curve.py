@@ -40,7 +40,7 @@ class SignalCurve:
         self._draw(min(max(first, 0), count), min(max(last, 0), count))
 
     def _draw(self, first: int, last: int) -> None:
-        columns = min(max(self._plot.lines_across, 200), MOST_COLUMNS)
+        columns = min(max(self._plot.columns, 200), MOST_COLUMNS)
         if (first, last, columns) == self._drawn:
             return
         self._drawn = (first, last, columns)

@@ -1,7 +1,9 @@
 """The lanes of a run say which channel they show, in its unit, also when the channels change."""
 
+import numpy as np
 import pytest
 
+from vibench.analysis.live import LiveChannel, LiveView
 from vibench.gui.pages.run._time_histories import TimeHistoryPlots, channel_axis
 from vibench.gui.widgets import LIGHT
 
@@ -11,6 +13,7 @@ FOUR = (
     ("base_acceleration", "m/s²"),
     ("m0_velocity", "m/s"),
 )
+RATE_HZ = 51_200.0
 OTHERS = (("base_acceleration", "m/s²"), ("m0_velocity", "V"))
 
 
@@ -39,3 +42,28 @@ def test_the_last_lane_alone_has_the_time(time_histories, qapp):
         qapp.processEvents()
         labelled = [plot.across.label.isVisible() for plot in time_histories.plots]
         assert labelled == [False] * (len(channels) - 1) + [True]
+
+
+@pytest.mark.parametrize("width", [833, 872, 905])
+def test_the_edge_of_a_growing_sine_has_no_teeth(time_histories, qapp, width):
+    """Where two columns fell on one pixel the next one stayed empty: a comb of one pixel at 1280."""
+    time_s = np.arange(round(2.0 * RATE_HZ)) / RATE_HZ
+    phase = 2 * np.pi * (290.0 + 6.75 * time_s) * time_s
+    sine = ((0.55 + 0.035 * time_s) * np.sin(phase)).astype(np.float32)
+    view = LiveView([LiveChannel("drive_voltage", "V", 1.0, 10.0)], RATE_HZ, band_hz=(150.0, 350.0))
+    view.add(0, sine[np.newaxis])
+    time_histories.show_channels((("drive_voltage", "V"),))
+    time_histories.resize(width, 200)
+    qapp.processEvents()
+    time_histories.show_view(view, 2.0)
+    qapp.processEvents()
+    (plot,) = time_histories.plots
+    picture = plot.grab().toImage()
+    box = plot.mapFromScene(plot.getViewBox().sceneBoundingRect()).boundingRect()
+    # Grey is the grid, which lies over the signal.
+    tops = [
+        next(y for y in range(box.top(), box.bottom()) if picture.pixelColor(x, y).saturation() > 100)
+        for x in range(box.left() + 5, box.right() - 5)
+    ]
+    assert tops[0] > tops[-1]
+    assert np.all(np.diff(tops) <= 0)

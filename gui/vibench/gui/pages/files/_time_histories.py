@@ -277,8 +277,7 @@ class RecordingTimeHistories(QWidget):
         rate_hz = self._overview.recording.sample_rate_hz
         low_s, high_s = self.view_s
         start, stop = int(low_s * rate_hz), int(np.ceil(high_s * rate_hz)) + 1
-        # A few more columns than pixels: with fewer, a pixel between two columns would stay empty.
-        columns = max(100, int(1.02 * self._histories[0].plot.lines_across) + 2)
+        columns = max(100, self._histories[0].plot.columns)
         picture = self._overview.picture([history.role for history in self._histories], start, stop, columns)
         for row, history in enumerate(self._histories):
             low, high = picture.low[row], picture.high[row]

@@ -68,7 +68,7 @@ class TimeHistoryPlots(QWidget):
         self.show_channels(tuple((channel.role, channel.unit) for channel in view.channels))
         if not self.plots:
             return
-        seen = view.time_histories(span_s, min(max(LEAST_COLUMNS, self.plots[0].lines_across), MOST_COLUMNS))
+        seen = view.time_histories(span_s, min(max(LEAST_COLUMNS, self.plots[0].columns), MOST_COLUMNS))
         if len(seen.time_s) == 0:
             return
         time_s = np.repeat(seen.time_s - seen.time_s[-1], 2)
