@@ -60,6 +60,19 @@ def test_copies_of_what_is_shipped_are_whole_and_never_overwrite(vibench_here, t
     assert changed.read_text(encoding="utf-8") == "changed"
 
 
+def test_a_disk_without_room_is_one_sentence(vibench_here, tmp_path):
+    resource = pytest.importorskip("resource", reason="bounds on files are POSIX")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, limits[1]))
+    try:
+        told = vibench_here("examples", "--copy", "mine", cwd=tmp_path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert told.returncode == 1
+    assert "there is no room for" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
 def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vibench_here, tmp_path):
     environment = {"VIBENCH_RIG_TOKEN": "do-not-tell", "VIBENCH_STATE_DIR": str(tmp_path / "state")}
     told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)

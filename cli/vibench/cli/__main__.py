@@ -267,12 +267,22 @@ def main() -> None:
         complain(error)
         sys.exit(ExitCode.FAILED)
     except OSError as error:
-        if error.errno != errno.ENAMETOOLONG:
+        if error.errno not in DISK_ERRORS:
             raise
         # Whoever looks at a path first meets it: here is the one place that all paths have behind them.
-        name = shortened(str(error.filename), NAME_SHOWN)
-        complain(OSError(f"the name {name} is too long for this disk; nothing was done, give a shorter one"))
+        name = shortened(str(error.filename or "a file"), NAME_SHOWN)
+        complain(OSError(DISK_ERRORS[error.errno].format(name=name)))
         sys.exit(ExitCode.FAILED)
+
+
+_PLACE = "{name} may not be written or read here; what was written before is kept. Give another place"
+_ROOM = "there is no room for {name}; what was written before is kept. Make room, or give another place"
+DISK_ERRORS = {
+    errno.ENAMETOOLONG: "the name {name} is too long for this disk; nothing was done, give a shorter one",
+    **dict.fromkeys((errno.EACCES, errno.EPERM, errno.EROFS), _PLACE),
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _ROOM),
+}
+"""What a person can do something about."""
 
 
 LONGEST_SENTENCE = 1800
