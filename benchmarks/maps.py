@@ -3,9 +3,13 @@
 `basin` draws starts at random from the rectangle of a basin map and counts what they come to, beside the
 shares that the map states. `map` computes a map with so many points along each axis and says what it took:
 processor time, time to the first picture, points computed, and what an estimate made before had said.
+`lanes` follows random motions in lanes and one by one, in the same run: time per impact on one core, and
+how far both lie from strict steps; then settles points of a map both ways, and counts those that came to
+another motion, among all of them and among those where several starts agree.
 """
 
 import argparse
+import math
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -14,9 +18,14 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import load_toml
-from vibench.sim import Given, MotionKind, settle_scene, wilson_share
-from vibench.sim.maps import Map, Range, estimate_map, open_map, solve_map
+from vibench.sim import Accuracy, Given, Harmonic, MotionKind, gong2025, settle_scene, wilson_share
+from vibench.sim.lanes import LaneRun, follow_in_lanes
+from vibench.sim.maps import Map, Range, estimate_map, map_solver, open_map, solve_map
+from vibench.sim.scene import settle_scenes
+from vibench.sim.scene._followed_run import FollowedRun, Stretch
+from vibench.sim.scene._observed_window import follow_strobed
 
+STANDARD = Accuracy.STANDARD.tolerance
 SAME = 2e-3
 """Relative difference of Response I of one periodic motion."""
 FIELDS = ("x_m", "y_m", "z_m", "vx_m_per_s", "vy_m_per_s", "vz_m_per_s")
@@ -68,8 +77,9 @@ def cost(asked: argparse.Namespace) -> int:
     said["frequency_hz"]["points"], said["amplitude_m"]["points"] = asked.columns, asked.rows
     plan = Map(specimen=plan.specimen, **said)
     # Kernels are compiled and loaded before the clock starts.
-    settle_scene(plan.scene((0, 0, asked.columns // 2)))
-    settle_scene(plan.scene((asked.rows - 1, 0, asked.columns // 2)))
+    solver = map_solver(plan)
+    solver(plan.scene((0, 0, asked.columns // 2)))
+    solver(plan.scene((asked.rows - 1, 0, asked.columns // 2)))
     before = estimate_map(plan, asked.workers)
     print(before.sentence)
     began_s, began_cpu_s = time.perf_counter(), time.process_time()
@@ -93,6 +103,116 @@ def cost(asked: argparse.Namespace) -> int:
     return 0
 
 
+ROUNDS = 5
+"""Both ways in turn; the shortest time of each counts."""
+WANDERED_S = 1.0
+"""Before a motion is timed."""
+COMPARED_S = 0.01
+"""After which both ways are compared with strict steps: chaos magnifies by e in a few ms."""
+STARTS = 8
+
+
+def random_runs(count: int, rng: np.random.Generator) -> list[FollowedRun]:
+    """Give motions on their way, at a whole drive period, in flight: 60 to 420 Hz, 2 to 50 um."""
+    runs = []
+    while len(runs) < count:
+        drive = Harmonic(rng.uniform(60.0, 420.0), math.exp(rng.uniform(math.log(2e-6), math.log(5e-5))))
+        run = FollowedRun(gong2025(), drive, STANDARD, np.zeros(6))
+        run.follow(math.ceil(WANDERED_S * drive.frequency_hz) / drive.frequency_hz)
+        if run.is_in_flight:
+            runs.append(run)
+    return runs
+
+
+def in_lanes(runs: list[FollowedRun], periods: list[int]) -> list[LaneRun]:
+    """Follow motions side by side."""
+    specimen = runs[0].specimen
+    return follow_in_lanes(
+        specimen, STANDARD, [each.flight for each in runs], [each.state for each in runs], periods
+    )
+
+
+def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | None = None) -> list[Stretch]:
+    """Follow the same ones after the other."""
+    twins = [each.apart(tolerance) for each in runs]
+    return [
+        follow_strobed(each, (each.periods + count) / each.drive.frequency_hz)
+        for each, count in zip(twins, periods, strict=True)
+    ]
+
+
+def ns_per_impact(follow, runs: list[FollowedRun], periods: list[int]) -> float:
+    """Follow motions one way, and say what an impact took."""
+    began_s = time.thread_time()
+    found = follow(runs, periods)
+    return 1e9 * (time.thread_time() - began_s) / sum(each.impacts for each in found)
+
+
+def lanes(asked: argparse.Namespace) -> int:
+    """Compare lanes with one motion after the other."""
+    rng = np.random.default_rng(asked.seed)
+    runs = random_runs(asked.motions, rng)
+    periods = [asked.periods] * len(runs)
+    timed = [
+        (ns_per_impact(in_lanes, runs, periods), ns_per_impact(one_by_one, runs, periods))
+        for _ in range(ROUNDS)
+    ]
+    beside_ns, alone_ns = np.min(timed, axis=0)
+    print(
+        f"{len(runs)} random motions, {asked.periods} drive periods each, one core: {beside_ns:.0f} ns per "
+        f"impact in lanes, {alone_ns:.0f} ns one by one: {alone_ns / beside_ns:.2f} times"
+    )
+    short = [math.ceil(COMPARED_S * each.drive.frequency_hz) for each in runs]
+    exact = one_by_one(runs, short, Accuracy.REFERENCE.tolerance)
+    gap_m = runs[0].specimen.gap_m
+    for name, found in (("in lanes", in_lanes(runs, short)), ("one by one", one_by_one(runs, short))):
+        off = [
+            np.abs(one.states[-1, :3] - other.states[-1, :3]).max() / gap_m
+            for one, other in zip(found, exact, strict=True)
+            if abs(other.states[-1, 1] - other.states[-1, 2]) < gap_m
+        ]
+        print(f"{name}: {np.median(off):.1e} of a gap from strict steps after {COMPARED_S} s, median")
+    return labels(asked)
+
+
+def labels(asked: argparse.Namespace) -> int:
+    """Settle random points of a map both ways; gives how many came to another motion where starts agree."""
+    plan = Map(
+        frequency_hz=Range(start=60.0, stop=420.0, points=600),
+        amplitude_m=Range(start=2e-6, stop=5e-5, points=400, spacing="logarithmic"),
+        random_starts=STARTS - 1,
+    )
+    rng = np.random.default_rng(asked.seed)
+    places = [(int(rng.integers(400)), int(rng.integers(600))) for _ in range(asked.points)]
+    first = [plan.scene((row, 0, column)) for row, column in places]
+    began_s = time.thread_time()
+    alone = [settle_scene(scene) for scene in first]
+    alone_s, began_s = time.thread_time() - began_s, time.thread_time()
+    beside = [each.prediction for each in settle_scenes(first)]
+    beside_s = time.thread_time() - began_s
+    print(
+        f"{asked.points} random points of a map: {1e3 * beside_s / asked.points:.2f} ms each in lanes, "
+        f"{1e3 * alone_s / asked.points:.2f} ms one by one: {alone_s / beside_s:.2f} times"
+    )
+    others = [plan.scene((row, k, column)) for row, column in places for k in range(1, STARTS)]
+    reached = [each.prediction for each in settle_scenes(others)]
+    labels_of = [
+        {(each.motion, each.period) for each in (beside[k], *reached[k * (STARTS - 1) :][: STARTS - 1])}
+        for k in range(asked.points)
+    ]
+    agree = [len(each) == 1 for each in labels_of]
+    same = [
+        (one.motion, one.period) == (other.motion, other.period)
+        for one, other in zip(alone, beside, strict=True)
+    ]
+    apart = sum(is_agreed and not is_same for is_same, is_agreed in zip(same, agree, strict=True))
+    print(
+        f"{sum(same)} of {asked.points} came to the same kind and period both ways; of the {sum(agree)} "
+        f"where {STARTS} starts agree, {apart} did not"
+    )
+    return int(apart > sum(agree) / 1000)
+
+
 def main() -> int:
     """Read what is asked."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -107,6 +227,12 @@ def main() -> int:
     points.add_argument("--columns", type=int, default=600)
     points.add_argument("--rows", type=int, default=400)
     points.set_defaults(run=cost)
+    compared = parts.add_parser("lanes")
+    compared.add_argument("--motions", type=int, default=96)
+    compared.add_argument("--periods", type=int, default=600)
+    compared.add_argument("--points", type=int, default=400)
+    compared.add_argument("--seed", type=int, default=1)
+    compared.set_defaults(run=lanes)
     asked = parser.parse_args()
     return asked.run(asked)
 

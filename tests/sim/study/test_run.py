@@ -32,7 +32,7 @@ class UnreliableExecutor:
 
     def replies(self, timeout_s):
         bundle = self._waiting.pop(self._luck.randrange(len(self._waiting)))
-        solved = tuple(solve_timed(scene, solve_scene) for scene in bundle.scenes)
+        solved = tuple(solve_timed(bundle.scenes, solve_scene))
         match self._luck.randrange(4):
             case 0:
                 return (Reply(bundle, solved[: self._luck.randrange(len(solved))]),)

@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from scipy.ndimage import distance_transform_edt
 
 from vibench.sim import Harmonic, MotionKind, Scene, integrate, settle_scene
-from vibench.sim.maps import Map, MapResults, Range, Spacing, compute_map
+from vibench.sim.maps import Map, MapResults, Range, Spacing, compute_map, map_solver
 from vibench.sim.study import MemoryStore, PointAnswer, executor_of
 
 from ..dynamics import SpecimenChoice, map_caption, motion_classes
@@ -138,7 +138,7 @@ def map_pictures(
     """Compute a map, and tell pictures of it as it grows; the last one is whole unless it was cancelled."""
     plan = request.plan
     store = PicturingStore(plan, tell)
-    with executor_of(None, None, settle_scene) as executor:
+    with executor_of(None, None, map_solver(plan)) as executor:
         compute_map(plan, executor, store, cancelled=cancelled)
     store.show()
 

@@ -9,6 +9,20 @@ from ._collision import (
     find_collision as find_collision,
     new_collision as new_collision,
 )
+from ._fit import (
+    COUNTS as COUNTS,
+    DERIVATIVES as DERIVATIVES,
+    LENGTH as LENGTH,
+    MIDDLE as MIDDLE,
+    MOMENTS as MOMENTS,
+    POLYNOMIALS as POLYNOMIALS,
+    PRODUCTS as PRODUCTS,
+    PUSHES as PUSHES,
+    VARIABLES as VARIABLES,
+    CollisionFit as CollisionFit,
+    fit_collisions as fit_collisions,
+    time_over_fifth_root as time_over_fifth_root,
+)
 from ._observer import (
     deepest_of as deepest_of,
     observe_collision as observe_collision,

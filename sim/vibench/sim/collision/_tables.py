@@ -139,7 +139,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 
 @lru_cache(maxsize=1)
-def _shapes() -> tuple[Table, Table]:
+def collision_shapes() -> tuple[Table, Table]:
     """Solve the collisions of the row, each begun from the one before."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without a press: 2.943 long, and close to half a sine.
@@ -207,7 +207,7 @@ def collisions_in_a_course(fastest: float) -> CollisionTables:
 
 
 def _with_shapes(fastest: float, powers: Table, struck: Table) -> CollisionTables:
-    shapes, durations = _shapes()
+    shapes, durations = collision_shapes()
     return CollisionTables(
         fastest=fastest,
         onto_x=np.ascontiguousarray(powers[:, :, AT_X].T),

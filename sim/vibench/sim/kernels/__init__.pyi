@@ -1,5 +1,6 @@
 from ._arrays import (
     Complex as Complex,
+    Counts as Counts,
     Floats as Floats,
     Table as Table,
     Vector as Vector,
@@ -38,11 +39,16 @@ from ._row import (
 )
 from ._simd import (
     SimdVector as SimdVector,
+    below as below,
+    choose as choose,
     eight as eight,
     eight_of_eight as eight_of_eight,
     eight_of_sixteen as eight_of_sixteen,
     eights as eights,
+    fma as fma,
     largest as largest,
+    magnitude as magnitude,
+    polynomials as polynomials,
     root as root,
     sixteen as sixteen,
     sixteen_of_sixteen as sixteen_of_sixteen,

@@ -6,9 +6,10 @@ of their own. Every operation is IEEE's, place by place and uncontracted: the sa
 """
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Self, cast
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -35,10 +36,19 @@ class SimdVector:
     def __sub__(self, _other: Self | float) -> Self:
         raise NotImplementedError
 
+    def __rsub__(self, _other: float) -> Self:
+        raise NotImplementedError
+
     def __mul__(self, _other: Self | float) -> Self:
         raise NotImplementedError
 
     def __rmul__(self, _other: float) -> Self:
+        raise NotImplementedError
+
+    def __neg__(self) -> Self:
+        raise NotImplementedError
+
+    def __truediv__(self, _other: Self | float) -> Self:
         raise NotImplementedError
 
 
@@ -247,6 +257,130 @@ first_outside = cast("Callable[[SimdVector, float, float], int]", _first_outside
 """The first lane that is not between two numbers; the count of lanes if all are."""
 
 
+def _mask_of(builder: Any, bits: Any) -> Any:
+    """Give the bits of lanes as a number."""
+    return builder.zext(builder.bitcast(bits, ir.IntType(bits.type.count)), ir.IntType(64))
+
+
+@intrinsic
+def _below(_context: Any, one: Any, other: Any) -> Any:
+    found = [each for each in (one, other) if isinstance(each, _SimdVectorType)]
+
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        pair = [_spread(builder, each, found[0].vector) for each in given]
+        return _mask_of(builder, builder.fcmp_ordered("<", *pair))
+
+    return (types.intp(one, other), code) if found else None
+
+
+below = cast("Callable[[SimdVector | float, SimdVector | float], int]", _below)
+"""Where one is below the other, as bits of a number; not where one is not a number."""
+
+
+@intrinsic
+def _choose(_context: Any, mask: Any, one: Any, other: Any) -> Any:  # noqa: ARG001 - numba's names
+    found = [each for each in (one, other) if isinstance(each, _SimdVectorType)]
+
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        vector = found[0].vector
+        bits = builder.trunc(given[0], ir.IntType(vector.count))
+        bits = builder.bitcast(bits, ir.VectorType(ir.IntType(1), vector.count))
+        return builder.select(bits, *(_spread(builder, each, vector) for each in given[1:]))
+
+    return (found[0](types.intp, one, other), code) if found else None
+
+
+choose = cast("Callable[[int, SimdVector | float, SimdVector | float], SimdVector]", _choose)
+"""One where the bit of a lane is set, the other elsewhere."""
+
+
+def _fused(builder: Any, one: Any, other: Any, added: Any) -> Any:
+    """Give one times other plus what is added, rounded once."""
+    kind = ir.FunctionType(one.type, [one.type] * 3)
+    name = f"llvm.fma.v{one.type.count}f64"
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [one, other, added])
+
+
+@intrinsic
+def _fma(_context: Any, one: Any, other: Any, added: Any) -> Any:
+    found = [each for each in (one, other, added) if isinstance(each, _SimdVectorType)]
+
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        return _fused(builder, *(_spread(builder, each, found[0].vector) for each in given))
+
+    return (found[0](one, other, added), code) if found else None
+
+
+fma = cast("Callable[[SimdVector | float, SimdVector | float, SimdVector | float], SimdVector]", _fma)
+"""One times the other plus the third, rounded once: the same on every processor, but slow where there is no
+such instruction."""
+
+
+@intrinsic
+def _magnitude(_context: Any, simd: Any) -> Any:
+    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+        name, kind = f"llvm.fabs.v{simd.vector.count}f64", ir.FunctionType(simd.vector, [simd.vector])
+        return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), [given[0]])
+
+    return simd(simd), code
+
+
+magnitude = cast("Callable[[SimdVector], SimdVector]", _magnitude)
+"""Absolute values."""
+
+Polynomials = Callable[[Table, Vector, Table], None]
+Monomial = tuple[int, int]
+"""The place of an earlier monomial, and the variable that it is multiplied with."""
+
+
+def polynomials(products: Sequence[Monomial], counts: Sequence[int]) -> Polynomials:
+    """Make a kernel that evaluates polynomials of eight points at once, written out without a loop.
+
+    Parameters
+    ----------
+    products
+        Of each monomial but the first, which is 1: an earlier one times a variable.
+    counts
+        How many monomials, from the first on, each polynomial has.
+
+    Returns
+    -------
+    A kernel of the variables, shape (variables, 8), the coefficients, polynomial after polynomial, shape
+    (sum(counts),), and the values, shape (polynomials, 8), which it writes.
+
+    """
+
+    @intrinsic
+    def evaluate(_context: Any, variables: Any, coefficients: Any, values: Any) -> Any:
+        def code(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+            at, out = (
+                context.make_array(kind)(context, builder, given[place]).data
+                for kind, place in ((variables, 0), (values, 2))
+            )
+            number = _numbers(context, builder, coefficients, given[1])
+            nothing, first = ir.Constant(_EIGHT.vector, [0.0] * 8), np.cumsum([0, *counts])
+            found = [ir.Constant(_EIGHT.vector, [1.0] * 8)]
+            sums = [[nothing] * _CHAINS for _ in counts]
+            for k in range(max(counts)):
+                if k > 0:
+                    before, variable = products[k - 1]
+                    factor = _load(builder, at, variable, _EIGHT.vector)
+                    found.append(factor if before == 0 else builder.fmul(found[before], factor))
+                for begins, count, chains in zip(first, counts, sums, strict=False):
+                    if k < count:
+                        weight = _spread(builder, number(int(begins) + k), _EIGHT.vector)
+                        chains[k % _CHAINS] = _fused(builder, weight, found[k], chains[k % _CHAINS])
+            for place, chains in enumerate(sums):
+                one, two = (builder.fadd(chains[i], chains[i + 1]) for i in (0, 2))
+                row = builder.bitcast(builder.gep(out, [_PLACE(place * 8)]), _EIGHT.vector.as_pointer())
+                builder.store(builder.fadd(one, two), row, align=_ALIGNED)
+            return context.get_dummy_value()
+
+        return types.none(variables, coefficients, values), code
+
+    return cast("Polynomials", evaluate)
+
+
 def _give_operator(function: Callable[..., object], name: str) -> None:
     """Give lanes an operator of Python."""
 
@@ -275,6 +409,22 @@ for name, functions in {
     "fadd": (operator.add, operator.iadd),
     "fsub": (operator.sub, operator.isub),
     "fmul": (operator.mul, operator.imul),
+    "fdiv": (operator.truediv, operator.itruediv),
 }.items():
     for function in functions:
         _give_operator(function, name)
+
+
+def _negated(_context: Any) -> Callable[..., object]:
+    def typed(simd: object) -> object:
+        return simd if isinstance(simd, _SimdVectorType) else None
+
+    return typed
+
+
+def _negate(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
+    return builder.fneg(given[0])
+
+
+type_callable(operator.neg)(_negated)
+lower_builtin(operator.neg, _SimdVectorType)(_negate)

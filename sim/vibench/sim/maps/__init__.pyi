@@ -8,6 +8,9 @@ from ._estimate import (
     MapEstimate as MapEstimate,
     estimate_map as estimate_map,
 )
+from ._expansion import (
+    map_solver as map_solver,
+)
 from ._map import (
     Map as Map,
     Range as Range,

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import Floats
+from ..lanes import lanes_pay
 from ..model import Outcome
-from ..scene import Given, MotionKind, Scene, expected_cost_s, settle_scene
+from ..scene import Given, MotionKind, Scene, expected_cost_s, settle_in_lanes, settle_scene
 from ..study import (
     NUMBERS,
     Arrays,
@@ -17,6 +18,7 @@ from ..study import (
     PointAnswer,
     PointState,
     Solved,
+    Solver,
     continued_point,
     end_phase,
     failed_point,
@@ -25,6 +27,7 @@ from ..study import (
 )
 from ._columns import contact_energy_j, section_cells
 from ._map import Map
+from ._quantities import OF_SPECIMEN
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 
 JUMP = 0.1
@@ -35,8 +38,24 @@ NOTHING = -1
 NOBODY = -1
 
 
+BUNDLE_S = 0.3
+"""Worker time of scenes that are handed over together: lanes are full only if there are many."""
+
+
+def map_solver(plan: Map) -> Solver:
+    """Choose what computes the points of a map: lanes, or one point after the other.
+
+    Lanes follow motions of one specimen that do not wait for each other, and pay where a processor has the
+    registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one.
+    """
+    is_one_specimen = not any(each in OF_SPECIMEN for each in plan.varied)
+    return settle_in_lanes if is_one_specimen and not plan.chain and lanes_pay() else settle_scene
+
+
 class MapPoints:
     """The scenes of a map, made when they are asked for."""
+
+    bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
         self.plan = plan
@@ -110,7 +129,7 @@ class MapPoints:
 
     def _planned(self, number: int) -> float:
         try:
-            return expected_cost_s(self.plan.scene(self.grid.place(number)), settle_scene)
+            return expected_cost_s(self.plan.scene(self.grid.place(number)), map_solver(self.plan))
         except ValueError:
             return 0.0
 

@@ -15,9 +15,11 @@ class Quantity:
     long_name: str
 
 
-DRIVE_AND_SPECIMEN = (
+DRIVE = (
     Quantity("frequency_hz", "frequency", "Hz", "drive frequency"),
     Quantity("amplitude_m", "amplitude", "m", "amplitude of the base displacement"),
+)
+OF_SPECIMEN = (
     Quantity("gap_m", "gap", "m", "clearance at both stops"),
     Quantity("damping_time_s", "damping_time", "s", "damping over stiffness of every link"),
     Quantity("k0_n_per_m", "k0", "N m-1", "stiffness between base and m0"),
@@ -25,12 +27,11 @@ DRIVE_AND_SPECIMEN = (
     Quantity("k2_n_per_m", "k2", "N m-1", "stiffness between m0 and m2"),
     Quantity("hertz_stiffness", "hertz_stiffness", "N m-1.5", "stiffness of the stops"),
 )
-START = (
-    Quantity("x_m", "x", "m", "displacement of m0 at the start"),
-    Quantity("y_m", "y", "m", "displacement of m1 at the start"),
-    Quantity("z_m", "z", "m", "displacement of m2 at the start"),
-    Quantity("vx_m_per_s", "vx", "m s-1", "velocity of m0 at the start"),
-    Quantity("vy_m_per_s", "vy", "m s-1", "velocity of m1 at the start"),
-    Quantity("vz_m_per_s", "vz", "m s-1", "velocity of m2 at the start"),
+START = tuple(
+    Quantity(
+        f"{symbol}{mass}_{suffix}", f"{symbol}{mass}", units, f"{what} of m{'xyz'.index(mass)} at the start"
+    )
+    for symbol, suffix, units, what in (("", "m", "m", "displacement"), ("v", "m_per_s", "m s-1", "velocity"))
+    for mass in "xyz"
 )
-QUANTITIES = (*DRIVE_AND_SPECIMEN, *START)
+QUANTITIES = (*DRIVE, *OF_SPECIMEN, *START)

@@ -6,7 +6,6 @@ from typing import Literal
 import numpy as np
 
 from ..kernels import Floats
-from ..scene import settle_scene
 from ..study import (
     Arrays,
     Cancelled,
@@ -20,7 +19,7 @@ from ..study import (
     run_points,
     store_of,
 )
-from ._expansion import MapPoints, points_of, refinement_of
+from ._expansion import MapPoints, map_solver, points_of, refinement_of
 from ._map import Map
 from ._refinement import Filling
 from ._results import MapResults, open_map
@@ -77,7 +76,7 @@ def solve_map(
         In one sentence: a file of another map, a cluster that does not answer, a full disk, ...
 
     """
-    with executor_of(workers, cluster, settle_scene) as executor, store_of(plan, out, existing) as store:
+    with executor_of(workers, cluster, map_solver(plan)) as executor, store_of(plan, out, existing) as store:
         compute_map(plan, executor, store, observer, cancelled)
         arrays = store.arrays
     return MapResults(plan, arrays) if out is None else open_map(out)
@@ -92,7 +91,7 @@ def compute_map(
 ) -> StudyEnd:
     """Compute what a store misses of a map, until ``cancelled``, and fill in the rest.
 
-    The solver is `settle_scene`.
+    The solver is `map_solver`.
     """
     end = run_points(MapPoints(plan), executor, store, observer, cancelled)
     if end is StudyEnd.COMPLETE:

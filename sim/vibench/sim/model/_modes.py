@@ -1,6 +1,7 @@
 """The specimen without contact, solved exactly: state matrix, modes, transmissibility. SI units."""
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -86,8 +87,9 @@ COINCIDENT = 1e7
 """Condition of the eigenvectors beyond which two modes count as one (critical damping to 14 digits)."""
 
 
+@lru_cache(maxsize=64)
 def modal_form(specimen: Specimen) -> ModalForm:
-    """Diagonalise the specimen without contact, for any damping.
+    """Diagonalise the specimen without contact, for any damping; its arrays are not to be written to.
 
     Raises ValueError when two modes coincide (critical damping): then no full set of modes exists.
     """

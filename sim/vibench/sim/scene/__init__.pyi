@@ -32,7 +32,10 @@ from ._shares import (
     wilson_share as wilson_share,
 )
 from ._solve import (
+    Settled as Settled,
+    settle_in_lanes as settle_in_lanes,
     settle_scene as settle_scene,
+    settle_scenes as settle_scenes,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
 )

@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..exponents import energy_metric
+from ..flight import FlightTables
 from ..kernels import Floats, advance_clock, clock_at
+from ..lanes import LaneRun
 from ..model import Accuracy, Harmonic, Outcome, Specimen
 from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion, state_scales
 from ..slots import (
@@ -28,6 +30,7 @@ from ..slots import (
     PEAK_X,
     PEAKS,
     PEAKS_AND_LINES,
+    SIDE,
     STEPS_LEFT,
     TANGENT_SIZE,
     no_tangent,
@@ -107,6 +110,11 @@ class FollowedRun:
         self._steps_left = MOST_STEPS
 
     @property
+    def tolerance(self) -> float:
+        """Relative error allowed in a step of a contact."""
+        return self._tolerance
+
+    @property
     def cost_s(self) -> float:
         """What following it from its beginning has cost, by `nominal_cost_s`."""
         return self._cost_s
@@ -135,6 +143,45 @@ class FollowedRun:
     def pass_over(self, drive_periods: int) -> None:
         """Let so many drive periods pass in which the motion comes back to its state."""
         advance_clock(self._clock, drive_periods / self.drive.frequency_hz)
+
+    @property
+    def periods(self) -> int | None:
+        """Whole drive periods up to now; None between two."""
+        whole = round(self.time_s * self.drive.frequency_hz)
+        return whole if whole / self.drive.frequency_hz == self.time_s else None
+
+    @property
+    def is_in_flight(self) -> bool:
+        """No stop is touched now."""
+        return bool(self._state[SIDE] == 0.0)
+
+    @property
+    def flight(self) -> FlightTables:
+        """Specimen and drive, as `follow_in_lanes` asks for them."""
+        return self._tables.flight
+
+    def take(self, found: LaneRun) -> Stretch:
+        """Be where a lane has come to that began here, at a whole drive period."""
+        periods = len(found.states)
+        start_s, frequency_hz = self.time_s, self.drive.frequency_hz
+        self._state = found.state
+        self._clock = clock_at((round(start_s * frequency_hz) + periods) / frequency_hz)
+        length_s = self.time_s - start_s
+        self._cost_s += nominal_cost_s(self.specimen.contact, self._tolerance, length_s, found.impacts, 0, 0)
+        samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, periods)
+        return Stretch(
+            start_s,
+            self.time_s,
+            self.outcome,
+            found.impacts,
+            0.0,
+            0.0,
+            0j,
+            0j,
+            samples,
+            found.states,
+            math.nan,
+        )
 
     def follow_tangent(self) -> None:
         """Carry a small change along from now on, in no special direction."""

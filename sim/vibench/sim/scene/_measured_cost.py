@@ -8,7 +8,7 @@ from ..costs import FEWEST, cost_ledger
 from ._plan import ScenePlan, plan_scene
 from ._prediction import ScenePrediction
 from ._scene import Scene
-from ._solve import settle_scene, solve_scene
+from ._solve import settle_in_lanes, settle_scene, solve_scene
 
 MEASURED_S = 0.5
 """Processor time after which no further run is made to measure a cost [s]."""
@@ -17,6 +17,10 @@ DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
 
 
 Solver = Callable[[Scene], ScenePrediction]
+
+
+SETTLED: dict[Solver, str] = {settle_scene: "settled", settle_in_lanes: "settled in lanes"}
+"""Solvers that find less than `solve_scene`, and what their runs are learnt as."""
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
@@ -35,7 +39,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
 
 
 def _kind(plan: ScenePlan, solver: Solver) -> str:
-    return f"settled/{plan.kind}" if solver is settle_scene else plan.kind
+    return f"{SETTLED[solver]}/{plan.kind}" if solver in SETTLED else plan.kind
 
 
 def measure_cost(scene: Scene) -> None:

@@ -6,8 +6,9 @@ on by its states alone for as long as a budget allows.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar, cast
 
 from ..model import Outcome
 from ._fixed_run import Pace, SceneRun, growth_of, judged
@@ -15,8 +16,9 @@ from ._followed_run import FollowedRun, ObservedQuantities, Stretch
 from ._observed_window import follow_strobed, states_of, whole_periods, window_of
 from ._prediction import MotionKind
 from ._repetition import Repetition, kind_of, wandered_until
-from ._states_alone import StatesAlone
+from ._states_alone import Following, StatesAlone
 
+Answer = TypeVar("Answer")
 SLICE_S, SLICE_PERIODS = 0.25, 4
 """Between two looks pass this long and this many drive periods, if the window is not shorter."""
 WINDOWS = 2
@@ -35,22 +37,40 @@ class Patience:
     """Nominal cost of following chaos on by its states alone; zero does not follow it on."""
 
 
-def run_until_settled(run: FollowedRun, patience: Patience, pace: Pace) -> SceneRun:
+Settling = Generator[Following, None, SceneRun]
+"""A motion that is being settled: it asks for motions to be followed, and goes on when they have been."""
+
+
+def alone(asking: Generator[Following, None, Answer]) -> Answer:
+    """Bring one motion to its end by itself."""
+    try:
+        while True:
+            next(asking).by_itself()
+    except StopIteration as end:
+        return cast("Answer", end.value)
+
+
+def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Settling:
     """Follow a motion that is at time zero until it repeats or surely never will, and observe it."""
     slice_periods, in_window = _slices(patience.window_s, pace.frequency_hz)
     longest_s = patience.longest_s
     watched_after_s = min(pace.attractor_s, longest_s - in_window * slice_periods / pace.frequency_hz)
-    early: list[Stretch] = []
+    slices = max(0, math.ceil(watched_after_s * pace.frequency_hz / slice_periods))
+    begun = StatesAlone(run, pace, slice_periods=slice_periods)
+    yield Following(begun, slices * slice_periods / pace.frequency_hz, math.inf)
+    early = begun.path
+    if begun.repeats is not None:
+        return _observe_period(run, begun.repeats, early, pace)
     late: list[Stretch] = []
     starts: list[FollowedRun] = []
-    made = 0
+    made = slices * slice_periods
     while run.outcome is Outcome.REACHED_END:
         repeats = pace.repeats([*early, *late])
         if repeats is not None:
             return _observe_period(run, repeats, [*early, *late], pace)
         kind = kind_of(None, growth_of(late), pace.forgetting_s)
         if kind is MotionKind.CHAOTIC and len(late) >= in_window and patience.alone_s > 0.0:
-            return _followed_on(run, [*early, *late], len(late), patience, pace)
+            return (yield from _followed_on(run, [*early, *late], len(late), patience, pace))
         if len(late) >= WINDOWS * in_window and kind is not MotionKind.UNDECIDED:
             seen = _observed(run, late, starts, in_window, pace, f"it is {kind}")
             return replace(seen, settled_s=late[0].start_s, path=(*early, *late))
@@ -58,9 +78,6 @@ def run_until_settled(run: FollowedRun, patience: Patience, pace: Pace) -> Scene
         end_s = made / pace.frequency_hz
         if len(late) >= in_window and end_s > longest_s:
             break
-        if run.time_s < watched_after_s:
-            early.append(follow_strobed(run, end_s))
-            continue
         if not late:
             run.follow_tangent()
         starts.append(run.apart())
@@ -72,19 +89,19 @@ def run_until_settled(run: FollowedRun, patience: Patience, pace: Pace) -> Scene
 
 def _followed_on(
     run: FollowedRun, path: Sequence[Stretch], watched: int, patience: Patience, pace: Pace
-) -> SceneRun:
+) -> Settling:
     """Follow chaos on by its states alone, until it dies out or the budget is used up, and observe it.
 
     The last ``watched`` stretches of the path were observed.
     """
     slice_periods, in_window = _slices(patience.window_s, pace.frequency_hz)
     window_s = in_window * slice_periods / pace.frequency_hz
-    alone = StatesAlone(run, pace, states_of(path))
+    states = StatesAlone(run, pace, states_of(path))
     until_s = whole_periods(patience.longest_s - window_s, pace.frequency_hz) / pace.frequency_hz
-    alone.follow(until_s, run.cost_s + patience.alone_s)
-    if alone.repeats is not None:
-        seen = _observe_period(run, alone.repeats, path, pace)
-        return replace(seen, grew=True, wandered_until_s=alone.wandered_until_s)
+    yield Following(states, until_s, run.cost_s + patience.alone_s)
+    if states.repeats is not None:
+        seen = _observe_period(run, states.repeats, path, pace)
+        return replace(seen, grew=True, wandered_until_s=states.wandered_until_s)
     begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
     last = [
         follow_strobed(

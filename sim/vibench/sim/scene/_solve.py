@@ -4,6 +4,8 @@ Amplitudes of the motion of m0 over frequency, from samples over whole drive per
 """
 
 import math
+import time
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +23,7 @@ from ._plan import plan_of, transient_decay_s
 from ._prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
 from ._scatter import WindowScatter, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
-from ._settling_run import Patience, run_until_settled
+from ._settling_run import Patience, alone, settling
 from ._several_starts import FEWEST, SEED, TOO_FEW, Draw, ReachedMotion, reached_motion
 from ._stated_error import (
     ROUNDING,
@@ -33,6 +35,7 @@ from ._stated_error import (
     stated_errors,
     with_errors,
 )
+from ._states_alone import Following, follow_all
 
 LEAST_RATE_HZ = 20_000.0
 """Samples a second, at least: contacts are ten times slower than that, and m0 hardly feels them."""
@@ -208,6 +211,59 @@ def settle_scene(scene: Scene) -> ScenePrediction:
         When the specimen cannot be followed in time, or not from such a start.
 
     """
+    return alone(_settling(scene))
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """What a scene came to that was settled beside others."""
+
+    prediction: ScenePrediction
+    taken_s: float
+    """Processor time of this thread for it [s]; of what was followed together, its part."""
+
+
+def settle_scenes(scenes: Sequence[Scene]) -> list[Settled]:
+    """Settle several scenes, each as `settle_scene` does, in lanes as long as states are enough.
+
+    The answer to each does not depend on the others.
+
+    Raises
+    ------
+    ValueError
+        When one of them cannot be followed in time, or not from its start.
+
+    """
+    under_way = [_settling(scene) for scene in scenes]
+    answers: dict[int, ScenePrediction] = {}
+    taken_s = [0.0] * len(scenes)
+    while len(answers) < len(scenes):
+        asked: dict[int, Following] = {}
+        for place, each in enumerate(under_way):
+            if place not in answers:
+                began_s = time.thread_time()
+                try:
+                    asked[place] = next(each)
+                except StopIteration as end:
+                    answers[place] = end.value
+                taken_s[place] += time.thread_time() - began_s
+        began_s = time.thread_time()
+        follow_all(list(asked.values()))
+        for place in asked:
+            taken_s[place] += (time.thread_time() - began_s) / len(asked)
+    return [Settled(answers[place], taken_s[place]) for place in range(len(scenes))]
+
+
+def settle_in_lanes(scene: Scene) -> ScenePrediction:
+    """Settle one scene as `settle_scenes` does among any others: to the last digit the same answer.
+
+    For one scene alone `settle_scene` is faster; of chaos it is another draw.
+    """
+    return settle_scenes([scene])[0].prediction
+
+
+def _settling(scene: Scene) -> Generator[Following, None, ScenePrediction]:
+    """Do as `settle_scene`, and hand out what may be followed beside others."""
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     method = plan_of(scene, motion).method
     if method is Method.CLOSED_FORM:
@@ -216,7 +272,7 @@ def settle_scene(scene: Scene) -> ScenePrediction:
         length_s = math.ceil(found.duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
         return replace(found, duration_s=length_s, final_state=_state(motion.state(length_s)))
     run = _begun(scene)
-    seen, _ = _seen(scene, run, motion, math.inf)
+    seen, _ = yield from _watching(scene, run, motion, math.inf)
     return _found(scene, method, run, seen, _Judged())
 
 
@@ -287,10 +343,15 @@ def _found(scene: Scene, method: Method, run: FollowedRun, seen: SceneRun, by: _
     return _with_pictures(scene, found, seen) if is_whole else found
 
 
-def _seen(
-    scene: Scene, run: FollowedRun, motion: LinearMotion, alone_s: float | None = None
-) -> tuple[SceneRun, Pace]:
-    """Follow the motion for as long as was asked; chaos alone for a part of the budget if absent."""
+def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> tuple[SceneRun, Pace]:
+    """Follow the motion for as long as was asked; chaos alone for a part of the budget."""
+    return alone(_watching(scene, run, motion, ALONE * scene.budget_s))
+
+
+def _watching(
+    scene: Scene, run: FollowedRun, motion: LinearMotion, alone_s: float
+) -> Generator[Following, None, tuple[SceneRun, Pace]]:
+    """Do the same, chaos alone for so long, and hand out what may be followed beside others."""
     drive = scene.drive
     match scene.duration:
         case FixedDuration(duration_s=longest_s):
@@ -302,8 +363,7 @@ def _seen(
         case FixedDuration(duration_s=duration_s, window_s=window_s):
             return run_for(run, duration_s, window_s, pace), pace
         case AutomaticDuration(window_s=window_s):
-            patience = Patience(window_s, longest_s, ALONE * scene.budget_s if alone_s is None else alone_s)
-            return run_until_settled(run, patience, pace), pace
+            return (yield from settling(run, Patience(window_s, longest_s, alone_s), pace)), pace
 
 
 def _between_windows(seen: SceneRun) -> WindowScatter | None:

@@ -1,14 +1,18 @@
 """A motion followed by its states alone, until it repeats: chaos that has shown itself, and other starts."""
 
 import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..kernels import Floats
-from ..model import Outcome
+from ..lanes import follow_in_lanes, lanes_serve
+from ..model import Outcome, Specimen
 from ._fixed_run import Pace, growth_of
-from ._followed_run import FollowedRun
-from ._observed_window import follow_strobed
+from ._followed_run import FollowedRun, Stretch
+from ._observed_window import follow_strobed, whole_periods
 from ._repetition import Growth, Repetition, section_needed, wandered_until
 
 SLICE_S = 0.5
@@ -22,15 +26,20 @@ REMEMBERED = 16.0
 class StatesAlone:
     """A run without a tangent, looked at now and then."""
 
-    def __init__(self, run: FollowedRun, pace: Pace, recent: Floats | None = None) -> None:
+    def __init__(
+        self, run: FollowedRun, pace: Pace, recent: Floats | None = None, slice_periods: int | None = None
+    ) -> None:
         run.drop_tangent()
         self.run = run
+        self.path: list[Stretch] = []
+        """What was seen of it, state after state."""
         self.repeats: Repetition | None = None
         """Found; it is followed no further then."""
         self.recent = np.empty((0, 6)) if recent is None else recent
         """States once a drive period, up to now."""
         self._settled_s: float | None = None
         self._pace = pace
+        self._slice_periods = slice_periods or max(1, math.ceil(SLICE_S * pace.frequency_hz))
         self._kept = section_needed(pace.forgetting_periods) + math.ceil(REMEMBERED * pace.forgetting_periods)
 
     @property
@@ -46,17 +55,28 @@ class StatesAlone:
     def follow(self, until_s: float, cost_s: float = math.inf) -> None:
         """Follow it until it repeats, an instant is reached, or its cost from its beginning is."""
         frequency_hz = self._pace.frequency_hz
-        periods = max(1, math.ceil(SLICE_S * frequency_hz))
         while not self.is_over and self.run.time_s < until_s and self.run.cost_s < cost_s:
             made = round(self.run.time_s * frequency_hz)
             # An end between two periods is reached, but nothing is looked for there.
-            end_s = min((made + periods) / frequency_hz, until_s)
+            end_s = min((made + self._slice_periods) / frequency_hz, until_s)
             stretch = follow_strobed(self.run, end_s)
-            self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
-            self.repeats = self._pace.repeats_in(self.recent)
+            self.repeats = self._noted(stretch)
             if self.repeats is not None:
                 since = wandered_until(self.recent, 2.0 * math.pi * frequency_hz, self.repeats.period)
                 self._settled_s = self.run.time_s - (len(self.recent) - since) / frequency_hz
+
+    def note(self, stretch: Stretch) -> bool:
+        """Keep the states of a stretch that lanes have followed; says whether the motion seems to repeat.
+
+        `follow` finds that out: it goes on from here by itself.
+        """
+        return self._noted(stretch) is not None
+
+    def _noted(self, stretch: Stretch) -> Repetition | None:
+        """Keep the states of a stretch, and say whether the motion repeats."""
+        self.path.append(stretch)
+        self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
+        return self._pace.repeats_in(self.recent)
 
     def growth_over(self, length_s: float) -> Growth:
         """Follow it on, and see how a small change grows meanwhile; nothing, over no time."""
@@ -66,3 +86,82 @@ class StatesAlone:
         stretches = [follow_strobed(self.run, end_s) for end_s in ends_s]
         self.run.drop_tangent()
         return growth_of(stretches)
+
+
+ROUND_S = 2.0
+"""Time between two looks at motions in lanes, at least."""
+TRIES = 8
+"""Drive periods that a motion is followed by itself until one ends in flight: lanes begin there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """A motion to be followed, and how far."""
+
+    alone: StatesAlone
+    until_s: float
+    cost_s: float
+    """From its beginning; see `StatesAlone.follow`."""
+
+    def by_itself(self) -> None:
+        """Follow it, and nothing beside it."""
+        self.alone.follow(self.until_s, self.cost_s)
+
+    @property
+    def periods(self) -> int:
+        """Whole drive periods of the next round in lanes; none between two periods, or within a contact."""
+        run = self.alone.run
+        if self.alone.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
+            return 0
+        frequency_hz = run.drive.frequency_hz
+        left = whole_periods(self.until_s, frequency_hz) - run.periods
+        return min(left, math.ceil(ROUND_S * frequency_hz))
+
+    def to_flight(self) -> None:
+        """Follow a motion that is in contact now until a drive period ends in flight, if one does soon."""
+        run = self.alone.run
+        for _ in range(TRIES):
+            if run.is_in_flight or run.periods is None:
+                return
+            self.alone.follow(min((run.periods + 1) / run.drive.frequency_hz, self.until_s), self.cost_s)
+
+
+def follow_all(several: Sequence[Following]) -> None:
+    """Follow motions as far as is asked: in lanes where these serve, else one by one.
+
+    Each comes to the same states whatever is followed beside it. Lanes follow states and nothing else:
+    whether a motion repeats is found, and its last state reached, as it is without them.
+    """
+    alike = defaultdict[tuple[Specimen, float], list[Following]](list)
+    for each in several:
+        run = each.alone.run
+        if lanes_serve(run.specimen, run.tolerance):
+            alike[run.specimen, run.tolerance].append(each)
+    for group in alike.values():
+        _follow_rounds(group)
+    for each in several:
+        each.by_itself()
+
+
+def _follow_rounds(group: Sequence[Following]) -> None:
+    under_way = list(group)
+    while under_way:
+        for each in under_way:
+            each.to_flight()
+        ready = [(each, each.periods) for each in under_way if each.periods > 0]
+        if not ready:
+            return
+        runs = [each.alone.run for each, _ in ready]
+        found = follow_in_lanes(
+            runs[0].specimen,
+            runs[0].tolerance,
+            [run.flight for run in runs],
+            [run.state for run in runs],
+            [periods for _, periods in ready],
+        )
+        # One that a lane has lost is where it was, and followed by itself.
+        under_way = [
+            each
+            for (each, _), lane in zip(ready, found, strict=True)
+            if lane is not None and not each.alone.note(each.alone.run.take(lane))
+        ]

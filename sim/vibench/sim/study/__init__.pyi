@@ -23,6 +23,7 @@ from ._errors import (
 from ._executor import (
     Executor as Executor,
     Solved as Solved,
+    Solver as Solver,
 )
 from ._expansion import (
     continued_point as continued_point,

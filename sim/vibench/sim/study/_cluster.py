@@ -31,8 +31,8 @@ Answer = tuple[str, tuple[Solved, ...]]
 
 
 def solve_bundle(scenes: Sequence[Scene], solver: Solver) -> Answer:
-    """Solve scenes one after the other; runs on a worker."""
-    return software(), tuple(solve_timed(scene, solver) for scene in scenes)
+    """Solve scenes; runs on a worker."""
+    return software(), tuple(solve_timed(scenes, solver))
 
 
 class ClusterExecutor:

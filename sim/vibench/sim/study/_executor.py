@@ -5,11 +5,11 @@ What a scene costs, without what a process pays once: the compilation of its ker
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..scene import Method, Scene, ScenePrediction, learn_cost
+from ..scene import Method, Scene, ScenePrediction, Settled, learn_cost, settle_in_lanes, settle_scenes
 
 
 @dataclass(frozen=True)
@@ -71,23 +71,45 @@ class Executor(Protocol):
 Solver = Callable[[Scene], ScenePrediction]
 Kind = tuple[object, ...]
 
+TOGETHER: dict[Solver, Callable[[Sequence[Scene]], Sequence[Settled]]] = {settle_in_lanes: settle_scenes}
+"""Solvers that answer several scenes in less time than one after the other."""
+
 _solved_before: set[Kind] = set()
 """Kinds of scenes whose kernels this process has compiled."""
 
 
-def solve_timed(scene: Scene, solver: Solver) -> Solved:
-    """Solve one scene, and say what it cost this thread.
+def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
+    """Solve scenes, together if the solver can, and say what each cost this thread.
 
     A scene that begins before one of its kind has ended may have compiled kernels, or waited for them: its
     time says nothing.
     """
-    kind: Kind = (solver, type(scene.specimen.contact), scene.observe, type(scene.duration))
-    is_compiled = kind in _solved_before
+    together = TOGETHER.get(solver)
+    if together is None:
+        for scene in scenes:
+            yield from _noted([scene], solver, lambda each: [_timed(each[0], solver)])
+    else:
+        yield from _noted(scenes, solver, together)
+
+
+def _timed(scene: Scene, solver: Solver) -> Settled:
     start_s = time.thread_time()
     prediction = solver(scene)
-    taken_s = time.thread_time() - start_s
-    _solved_before.add(kind)
-    # To plan a closed form takes about as long as to evaluate it.
-    if is_compiled and prediction.method is not Method.CLOSED_FORM:
-        learn_cost(scene, taken_s, solver)
-    return Solved(prediction, taken_s if is_compiled else math.nan)
+    return Settled(prediction, time.thread_time() - start_s)
+
+
+def _noted(
+    scenes: Sequence[Scene], solver: Solver, solve: Callable[[Sequence[Scene]], Sequence[Settled]]
+) -> Iterator[Solved]:
+    """Solve scenes, and learn what they cost from those whose kernels were compiled before."""
+    kinds: list[Kind] = [
+        (solver, type(each.specimen.contact), each.observe, type(each.duration)) for each in scenes
+    ]
+    are_compiled = [kind in _solved_before for kind in kinds]
+    found = solve(scenes)
+    _solved_before.update(kinds)
+    for scene, is_compiled, each in zip(scenes, are_compiled, found, strict=True):
+        # To plan a closed form takes about as long as to evaluate it.
+        if is_compiled and each.prediction.method is not Method.CLOSED_FORM:
+            learn_cost(scene, each.taken_s, solver)
+        yield Solved(each.prediction, each.taken_s if is_compiled else math.nan)

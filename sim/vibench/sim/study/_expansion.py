@@ -100,8 +100,14 @@ def failed_point(number: int, error: BaseException) -> PointAnswer:
     return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(said)})
 
 
+BUNDLE_S = 0.05
+"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster."""
+
+
 class Expansion:
     """The scenes of a study, made when they are asked for."""
+
+    bundle_s = BUNDLE_S
 
     def __init__(self, study: Study) -> None:
         self._study = study

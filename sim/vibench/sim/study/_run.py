@@ -22,8 +22,6 @@ from ._progress import Cancelled, StudyObserver, StudyProgress
 from ._store import Store
 from ._study import Study
 
-BUNDLE_S = 0.05
-"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster."""
 MOST_IN_BUNDLE = 64
 """Answers that may be lost together with their worker."""
 SHARE = 8
@@ -43,6 +41,9 @@ class StudyEnd(StrEnum):
 
 class Points(Protocol):
     """The points of a plan as scenes, and which of them are to be computed."""
+
+    bundle_s: float
+    """Worker time of the scenes that are handed over together, at most."""
 
     @property
     def grid(self) -> Grid:
@@ -154,7 +155,7 @@ class _Session:
         self._look()
         slots = self._executor.slots
         while self._out < slots * QUEUED_PER_SLOT:
-            worth_s = min(BUNDLE_S, self._work_left_s / (slots * SHARE))
+            worth_s = min(self._points.bundle_s, self._work_left_s / (slots * SHARE))
             numbers = self._scheduler.take(worth_s, MOST_IN_BUNDLE)
             if not numbers:
                 return

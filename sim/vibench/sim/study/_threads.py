@@ -65,10 +65,12 @@ class ThreadExecutor:
         self.cancel()
 
     def _solve_into(self, solved: list[Solved], scenes: Sequence[Scene]) -> None:
-        for scene in scenes:
+        if self._is_cancelled.is_set():
+            return
+        for each in solve_timed(scenes, self._solver):
+            solved.append(each)
             if self._is_cancelled.is_set():
                 return
-            solved.append(solve_timed(scene, self._solver))
 
     def _note(self, bundle: Bundle, solved: list[Solved], future: Future[None]) -> None:
         error = None if future.cancelled() else future.exception()

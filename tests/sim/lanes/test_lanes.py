@@ -1,0 +1,175 @@
+"""Eight motions side by side: against one after the other, strict steps, energy, mirror images."""
+
+import math
+
+import numpy as np
+import pytest
+from llvmlite.binding import get_host_cpu_features
+from numba import njit
+
+from vibench.sim import Accuracy, Harmonic, gong2025, integrate
+from vibench.sim.flight import flight_tables
+from vibench.sim.lanes import follow_in_lanes, lanes_serve
+from vibench.sim.lanes._flight import march_lanes
+from vibench.sim.lanes._rows import LANES, ROWS, TERMS
+from vibench.sim.model import Specimen
+
+STANDARD = Accuracy.STANDARD.tolerance
+SPECIMEN = gong2025()
+
+
+def followed(specimen, drives, starts, periods, tolerance=STANDARD):
+    return follow_in_lanes(
+        specimen, tolerance, [flight_tables(specimen, each) for each in drives], starts, periods
+    )
+
+
+def random_scenes(count, seed):
+    """Drives from 60 to 420 Hz and 2 to 50 um, and states that the specimen wanders through under them."""
+    rng = np.random.default_rng(seed)
+    drives, starts = [], []
+    while len(drives) < count:
+        drive = Harmonic(rng.uniform(60.0, 420.0), math.exp(rng.uniform(math.log(2e-6), math.log(5e-5))))
+        periods = int(0.5 * drive.frequency_hz) + int(rng.integers(8))
+        state = integrate(SPECIMEN, drive, periods / drive.frequency_hz, "standard").final_state
+        if abs(state[1] - state[2]) < SPECIMEN.gap_m:
+            drives.append(drive)
+            starts.append(state)
+    return drives, starts
+
+
+def sections(specimen, drive, start, periods, accuracy):
+    """States once a drive period, one motion after the other, and how often a stop was touched."""
+    run = integrate(
+        specimen, drive, periods / drive.frequency_hz, accuracy, start, sample_rate_hz=drive.frequency_hz
+    )
+    return run.states[1:], run.impacts.count
+
+
+def off(found, states):
+    """Differences over a gap's length, and over the gap times 1 kHz for velocities."""
+    scale = SPECIMEN.gap_m * np.repeat([1.0, 2.0 * math.pi * 1e3], 3)
+    return np.abs((found - states) / scale).max(axis=-1)
+
+
+def test_random_motions_in_lanes_are_as_near_to_strict_steps_as_those_one_by_one():
+    drives, starts = random_scenes(40, 2026)
+    periods = [max(1, math.ceil(0.01 * drive.frequency_hz)) for drive in drives]
+    lanes, alone = [], []
+    for drive, start, count, found in zip(
+        drives, starts, periods, followed(SPECIMEN, drives, starts, periods), strict=True
+    ):
+        exact, touches = sections(SPECIMEN, drive, start, count, "reference")
+        assert found.impacts == touches
+        # A state within a contact is said as that of the flight after it.
+        is_free = abs(exact[-1, 1] - exact[-1, 2]) < SPECIMEN.gap_m
+        if is_free:
+            lanes.append(off(found.states[-1], exact[-1]))
+            alone.append(off(sections(SPECIMEN, drive, start, count, "standard")[0][-1], exact[-1]))
+    assert len(lanes) >= 30
+    assert np.median(lanes) < 1e-7
+    # Of each other's size where the motion magnifies both alike.
+    assert np.median(np.array(lanes) / np.maximum(alone, 1e-9)) < 10.0
+
+
+def test_a_motion_that_repeats_is_followed_to_the_same_states_for_ever():
+    drive = Harmonic(130.0, 2e-5)
+    settled = integrate(SPECIMEN, drive, 400.0 / 130.0, "standard").final_state
+    (found,) = followed(SPECIMEN, [drive], [settled], [1000])
+    alone, touches = sections(SPECIMEN, drive, settled, 1000, "standard")
+    assert found.impacts == touches == 2000
+    assert off(found.states, alone).max() < 1e-6
+
+
+def test_lanes_that_end_in_contact_hand_over_the_contact():
+    drives, starts = random_scenes(24, 7)
+    drives, starts = [drives[0]] * 64, [starts[0] * (1.0 + 1e-3 * k) for k in range(64)]
+    ends = [each.state for each in followed(SPECIMEN, drives, starts, [12] * 64)]
+    beyond = [abs(state[1] - state[2]) - SPECIMEN.gap_m for state in ends]
+    in_contact = [state[6] != 0.0 for state in ends]
+    assert any(in_contact)
+    for is_in_contact, depth in zip(in_contact, beyond, strict=True):
+        assert (depth > 0.0) == is_in_contact
+
+
+def test_a_motion_does_not_depend_on_what_is_followed_beside_it():
+    drives, starts = random_scenes(11, 3)
+    periods = [37 + 5 * k for k in range(11)]
+    together = followed(SPECIMEN, drives, starts, periods)
+    for k in (0, 4, 10):
+        (alone,) = followed(SPECIMEN, [drives[k]], [starts[k]], [periods[k]])
+        np.testing.assert_array_equal(alone.states, together[k].states)
+        np.testing.assert_array_equal(alone.state, together[k].state)
+
+
+def test_energy_stays_through_hundreds_of_collisions_where_nothing_takes_it():
+    undamped = gong2025(damping_time_s=0.0)
+    drive = Harmonic(100.0, 1e-15)
+    rng = np.random.default_rng(5)
+    starts = [rng.uniform(-1.0, 1.0, 6) * ([3e-5] * 3 + [0.15] * 3) for _ in range(8)]
+    for start, found in zip(starts, followed(undamped, [drive] * 8, starts, [40] * 8), strict=True):
+        assert found.impacts > 100
+        flown = np.abs(found.states[:, 1] - found.states[:, 2]) < undamped.gap_m
+        before = energy_j(undamped, start)
+        np.testing.assert_allclose(
+            [energy_j(undamped, each) for each in found.states[flown]], before, rtol=2e-6
+        )
+
+
+def energy_j(specimen, state):
+    """Kinetic energy, and that of the springs, but not of the stops."""
+    x, v = state[:3], state[3:6]
+    return 0.5 * v @ specimen.mass_matrix @ v + 0.5 * x @ specimen.stiffness_matrix @ x
+
+
+def test_a_mirrored_start_half_a_period_on_moves_as_the_mirror_image():
+    drive = Harmonic(130.0, 2e-5)
+    start = integrate(SPECIMEN, drive, 400.0 / 130.0, "standard").final_state
+    mirrored = Harmonic(130.0, 2e-5, phase_rad=math.pi)
+    one, other = followed(SPECIMEN, [drive, mirrored], [start, -start], [50, 50])
+    assert off(one.states, -other.states).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("specimen", "tolerance", "serves"),
+    [
+        (SPECIMEN, STANDARD, True),
+        (gong2025(gap_m=(30e-6, 60e-6)), STANDARD, True),
+        (SPECIMEN, Accuracy.REFERENCE.tolerance, False),
+        (gong2025(contact="rigid:0.8"), STANDARD, False),
+        (gong2025(contact="power:5"), STANDARD, False),
+        (gong2025(contact="linear"), STANDARD, False),
+        (gong2025(damping_time_s=2e-4), STANDARD, False),
+    ],
+)
+def test_lanes_serve_hertz_stops_and_lightly_damped_modes(specimen: Specimen, tolerance, serves):
+    assert lanes_serve(specimen, tolerance) is serves
+
+
+def test_stops_at_unequal_gaps_are_each_touched_where_they_are():
+    specimen = gong2025(gap_m=(30e-6, 60e-6))
+    drives, starts = [Harmonic(200.0 + k, 1e-5) for k in range(8)], [np.zeros(6)] * 8
+    for drive, start, found in zip(drives, starts, followed(specimen, drives, starts, [6] * 8), strict=True):
+        alone, touches = sections(specimen, drive, start, 6, "standard")
+        assert found.impacts == touches > 0
+        assert off(found.states[-1], alone[-1]) < 1e-4
+
+
+def test_what_lanes_cannot_follow_is_refused_in_a_sentence():
+    with pytest.raises(ValueError, match="cannot be followed in lanes"):
+        followed(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
+
+
+@pytest.mark.skipif(not get_host_cpu_features().get("avx2"), reason="this processor has no registers to fill")
+def test_eight_lanes_are_marched_by_whole_registers():
+    # Compiled here: of a kernel from the cache there is no listing.
+    march = njit(error_model="numpy")(march_lanes.py_func)
+    march(np.zeros((ROWS, LANES)), 0, 0, 0)
+    (code,) = march.inspect_asm().values()
+    fused = [
+        line.split() for line in code.splitlines() if line.strip().startswith(("vfmadd", "vfnmadd", "vfmsub"))
+    ]
+    assert all(name.endswith("pd") for name, *_ in fused)
+    by_register = [any("mm" in each and "%x" not in each for each in operands) for _, *operands in fused]
+    # A complex product for each term.
+    assert by_register.count(True) >= 2 * TERMS
