@@ -13,6 +13,7 @@ import math
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -86,7 +87,7 @@ def cost(asked: argparse.Namespace) -> int:
     steps: list[str] = []
 
     def tell(progress) -> None:
-        if progress.kept == progress.points:
+        if progress.kept >= (progress.points if steps else before.coarse_points):
             steps.append(
                 f"{progress.points} points after {time.perf_counter() - began_s:.1f} s, "
                 f"{time.process_time() - began_cpu_s:.1f} s of processor time"
@@ -110,6 +111,7 @@ WANDERED_S = 1.0
 COMPARED_S = 0.01
 """After which both ways are compared with strict steps: chaos magnifies by e in a few ms."""
 STARTS = 8
+PUSH_M = 4.5e-11
 
 
 def random_runs(count: int, rng: np.random.Generator) -> list[FollowedRun]:
@@ -176,7 +178,10 @@ def lanes(asked: argparse.Namespace) -> int:
 
 
 def labels(asked: argparse.Namespace) -> int:
-    """Settle random points of a map both ways; gives how many came to another motion where starts agree."""
+    """Settle random points of a map both ways; gives 1 if more came to another motion than chance would have.
+
+    What chance does is counted one by one, from starts a millionth of a gap away.
+    """
     plan = Map(
         frequency_hz=Range(start=60.0, stop=420.0, points=600),
         amplitude_m=Range(start=2e-6, stop=5e-5, points=400, spacing="logarithmic"),
@@ -201,16 +206,20 @@ def labels(asked: argparse.Namespace) -> int:
         for k in range(asked.points)
     ]
     agree = [len(each) == 1 for each in labels_of]
-    same = [
-        (one.motion, one.period) == (other.motion, other.period)
-        for one, other in zip(alone, beside, strict=True)
-    ]
-    apart = sum(is_agreed and not is_same for is_same, is_agreed in zip(same, agree, strict=True))
-    print(
-        f"{sum(same)} of {asked.points} came to the same kind and period both ways; of the {sum(agree)} "
-        f"where {STARTS} starts agree, {apart} did not"
-    )
-    return int(apart > sum(agree) / 1000)
+    pushed = [replace(scene, start=Given((PUSH_M, 0.0, 0.0, 0.0, 0.0, 0.0), "pushed")) for scene in first]
+    again = [settle_scene(scene) for scene in pushed]
+    counts = []
+    for name, found in (("in lanes", beside), ("one by one, pushed by a millionth of a gap", again)):
+        differs = [
+            (one.motion, one.period) != (other.motion, other.period)
+            for one, other in zip(alone, found, strict=True)
+        ]
+        counts.append(sum(is_other and is_agreed for is_other, is_agreed in zip(differs, agree, strict=True)))
+        print(
+            f"{name}: {sum(differs)} of {asked.points} came to another kind or period than one by one; "
+            f"{counts[-1]} of the {sum(agree)} where {STARTS} starts in lanes agree"
+        )
+    return int(counts[0] - counts[1] > 3.0 * math.sqrt(sum(counts) + 1.0))
 
 
 def main() -> int:
