@@ -71,6 +71,21 @@ def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_
         statistical_numbers(recording, gong2025(), STRETCH_S, 260.0)
 
 
+@pytest.mark.parametrize(
+    ("specimen", "stretch_s", "why"),
+    [
+        (gong2025(), (0.5, 0.7), "0.2 s of it at 51200 samples a second are no basis"),
+        (gong2025(), (1.4, 1.7), "no basis for statistics"),
+        (gong2025(contact="rigid:0.8"), STRETCH_S, "cannot be tracked"),
+        (gong2025(contact="linear"), STRETCH_S, "without stops"),
+        (gong2025(gap_m=(math.inf, 4e-5)), STRETCH_S, "a stop on one side only"),
+    ],
+)
+def test_what_statistics_cannot_tell_is_said_in_a_sentence(buried, specimen, stretch_s, why):
+    with open_recording(buried.path) as recording, pytest.raises(AnalysisError, match=why):
+        statistical_numbers(recording, specimen, stretch_s, 260.0, rounds=FEW)
+
+
 def test_statistics_are_the_same_of_another_run_and_sides_change_signs_of_even_harmonics():
     rate_hz, time_s = 20_000.0, np.arange(40_000) / 20_000.0
     turn = 2 * math.pi * 250.0 * time_s

@@ -10,7 +10,7 @@ import numpy as np
 from vibench.acquisition.recording import Recording
 from vibench.sim import Hertz, HuntCrossley, LinearGap, Specimen
 
-from ..errors import InvalidRequest, UnusableData
+from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..hidden_motion import FoundParameter, Hidden, tracked_specimen, value_of, with_values
 from ..model import FittedShaker, StretchDraws, stretch_draws
 from ..signals import Flags, Reals
@@ -26,6 +26,7 @@ _TOLD = 0.5
 """Width of bounds, over what is looked through, above which the statistics say nothing new."""
 _LIKELY = 2.0
 """Factor between the recorded base motion and those of first draws, beyond which nothing is drawn."""
+_LEAST_S, _LEAST_RATE_HZ = 0.5, 5_000.0
 _SEED = 29
 
 
@@ -76,6 +77,11 @@ def statistical_numbers(
         raise InvalidRequest("the specimen is described with a stop on one side only; statistics need two")
     draws = stretch_draws(recording, specimen, start, stop, fitted)
     measured = draws.measured
+    if measured.shape[1] < _LEAST_S * rate_hz or rate_hz < _LEAST_RATE_HZ:
+        raise NotEnoughData(
+            f"{measured.shape[1] / rate_hz:.3g} s of it at {rate_hz:g} samples a second are no basis for "
+            f"statistics; record {_LEAST_S:g} s or more, at {_LEAST_RATE_HZ:g} or more"
+        )
     if np.isnan(measured).any():
         raise UnusableData("samples were lost, and statistics of what is left are those of another window")
     observed = chaos_statistics(measured, rate_hz, drive_hz)
