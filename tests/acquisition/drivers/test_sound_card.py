@@ -1,11 +1,14 @@
 """A sound card as converter and output: real sounddevice on a simulated PortAudio, and the analogue world."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
 from vibench.acquisition.bench import Verdict
 from vibench.acquisition.check import bench_report
+from vibench.acquisition.drivers._sound_card import _Card
 from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, StreamedNoise
 from vibench.acquisition.rig import CalibrationRule, OutputConfig, confirm_simulated
@@ -188,3 +191,32 @@ def test_an_output_that_nobody_feeds_runs_dry_and_says_so(opened):
     bench.digitizer.read(4096)
     with pytest.raises(DataLost, match="ran dry"):
         bench.output.write(np.zeros(600))
+
+
+@pytest.mark.parametrize("name", ["input_full_scale_v", "output_full_scale_v", "low_cut_hz"])
+@pytest.mark.parametrize("value", ["two", True, 0.0, -1.0])
+def test_a_calibration_that_is_no_number_above_zero_is_told_before_anything_opens(
+    card_rig, audio, name, value
+):
+    rig = card_rig(**{name: value}).model_copy(update={"virtual": None})
+    with pytest.raises(ConfigurationError, match=f"options.{name} = .* give a number above 0"):
+        open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
+
+
+def test_an_output_that_no_card_has_is_told_as_that(card_rig, audio):
+    rig = card_rig().model_copy(update={"virtual": None})
+    output = rig.daq.output.model_copy(update={"physical": "out1"})
+    rig = rig.model_copy(update={"daq": rig.daq.model_copy(update={"output": output})})
+    with pytest.raises(ConfigurationError, match="'out1' is nothing of a sound card"):
+        open_bench(rig, confirm_simulated, CalibrationRule.WAIVED)
+
+
+def test_what_nobody_reads_is_kept_for_the_time_of_the_buffer_only(card_rig, audio):
+    rig = card_rig()
+    card = _Card(rig, (0, 1, 2, 3), 0)
+    heard, fine = np.zeros((4800, 4), dtype=np.float32), SimpleNamespace(input_overflow=False)
+    for _ in range(40 * round(rig.daq.buffer_s)):
+        card._hear(heard, 4800, None, fine)
+    assert card.failure
+    assert sum(block.shape[1] for block in card.blocks) <= (rig.daq.buffer_s + 0.2) * RATE_HZ
+    card.stream.close()

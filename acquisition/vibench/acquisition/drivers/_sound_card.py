@@ -46,7 +46,7 @@ def _sounddevice() -> Any:
 class _Card:
     """One stream of a card: samples in, samples out, on PortAudio's own thread."""
 
-    def __init__(self, rig: Rig, inputs: tuple[int, ...]) -> None:
+    def __init__(self, rig: Rig, inputs: tuple[int, ...], output: int | None) -> None:
         daq, library, self.rate_hz = rig.daq, _sounddevice(), rig.daq.sample_rate_hz
         self.inputs = inputs
         self.changed = Condition()
@@ -58,7 +58,7 @@ class _Card:
         self.is_armed = False
         self.failure = ""
         self.ran_dry = False
-        self._output = None if daq.output is None else int(daq.output.physical.removeprefix("ao"))
+        self._output = output
         highest = 1 + max(inputs)
         common = {"samplerate": self.rate_hz, "dtype": "float32", "device": daq.device}
         self.stream: Any = (
@@ -86,8 +86,9 @@ class _Card:
         with self.changed:
             if status.input_overflow or self.waiting > self.most_waiting:
                 self.failure = "samples were overwritten before they were read"
-            self.blocks.append(heard.T[list(self.inputs)].astype(np.float64))
-            self.waiting += heard.shape[0]
+            if not self.failure:  # what nobody reads is not kept
+                self.blocks.append(heard.T[list(self.inputs)].astype(np.float64))
+                self.waiting += heard.shape[0]
             self.changed.notify_all()
 
     def _hear_and_play(self, heard: Samples, played: Samples, frames: int, time: object, status: Any) -> None:
@@ -140,8 +141,9 @@ class SoundCardDigitizer:
         _require_calibration(rig)
         channels = channels_of(rig)
         inputs = tuple(_input(channel, rig) for channel in channels)
+        output = None if rig.daq.output is None else _number(rig.daq.output.physical, "ao")
         try:
-            card = _Card(rig, inputs)
+            card = _Card(rig, inputs, output)
         except ValueError as error:
             raise InstrumentLost(
                 f"no sound card {rig.daq.device!r} is there ({error}); name one of the system's in daq.device"
@@ -348,6 +350,12 @@ def _require_calibration(rig: Rig) -> None:
             "Nothing was opened; play a known sine into it, measure what its output gives at full scale, and "
             "enter them (docs/instruments.md)"
         )
+    for key in needed[1:]:
+        value = rig.daq.options[key]
+        if isinstance(value, (str, bool)) or not value > 0:
+            raise ConfigurationError(
+                f"daq.options.{key} = {value!r}; give a number above 0. Nothing was opened"
+            )
 
 
 def _input(channel: Channel, rig: Rig) -> int:
@@ -365,6 +373,14 @@ def _input(channel: Channel, rig: Rig) -> int:
             f'{channel.range_v:g} V were asked for. Give coupling = "AC", a range within it, and an IEPE '
             "supply in front"
         )
-    if not name.startswith("in") or not name[2:].isdigit():
-        raise ConfigurationError(f"physical = {name!r} is no input of a sound card; give in0, in1, ...")
-    return int(name[2:])
+    return _number(name, "in")
+
+
+def _number(name: str, side: str) -> int:
+    """Give the number of an input or output, counted from 0."""
+    number = name.removeprefix(side)
+    if number == name or not number.isdecimal():
+        raise ConfigurationError(
+            f"physical = {name!r} is nothing of a sound card; inputs are in0, in1, ..., outputs ao0, ao1, ..."
+        )
+    return int(number)
