@@ -159,6 +159,16 @@ def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vib
     assert result.stdout == ""
 
 
+@pytest.mark.parametrize("words", [("--amplitude", "5um"), ("--amplitude", "5e-6", "--gap=45um")])
+def test_a_number_with_its_unit_is_refused_with_what_was_given_and_what_may_stand_there(
+    vibench_here, tmp_path, words
+):
+    result = vibench_here("predict", "--frequency", "260", *words, cwd=tmp_path)
+    assert result.returncode == 2
+    said = " ".join(result.stderr.replace("│", " ").split())
+    assert f"{words[-1].removeprefix('--gap=')!r} is no number; give one in SI units" in said
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [(("--json",), "add --estimate"), (("--notify", "no-such-program --now"), "is no program")],

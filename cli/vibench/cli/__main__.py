@@ -7,10 +7,11 @@ import errno
 import importlib
 import logging
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib.metadata import version
+from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
@@ -56,7 +57,30 @@ class LateCommand(TyperCommand):
         """Read the arguments as the command itself does."""
         command = typer.main.get_command(self._place.load())
         command.name = self.name
-        return command.make_context(info_name, args, *given, **named)
+        try:
+            return command.make_context(info_name, [*args], *given, **named)
+        except typer.BadParameter as error:
+            _name_what_was_given(error, args)
+            raise
+
+
+def _name_what_was_given(error: typer.BadParameter, args: Sequence[str]) -> None:
+    """Say of an option that takes a number what stands there and what may."""
+    option = error.param
+    if option is None or not any(kind in error.message for kind in ("number", "float", "integer")):
+        return
+    for word, following in pairwise([*(part for each in args for part in each.split("=", 1)), ""]):
+        if word in option.opts and not _is_number(following):
+            advice = "give one in SI units and without their names, such as 5 or 5e-6"
+            error.message = f"{following!r} is no number; {advice}."
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def late_commands(places: Mapping[str, Place]) -> type[TyperGroup]:
