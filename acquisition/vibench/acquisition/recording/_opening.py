@@ -60,7 +60,9 @@ def _require_file(path: Path) -> None:
             f"{path} does not exist, but {part.name} does: it is being recorded, or was interrupted."
             f" Open {part.name} to look at it, or recover it."
         )
-    raise RecordingError(f"{path} does not exist, or is no file.")
+    raise RecordingError(
+        f"{path} does not exist, or is no file. Check its name; vibench catalogue FOLDER lists recordings."
+    )
 
 
 def _require_ours(path: Path, file: h5py.File) -> None:
