@@ -104,6 +104,7 @@ def test_statistics_are_the_same_of_another_run_and_sides_change_signs_of_even_h
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_a_fit_tells_numbers_of_a_motion_that_noise_hides_from_tracking(buried):
     updated = update_model(analyse_files([buried.path], "buried", Simulation.LEFT_OUT))
     gap = {each.what: each for each in updated.collisions.told}[Hidden.MEAN_GAP]
@@ -115,6 +116,7 @@ def test_a_fit_tells_numbers_of_a_motion_that_noise_hides_from_tracking(buried):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1700)
 def test_bounds_hold_on_random_specimens():
     """Thirty draws; `--seed` and `--shard` ask for others."""
     place = Path(__file__).parents[3] / "benchmarks" / "posterior_coverage.py"

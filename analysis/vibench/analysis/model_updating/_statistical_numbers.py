@@ -167,11 +167,12 @@ def _told(found: Posterior, specimen: Specimen) -> Iterator[FoundParameter]:
     sides = lower * np.exp(parts[Hidden.LOWER_GAP]) + upper * np.exp(parts[Hidden.UPPER_GAP])
     parts = {Hidden.MEAN_GAP: np.log(sides / (lower + upper)), **parts}
     for what, each in parts.items():
-        low, middle, high = np.quantile(each, [0.5 - 0.5 * _CONFIDENCE, 0.5, 0.5 + 0.5 * _CONFIDENCE])
+        low, high = np.quantile(each, [0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE])
         flat = high - low > _TOLD * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
         value = value_of(described, what)
-        middle, low, high = (value * float(np.exp(each)) for each in (middle, low, high))
+        low, high = (value * float(np.exp(each)) for each in (low, high))
         why = "the motion's statistics tell it no better than it was assumed" if flat else ""
-        yield FoundParameter(what, middle, low, high, value, why)
+        # The middle of its bounds, for they are written as it and a half width.
+        yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
     nan, why = float("nan"), "statistics are compared with runs of the described exponent"
     yield FoundParameter(Hidden.EXPONENT, nan, nan, nan, described.exponent, why)
