@@ -113,6 +113,8 @@ class QueuePage(Page):
         self.hold_button.setEnabled(state in (EngineState.RUNNING, EngineState.HELD))
         self.hold_button.setText("Go on" if state is EngineState.HELD else "Hold (drive on)")
         self.rows.show_rows(point_rows(self._seen, () if status is None else status.rows, state))
+        if campaign is not None and self._seen is not None:
+            self._say_summary(campaign, self._seen)  # the clock goes on
         self._show_progress(status)
 
     @property
@@ -185,6 +187,9 @@ class QueuePage(Page):
         row = self.entries.currentRow()
         self.entries.show_rows(seen.rows)
         self.entries.selectRow(min(row, len(seen.rows) - 1))
+        self._say_summary(campaign, seen)
+
+    def _say_summary(self, campaign: Campaign, seen: CampaignPreview) -> None:
         size = "" if seen.size_bytes is None else f"   ·   {seen.size_bytes / 1e9:.2f} GB"
         end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
         self.summary.setText(
