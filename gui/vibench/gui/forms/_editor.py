@@ -147,6 +147,7 @@ class SuggestionEditor:
         self._box.activated.connect(self._tell)
         line = self._box.lineEdit()
         if line is not None:
+            line.setPlaceholderText(_LEFT_OPEN)
             line.editingFinished.connect(self._tell)
         self.widget = self._box
 

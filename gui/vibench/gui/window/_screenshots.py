@@ -31,7 +31,8 @@ from ._window import Window
 SIZE = (1280, 800)
 OTHER_SIZES = ((1280, 720), (1920, 1080))
 """The smallest that everything must fit into, and a usual one; their pictures lie in folders of their own."""
-PATIENCE_S = 180.0
+PATIENCE_S = 1200.0
+"""On a busy machine; a picture of something half done would stand in the manual."""
 STILL_MS = 1200
 """Until the status line shows what a page in sight costs, and no more what it cost to get there."""
 _SMALLEST_FILE = 0

@@ -239,9 +239,7 @@ class MapsPage(Page):
             self._open_in_simulate,
         )
         self._open.setEnabled(False)
-        legend = QLabel(
-            "  ".join(f'<span style="color:{colour}">■</span> {name}' for name, colour in MOTION_CLASSES)
-        )
+        legend = QLabel(" ".join(_legend_entry(*each) for each in MOTION_CLASSES))
         legend.setWordWrap(True)
         legend.setAccessibleName("Colours of the kinds of motion")
         row = QHBoxLayout()
@@ -261,6 +259,12 @@ class MapsPage(Page):
         answer.setSizes([MAP_SHARE, 1000 - MAP_SHARE])
         answer.setChildrenCollapsible(False)
         return answer
+
+
+def _legend_entry(name: str, colour: str) -> str:
+    """Give a framed square, for some colours are those of the page, and a name that is never broken."""
+    unbroken = name.replace(" ", "&nbsp;").replace("-", "&#8209;")
+    return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
 
 
 def _let_pass(_error: BaseException) -> None:

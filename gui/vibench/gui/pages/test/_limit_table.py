@@ -9,6 +9,7 @@ from ...plots import SHARE_ROLE, BarDelegate
 from ...widgets import ReadTable
 
 _USED = 0
+_LEAST_LETTERS = 10
 _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 _UNITS = {"m s-2": "m/s²", "m/s2": "m/s²", "m s-1": "m/s"}
 
@@ -21,6 +22,8 @@ class LimitTable(ReadTable):
             "Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1, parent=parent
         )
         self.setItemDelegateForColumn(_USED, BarDelegate(self))
+        # In a small window the limits are scrolled to: what they are of must be read in any.
+        self.horizontalHeader().setMinimumSectionSize(_LEAST_LETTERS * self.fontMetrics().averageCharWidth())
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
         """Show what was held against the rig."""

@@ -322,8 +322,9 @@ class TestPage(Page):
             2,
             1,
         )
-        for row in (1, 2):
-            cells.setRowStretch(row, 1)
+        # Below, words take their part of the height.
+        cells.setRowStretch(1, 2)
+        cells.setRowStretch(2, 3)
         for table in (self.limits, self.prediction):
             # Neither asks for more height than the preview: they share what is there.
             table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
