@@ -1,6 +1,7 @@
 """Eight motions side by side: against one after the other, strict steps, energy, mirror images."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from vibench.sim.flight import flight_tables
 from vibench.sim.lanes import follow_in_lanes, lanes_serve
 from vibench.sim.lanes._flight import march_lanes
 from vibench.sim.lanes._rows import LANES, ROWS, TERMS
-from vibench.sim.model import Specimen
+from vibench.sim.model import Hertz, Specimen
 
 STANDARD = Accuracy.STANDARD.tolerance
 SPECIMEN = gong2025()
@@ -140,6 +141,8 @@ def test_a_mirrored_start_half_a_period_on_moves_as_the_mirror_image():
         (gong2025(contact="power:5"), STANDARD, False),
         (gong2025(contact="linear"), STANDARD, False),
         (gong2025(damping_time_s=2e-4), STANDARD, False),
+        (replace(SPECIMEN, contact=Hertz(1e6)), STANDARD, False),
+        (replace(SPECIMEN, contact=Hertz(1e12)), STANDARD, True),
     ],
 )
 def test_lanes_serve_hertz_stops_and_lightly_damped_modes(specimen: Specimen, tolerance, serves):

@@ -49,6 +49,8 @@ FIRST_DERIVATIVE, LATER = 0.03, 0.1
 """The first derivative over speed / u^2, of the paper's specimen, and each one over the one before."""
 PAPER_TURN = 0.053
 """Fastest rate times u, of the paper's specimen in the middle of its speeds."""
+SLOWEST_TURN = 0.15
+"""Fastest rate times u, at most: a collision lasts three times as long [rad]."""
 REACH = (0.3, 0.08, 0.015, 0.002, 2e-4, 0.03)
 """By how much each power of a variable adds less than the one before."""
 LEAST = (1e-6, 1e-7, 3e-6, 1e-4, 4e-3, 0.05)
@@ -99,9 +101,14 @@ class CollisionFit:
 
 
 @lru_cache(maxsize=8)
-def fit_collisions(specimen: Specimen) -> CollisionFit:
-    """Fit the polynomials to collisions drawn at random from a box; about a second."""
+def fit_collisions(specimen: Specimen) -> CollisionFit | None:
+    """Fit the polynomials to collisions drawn at random from a box; about a second.
+
+    None where stops are so soft that the other springs move on meanwhile: nothing is solved then.
+    """
     middle, half = _box(specimen)
+    if _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
+        return None
     rng = np.random.default_rng(SEED)
     count = COLLISIONS + CHECKED
     places = rng.uniform(-1.0, 1.0, (count, VARIABLES))

@@ -99,7 +99,7 @@ def _numbers(specimen: Specimen) -> _Numbers | None:
     ):
         return None
     fit = fit_collisions(specimen)
-    if not fit.error < FIT_ERROR:
+    if fit is None or not fit.error < FIT_ERROR:
         return None
     m1, m2 = specimen.masses[1:]
     onto = modes.rows * path[:, None]
