@@ -4,11 +4,12 @@
 shares that the map states. `map` computes a map with so many points along each axis and says what it took:
 processor time, time to the first picture, points computed, and what an estimate made before had said.
 `lanes` follows random motions in lanes and one by one, in the same run: time per impact on one core, and
-how far both lie from strict steps; then settles points of a map both ways, and counts those that came to
-another motion, among all of them and among those where several starts agree.
+how far both lie from strict steps; some of them by heyoka too, if it is installed; then settles points of a
+map both ways, and counts those that came to another motion, and those where several starts agree.
 """
 
 import argparse
+import importlib.util
 import math
 import sys
 import time
@@ -110,6 +111,10 @@ WANDERED_S = 1.0
 """Before a motion is timed."""
 COMPARED_S = 0.01
 """After which both ways are compared with strict steps: chaos magnifies by e in a few ms."""
+PEERS = 4
+PEER_TOLERANCES = 1e-6, 1e-9, 1e-12
+PEER_S = 0.3
+"""Simulated, where two solvers are timed."""
 STARTS = 8
 PUSH_M = 4.5e-11
 
@@ -174,7 +179,41 @@ def lanes(asked: argparse.Namespace) -> int:
             if abs(other.states[-1, 1] - other.states[-1, 2]) < gap_m
         ]
         print(f"{name}: {np.median(off):.1e} of a gap from strict steps after {COMPARED_S} s, median")
+    if importlib.util.find_spec("heyoka"):
+        peer(runs[:PEERS])
     return labels(asked)
+
+
+def peer(runs: list[FollowedRun]) -> None:
+    """Follow some of the motions in heyoka's batches, eight neighbours of each, and say time and error."""
+    from heyoka_peers import LANES, AtHome  # noqa: PLC0415 - only where the peer is there
+    from work_precision import constants_of  # noqa: PLC0415
+
+    gap_m, best = runs[0].specimen.gap_m, [AtHome(constants_of(each)) for each in runs]
+    periods = [math.ceil(COMPARED_S * each.drive.frequency_hz) for each in runs]
+    exact = [each.states[-1, :3] for each in one_by_one(runs, periods, Accuracy.REFERENCE.tolerance)]
+
+    def off(states) -> float:
+        apart = [np.abs(one[:3] - other).max() for one, other in zip(states, exact, strict=True)]
+        return float(np.median(apart)) / gap_m
+
+    longer = [math.ceil(PEER_S * each.drive.frequency_hz) for each in runs]
+    many = [each for each in runs for _ in range(LANES)]
+    began_s = time.thread_time()
+    in_lanes(many, [count for count in longer for _ in range(LANES)])
+    taken = (time.thread_time() - began_s) / (len(many) * PEER_S)
+    found = [each.state for each in in_lanes(runs, periods)]
+    said = "{:.2f} ms a simulated second, {:.1e} of a gap off"
+    print(f"{len(runs)} of them, eight at a time: " + said.format(1e3 * taken, off(found)))
+    for tolerance in PEER_TOLERANCES:
+        states = [
+            each.end(tolerance, run.state, count / run.drive.frequency_hz)
+            for each, run, count in zip(best, runs, periods, strict=True)
+        ]
+        pairs = zip(best, runs, strict=True)
+        cost = float(np.mean([each.cost(LANES, tolerance, run.state, PEER_S) for each, run in pairs]))
+        told = said.format(1e3 * cost, off(states))
+        print(f"heyoka at {tolerance:g}: {told}: {cost / taken:.1f} times as long")
 
 
 def labels(asked: argparse.Namespace) -> int:

@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..model import Specimen
 from ..scene import ScenePrediction
 from ..study import COLUMNS, MESSAGE, Cell, Column
@@ -47,6 +50,15 @@ _MAP_COLUMNS = (
 def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
     """Give all columns; the state of a point is the last."""
     return (*_MAP_COLUMNS, *more, _OF_STUDIES["state"])
+
+
+LONGER = 64
+"""Than the longest period that is looked for."""
+
+
+def labels_of(motion: NDArray[np.int64], period: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give the same number to motions of one kind and period."""
+    return motion * LONGER + period
 
 
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:

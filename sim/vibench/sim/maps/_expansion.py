@@ -25,7 +25,7 @@ from ..study import (
     planned_times,
     predecessors,
 )
-from ._columns import contact_energy_j, section_cells
+from ._columns import contact_energy_j, labels_of, section_cells
 from ._map import Map
 from ._quantities import OF_SPECIMEN
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
@@ -143,7 +143,7 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
         np.asarray(arrays[name], dtype=np.int64).reshape(shape) for name in ("motion", "period")
     )
     is_whole = state == PointState.DONE
-    label = np.where(is_whole, motion * 64 + period, NOTHING)
+    label = np.where(is_whole, labels_of(motion, period), NOTHING)
     size = np.log(np.maximum(np.asarray(arrays["response_i"], dtype=np.float64).reshape(shape)[:, 0], 1e-300))
     is_steady = is_whole[:, 0] & (motion[:, 0] == list(MotionKind).index(MotionKind.PERIODIC))
     seen = Seen(

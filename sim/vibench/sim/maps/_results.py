@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..kernels import Floats
 from ..scene import Count, MotionKind, Share, shares_of, wilson_share
 from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions
+from ._columns import labels_of
 from ._expansion import BASIN_JUMP, refinement_of
 from ._map import Map
 
@@ -142,8 +143,8 @@ class MapResults(GridResults[Map]):
     def _labels(self) -> NDArray[np.int64]:
         state = self.state.reshape(-1)
         motion, period = (self.arrays[name].astype(np.int64) for name in ("motion", "period"))
-        label = motion * 64 + period
-        return np.where((state == PointState.DONE) | (state == PointState.FILLED), label, UNKNOWN)
+        is_known = (state == PointState.DONE) | (state == PointState.FILLED)
+        return np.where(is_known, labels_of(motion, period), UNKNOWN)
 
     @cached_property
     def _sizes(self) -> Floats:
