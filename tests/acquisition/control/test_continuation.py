@@ -5,9 +5,11 @@ from contextlib import ExitStack
 import numpy as np
 import pytest
 
-from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
+from vibench.acquisition import ConfigurationError, LimitExceeded, open_bench, open_recording, run_measurement
 from vibench.acquisition.control._branch_solver import BranchSolver, LoopSetting, Seen, is_new
+from vibench.acquisition.control._fast_loop import fast_loop, require_held
 from vibench.acquisition.excitation import BaseLevel
+from vibench.acquisition.instruments import LoopState
 from vibench.acquisition.plan import BranchContinuation, Measurement, RunState
 from vibench.acquisition.recording import BranchEnd, BranchEndNote, BranchPointNote, feedback_note
 from vibench.acquisition.rig import ControllerConfig, confirm_simulated, specimen_of
@@ -29,8 +31,9 @@ def hardening(rig, latency_s=3e-4, **virtual):
 
 
 def continuation(**more):
-    given = {"start_hz": 94, "low_hz": 90, "high_hz": 118, "record_s": 0.3} | more
-    return BranchContinuation(amplitude_vpp=4, base_level=BaseLevel(displacement_m=LEVEL_M), **given)
+    usual = {"amplitude_vpp": 4, "start_hz": 94, "low_hz": 90, "high_hz": 118, "record_s": 0.3}
+    given = usual | more
+    return BranchContinuation(base_level=BaseLevel(displacement_m=LEVEL_M), **given)
 
 
 def measurement(plan):
@@ -137,6 +140,22 @@ def test_a_bench_without_a_controller_says_so(rig, tmp_path):
         run_measurement(bench, measurement(continuation()), tmp_path / "none.h5")
 
 
+def test_a_latency_at_which_the_loop_fails_is_refused_with_the_number_before_anything_plays(rig, tmp_path):
+    with open_bench(hardening(rig, latency_s=1.5e-3)) as bench:
+        with pytest.raises(LimitExceeded, match=r"largest multiplier is 1\.\d+ at .* with 1.5 ms of latency"):
+            run_measurement(bench, measurement(continuation()), tmp_path / "late.h5")
+        assert bench.controller.report().state is LoopState.SILENT
+    assert not (tmp_path / "late.h5").exists()
+
+
+def test_motions_near_grazing_are_refused_with_their_growth_time(rig):
+    fast = fast_loop(hardening(rig).model_copy(update={"specimen": rig.specimen}))
+    plan = continuation(start_hz=250, low_hz=249, high_hz=256)
+    plan = plan.model_copy(update={"base_level": BaseLevel(displacement_m=3e-6)})
+    with pytest.raises(LimitExceeded, match=r"grows by e in .* ms, and a loop with 0.3 ms of latency"):
+        require_held(fast, plan)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("noise", [1.0, 10.0])
 def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tmp_path, noise):
@@ -146,9 +165,13 @@ def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tm
         accelerometer_noise_m_per_s2=noise * 5e-3,
         vibrometer_noise_m_per_s_per_rthz=noise * 2e-8,
     )
-    # The host believes in a coil that pushes by 10 % more, and brakes by as much more.
+    # The host believes in springs that are 10 % stiffer, and in a coil that pushes by 10 % more.
+    stiffer = tuple(1.1**0.5 * each for each in true.specimen.single_frequencies_hz)
     believed = true.model_copy(
-        update={"shaker": true.shaker.model_copy(update={"force_constant_n_per_a": 1.1 * 6.78})}
+        update={
+            "shaker": true.shaker.model_copy(update={"force_constant_n_per_a": 1.1 * 6.78}),
+            "specimen": true.specimen.model_copy(update={"single_frequencies_hz": stiffer}),
+        }
     )
     points, notes = followed(believed, continuation(most_points=110), tmp_path / "branch.h5", true)
     branch, folds = model_of(true)

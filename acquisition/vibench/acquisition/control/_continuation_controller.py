@@ -21,7 +21,7 @@ from ._branch_solver import (
 )
 from ._closed_loop_check import require_answer
 from ._control_action import ControlAction, Controller, PhaseSamples
-from ._fast_loop import Coefficients, FastLoop, fast_loop
+from ._fast_loop import Coefficients, FastLoop, fast_loop, level_at, require_held
 from ._sine_loop import SineLoop
 
 _BLOCK_PERIODS = 10
@@ -68,14 +68,13 @@ class BranchPlayer:
         self._loop = loop
         self._feedback = fast.feedback
 
-    def tone(self, setting: LoopSetting, dither_v: float = 0.0) -> LoopTone:
+    def tone(self, setting: LoopSetting) -> LoopTone:
         """Give what the controller is told."""
         program = LoopProgram(
             frequency_hz=setting.frequency_hz,
             reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
             feedback=self._feedback,
             glide_s=_GLIDE_S,
-            dither_v=dither_v,
             block_periods=_BLOCK_PERIODS,
             harmonics=max(_HIGHEST, self.plan.harmonics),
         )
@@ -124,10 +123,18 @@ class BranchPlayer:
 
 
 def follow_branch(loop: SineLoop, plan: BranchContinuation) -> Controller[None]:
-    """Begin from rest, follow the branch until it ends or leaves its range, ramp down."""
+    """Begin from rest, follow the branch until it ends or leaves its range, ramp down.
+
+    Raises LimitExceeded at once where the loop would not hold the branch: before anything is yielded.
+    """
     fast = fast_loop(loop.rig)
+    require_held(fast, plan)
+    return _branch(loop, plan, fast)
+
+
+def _branch(loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> Controller[None]:
     player = BranchPlayer(loop, plan, fast)
-    start_m = _level_m(plan, plan.start_hz)
+    start_m = level_at(plan, plan.start_hz)
     gains = fast.gains(plan.start_hz, plan.harmonics)
     beside = abs(fast.gains(plan.start_hz + _BEND_HZ, 1)[0])
     first = np.zeros(plan.harmonics, dtype=np.complex128)
@@ -221,7 +228,7 @@ def _corrected(
 def _seen(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[Seen]:
     plan, setting = player.plan, solver.setting(unknowns)
     look = yield from player.looked(setting)
-    residual = residual_of(look.base_m[: plan.harmonics], _level_m(plan, setting.frequency_hz))
+    residual = residual_of(look.base_m[: plan.harmonics], level_at(plan, setting.frequency_hz))
     seen = Seen(unknowns, residual, complex(look.m0_m[0] / look.base_m[0]))
     solver.learn(seen)
     return seen
@@ -252,7 +259,3 @@ def _is_sine(residual: Vector, tolerance: float) -> bool:
     """Whether the base moves as it should: its fundamental, and each harmonic."""
     harmonics = np.hypot(residual[1::2], residual[2::2])
     return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
-
-
-def _level_m(plan: BranchContinuation, frequency_hz: float) -> float:
-    return plan.base_level.acceleration_at(frequency_hz) / (2 * pi * frequency_hz) ** 2

@@ -7,13 +7,26 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.feedback import LinearLaw, LoopTiming, SampledPlant, designed_law, loop_transfer
+from vibench.sim.branches import least_growth_time_s
+from vibench.sim.feedback import (
+    LinearLaw,
+    LoopTiming,
+    SampledPlant,
+    branch_hold,
+    designed_law,
+    loop_transfer,
+)
 
-from ..errors import ConfigurationError
+from ..errors import ConfigurationError, LimitExceeded
+from ..excitation import BranchContinuation
 from ..instruments import LoopBlock, LoopFeedback
 from ..rig import ControllerConfig, Rig, amplifier_of, shaker_of, specimen_of
 
 Coefficients = NDArray[np.complex128]
+LARGEST_MULTIPLIER = 0.99
+"""Of the loop along a branch that is allowed: a departure falls to a third in a hundred periods."""
+_SAMPLES_LATE = 1.5
+"""How late a mean over a sample is, and a volt that is held over one, in samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +77,42 @@ def fast_loop(rig: Rig) -> FastLoop:
     """Design the law of a rig's controller; raises ConfigurationError where it has none."""
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), loop_timing(rig))
     return FastLoop(rig, plant, designed_law(plant))
+
+
+def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
+    """Refuse a branch that the loop does not hold, by the model.
+
+    Smooth springs are judged by the multipliers of the loop; stops, whose contacts are shorter than a sample,
+    by how fast the motion grows without it.
+
+    Raises
+    ------
+    LimitExceeded
+        With the number. Nothing was played.
+
+    """
+    level_m = level_at(plan, plan.start_hz)
+    hold = branch_hold(fast.plant, fast.law, level_m, plan.start_hz, plan.band_hz)
+    timing = fast.plant.timing
+    loop = f"{1e3 * timing.latency_s:.3g} ms of latency at {timing.rate_hz:g} samples a second"
+    if hold.multiplier is not None and hold.multiplier > LARGEST_MULTIPLIER:
+        raise LimitExceeded(
+            f"the fast loop would not hold the branch: by the model its largest multiplier is "
+            f"{hold.multiplier:.3g} at {hold.at_hz:.5g} Hz with {loop}, allowed is at most "
+            f"{LARGEST_MULTIPLIER:g}. Nothing was played; shorten the latency, or lower the level"
+        )
+    least_s = least_growth_time_s(timing.latency_s + _SAMPLES_LATE / timing.rate_hz)
+    if hold.multiplier is None and hold.growth_s < least_s:
+        raise LimitExceeded(
+            f"the branch cannot be held: by the model a motion at {hold.at_hz:.5g} Hz grows by e in "
+            f"{1e3 * hold.growth_s:.3g} ms, and a loop with {loop} holds what takes {1e3 * least_s:.3g} ms "
+            "or longer. Nothing was played; narrow the range to gentler motions, or shorten the latency"
+        )
+
+
+def level_at(plan: BranchContinuation, frequency_hz: float) -> float:
+    """Give the amplitude of the base's displacement that is held [m]."""
+    return plan.base_level.acceleration_at(frequency_hz) / (2 * pi * frequency_hz) ** 2
 
 
 def loop_timing(rig: Rig) -> LoopTiming:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import ClassVar, Literal, Self
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
 from ..recording import SegmentLabel
 from ._feedback import BaseLevel, Share
@@ -52,10 +52,6 @@ class BranchContinuation(AbstractFeedback):
     """Periods of a look."""
     record_s: PositiveFloat = 0.5
     """Time recorded at each point [s]."""
-    dither_s: NonNegativeFloat = 0.0
-    """Time recorded at each point with a little noise added, from which its stability is told; 0 for none."""
-    dither: Share = 0.02
-    """That noise, rms over the amplitude of the sine."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:
@@ -80,7 +76,7 @@ class BranchContinuation(AbstractFeedback):
     def playing_s(self) -> float:
         """All points with the longest search for each [s]."""
         look_s = self.settle_s + self.look_periods / self.low_hz
-        return self.most_points * (_NO_TRIES * look_s + self.record_s + self.dither_s)
+        return self.most_points * (_NO_TRIES * look_s + self.record_s)
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:

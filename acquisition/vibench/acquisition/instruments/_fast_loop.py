@@ -53,9 +53,9 @@ class LoopFeedback(FrozenModel):
 
 
 class LoopProgram(FrozenModel):
-    """What a controller plays: a Fourier series, the answer of a law to what it samples, and a little noise.
+    """What a controller plays: a Fourier series, and the answer of a law to what it samples.
 
-    ``v(t) = sum Re(reference_k exp(i k theta)) + u + dither``, theta the controller's own phase, which goes
+    ``v(t) = sum Re(reference_k exp(i k theta)) + u``, theta the controller's own phase, which goes
     on without a jump from program to program.
     """
 
@@ -66,8 +66,6 @@ class LoopProgram(FrozenModel):
     """None for none; a law that is the same as before keeps its memory."""
     glide_s: NonNegativeFloat = 0.1
     """Time in which frequency and coefficients go over to those of now, along a half cosine [s]."""
-    dither_v: NonNegativeFloat = 0.0
-    """White noise that is added, rms [V]."""
     block_periods: int = Field(default=10, ge=2, le=1000)
     """Periods over which the coefficients that come back are taken, under a Hann window."""
     harmonics: int = Field(default=9, ge=1, le=MOST_HARMONICS)

@@ -247,10 +247,6 @@ class BranchPointNote(AbstractNote):
     reference_v: SixFigures
     """First coefficient of what the controller was told [V]."""
     tries: int
-    multiplier: SixFigures | None = None
-    """Largest Floquet multiplier of the motion under a base that moves as it does, told from noise."""
-    multiplier_u: SixFigures | None = None
-    """Its standard uncertainty."""
 
 
 class BranchEndNote(AbstractNote):

@@ -28,9 +28,6 @@ class HeldBranch(Labelled):
     residue: Reals
     """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
     residue_acceleration: Reals
-    multiplier: Reals
-    """Largest Floquet multiplier as told from noise; NaN where it was not asked for."""
-    u_multiplier: Reals
 
     @property
     def folds(self) -> tuple[int, ...]:
@@ -51,8 +48,6 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
         phase_deg=np.array([each.phase_deg for each in points]),
         residue=np.array([each.residue for each in points]),
         residue_acceleration=np.array([each.residue_acceleration for each in points]),
-        multiplier=_known([each.multiplier for each in points]),
-        u_multiplier=_known([each.multiplier_u for each in points]),
     )
 
 
@@ -73,7 +68,3 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
         told.append(f"The branch turned at {turns} Hz.")
     told.extend(f"It was left because {each.end.value}." for each in ends)
     return tuple(told)
-
-
-def _known(values: Sequence[float | None]) -> Reals:
-    return np.array([np.nan if each is None else each for each in values], dtype=np.float64)

@@ -1,3 +1,7 @@
+from ._branch import (
+    BranchHold as BranchHold,
+    branch_hold as branch_hold,
+)
 from ._law import (
     LawWeights as LawWeights,
     LinearLaw as LinearLaw,

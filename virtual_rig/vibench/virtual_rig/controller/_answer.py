@@ -26,7 +26,6 @@ class Now(IntEnum):
     FADE = auto()
     """Of everything that is played, 1 but for its end."""
     FADE_STEP = auto()
-    DITHER = auto()
     LIMIT = auto()
     AT_LIMIT = auto()
     """Samples in a row with the output at its limit."""
@@ -42,7 +41,7 @@ class Now(IntEnum):
 
 _THETA, _OMEGA, _OMEGA_FROM, _OMEGA_TO = map(int, (Now.THETA, Now.OMEGA, Now.OMEGA_FROM, Now.OMEGA_TO))
 _GLIDE, _GLIDE_STEP, _FADE, _FADE_STEP = map(int, (Now.GLIDE, Now.GLIDE_STEP, Now.FADE, Now.FADE_STEP))
-_DITHER, _LIMIT, _AT_LIMIT, _TURNS = map(int, (Now.DITHER, Now.LIMIT, Now.AT_LIMIT, Now.TURNS))
+_LIMIT, _AT_LIMIT, _TURNS = map(int, (Now.LIMIT, Now.AT_LIMIT, Now.TURNS))
 _BLOCK, _WEIGHT, _STEADY, _DONE = map(int, (Now.BLOCK, Now.WEIGHT, Now.STEADY, Now.DONE))
 
 
@@ -50,7 +49,6 @@ _BLOCK, _WEIGHT, _STEADY, _DONE = map(int, (Now.BLOCK, Now.WEIGHT, Now.STEADY, N
 def answer(
     base_v: float,
     m0_v: float,
-    random: float,
     now: FloatArray,
     reference: ComplexArray,
     law: FloatArray,
@@ -70,7 +68,7 @@ def answer(
     share = 0.5 - 0.5 * np.cos(np.pi * now[_GLIDE])
     now[_OMEGA] = now[_OMEGA_FROM] + share * (now[_OMEGA_TO] - now[_OMEGA_FROM])
     turn = complex(np.cos(now[_THETA]), np.sin(now[_THETA]))
-    volts, turned = now[_DITHER] * random, turn
+    volts, turned = 0.0, turn
     for k in range(reference.shape[1]):
         wanted = reference[0, k] + share * (reference[1, k] - reference[0, k])
         volts += wanted.real * turned.real - wanted.imag * turned.imag

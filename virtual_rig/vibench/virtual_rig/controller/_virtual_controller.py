@@ -3,7 +3,6 @@
 import json
 import threading
 from collections.abc import Callable
-from zlib import crc32
 
 import numpy as np
 from pydantic import ValidationError
@@ -28,7 +27,6 @@ LONGEST_AT_LIMIT_S = 0.05
 """An output that stays at its limit for so long is a law that does not hold: it ramps down [s]."""
 MOST_BLOCKS = 2000
 """Blocks kept for a host that does not ask for them."""
-_DRAWN = 4096
 
 
 class VirtualController:
@@ -42,14 +40,10 @@ class VirtualController:
         Rig time [s].
     grid_rate_hz
         Steps a second of the world that it samples; a whole number of them from sample to sample.
-    seed
-        Of its dither.
 
     """
 
-    def __init__(
-        self, facts: LoopFacts, clock: Callable[[], float], grid_rate_hz: float, seed: int = 0
-    ) -> None:
+    def __init__(self, facts: LoopFacts, clock: Callable[[], float], grid_rate_hz: float) -> None:
         self.facts = facts
         self.steps_per_sample = round(grid_rate_hz / facts.rate_hz)
         self.latency_steps = round(facts.latency_s * grid_rate_hz)
@@ -65,8 +59,6 @@ class VirtualController:
         self._law: FloatArray = np.zeros((1, 2))
         self._memory: FloatArray = np.zeros(0)
         self._sums = self._done = np.zeros((3, 1), dtype=np.complex128)
-        self._random = np.random.default_rng([seed, crc32(b"controller")])
-        self._drawn = np.zeros(0)
 
     @property
     def is_on(self) -> bool:
@@ -76,11 +68,8 @@ class VirtualController:
     def answer(self, base_v: float, m0_v: float) -> float:
         """Take one sample of both sensors [V], and give the volts that answer it."""
         with self._turn:
-            if not len(self._drawn):
-                self._drawn = self._random.standard_normal(_DRAWN)
-            random, self._drawn = self._drawn[0], self._drawn[1:]
             state = (self._now, self._reference, self._law, self._memory, self._sums, self._done)
-            volts = answer(base_v, m0_v, random, *state)
+            volts = answer(base_v, m0_v, *state)
             if self._now[Now.DONE]:
                 self._keep_block()
             self._watch()
@@ -128,7 +117,7 @@ class VirtualController:
         glide_samples = max(program.glide_s * self.facts.rate_hz, 1.0)
         now[Now.GLIDE], now[Now.GLIDE_STEP] = 0.0, 1.0 / glide_samples
         now[Now.FADE], now[Now.FADE_STEP] = 1.0, 0.0
-        now[Now.DITHER], now[Now.BLOCK] = program.dither_v, program.block_periods
+        now[Now.BLOCK] = program.block_periods
         now[[Now.TURNS, Now.WEIGHT, Now.STEADY]] = 0.0
         self._sums = np.zeros((3, program.harmonics + 1), dtype=np.complex128)
         self._done = np.zeros_like(self._sums)

@@ -217,7 +217,7 @@ def _controller(rig: Rig, virtual: VirtualConfig, clock: Callable[[], float]) ->
         limit_v=told.limit_v,
         watchdog_s=told.watchdog_s,
     )
-    return VirtualController(facts, clock, virtual.grid_rate_hz, virtual.seed)
+    return VirtualController(facts, clock, virtual.grid_rate_hz)
 
 
 def _pace(virtual: VirtualConfig) -> Pace:
