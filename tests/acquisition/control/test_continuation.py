@@ -176,9 +176,9 @@ def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tm
     points, notes = followed(believed, continuation(most_points=110), tmp_path / "branch.h5", true)
     branch, folds = model_of(true)
     hertz = np.array([each.frequency_hz for each in points])
-    top, bottom = np.flatnonzero(np.diff(np.sign(np.diff(hertz)))) + 1
     assert isinstance(notes[-1], BranchEndNote)
-    assert notes[-1].end is BranchEnd.RANGE
+    assert notes[-1].end is BranchEnd.RANGE, notes
+    top, bottom = np.flatnonzero(np.diff(np.sign(np.diff(hertz)))) + 1
     assert hertz[top] == pytest.approx(folds[0].frequency_hz, abs=0.3)
     assert hertz[bottom] == pytest.approx(folds[1].frequency_hz, abs=0.3)
     assert bottom - top - 1 >= 15

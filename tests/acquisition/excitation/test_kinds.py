@@ -17,6 +17,7 @@ from vibench.acquisition.excitation import (
     HeldAcceleration,
     HeldDwell,
     HeldNoise,
+    HeldResponse,
     HeldSweep,
     LeadIn,
     MultisineNoise,
@@ -56,6 +57,7 @@ EXAMPLES = (
         amplitude_vpp=1, realisations=2, spectrum=(SpectrumPoint(frequency_hz=20, density=0.01),), **BAND
     ),
     BranchContinuation(amplitude_vpp=1, base_level=HELD, start_hz=94, low_hz=90, high_hz=118),
+    HeldResponse(amplitude_vpp=1, frequencies_hz=(200, 210), response_m=5e-6),
 )
 by_kind = {each.kind: each for each in EXAMPLES}
 every_kind = pytest.mark.parametrize("excitation", EXAMPLES, ids=list(by_kind))
@@ -101,6 +103,7 @@ def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
         ("held_dwell", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
         ("resonance_tracking", HeldAcceleration(0.6)),
         ("held_noise", RmsSetting()),
+        ("held_response", RelativeSetting(1.0)),
         ("branch_continuation", HeldAcceleration(pytest.approx(5e-6 * (2 * np.pi * 250) ** 2))),
     ],
 )
@@ -119,6 +122,7 @@ def test_a_settled_sine_without_a_level_plays_its_setting():
     [
         ("sine_sweep", "sine sweep, 1 Vpp"),
         ("held_dwell", "held dwell, base held at 5 µm, at most 1 Vpp"),
+        ("held_response", "held response, relative motion of m0 held at 5 µm, at most 1 Vpp"),
         ("held_noise", "held noise, base held at 2.79 m/s² rms, at most 1 Vpp"),
         ("resonance_tracking", "resonance tracking, base held at 0.6 m/s², 0.3 m/s², at most 1 Vpp"),
     ],
@@ -127,7 +131,9 @@ def test_words_of_a_plan_name_the_level_that_it_holds(kind, said):
     assert excitation_text(by_kind[kind]) == said
 
 
-@pytest.mark.parametrize("kind", ["sine_sweep", "held_sweep", "stepped_sine", "settled_sine"])
+@pytest.mark.parametrize(
+    "kind", ["sine_sweep", "held_sweep", "stepped_sine", "settled_sine", "held_response"]
+)
 def test_what_goes_through_frequencies_comes_to_each_from_the_side_it_is_turned_to(kind):
     for direction, approach in ((Direction.UP, Approach.UP), (Direction.DOWN, Approach.DOWN)):
         turned = by_kind[kind].turned(direction)

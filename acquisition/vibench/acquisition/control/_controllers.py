@@ -12,6 +12,7 @@ from ._dwell_controller import hold_dwell
 from ._feedback_channels import feedback_channels_of
 from ._noise_controller import equalise_noise
 from ._resonance_controller import track_resonance
+from ._response_controller import hold_response
 from ._settled_controller import step_settled
 from ._sine_loop import SineLoop
 from ._sweep_controller import hold_sweep
@@ -24,6 +25,7 @@ CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = Mapping
         "resonance_tracking": track_resonance,
         "held_noise": equalise_noise,
         "branch_continuation": follow_branch,
+        "held_response": hold_response,
     }
 )
 """Controller of each kind with feedback: of the loop, and of a plan of its kind."""

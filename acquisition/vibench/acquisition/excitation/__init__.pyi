@@ -26,6 +26,9 @@ from ._held_noise import (
     SpectrumPoint as SpectrumPoint,
     density_at as density_at,
 )
+from ._held_response import (
+    HeldResponse as HeldResponse,
+)
 from ._held_sweep import (
     HeldSweep as HeldSweep,
 )

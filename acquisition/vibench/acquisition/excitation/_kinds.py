@@ -11,6 +11,7 @@ from ._branch_continuation import BranchContinuation
 from ._dwell import Dwell
 from ._held_dwell import HeldDwell
 from ._held_noise import HeldNoise
+from ._held_response import HeldResponse
 from ._held_sweep import HeldSweep
 from ._multisine_noise import MultisineNoise
 from ._odd_multisine import OddMultisine
@@ -35,7 +36,8 @@ Excitation: TypeAlias = Annotated[
     | HeldDwell
     | ResonanceTracking
     | HeldNoise
-    | BranchContinuation,
+    | BranchContinuation
+    | HeldResponse,
     Field(discriminator="kind"),
 ]
 Row = TypeVar("Row")

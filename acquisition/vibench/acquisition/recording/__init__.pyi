@@ -13,6 +13,7 @@ from ._feedback_note import (
     ExcursionNote as ExcursionNote,
     FeedbackNote as FeedbackNote,
     Held as Held,
+    HeldResponseNote as HeldResponseNote,
     JumpNote as JumpNote,
     JumpSearchEnd as JumpSearchEnd,
     JumpSide as JumpSide,

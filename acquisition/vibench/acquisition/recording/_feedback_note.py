@@ -221,6 +221,20 @@ class NoiseNote(AbstractNote):
     """Of the base's acceleration; 3 of Gaussian noise."""
 
 
+class HeldResponseNote(AbstractNote):
+    """What was held of the response at one frequency, and what the base did for it."""
+
+    kind: Literal["held_response"] = "held_response"
+    frequency_hz: float
+    """As commanded [Hz]."""
+    response_m: SixFigures
+    response_ii: SixFigures
+    base_m_per_s2: SixFigures
+    base_u: SixFigures
+    setting_vpp: SixFigures
+    level: Held
+
+
 class BranchEnd(StrEnum):
     """Why a branch was left."""
 
@@ -267,13 +281,14 @@ FeedbackNote: TypeAlias = (
     | JumpNote
     | ResonanceNote
     | NoiseNote
+    | HeldResponseNote
     | BranchPointNote
     | BranchEndNote
 )
 _NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
-_KINDS = frozenset(
-    {"settled", "achieved", "level", "jump", "resonance", "spectrum", "branch_point", "branch_end"}
-)
+_FOUND = ("settled", "achieved", "level", "jump", "resonance", "spectrum")
+_FOLLOWED = ("held_response", "branch_point", "branch_end")
+_KINDS = frozenset((*_FOUND, *_FOLLOWED))
 
 
 def feedback_note(event: Event) -> FeedbackNote | None:

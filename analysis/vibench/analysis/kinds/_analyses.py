@@ -24,6 +24,7 @@ ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
         "stepped_level": STEPPED_LEVEL,
         "resonance_tracking": RESONANCE_TRACKING,
         "branch_continuation": BRANCH_CONTINUATION,
+        "held_response": SETTLED_SINE,
     },
 )
 """By the word in a plan; families in the order in which a report shows them."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from vibench.acquisition.plan import (
     BranchContinuation,
+    HeldResponse,
     ResonanceTracking,
     SettledSine,
     SteppedLevel,
@@ -24,7 +25,7 @@ from ..signals import Reals
 from ..tables import Labelled
 from ._dwell import DwellResponse, dwell_response
 
-Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | BranchContinuation
+Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | BranchContinuation | HeldResponse
 """What is recorded frequency by frequency, or level by level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end; read beyond the step, where there is more."""
