@@ -38,9 +38,12 @@ _AGREED = 0.25
 """Looks at one setting until its blocks agree to this part of the tolerance."""
 _PROBES = (-0.05, -0.05)
 """Changes of frequency and first coefficient by which both are probed, in steps."""
-_BELOW, _INSIDE = 5.0, 0.15
-"""Steps of the first coefficient below the model's from which it is raised; least part of a bracket that is
-cut off."""
+_BELOW = 5.0
+"""Steps of the first coefficient below the model's from which it is raised."""
+_SLOPES = 0.05, 1.0
+"""Least and largest change of the base's level in a step of the first coefficient, while it is raised."""
+_TOLD = 0.01
+"""Shortest change of it that tells the slope, in steps."""
 _CLOSER, _CLOSE = 0.3, 0.7
 """Parts of the tolerance that a point must keep when it is found: a fold moves with the level."""
 _BEND_HZ = 0.05
@@ -185,20 +188,17 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
     foreseen = solver.first()
     unknowns = foreseen.unknowns.copy()
     unknowns[1] -= _BELOW
-    low: Seen | None = None
-    high: Seen | None = None
+    slope, before = _SLOPES[0], None
     for tries in range(1, _FIRST_TRIES + 1):
-        seen = yield from _seen(player, solver, unknowns)
+        seen: Seen = yield from _seen(player, solver, unknowns)
+        wrong = float(seen.residual[0])
         if _is_sine(seen.residual, player.plan.tolerance):
             return seen, tries
-        low, high = (seen, high) if seen.residual[0] < 0 else (low, seen)
-        unknowns = solver.corrected(seen, foreseen)
-        if low is None or high is None:
-            unknowns[1] = seen.unknowns[1] + (1.0 if low is not None else -1.0)
-        else:
-            share = -low.residual[0] / (high.residual[0] - low.residual[0])
-            first = low.unknowns[1], high.unknowns[1]
-            unknowns[1] = first[0] + min(max(share, _INSIDE), 1 - _INSIDE) * (first[1] - first[0])
+        if before is not None and abs(moved := seen.unknowns[1] - before.unknowns[1]) > _TOLD:
+            slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
+        before, unknowns = seen, solver.corrected(seen, foreseen)
+        # A secant of its own: harmonics that are not yet zero move the level too, and no bracket lasts.
+        unknowns[1] = seen.unknowns[1] - min(max(wrong / slope, -1.0), 1.0)
     return None
 
 
