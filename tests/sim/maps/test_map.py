@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim import Hertz, gong2025, integrate
-from vibench.sim.maps import Map, Range, Spacing, estimate_map, solve_map
+from vibench.sim import Hertz, MotionKind, gong2025, integrate
+from vibench.sim.lanes import lanes_pay
+from vibench.sim.maps import Map, Range, Spacing, estimate_map, map_solver, solve_map
 from vibench.sim.maps._columns import contact_energy_j
-from vibench.sim.scene import Method, settle_scene, solve_scene
+from vibench.sim.scene import Method, settle_in_lanes, settle_scene, settle_scenes, solve_scene
 
 FREQUENCIES = Range(start=100.0, stop=300.0, points=5)
 LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
@@ -123,6 +124,46 @@ def test_an_estimate_grows_with_the_work_and_shrinks_with_the_workers():
     assert several.points == 80
     assert several.work_s > one.work_s
     assert math.isfinite(several.most_useful_workers)
+
+
+@pytest.mark.skipif(not lanes_pay(), reason="this processor has no registers for lanes")
+@pytest.mark.parametrize(
+    ("said", "lanes"),
+    [
+        ({"amplitude_m": LEVELS}, True),
+        ({"random_starts": 2}, True),
+        ({"chain": ("up",)}, False),
+        ({"gap_m": Range(start=30e-6, stop=60e-6, points=3)}, False),
+    ],
+)
+def test_points_of_one_specimen_that_wait_for_nobody_go_through_lanes(said, lanes):
+    plan = Map(frequency_hz=FREQUENCIES, **said)
+    assert (map_solver(plan) is settle_in_lanes) is lanes
+    assert ("lanes" in estimate_map(plan, 1).sentence) is lanes
+
+
+def test_a_scene_settles_the_same_in_lanes_whatever_is_settled_beside_it():
+    plan = Map(frequency_hz=Range(start=240.0, stop=280.0, points=5), amplitude_m=LEVELS, periods=1200)
+    scenes = [plan.scene((row, 0, column)) for row in (0, 1) for column in range(5)]
+    together = [each.prediction for each in settle_scenes(scenes)]
+    assert sum(each.period is None for each in together) >= 3
+    for number in (1, 6, 8):
+        alone = settle_in_lanes(scenes[number])
+        assert alone.final_state == together[number].final_state
+        assert (alone.response_i, alone.response_ii) == (
+            together[number].response_i,
+            together[number].response_ii,
+        )
+
+
+@pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(130.0, 2e-5), (95.0, 5e-6)])
+def test_a_periodic_motion_has_the_same_responses_in_lanes(frequency_hz, amplitude_m):
+    plan = Map(frequency_hz=Range(start=50.0, stop=frequency_hz, points=2), amplitude_m=amplitude_m)
+    alone, beside = (settle(plan.scene((0, 1))) for settle in (settle_scene, settle_in_lanes))
+    assert alone.motion is beside.motion is MotionKind.PERIODIC
+    assert alone.period == beside.period
+    assert beside.response_i == pytest.approx(alone.response_i, rel=1e-5)
+    assert beside.response_ii == pytest.approx(alone.response_ii, rel=1e-5)
 
 
 def test_a_map_along_one_quantity_keeps_states_once_a_drive_period():

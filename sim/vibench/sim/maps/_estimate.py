@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ._expansion import MapPoints
+from ..scene import settle_in_lanes
+from ._expansion import MapPoints, map_solver
 from ._map import Map
 
 POINT_S = 2e-4
@@ -26,6 +27,8 @@ class MapEstimate:
     """Of the first lattice."""
     workers: int
     file_bytes: int
+    followed: str
+    """How motions are followed, as `map_solver` chooses."""
 
     @property
     def most_s(self) -> float:
@@ -54,7 +57,7 @@ class MapEstimate:
             f"planned as {self.work_s:.2g} s of one core. With {self.workers} worker(s): the first picture "
             f"after {self.first_s:.2g} s, everything after {self.most_s:.2g} s at most, without compiling; "
             f"more than {self.most_useful_workers} workers would wait. The file takes "
-            f"{self.file_bytes / 1e6:.1f} MB."
+            f"{self.file_bytes / 1e6:.1f} MB. Motions are followed {self.followed}."
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -82,4 +85,7 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
         coarse_work_s=float(points.planned_s[first].sum()),
         workers=(os.cpu_count() or 1) if workers is None else max(1, workers),
         file_bytes=plan.grid.size * row_bytes,
+        followed="eight at a time, in lanes"
+        if map_solver(plan) is settle_in_lanes
+        else "one after the other",
     )
