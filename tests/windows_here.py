@@ -2,7 +2,11 @@
 
     python -m tests.windows_here measure campaign.toml --out recordings
 
-runs a command of vibench so. Left of the true system are its libraries (numba, HDF5, Qt) and Python's own.
+runs a command of vibench so, and
+
+    pytest -p tests.windows_here -o timeout_method=thread tests/acquisition/recording
+
+the tests of a room. Left of the true system are its libraries (numba, HDF5, Qt) and Python's own.
 """
 
 import errno
@@ -69,6 +73,14 @@ def become_windows() -> None:
     for name in POSIX_SIGNALS:
         if hasattr(signal, name):
             delattr(signal, name)
+
+
+def pytest_configure() -> None:
+    """Run tests so; pytest alone still asks who the user is."""
+    import _pytest.tmpdir
+
+    _pytest.tmpdir.get_user_id = lambda: None
+    become_windows()
 
 
 def main() -> None:
