@@ -16,8 +16,6 @@ import itertools
 import sys
 import threading
 from array import array
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -234,15 +232,21 @@ def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
     return len(data)
 
 
-@contextmanager
-def _usb_errors() -> Iterator[None]:
-    """Turn a device's OSError into what PyUSB's own backends raise."""
-    try:
-        yield
-    except TimeoutError as error:
-        raise usb.core.USBTimeoutError("Operation timed out", errno=errno.ETIMEDOUT) from error
-    except OSError as error:
-        raise usb.core.USBError(error.strerror, errno=error.errno) from error
+class _usb_errors:  # noqa: N801 - reads as a verb where it is used
+    """Turns a device's OSError into what PyUSB's own backends raise.
+
+    No generator: from Python 3.13 on its frame keeps the handle of a session that failed to open.
+    """
+
+    def __enter__(self) -> None:
+        """Nothing to prepare."""
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        match error:
+            case TimeoutError():
+                raise usb.core.USBTimeoutError("Operation timed out", errno=errno.ETIMEDOUT) from error
+            case OSError():
+                raise usb.core.USBError(error.strerror, errno=error.errno) from error
 
 
 _BUS = UsbBus()
