@@ -15,7 +15,7 @@ from ..collision import (
     VARIABLES,
 )
 from ..contact import HELD, LEFT as LEAVES, advance_contact, begin_contact
-from ..flight import touched_side
+from ..flight import FORCE_TERMS, touched_side
 from ..kernels import (
     Complex,
     SimdVector,
@@ -57,7 +57,6 @@ HIGHEST = 8
 """Derivative of p that is taken at a touch: a collision is short beside the fastest mode."""
 STRETCH_TURN = 0.3
 """Longest stretch of a contact, as drive phase [rad]; as in `vibench.sim.stepping`."""
-FORCE_TERMS = 8
 FACTORIALS = np.array([float(math.factorial(k)) for k in range(HIGHEST + 1)])
 AWAY = np.array([MIDDLE**k / math.factorial(k) for k in range(HIGHEST + 1)])
 

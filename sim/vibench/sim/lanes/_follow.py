@@ -8,7 +8,7 @@ from functools import cache, lru_cache
 import llvmlite.binding
 import numpy as np
 
-from ..collision import CollisionFit, fit_collisions, time_over_fifth_root
+from ..collision import LEAST_TOLERANCE, CollisionFit, fit_collisions, time_over_fifth_root
 from ..flight import GRID_TURN, FlightTables
 from ..kernels import Complex, Floats, Table, Vector
 from ..model import VY, VZ, Hertz, Specimen, Y, Z, modal_form
@@ -42,8 +42,6 @@ LEAST_PART = 1e-9
 """Of a mode in p, over the largest: lanes follow p alone, and find everything else from it."""
 FIT_ERROR = 2e-7
 """Largest error of a speed after a collision, over the speed before, that the fit may have."""
-LEAST_TOLERANCE = 1e-7
-"""Accuracy *reference* asks for more than a fit knows."""
 GUESS_POINTS = 64
 
 

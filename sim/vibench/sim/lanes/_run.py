@@ -4,9 +4,10 @@ import numpy as np
 
 from ..collision import POLYNOMIALS, VARIABLES
 from ..contact import LOG_COLUMNS, contact_workspace
+from ..flight import FORCE_TERMS, LARGEST_BOUND
 from ..kernels import Complex, Counts, Table, Vector, below, eight, eights, fma, kernel, store
 from ..slots import STATE_SIZE, Parameters
-from ._collision import FORCE_TERMS, collide_lanes, contact_by_steps, leaves_clear
+from ._collision import collide_lanes, contact_by_steps, leaves_clear
 from ._flight import (
     LONG,
     bound_flights,
@@ -27,7 +28,6 @@ WAITING = 1
 half of the lanes."""
 MOST_EVENTS = 10_000
 """In a drive period, on average: far beyond any motion of a specimen."""
-LARGEST_BOUND = 1e150
 FOLLOWED, IN_CONTACT, FAILED = range(3)
 """How a motion ends: in flight; in contact, by its state; not at all."""
 
