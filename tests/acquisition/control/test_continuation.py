@@ -157,14 +157,9 @@ def test_motions_near_grazing_are_refused_with_their_growth_time(rig):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("noise", [1.0, 10.0])
-def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tmp_path, noise):
+def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tmp_path):
     """Four minutes of rig time: at least 15 unstable points, folds within 0.3 Hz, m0 within 2 %."""
-    true = hardening(
-        rig,
-        accelerometer_noise_m_per_s2=noise * 5e-3,
-        vibrometer_noise_m_per_s_per_rthz=noise * 2e-8,
-    )
+    true = hardening(rig)
     # The host believes in springs that are 10 % stiffer, and in a coil that pushes by 10 % more.
     stiffer = tuple(1.1**0.5 * each for each in true.specimen.single_frequencies_hz)
     believed = true.model_copy(
