@@ -112,7 +112,7 @@ def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
 
 
 def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
-    """Keep a sheet in place of an older one; ConfigurationError where another file has the name."""
+    """Keep a sheet in place of an older one; raises ConfigurationError where another file has the name."""
     if path.exists():
         load_knob_sheet(path)
     knobs = "".join(

@@ -41,7 +41,7 @@ PRIOR_SD = {
 
 
 def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
-    """Read one parameter."""
+    """Read one parameter [m, kg, kg/s, N/m, N; the exponent has no unit]."""
     specimen = tracked.specimen
     lower, upper = specimen.gaps_m
     (k0, _, k2), (c0, c1, c2) = specimen.stiffnesses, specimen.dampings
