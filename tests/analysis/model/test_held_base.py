@@ -28,6 +28,7 @@ HELD_UM = {
     "smart-period_3": 40.0,
     "smart-dwell_260": 5.0,
     "smart-sweep_held": 5.0,
+    "branch-branch_3um": 3.0,
 }
 """Highest level of the base that each plan names, as a displacement where it is played."""
 

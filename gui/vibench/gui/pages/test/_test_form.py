@@ -19,6 +19,7 @@ USUAL = {
     "lowest_vpp": 0.2,
     "step_vpp": 0.2,
     "base_level": {"displacement_m": 5e-6},
+    "response_m": 5e-6,
     "frequencies_hz": [240.0, 260.0, 280.0],
     "spectrum": [{"frequency_hz": 40.0, "density": 1e-3}, {"frequency_hz": 600.0, "density": 1e-3}],
     "accelerations_m_per_s2": [0.3, 0.6],
