@@ -279,8 +279,12 @@ def vibench(
     ] = False,
 ) -> None:
     """Hold the commands."""
-    logging.basicConfig(format="%(asctime)s %(name)s: %(message)s")
-    logging.getLogger("vibench").setLevel(log_level.upper())
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s"))
+    # Ours alone: other libraries log what a broken message of a client did to them, with a traceback.
+    ours = logging.getLogger("vibench")
+    ours.handlers = [handler]
+    ours.setLevel(log_level.upper())
 
 
 def main() -> None:
