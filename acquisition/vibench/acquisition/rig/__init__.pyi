@@ -18,8 +18,6 @@ from ._configuration import (
     Role as Role,
     StatedUncertainty as StatedUncertainty,
     VibrometerConfig as VibrometerConfig,
-    load_rig as load_rig,
-    with_faults as with_faults,
 )
 from ._drivers import (
     ControllerDriver as ControllerDriver,
@@ -36,6 +34,10 @@ from ._knobs import (
     confirm_by_sheet as confirm_by_sheet,
     confirm_simulated as confirm_simulated,
     save_knob_sheet as save_knob_sheet,
+)
+from ._load_rig import (
+    load_rig as load_rig,
+    with_faults as with_faults,
 )
 from ._model import (
     BaseQuantity as BaseQuantity,

@@ -3,16 +3,14 @@
 from datetime import date
 from enum import StrEnum
 from math import inf
-from pathlib import Path
 from typing import Literal, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from vibench.sim import SpecimenTable
 
-from ..errors import ConfigurationError
-from ..host import FrozenModel, load_toml, named
-from ..instruments import Knob, PlugInKind, plug_in_names
+from ..host import FrozenModel
+from ..instruments import Knob
 from ._output import OutputConfig
 from ._virtual import VirtualConfig, fastest_sample_rate_hz
 
@@ -343,62 +341,3 @@ class Rig(FrozenModel):
             ),
             Knob(instrument=vibrometer.model, setting="tracking filter", value=vibrometer.tracking_filter),
         )
-
-
-def load_rig(path: Path | str) -> Rig:
-    """Read a hardware configuration: a TOML file, or by its name (``"virtual_rig"``) a shipped one.
-
-    Raises
-    ------
-    ConfigurationError
-        With file, key, what was given and what is allowed.
-
-    """
-    path = named(path, "hardware_configs")
-    rig = load_toml(path, Rig)
-    _require_plug_ins(rig, path)
-    if rig.virtual is None or rig.virtual.faults is None:
-        return rig
-    return with_faults(rig, path.absolute().parent / rig.virtual.faults)
-
-
-def _require_plug_ins(rig: Rig, path: Path) -> None:
-    """Refuse names that no installed package offers; a recording that names them is read without."""
-    asked = [
-        ("generator.driver", PlugInKind.GENERATOR, rig.generator.driver),
-        ("daq.driver", PlugInKind.DIGITIZER, rig.daq.driver),
-        *(
-            ("daq.channels.sensor", PlugInKind.SENSOR, channel.sensor)
-            for channel in rig.daq.channels
-            if channel.sensor is not None
-        ),
-    ]
-    if rig.controller is not None:
-        asked.append(("controller.driver", PlugInKind.CONTROLLER, rig.controller.driver))
-    if rig.daq.output is not None:
-        asked.append(("daq.driver (of the output)", PlugInKind.OUTPUT, rig.daq.driver))
-    for key, kind, name in asked:
-        if name not in (names := plug_in_names(kind)):
-            raise ConfigurationError(
-                f"{path}: {key} = {name!r} is not installed: {', '.join(names)} may be given, or the name "
-                f"of an entry point {kind.value} of a package that you install (docs/instruments.md)"
-            )
-
-
-def with_faults(rig: Rig, script: Path) -> Rig:
-    """Have a script of faults played on a virtual rig.
-
-    Raises
-    ------
-    ConfigurationError
-        When the rig is a real one, whose faults come by themselves.
-
-    """
-    if rig.virtual is None:
-        raise ConfigurationError(
-            f"{script}: the rig {rig.name!r} is a real one, and faults can be scripted on a virtual one "
-            "only. Nothing was opened; leave the script out, or name a rig with a [virtual] table"
-        )
-    script = named(script, "hardware_configs/faults")
-    scripted = rig.virtual.model_copy(update={"faults": str(script.absolute())})
-    return rig.model_copy(update={"virtual": scripted})
