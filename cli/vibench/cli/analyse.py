@@ -322,9 +322,10 @@ def fitted_to(
 
 
 def complain_about(results: CampaignResults) -> None:
-    """End with a sentence for each recording without a result."""
+    """End with a sentence for each recording without a result, or whose result has no simulation."""
     for failure in results.failures:
-        typer.echo(f"error: {_named(failure)}", err=True)
+        word = "error" if failure.what is FailedStep.ANALYSIS else "note"
+        typer.echo(f"{word}: {_named(failure)}", err=True)
     if any(failure.what is FailedStep.ANALYSIS for failure in results.failures):
         raise typer.Exit(ExitCode.FAILED)
 

@@ -1,0 +1,23 @@
+"""How `analyse` ends: without a result it fails, without the simulation of a result it does not."""
+
+import pytest
+import typer
+
+from vibench.analysis.results import AnalysisFailure, CampaignResults, FailedStep
+from vibench.cli.analyse import complain_about
+
+
+def ended(what):
+    return CampaignResults("night", (), (AnalysisFailure("a.h5", what, "the reason"),))
+
+
+def test_a_result_without_its_simulation_is_noted_and_is_no_failure(capsys):
+    complain_about(ended(FailedStep.SIMULATION))
+    assert capsys.readouterr().err == "note: a.h5: the reason\n"
+
+
+def test_a_recording_without_a_result_is_a_failure(capsys):
+    with pytest.raises(typer.Exit) as end:
+        complain_about(ended(FailedStep.ANALYSIS))
+    assert end.value.exit_code == 1
+    assert capsys.readouterr().err == "error: a.h5: the reason\n"
