@@ -31,11 +31,13 @@ from ._shares import (
     shares_of as shares_of,
     wilson_share as wilson_share,
 )
-from ._solve import (
+from ._side_by_side import (
     Settled as Settled,
     settle_in_lanes as settle_in_lanes,
-    settle_scene as settle_scene,
     settle_scenes as settle_scenes,
+)
+from ._solve import (
+    settle_scene as settle_scene,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
 )

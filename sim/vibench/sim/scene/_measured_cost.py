@@ -8,7 +8,8 @@ from ..costs import FEWEST, cost_ledger
 from ._plan import ScenePlan, plan_scene
 from ._prediction import ScenePrediction
 from ._scene import Scene
-from ._solve import settle_in_lanes, settle_scene, solve_scene
+from ._side_by_side import settle_in_lanes
+from ._solve import settle_scene, solve_scene
 
 MEASURED_S = 0.5
 """Processor time after which no further run is made to measure a cost [s]."""

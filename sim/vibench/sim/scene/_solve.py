@@ -1,11 +1,7 @@
-"""The answer to a scene: what was seen, and how far to trust it. SI units.
-
-Amplitudes of the motion of m0 over frequency, from samples over whole drive periods. SI units.
-"""
+"""The answer to a scene: what was seen, and how far to trust it. SI units."""
 
 import math
-import time
-from collections.abc import Generator, Sequence
+from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,8 +12,9 @@ from ..model import Accuracy, Outcome
 from ._ensemble import ErrorOf, lasting
 from ._fixed_run import Pace, SceneRun, pace_of, run_for
 from ._followed_run import FollowedRun
+from ._line_spectrum import spectrum_of
 from ._linear_motion import LinearMotion, linear_motion
-from ._observed_window import ObservedWindow, samples_between, states_of, whole_periods
+from ._observed_window import states_of, whole_periods
 from ._other_starts import ALONE, ensemble_beside, memory_of
 from ._plan import plan_of, transient_decay_s
 from ._prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
@@ -35,44 +32,7 @@ from ._stated_error import (
     stated_errors,
     with_errors,
 )
-from ._states_alone import Following, follow_all
-
-LEAST_RATE_HZ = 20_000.0
-"""Samples a second, at least: contacts are ten times slower than that, and m0 hardly feels them."""
-HIGHEST = 0.25
-"""Highest frequency kept, over the sample rate: what is folded back there has passed m0 twice."""
-
-
-@dataclass(frozen=True, eq=False)
-class LineSpectrum:
-    """Amplitudes of x, unweighted, so that the drive's line and its multiples are exact."""
-
-    frequency_hz: Floats
-    """Shape (lines,)."""
-    amplitude_m: Floats
-    """Shape (lines,)."""
-
-
-def spectrum_of(window: ObservedWindow) -> LineSpectrum:
-    """Follow a window once more, stretch by stretch as before, and take the spectrum of its whole periods.
-
-    Samples change nothing: it is the same motion to the last digit, even in chaos.
-    """
-    run, periods = window.begins.apart(), window.line_periods
-    frequency = run.drive.frequency_hz
-    per_period = math.ceil(LEAST_RATE_HZ / frequency)
-    rate, count = per_period * frequency, per_period * periods
-    followed = [
-        run.follow(stretch.end_s, samples=samples_between(rate, stretch.start_s, stretch.end_s))
-        for stretch in window.stretches
-    ]
-    states = states_of(followed)[-count:]
-    amplitudes = np.abs(np.fft.rfft(states[:, 0])) * 2.0 / count
-    amplitudes[0] *= 0.5
-    frequencies = np.arange(len(amplitudes), dtype=np.float64) * (frequency / periods)
-    is_kept = frequencies <= HIGHEST * rate
-    return LineSpectrum(frequencies[is_kept], amplitudes[is_kept])
-
+from ._states_alone import Following
 
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
@@ -211,58 +171,10 @@ def settle_scene(scene: Scene) -> ScenePrediction:
         When the specimen cannot be followed in time, or not from such a start.
 
     """
-    return alone(_settling(scene))
+    return alone(settling_scene(scene))
 
 
-@dataclass(frozen=True, eq=False)
-class Settled:
-    """What a scene came to that was settled beside others."""
-
-    prediction: ScenePrediction
-    taken_s: float
-    """Processor time of this thread for it [s]; of what was followed together, its part."""
-
-
-def settle_scenes(scenes: Sequence[Scene]) -> list[Settled]:
-    """Settle several scenes, each as `settle_scene` does, in lanes as long as states are enough.
-
-    The answer to each does not depend on the others.
-
-    Raises
-    ------
-    ValueError
-        When one of them cannot be followed in time, or not from its start.
-
-    """
-    under_way = [_settling(scene) for scene in scenes]
-    answers: dict[int, ScenePrediction] = {}
-    taken_s = [0.0] * len(scenes)
-    while len(answers) < len(scenes):
-        asked: dict[int, Following] = {}
-        for place, each in enumerate(under_way):
-            if place not in answers:
-                began_s = time.thread_time()
-                try:
-                    asked[place] = next(each)
-                except StopIteration as end:
-                    answers[place] = end.value
-                taken_s[place] += time.thread_time() - began_s
-        began_s = time.thread_time()
-        follow_all(list(asked.values()))
-        for place in asked:
-            taken_s[place] += (time.thread_time() - began_s) / len(asked)
-    return [Settled(answers[place], taken_s[place]) for place in range(len(scenes))]
-
-
-def settle_in_lanes(scene: Scene) -> ScenePrediction:
-    """Settle one scene as `settle_scenes` does among any others: to the last digit the same answer.
-
-    For one scene alone `settle_scene` is faster; of chaos it is another draw.
-    """
-    return settle_scenes([scene])[0].prediction
-
-
-def _settling(scene: Scene) -> Generator[Following, None, ScenePrediction]:
+def settling_scene(scene: Scene) -> Generator[Following, None, ScenePrediction]:
     """Do as `settle_scene`, and hand out what may be followed beside others."""
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     method = plan_of(scene, motion).method
