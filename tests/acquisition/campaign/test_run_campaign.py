@@ -12,7 +12,7 @@ from vibench.acquisition import (
     run_campaign,
     run_measurement,
 )
-from vibench.acquisition.campaign import AfterFailure, ExistingRecordings, PointOutcome
+from vibench.acquisition.campaign import AfterFailure, ExistingRecordings, PointOutcome, _opening
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState
 from vibench.acquisition.recording import RecordingState
@@ -53,6 +53,18 @@ def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(benc
         run_campaign(bench, CAMPAIGN, taken)
     assert taken.read_text() == "mine"
     assert not any(name == "start" for name, _, _ in bench.world.calls)
+
+
+def test_a_point_and_its_repeats_are_held_against_the_limits_once(bench, tmp_path, monkeypatch):
+    checked = []
+    monkeypatch.setattr(
+        _opening, "require_within_limits", lambda measurement, rig: checked.append(measurement)
+    )
+    repeated = CAMPAIGN.measurements[0].model_copy(update={"repeats": 3})
+    run_campaign(
+        bench, Campaign(name="c", measurements=(repeated, CAMPAIGN.measurements[1])), tmp_path / "out"
+    )
+    assert [each.name for each in checked] == ["one", "two"]
 
 
 def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.instruments import PlugInKind, plug_in, plug_in_names
+from vibench.acquisition.instruments import PlugInKind, _plug_in, plug_in, plug_in_names
 from vibench.acquisition.instruments._plug_in import OURS
 from vibench.acquisition.rig import load_rig
 
@@ -91,6 +91,17 @@ def test_two_packages_with_one_name_are_told_apart_by_nobody(tmp_path, monkeypat
     offer(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
     with pytest.raises(ConfigurationError, match=r"offered more than once \(somebody:Else, vibench"):
         plug_in(PlugInKind.GENERATOR, "afg1022x")
+
+
+def test_installed_packages_are_looked_at_once_and_again_when_the_path_changes(tmp_path, monkeypatch):
+    looks = []
+    monkeypatch.setattr(_plug_in, "entry_points", lambda group: looks.append(group) or ())
+    monkeypatch.syspath_prepend(tmp_path / "first")
+    for _ in range(3):
+        plug_in_names(PlugInKind.SENSOR)
+    monkeypatch.syspath_prepend(tmp_path / "second")
+    plug_in_names(PlugInKind.SENSOR)
+    assert looks == ["vibench.sensors"] * 2
 
 
 def offer(folder, monkeypatch, name, target):

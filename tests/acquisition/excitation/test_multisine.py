@@ -56,6 +56,13 @@ def test_realisations_share_their_rms_and_the_sharpest_reaches_full_range():
     assert max(peaks) == pytest.approx(1.0, rel=1e-15)
 
 
+def test_a_plan_that_is_asked_again_makes_its_waveforms_only_once():
+    first, again = (flat_periods(BAND, realisations=2, seed=5) for _ in range(2))
+    assert all(one is other for one, other in zip(first, again, strict=True))
+    with pytest.raises(ValueError, match="read-only"):
+        first[0][0] = 0.0
+
+
 def test_realisations_are_different_noises():
     first, second = flat_periods(BAND, realisations=2, seed=5)
     correlation = np.corrcoef(first, second)[0, 1]

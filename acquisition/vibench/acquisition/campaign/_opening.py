@@ -108,10 +108,10 @@ class PlannedRecording:
 def require_all_within_limits(points: tuple[Point, ...], bench: RunBench) -> None:
     """Refuse a campaign of which any point passes a limit, or cannot be played; raises LimitExceeded."""
     complaints: dict[str, None] = {}
-    for point in points:
+    for measurement in dict.fromkeys(point.measurement for point in points):  # repeats are one
         try:
-            require_within_limits(point.measurement, bench.rig)
-            drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
+            require_within_limits(measurement, bench.rig)
+            drive_for(bench, measurement)  # refuses what nothing on this bench can play
         except LimitExceeded as error:
             complaints[str(error)] = None
     if complaints:

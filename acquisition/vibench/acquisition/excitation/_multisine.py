@@ -1,5 +1,7 @@
 """The arithmetic of a multisine in a generator's memory: lines, hold, phases, crest factor."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -64,12 +66,22 @@ def flat_periods(
     Returns
     -------
     tuple of arrays
-        ``realisations`` arrays of shape (points,).
+        ``realisations`` arrays of shape (points,), read-only: who asks again is given the same.
 
     """
-    periods = [_smoothest(lines, realisation, seed, points) for realisation in range(realisations)]
+    return _flat_periods(tuple(lines.tolist()), realisations, seed, points)
+
+
+# Limits, preview and playing ask for the waveforms of a plan; all its levels have the same.
+@lru_cache(maxsize=2)
+def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: int) -> tuple[Samples, ...]:
+    excited = np.array(lines, dtype=np.int64)
+    periods = [_smoothest(excited, realisation, seed, points) for realisation in range(realisations)]
     highest = max(float(np.max(np.abs(period))) for period in periods)
-    return tuple(period / highest for period in periods)
+    scaled = tuple(period / highest for period in periods)
+    for period in scaled:
+        period.flags.writeable = False
+    return scaled
 
 
 def shaped_period(lines: Lines, peaks: Samples, points: int, seed: int, realisation: int) -> Samples:
