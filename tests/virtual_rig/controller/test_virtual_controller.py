@@ -13,7 +13,7 @@ from vibench.acquisition.instruments import (
     LoopRequest,
     LoopState,
 )
-from vibench.virtual_rig.controller import VirtualController
+from vibench.virtual_rig.controller import VirtualController, answer, wants_attention
 
 RATE_HZ = 10_240.0
 FACTS = LoopFacts(name="simulated", serial="1", rate_hz=RATE_HZ, latency_s=3e-4, limit_v=2.0, watchdog_s=0.5)
@@ -37,10 +37,10 @@ class Wired:
 
     def run(self, seconds):
         for _ in range(round(seconds * RATE_HZ)):
-            volts = (
-                self.controller.answer(self.gain * self.played[-3], 0.25) if self.controller.is_on else 0.0
-            )
-            self.played.append(volts)
+            with self.controller.answering() as parts:
+                self.played.append(answer(self.gain * self.played[-3], 0.25, parts))
+                if wants_attention(parts.now):
+                    self.controller.attend(self.samples / RATE_HZ)
             self.samples += 1
 
 

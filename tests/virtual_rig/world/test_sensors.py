@@ -10,7 +10,7 @@ from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig.world import FULL_BAND_HZ
 from vibench.virtual_rig.world._disturbance import Disturbance, RandomDropouts
 from vibench.virtual_rig.world._noise import PAGE, NoiseStream
-from vibench.virtual_rig.world._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
+from vibench.virtual_rig.world._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
 from vibench.virtual_rig.world._time_grid import USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
@@ -33,26 +33,26 @@ def accelerometer(noise_m_per_s2=0.0, **config):
 
 
 def test_a_steady_velocity_shows_as_volts_by_the_decoders_range():
-    volts = vibrometer().show(np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
+    volts = shown(vibrometer(), np.full(200, 0.3 * FULL_SCALE_M_PER_S), 0)
     assert volts[-1] == pytest.approx(0.3 * FULL_SCALE_V, rel=1e-9)
 
 
 def test_velocity_beyond_full_scale_is_clipped_and_counted():
     instrument = vibrometer()
-    volts = instrument.show(np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
+    volts = shown(instrument, np.full(200, -1.7 * FULL_SCALE_M_PER_S), 0)
     assert np.min(volts) == -FULL_SCALE_V
     assert instrument.over_range_steps > 190
 
 
 def test_the_vibrometers_noise_has_the_density_that_is_configured():
     density = 2e-8
-    volts = vibrometer(noise_density=density).show(np.zeros(200_000), 0)
+    volts = shown(vibrometer(noise_density=density), np.zeros(200_000), 0)
     rms = np.std(volts) * FULL_SCALE_M_PER_S / FULL_SCALE_V
     assert rms == pytest.approx(density * np.sqrt(GRID_RATE_HZ / 2), rel=0.01)
 
 
 def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
-    acceleration = accelerometer(noise_m_per_s2=0.005).show(np.zeros(200_000), 0)
+    acceleration = shown(accelerometer(noise_m_per_s2=0.005), np.zeros(200_000), 0)
     acceleration /= RIG.accelerometer.sensitivity_v_per_m_per_s2
     spectrum = np.abs(np.fft.rfft(acceleration)) ** 2 * 2 / len(acceleration) ** 2
     in_band = np.fft.rfftfreq(len(acceleration), 1 / GRID_RATE_HZ) < FULL_BAND_HZ
@@ -61,7 +61,7 @@ def test_the_accelerometers_noise_has_its_rms_in_the_full_band():
 
 def test_the_accelerometer_clips_at_its_full_scale():
     limit = RIG.accelerometer.full_scale_v
-    volts = accelerometer().show(np.full(2000, 3 * limit / RIG.accelerometer.sensitivity_v_per_m_per_s2), 0)
+    volts = shown(accelerometer(), np.full(2000, 3 * limit / RIG.accelerometer.sensitivity_v_per_m_per_s2), 0)
     assert volts[-1] == limit
 
 
@@ -80,7 +80,7 @@ def test_a_delay_that_cannot_be_simulated_is_refused():
 def test_a_dropout_on_demand_replaces_the_signal_for_its_time():
     instrument = vibrometer()
     instrument.disturb(Disturbance(150, 160, 1.0))
-    first, second = (instrument.show(np.full(100, 0.01), start) for start in (100, 200))
+    first, second = (shown(instrument, np.full(100, 0.01), start) for start in (100, 200))
     assert np.all(first[50:60] == FULL_SCALE_V)
     assert instrument.over_range_steps == 10
     quiet = 0.01 / FULL_SCALE_M_PER_S * FULL_SCALE_V
@@ -99,8 +99,8 @@ def test_dropouts_come_at_random_as_often_as_configured():
 
 def test_dropouts_do_not_depend_on_the_blocks_they_are_looked_up_in():
     steps = 5 * PAGE  # a multiple of 640
-    whole = vibrometer(dropouts_per_s=200.0).show(np.zeros(steps), 0)
+    whole = shown(vibrometer(dropouts_per_s=200.0), np.zeros(steps), 0)
     instrument = vibrometer(dropouts_per_s=200.0)
-    parts = [instrument.show(np.zeros(640), start) for start in range(0, steps, 640)]
+    parts = [shown(instrument, np.zeros(640), start) for start in range(0, steps, 640)]
     assert np.count_nonzero(whole) > 500
     assert np.array_equal(np.concatenate(parts), whole)

@@ -8,19 +8,23 @@ ROOT = Path(__file__).parents[3]
 PROGRAM = """
 from pathlib import Path
 from vibench.acquisition import open_bench
+from vibench.acquisition.instruments import LoopProgram
 from vibench.sim.shaker import _loaded_shaker as loaded_shaker
 from vibench.virtual_rig.world import (
     _conversion as conversion,
     _decimation as decimation,
     _input_stage as input_stage,
-    _recursive_filter as recursive_filter,
+    _loop_cables as loop_cables,
+    _sensors as sensors,
 )
 
 kernels = (
-    loaded_shaker._move, decimation._weigh, input_stage._clipped, conversion._quantise, recursive_filter._run
+    loaded_shaker.move_shaker, decimation._weigh, input_stage._clipped, conversion._quantise,
+    sensors.show_steps, loop_cables._closed_loop
 )
-with open_bench(Path("hardware_configs/virtual_rig.toml")) as bench:
+with open_bench(Path("hardware_configs/virtual_rig_controller.toml")) as bench:
     before = [len(each.signatures) for each in kernels]
+    bench.controller.play(LoopProgram(frequency_hz=100, reference_v=((0.1, 0.0),)))
     bench.digitizer.start()
     bench.digitizer.read(512)
     print(before, [len(each.signatures) for each in kernels])

@@ -62,22 +62,3 @@ class AnalogueWorld(Protocol):
 
     def silence(self, physical_channel: str) -> None:
         """Drop what is queued and hold that output at zero."""
-
-
-class FastLoop(Protocol):
-    """A controller that answers what base and m0 do, sample by sample, with a voltage at the amplifier."""
-
-    @property
-    def is_on(self) -> bool:
-        """Whether it answers at all; silent, it is not asked."""
-
-    @property
-    def steps_per_sample(self) -> int:
-        """Steps of the world's grid from sample to sample."""
-
-    @property
-    def latency_steps(self) -> int:
-        """Steps from a sample to the voltage that answers it."""
-
-    def answer(self, base_v: float, m0_v: float) -> float:
-        """Take means over the last sample of both sensors [V], and give the voltage of the next [V]."""

@@ -7,7 +7,7 @@ that happens inside a step and all lie at the step's middle, so channels agree i
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -54,6 +54,16 @@ class _ShakerTables(NamedTuple):
     specimen: IntervalTables
 
 
+class ShakerParts(NamedTuple):
+    """What `move_shaker` moves, and moves by."""
+
+    state: FloatArray
+    specimen: FloatArray
+    tables: _ShakerTables
+    counts: NDArray[np.int64]
+    """Contacts, bumps and limited steps, of which a `LoadedShaker` keeps the sums."""
+
+
 @dataclass(frozen=True)
 class ShakenMotion:
     """What happened in a stretch of steps; arrays of one value a step, means over the step."""
@@ -66,6 +76,12 @@ class ShakenMotion:
     """[m/s]"""
     ends: FloatArray
     """Shape (steps, 9), columns MOTION_COLUMNS, at the ends of the steps; no rows unless asked for."""
+
+    @classmethod
+    def of(cls, count: int, end_rows: int) -> Self:
+        """Make room for so many steps, and for the ends of the first of them."""
+        ends = np.empty((end_rows, len(MOTION_COLUMNS)))
+        return cls(np.empty(count), np.empty(count), np.empty(count), ends)
 
 
 class MotionFailed(ArithmeticError):
@@ -123,6 +139,12 @@ class LoadedShaker:
     def gain(self, gain: float) -> None:
         self._tables = self._tables._replace(gain=gain)
 
+    @property
+    def parts(self) -> ShakerParts:
+        """What a compiled loop around it moves; `account` says when it has."""
+        self._counts[:] = 0
+        return ShakerParts(self._state, self._specimen, self._tables, self._counts)
+
     def change_specimen(self, specimen: Specimen) -> None:
         """Go on with another specimen on the table, its masses where those of the last one are now.
 
@@ -149,23 +171,25 @@ class LoadedShaker:
             When the motion is no longer finite; this shaker cannot go on.
 
         """
-        count = len(drive_v)
-        motion = ShakenMotion(
-            np.empty(count), np.empty(count), np.empty(count), np.empty((end_rows, len(MOTION_COLUMNS)))
-        )
-        self._counts[:] = 0
-        good = _move(
+        motion = ShakenMotion.of(len(drive_v), end_rows)
+        self.move_into(motion, drive_v, np.zeros(len(drive_v)) if noise_v is None else noise_v)
+        return motion
+
+    def move_into(self, motion: ShakenMotion, drive_v: FloatArray, noise_v: FloatArray) -> None:
+        """Advance like `move`, into arrays that are there."""
+        good = move_shaker(
             drive_v,
-            np.zeros(count) if noise_v is None else noise_v,
-            self._state,
-            self._specimen,
-            self._tables,
+            noise_v,
+            self.parts,
             motion.amplifier_voltage,
             motion.base_acceleration,
             motion.m0_velocity,
             motion.ends,
-            self._counts,
         )
+        self.account(good, len(drive_v))
+
+    def account(self, good: int, count: int) -> None:
+        """Add up what `move_shaker` counted in a stretch; MotionFailed when it did not finish."""
         if good < count:
             msg = (
                 f"The specimen's motion was lost {good} steps into a stretch of {count}: it is not finite, "
@@ -175,7 +199,6 @@ class LoadedShaker:
         self.impacts += int(self._counts[0])
         self.bumps += int(self._counts[1])
         self.limited_steps += int(self._counts[2])
-        return motion
 
 
 def _shaker_tables(amplifier: Amplifier, shaker: Shaker, specimen: Specimen, step_s: float) -> _ShakerTables:
@@ -208,19 +231,17 @@ def _mean_of_decay(steps_per_time_constant: float) -> float:
 
 
 @kernel
-def _move(
+def move_shaker(
     drive: FloatArray,
     noise: FloatArray,
-    state: FloatArray,
-    specimen: FloatArray,
-    tables: _ShakerTables,
+    parts: ShakerParts,
     amplifier_voltage: FloatArray,
     base_acceleration: FloatArray,
     m0_velocity: FloatArray,
     ends: FloatArray,
-    counts: NDArray[np.int64],
 ) -> int:
     """Advance step by step; return the steps done, fewer than asked for when the specimen failed."""
+    state, specimen, tables, counts = parts
     h, t = tables.step, tables.transition
     base = np.empty(4)
     for n in range(drive.size):

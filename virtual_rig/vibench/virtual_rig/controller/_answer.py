@@ -1,6 +1,7 @@
 """One sample of a controller, compiled: phase, Fourier series, law, and the coefficients that come back."""
 
 from enum import IntEnum, auto
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,32 +37,45 @@ class Now(IntEnum):
     WEIGHT = auto()
     STEADY = auto()
     DONE = auto()
-    """1 when a block has been completed."""
+    """1 when a block has been completed, 2 when nothing was changed in it."""
+    ON = auto()
+    """0 while it is silent."""
+    UNHEARD = auto()
+    """Samples since its host said anything."""
+    MOST_UNHEARD = auto()
+    MOST_AT_LIMIT = auto()
 
 
 _THETA, _OMEGA, _OMEGA_FROM, _OMEGA_TO = map(int, (Now.THETA, Now.OMEGA, Now.OMEGA_FROM, Now.OMEGA_TO))
 _GLIDE, _GLIDE_STEP, _FADE, _FADE_STEP = map(int, (Now.GLIDE, Now.GLIDE_STEP, Now.FADE, Now.FADE_STEP))
 _LIMIT, _AT_LIMIT, _TURNS = map(int, (Now.LIMIT, Now.AT_LIMIT, Now.TURNS))
 _BLOCK, _WEIGHT, _STEADY, _DONE = map(int, (Now.BLOCK, Now.WEIGHT, Now.STEADY, Now.DONE))
+_ON, _UNHEARD = map(int, (Now.ON, Now.UNHEARD))
+_MOST_UNHEARD, _MOST_AT_LIMIT = map(int, (Now.MOST_UNHEARD, Now.MOST_AT_LIMIT))
+
+
+class LoopParts(NamedTuple):
+    """What a sample is answered with, and what it changes."""
+
+    now: FloatArray
+    """By `Now`."""
+    reference: ComplexArray
+    """Coefficients before the glide and after it, shape (2, harmonics) [V]."""
+    law: FloatArray
+    memory: FloatArray
+    sums: ComplexArray
+    """Of the block that lasts, shape (3, 1 + harmonics)."""
+    done: ComplexArray
+    """Coefficients of the last block."""
 
 
 @kernel
-def answer(
-    base_v: float,
-    m0_v: float,
-    now: FloatArray,
-    reference: ComplexArray,
-    law: FloatArray,
-    memory: FloatArray,
-    sums: ComplexArray,
-    done: ComplexArray,
-) -> float:
-    """Give the volts of one sample.
-
-    ``reference``: coefficients gone from and to, shape (2, harmonics). ``law``: rows of memory and then the
-    output, columns of memory and then both inputs, shape (n + 1, n + 2). ``sums``, ``done``: output, base, m0
-    of the block that is under way and of the last one, shape (3, 1 + harmonics).
-    """
+def answer(base_v: float, m0_v: float, parts: LoopParts) -> float:
+    """Give the volts that answer the means of both sensors over the last sample [V]; none while silent."""
+    now, reference, law, memory, sums, done = parts
+    if now[_ON] == 0.0:
+        return 0.0
+    now[_UNHEARD] += 1.0
     if now[_GLIDE] < 1.0:
         now[_GLIDE] = min(now[_GLIDE] + now[_GLIDE_STEP], 1.0)
         now[_STEADY] = 0.0
@@ -83,6 +97,17 @@ def answer(
     _look(volts, base_v, m0_v, now, turn, sums, done)
     now[_THETA] = (now[_THETA] + now[_OMEGA]) % (2.0 * np.pi)
     return float(volts)
+
+
+@kernel
+def wants_attention(now: FloatArray) -> bool:
+    """Whether a block is to be kept, or the controller is to end or has ended, before the next sample."""
+    return bool(
+        now[_DONE] > 0.0
+        or now[_UNHEARD] > now[_MOST_UNHEARD]
+        or now[_AT_LIMIT] > now[_MOST_AT_LIMIT]
+        or (now[_ON] > 0.0 and now[_FADE] <= 0.0)
+    )
 
 
 @kernel

@@ -2,7 +2,8 @@
 
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from pydantic import ValidationError
@@ -17,9 +18,10 @@ from vibench.acquisition.instruments import (
     LoopRequest,
     LoopState,
 )
+from vibench.acquisition.rig import Rig
 
 from ..generator import Reply
-from ._answer import ComplexArray, FloatArray, Now, answer
+from ._answer import ComplexArray, FloatArray, LoopParts, Now
 
 RAMP_S = 0.05
 """How fast it ramps down by itself [s]."""
@@ -52,8 +54,8 @@ class VirtualController:
         self._state = LoopState.SILENT
         self._reason = ""
         self._blocks: list[LoopBlock] = []
-        self._unheard = 0
         self._now: FloatArray = np.zeros(len(Now))
+        self._limit()
         self._program: LoopProgram | None = None
         self._reference: ComplexArray = np.zeros((2, 1), dtype=np.complex128)
         self._law: FloatArray = np.zeros((1, 2))
@@ -65,15 +67,18 @@ class VirtualController:
         """Whether anything is played."""
         return self._state is not LoopState.SILENT
 
-    def answer(self, base_v: float, m0_v: float) -> float:
-        """Take one sample of both sensors [V], and give the volts that answer it."""
+    @contextmanager
+    def answering(self) -> Iterator[LoopParts]:
+        """Hand out what samples are answered with; nothing is changed by its host meanwhile."""
         with self._turn:
-            state = (self._now, self._reference, self._law, self._memory, self._sums, self._done)
-            volts = answer(base_v, m0_v, *state)
+            yield LoopParts(self._now, self._reference, self._law, self._memory, self._sums, self._done)
+
+    def attend(self, time_s: float) -> None:
+        """See to what `wants_attention` asked for at a rig time: keep a block, end, be silent."""
+        with self._turn:
             if self._now[Now.DONE]:
-                self._keep_block()
+                self._keep_block(time_s)
             self._watch()
-            return volts
 
     def execute(self, message: bytes) -> Reply:
         """Carry out one line of the protocol, and give the line that answers it."""
@@ -84,7 +89,7 @@ class VirtualController:
             place = ".".join(map(str, first["loc"]))
             return _line(_refusal(f"{place}: {first['msg']}; what it plays goes on"))
         with self._turn:
-            self._unheard = 0
+            self._now[Now.UNHEARD] = 0.0
             return _line(self._answered(request))
 
     def _answered(self, request: LoopRequest) -> str:
@@ -112,7 +117,8 @@ class VirtualController:
         omega = 2 * np.pi * program.frequency_hz / self.facts.rate_hz
         if began:
             now[:] = 0.0
-            now[Now.OMEGA], now[Now.LIMIT] = omega, self.facts.limit_v
+            self._limit()
+            now[Now.OMEGA] = omega
         now[Now.OMEGA_FROM], now[Now.OMEGA_TO] = now[Now.OMEGA], omega
         glide_samples = max(program.glide_s * self.facts.rate_hz, 1.0)
         now[Now.GLIDE], now[Now.GLIDE_STEP] = 0.0, 1.0 / glide_samples
@@ -125,6 +131,13 @@ class VirtualController:
             self._law = _law_of(program.feedback)
             self._memory = np.zeros(2 * (len(self._law) - 1))
         self._program, self._state, self._reason = program, LoopState.PLAYING, ""
+        now[Now.ON] = 1.0
+
+    def _limit(self) -> None:
+        rate_hz = self.facts.rate_hz
+        self._now[Now.LIMIT] = self.facts.limit_v
+        self._now[Now.MOST_UNHEARD] = self.facts.watchdog_s * rate_hz
+        self._now[Now.MOST_AT_LIMIT] = LONGEST_AT_LIMIT_S * rate_hz
 
     def _wanted(self) -> ComplexArray:
         share = 0.5 - 0.5 * np.cos(np.pi * self._now[Now.GLIDE])
@@ -136,22 +149,37 @@ class VirtualController:
             self._now[Now.FADE_STEP] = 1.0 / max(ramp_s * self.facts.rate_hz, 1.0)
 
     def _watch(self) -> None:
-        self._unheard += 1
-        if self._unheard > self.facts.watchdog_s * self.facts.rate_hz:
+        now = self._now
+        if now[Now.UNHEARD] > now[Now.MOST_UNHEARD]:
             self._end(f"its host said nothing for {self.facts.watchdog_s:g} s", RAMP_S)
-        elif self._now[Now.AT_LIMIT] > LONGEST_AT_LIMIT_S * self.facts.rate_hz:
+        elif now[Now.AT_LIMIT] > now[Now.MOST_AT_LIMIT]:
             self._end(f"its output stayed at its limit of {self.facts.limit_v:g} V", RAMP_S)
-        if self._state is LoopState.ENDING and self._now[Now.FADE] <= 0.0:
+        if self._state is LoopState.ENDING and now[Now.FADE] <= 0.0:
             self._state = LoopState.SILENT
+            now[[Now.ON, Now.UNHEARD, Now.AT_LIMIT]] = 0.0
 
-    def _keep_block(self) -> None:
+    def _keep_block(self, end_s: float) -> None:
         output, base, m0 = (tuple((float(c.real), float(c.imag)) for c in row) for row in self._done)
         steady = bool(self._now[Now.DONE] > 1.0)
         self._now[Now.DONE] = 0.0
         if len(self._blocks) < MOST_BLOCKS:
-            self._blocks.append(
-                LoopBlock(end_s=self._clock(), steady=steady, output=output, base=base, m0=m0)
-            )
+            self._blocks.append(LoopBlock(end_s=end_s, steady=steady, output=output, base=base, m0=m0))
+
+
+def controller_of(rig: Rig, clock: Callable[[], float]) -> VirtualController | None:
+    """Give what closes a fast loop on a virtual rig; None where the rig has none."""
+    told, virtual = rig.controller, rig.virtual
+    if told is None or virtual is None:
+        return None
+    facts = LoopFacts(
+        name="simulated controller",
+        serial="virtual",
+        rate_hz=told.rate_hz,
+        latency_s=told.latency_s,
+        limit_v=told.limit_v,
+        watchdog_s=told.watchdog_s,
+    )
+    return VirtualController(facts, clock, virtual.grid_rate_hz)
 
 
 def _law_of(feedback: LoopFeedback | None) -> FloatArray:

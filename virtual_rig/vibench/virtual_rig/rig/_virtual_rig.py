@@ -1,6 +1,6 @@
 """The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from enum import Enum, auto
 from pathlib import Path
@@ -8,11 +8,10 @@ from types import MappingProxyType, TracebackType
 from typing import Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
-from vibench.acquisition.instruments import LoopFacts
 from vibench.acquisition.recording import DiskTrouble, troubled_disks
 from vibench.acquisition.rig import Rig, VirtualConfig
 
-from ..controller import VirtualController
+from ..controller import controller_of
 from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue_with, serve, token_for
 from ..generator import AFG1022, Keysight33500B, Panel, Quirks, ScpiSocket, Terminal
 from ..usb import UsbTmcInstrument, plug_in, unplug, usb_service
@@ -90,7 +89,7 @@ class VirtualRig:
             terminal=_terminal(rig, virtual),
         )
         """What is behind the USB cable."""
-        self.controller = _controller(rig, virtual, lambda: self.world.time_s)
+        self.controller = controller_of(rig, lambda: self.world.time_s)
         """What closes a fast loop; None where the rig has none."""
         self.world = World(rig, self.generator, loop=self.controller)
         """What is behind the terminals."""
@@ -203,21 +202,6 @@ class _Running:
         self.controller = controller
         self.play = play
         self.closing = closing
-
-
-def _controller(rig: Rig, virtual: VirtualConfig, clock: Callable[[], float]) -> VirtualController | None:
-    told = rig.controller
-    if told is None:
-        return None
-    facts = LoopFacts(
-        name="simulated controller",
-        serial="virtual",
-        rate_hz=told.rate_hz,
-        latency_s=told.latency_s,
-        limit_v=told.limit_v,
-        watchdog_s=told.watchdog_s,
-    )
-    return VirtualController(facts, clock, virtual.grid_rate_hz)
 
 
 def _pace(virtual: VirtualConfig) -> Pace:

@@ -1,11 +1,21 @@
 """A digital filter that goes on where its last block ended, in a compiled loop: blocks are short here."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibench.sim.kernels import kernel
 
 FloatArray = NDArray[np.float64]
+
+
+class FilterParts(NamedTuple):
+    """Weights and memory of a filter."""
+
+    numerator: FloatArray
+    denominator: FloatArray
+    state: FloatArray
 
 
 class RecursiveFilter:
@@ -21,15 +31,19 @@ class RecursiveFilter:
     def run(self, values: FloatArray) -> FloatArray:
         """Return the next output values, one for each input value."""
         result = np.empty(len(values))
-        _run(self._numerator, self._denominator, self._state, values, result)
+        run_filter(self.parts, values, result)
         return result
+
+    @property
+    def parts(self) -> FilterParts:
+        """What a compiled loop around it runs."""
+        return FilterParts(self._numerator, self._denominator, self._state)
 
 
 @kernel
-def _run(
-    numerator: FloatArray, denominator: FloatArray, state: FloatArray, values: FloatArray, result: FloatArray
-) -> None:
-    """Filter ``values`` into ``result``; the last element of ``state`` stays zero."""
+def run_filter(parts: FilterParts, values: FloatArray, result: FloatArray) -> None:
+    """Filter ``values`` into ``result``; the last element of the state stays zero."""
+    numerator, denominator, state = parts
     for n in range(values.size):
         value = values[n]
         shown = state[0] + numerator[0] * value

@@ -1,16 +1,18 @@
 """From motion to volts: the laser vibrometer that watches m0 and the accelerometer on the base."""
 
 from dataclasses import dataclass
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import AccelerometerConfig, VibrometerConfig
+from vibench.sim.kernels import kernel
 
 from ._disturbance import Disturbance, RandomDropouts, overwrite
 from ._noise import NoiseStream
-from ._recursive_filter import RecursiveFilter
+from ._recursive_filter import FilterParts, RecursiveFilter, run_filter
 from ._time_grid import USUAL_GRID, TimeGrid
 
 _FIT_BAND = 0.2
@@ -69,6 +71,11 @@ class RunningFilter:
         self._numerator = _fitted_zeros(analogue, self._denominator, step_s)
         self._running = RecursiveFilter(self._numerator, self._denominator)
 
+    @property
+    def parts(self) -> FilterParts:
+        """What runs."""
+        return self._running.parts
+
     def run(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the next output values, one for each input value."""
         return self._running.run(values)
@@ -106,6 +113,49 @@ LONGEST_DELAY_S = 5e-3
 """Of a sensor: what the converter keeps for the beginning of a conversion at its lowest rate."""
 
 
+class SensorParts(NamedTuple):
+    """What a stretch of motion is shown with."""
+
+    filter: FilterParts
+    noise: FloatArray
+    """In units of the motion, shape (steps,)."""
+    instead: FloatArray
+    """Shown where it is a number, likewise; empty where there is none."""
+    full_scale: float
+    """In units of the motion."""
+    full_scale_v: float
+    over_range: NDArray[np.int64]
+    """Steps at full scale so far, shape (1,)."""
+
+
+@kernel
+def show_steps(values: FloatArray, first: int, parts: SensorParts, volts: FloatArray) -> None:
+    """Show the means of a motion over some steps, from a first one of the stretch on."""
+    run_filter(parts.filter, values, volts)
+    scale = parts.full_scale_v / parts.full_scale
+    for n in range(values.size):
+        seen = volts[n] + parts.noise[first + n]
+        if parts.instead.size and not np.isnan(parts.instead[first + n]):
+            seen = parts.instead[first + n]
+        if abs(seen) >= parts.full_scale:
+            parts.over_range[0] += 1
+        volts[n] = min(max(seen * scale, -parts.full_scale_v), parts.full_scale_v)
+
+
+class Sensor(Protocol):
+    """What shows a motion."""
+
+    def parts(self, first_step: int, count: int) -> SensorParts:
+        """Give what the motion is shown with in the next steps."""
+
+
+def shown(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
+    """Output volts for the means of a motion over the next steps, shape (steps,)."""
+    volts = np.empty(len(values))
+    show_steps(values, 0, sensor.parts(first_step, len(values)), volts)
+    return volts
+
+
 class Vibrometer:
     """A laser vibrometer with its velocity decoder.
 
@@ -130,8 +180,7 @@ class Vibrometer:
             )
         bandwidth = first_order(config.bandwidth_hz)
         self.delay_steps = (config.delay_s - bandwidth.delay_s) * grid.rate_hz
-        self.over_range_steps = 0
-        """Steps at full scale since the instrument was switched on: what its red lamp shows."""
+        self._over_range = np.zeros(1, dtype=np.int64)
         self._filter = RunningFilter(bandwidth, grid.step_s)
         self._noise_rms = noise_density * np.sqrt(grid.rate_hz / 2)
         self._full_scale_m_per_s = config.full_scale_m_per_s
@@ -140,26 +189,24 @@ class Vibrometer:
         self._dropouts = dropouts
         self._demanded: list[Disturbance] = []
 
+    @property
+    def over_range_steps(self) -> int:
+        """Steps at full scale since the instrument was switched on: what its red lamp shows."""
+        return int(self._over_range[0])
+
     def disturb(self, disturbance: Disturbance) -> None:
         """Show a level instead of the velocity for some steps: a dropout or an over-range on demand."""
         self._demanded.append(disturbance)
 
-    def show(self, velocity: FloatArray, first_step: int) -> FloatArray:
-        """Output volts for the means of the velocity [m/s] over the next steps, shape (steps,)."""
-        stop = first_step + len(velocity)
-        seen = self._filter.run(velocity)
-        seen += self._noise_rms * self._noise.draw(first_step, len(velocity))
+    def parts(self, first_step: int, count: int) -> SensorParts:
+        """Give what the velocity [m/s] is shown with in the next steps."""
         self._demanded = [one for one in self._demanded if one.stop_step > first_step]
-        overwrite(
-            seen,
-            first_step,
-            self._full_scale_m_per_s,
-            self._dropouts.between(first_step, stop) + self._demanded,
-        )
-        full = np.abs(seen) >= self._full_scale_m_per_s
-        self.over_range_steps += int(np.count_nonzero(full))
-        volts = seen * (self._full_scale_v / self._full_scale_m_per_s)
-        return np.clip(volts, -self._full_scale_v, self._full_scale_v)
+        disturbed = self._dropouts.between(first_step, first_step + count) + self._demanded
+        instead = np.full(count if disturbed else 0, np.nan)
+        overwrite(instead, first_step, self._full_scale_m_per_s, disturbed)
+        noise = self._noise_rms * self._noise.draw(first_step, count)
+        scale = self._full_scale_m_per_s, self._full_scale_v
+        return SensorParts(self._filter.parts, noise, instead, *scale, self._over_range)
 
 
 class Accelerometer:
@@ -175,13 +222,14 @@ class Accelerometer:
         """``noise_m_per_s2``: rms in ``FULL_BAND_HZ``."""
         mounted = resonant(config.resonance_hz, ACCELEROMETER_DAMPING_RATIO)
         self._filter = RunningFilter(mounted, grid.step_s)
+        self._over_range = np.zeros(1, dtype=np.int64)
         self._noise_rms = grid.rms_per_step(noise_m_per_s2)
         self._sensitivity = config.sensitivity_v_per_m_per_s2
         self._full_scale_v = config.full_scale_v
         self._noise = noise
 
-    def show(self, acceleration: FloatArray, first_step: int) -> FloatArray:
-        """Output volts, without bias, for the means of the acceleration [m/s2], shape (steps,)."""
-        seen = self._filter.run(acceleration)
-        seen += self._noise_rms * self._noise.draw(first_step, len(acceleration))
-        return np.clip(seen * self._sensitivity, -self._full_scale_v, self._full_scale_v)
+    def parts(self, first_step: int, count: int) -> SensorParts:
+        """Give what the acceleration [m/s2] is shown with in the next steps, without bias."""
+        noise = self._noise_rms * self._noise.draw(first_step, count)
+        scale = self._full_scale_v / self._sensitivity, self._full_scale_v
+        return SensorParts(self._filter.parts, noise, np.empty(0), *scale, self._over_range)

@@ -23,15 +23,16 @@ from vibench.acquisition.rig import (
 from vibench.sim import Specimen
 from vibench.sim.shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
 
-from ..analogue import FastLoop, Input
+from ..analogue import Input
+from ..controller import VirtualController
 from ._analogue_output import AnalogueOutput
 from ._conversion import Conversion, converter_input
 from ._decimation import history_steps
 from ._disturbance import Disturbance, RandomDropouts
 from ._input_stage import InputStage
-from ._loop_cables import LoopCables
+from ._loop_cables import LoopCables, PlantParts
 from ._noise import NoiseStream
-from ._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer
+from ._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
 from ._time_grid import PPM, USUAL_GRID, TimeGrid
 from ._wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
 
@@ -89,7 +90,7 @@ class World:
         rig: Rig,
         terminal: TerminalVoltage,
         specimen: Specimen | None = None,
-        loop: FastLoop | None = None,
+        loop: VirtualController | None = None,
     ) -> None:
         """``specimen`` defaults to the one the rig describes; ``loop``: a controller beside the generator."""
         virtual = virtual_section(rig)
@@ -276,38 +277,36 @@ class World:
             played = output.render(first, steps)
             if channel == self._amplifier_input:
                 drive += played
-        noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
         signals = np.empty((len(Signal), steps))
-        loop = self._loop if self._loop is not None and self._loop.is_on else None
-        begin = 0
-        while begin < steps:
-            end = steps if loop is None else min(begin + loop.until_sample(first + begin), steps)
-            if loop is not None:
-                drive[begin:end] += loop.played(first + begin, end - begin)
-            self._show(drive[begin:end], noise[begin:end], first + begin, signals[:, begin:end])
-            if loop is not None:
-                loop.take(signals[:, begin:end])
-            begin = end
+        signals[Signal.DRIVE] = drive
+        self._move(first, signals)
         self._step = first + steps
         self._remember(signals)
         for conversion in self._conversions:
             conversion.take(signals, first)
 
-    def _show(self, drive: FloatArray, noise: FloatArray, first: int, signals: FloatArray) -> None:
-        motion = self._moved(drive, noise)
-        signals[Signal.DRIVE] = drive
-        signals[Signal.AMPLIFIER] = motion.amplifier_voltage
-        signals[Signal.BASE_ACCELERATION] = self._accelerometer.show(motion.base_acceleration, first)
-        signals[Signal.M0_VELOCITY] = self.vibrometer.show(motion.m0_velocity, first)
-
-    def _moved(self, drive: FloatArray, noise: FloatArray) -> ShakenMotion:
+    def _move(self, first: int, signals: FloatArray) -> None:
+        """Fill in what the drive in its row of ``signals`` makes of amplifier and sensors."""
+        steps = signals.shape[1]
+        noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
+        motion = ShakenMotion.of(steps, steps if self._truth is not None else 0)
         try:
-            motion = self.plant.move(drive, noise, len(drive) if self._truth is not None else 0)
+            if self._loop is not None and self._loop.is_on:
+                base, m0 = self._accelerometer.parts(first, steps), self.vibrometer.parts(first, steps)
+                plant = PlantParts(self.plant.parts, noise, base, m0)
+                good = self._loop.move(first, self._grid.step_s, plant, motion, signals)
+                self.plant.account(good, steps)
+            else:
+                self.plant.move_into(motion, signals[Signal.DRIVE], noise)
+                signals[Signal.AMPLIFIER] = motion.amplifier_voltage
+                signals[Signal.BASE_ACCELERATION] = shown(
+                    self._accelerometer, motion.base_acceleration, first
+                )
+                signals[Signal.M0_VELOCITY] = shown(self.vibrometer, motion.m0_velocity, first)
         except MotionFailed as error:
             raise AcquisitionError(f"{error}. The virtual rig stands still: restart it") from error
         if self._truth is not None:
             self._truth.append(motion.ends)
-        return motion
 
     def _remember(self, signals: FloatArray) -> None:
         steps, kept = signals.shape[1], self._history.shape[1]
