@@ -29,6 +29,8 @@ SMALLEST_PART = 1e-2
 MOST_STEPS = 400_000
 """In a drive period: more is given up."""
 FIRST_STEP_S = 1e-7
+LONGEST_STEP_S = 1e-5
+"""A step finds one touch of a stop; of a bounce in a longer one it would see neither beginning nor end."""
 REPEATED = 1e-7
 """A motion repeats when its states once a drive period come back to this part of their size."""
 MOST_PERIODS = 32
@@ -289,7 +291,7 @@ def _follow(
 def _advance(state, place, tau, until, numbers, powers, forces, tolerance, sizes, observe, peaks):
     stages, other = np.empty((STAGES + 1, SIZE)), np.empty((STAGES + 1, SIZE))
     end, spare = np.empty(SIZE), np.empty(SIZE)
-    longest = min(1e-4, 0.05 * (2.0 * math.pi / numbers[15]))
+    longest = min(LONGEST_STEP_S, 0.05 * (2.0 * math.pi / numbers[15]))
     step = FIRST_STEP_S
     for _ in range(MOST_STEPS):
         if tau >= until:
