@@ -47,7 +47,9 @@ class Pulse:
 
     def _run(self) -> None:
         while not self._closing.wait(BEAT_S):
-            self._heartbeat.beat(monotonic() - self._lived_s)
+            # Before the clock is read: the window may live in between.
+            lived_s = self._lived_s
+            self._heartbeat.beat(monotonic() - lived_s)
 
 
 class Urgency(IntEnum):
