@@ -10,7 +10,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from vibench.sim import Accuracy, Harmonic, gong2025, integrate
+from vibench.sim import Accuracy, Harmonic, gong2025, integrate, steady_response
 from vibench.sim.chain import (
     chain_energies,
     chain_lyapunov_exponent,
@@ -28,8 +28,11 @@ DRIVE = Harmonic(220.0, 40e-6)
 DURATION_S = 0.5
 DRIFT_SEEDS = range(10)
 PERIODIC = Harmonic(130.0, 20e-6)
-UNITS = np.repeat([1e-4, 0.1], 3)
-"""Errors are in units of 100 um and 0.1 m/s."""
+LAWS = ("hertz", "linear", "linear_gap:2e5", "hunt_crossley:0.5", "power:5", "power:3+5+7")
+DAMPINGS_S = (0.0, 2e-5, 1e-4)
+ONE_CELL_DRIVES = (PERIODIC, DRIVE, Harmonic(300.0, 5e-6))
+SETTLE_S = 5.0
+WATCHED = (2, 8)
 
 
 def best(job, repeats=REPEATS):
@@ -90,20 +93,43 @@ def report_lengths(accuracy):
 
 
 def report_one_cell():
-    """One cell against the engine made for it: cost side by side, and how far they are apart."""
-    specimen = gong2025(damping_time_s=3e-5)
-    chain = chain_of(specimen, 1)
-    reference = integrate(specimen, PERIODIC, 2.0, Accuracy.REFERENCE).final_state
-    for accuracy in Accuracy:
-        ours, run = best(lambda a=accuracy: integrate_chain(chain, PERIODIC, 2.0, a))
-        theirs, other = best(lambda a=accuracy: integrate(specimen, PERIODIC, 2.0, a))
-        error, other_error = (
-            np.max(np.abs(state - reference) / UNITS) for state in (run.final_state[0], other.final_state)
-        )
-        print(
-            f"one cell, 130 Hz 20 um, 2 s, {accuracy:9}: {ours * 1e3:.2f} ms, {ours / theirs:.1f} x the "
-            f"engine of one cell; from reference {error:.1e} (that engine {other_error:.1e})"
-        )
+    """One cell against its specimen: responses and motion, from rest and settled; and whether they agree."""
+    print("one cell over its specimen, 2 s, standard: time of responses, of motion (the same motion?)")
+    for contact in LAWS:
+        for damping_time_s in DAMPINGS_S:
+            specimen = gong2025(damping_time_s=damping_time_s, contact=contact)
+            row = []
+            for drive in ONE_CELL_DRIVES:
+                settled = integrate(specimen, drive, SETTLE_S).final_state
+                row += [one_cell_over_specimen(specimen, drive, state) for state in (np.zeros(6), settled)]
+            print(f"{contact:18} {damping_time_s * 1e6:3.0f} us  {'  '.join(row)}")
+
+
+def one_cell_over_specimen(specimen, drive, state):
+    """Time ratios of responses and of motion, and whether both engines end in the same state."""
+    chain, start = chain_of(specimen, 1), state[None, :]
+    alone, theirs = best(lambda: steady_response(specimen, drive, "standard", 2.0, 1.0, state))
+    row, ours = best(lambda: chain_response(chain, drive, "standard", 2.0, 1.0, start))
+    alone_s, _ = best(lambda: integrate(specimen, drive, 2.0, "standard", state))
+    chain_s, _ = best(lambda: integrate_chain(chain, drive, 2.0, "standard", start))
+    same = np.array_equal(ours.final_state[0], theirs.final_state) and (
+        float(ours.largest_m[0, 0]),
+        float(ours.largest_m[0, 1]),
+    ) == (theirs.largest_x_m, theirs.largest_p_m)
+    return f"{row / alone:.2f} {chain_s / alone_s:.2f} {'=' if same else 'DIFFERS'}"
+
+
+def report_watching():
+    """Say what observing adds to the cost of a motion, for every law."""
+    print("responses over the motion alone, 1 s, standard, every cell struck at the start")
+    for contact in LAWS:
+        row = []
+        for cells in WATCHED:
+            chain, start = chain_of(gong2025(contact=contact), cells), lively(cells)
+            motion, _ = best(lambda c=chain, s=start: integrate_chain(c, DRIVE, 1.0, "standard", s))
+            watched, _ = best(lambda c=chain, s=start: chain_response(c, DRIVE, "standard", 1.0, 1.0, s))
+            row.append(f"{cells} cells {watched / motion:.2f}x")
+        print(f"{contact:18} {'  '.join(row)}")
 
 
 def report_drift():
@@ -137,6 +163,7 @@ def report_exponents():
 if __name__ == "__main__":
     report_first_use()
     report_one_cell()
+    report_watching()
     for level in (Accuracy.STANDARD, Accuracy.REFERENCE):
         report_lengths(level)
     report_drift()

@@ -117,7 +117,7 @@ def deposit_base(turned: Complex, force: Vector, length: float, tables: ChainTab
 
 @kernel_without_refcount
 def add_base_series(series: Vector, force: Vector, cell: int, what: int, tables: ChainTables) -> None:
-    """Add what the base's force makes of p, x, y or z of a cell to its polynomial."""
+    """Add what the base's force makes of p or x of a cell to its polynomial."""
     if len(tables.pieces) == 0:
         return
     answer = tables.base_markov[cell, what]

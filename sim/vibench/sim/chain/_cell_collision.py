@@ -17,7 +17,7 @@ from ..collision import (
 from ..contact import ARGUMENT, DEEPEST, gap_of
 from ..flight import P
 from ..kernels import Table, Vector, eight_of_sixteen, inlined, kernel_without_refcount, store
-from ._cell_contact import log_moment, motion_in_series
+from ._cell_contact import SUMMARY_ONLY, log_moment, motion_in_series
 from ._cell_flow import (
     MEMORY,
     MOMENT,
@@ -96,8 +96,9 @@ def collide_cell(
     )
     if duration == 0.0:
         return 0.0
-    if len(log) > 0:
+    if len(log) > SUMMARY_ONLY:
         _log_points(cell, tau, duration, collision, collisions, work, log)
+    if len(log) > 0:
         log[0, DEEPEST] = deepest_of(log[0, DEEPEST], collision, gap, collisions)
     age_moments(cell, duration)
     store(collision.course, 0, eight_of_sixteen(collisions.ends, 0, collision.workspace[FORCE]))

@@ -58,6 +58,12 @@ CARE = 0.03
 """Part of the tolerance that a step may use. Errors of steps take energy and do not give it, so that they add
 up from contact to contact; those of whole collisions do not."""
 FINEST = 1e-11
+PUSHED, SO_FAR = 3, 4
+"""Places of a log's first row, after those of `vibench.sim.contact`: the variation of I_1 in the window, and
+its last value.
+"""
+SUMMARY_ONLY = 1
+"""Rows of a log that keeps its first row alone."""
 FIRST_STEP_TOLERANCE = 1e-6
 """The tolerance for which a contact's first step is tuned; it scales with the eighth root."""
 
@@ -130,7 +136,9 @@ def _log_apex(
     """Note the largest abs(p) of the step just taken; where r turns, step to r = 0 exactly."""
     log[0, DEEPEST] = max(log[0, DEEPEST], _far(work[TRIAL, W], side, system.law))
     before, after = work[POINT, R], work[TRIAL, R]
-    if before * after >= 0.0:
+    # While r falls w stays below the tangents of both ends, of slope r/2.
+    highest = min(work[POINT, W] + 0.5 * step * abs(before), work[TRIAL, W] + 0.5 * step * abs(after))
+    if before * after >= 0.0 or _far(highest, side, system.law) <= log[0, DEEPEST]:
         return
     copy_row(work[SPARE], work[TRIAL])
     low, high = 0.0, step

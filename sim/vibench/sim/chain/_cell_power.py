@@ -9,13 +9,14 @@ import math
 
 import numpy as np
 
-from ..contact import ARGUMENT
+from ..contact import ARGUMENT, DEEPEST
 from ..kernels import (
     Table,
     Vector,
     eight,
     eight_of_eight,
     eights,
+    inlined,
     kernel_without_refcount,
     largest,
     store,
@@ -34,7 +35,7 @@ from ..power_law import (
     power_forces,
     stiffest_rate,
 )
-from ._cell_contact import log_moment, motion_in_series
+from ._cell_contact import PUSHED, SUMMARY_ONLY, log_moment, motion_in_series
 from ._cell_flow import (
     MEMORY,
     MOMENT,
@@ -116,13 +117,25 @@ def press_power(
         return 0.0
     if length < left or misfit < TRY_LONGER:
         cell[STEP] = length * (LONGER if misfit < TRY_LONGER else 1.0)
-    if len(log) > 0:
+    if len(log) > SUMMARY_ONLY:
         _log_points(cell, tau, length, memory, work, log)
     _take(cell, length, memory)
     p, rate = motion_in_series(cell[MEMORY:], series, markov, tau + length)
+    if len(log) > 0:
+        log[0, PUSHED] += length * largest(eight(memory, FORCE))
+        log[0, DEEPEST] = max(log[0, DEEPEST], _highest(cell[ROOT], cell[RATE], p, rate, length))
     cell[ROOT_SCALE] = max(abs(p), FADING * cell[ROOT_SCALE])
     cell[ROOT], cell[RATE] = p, rate
     return length
+
+
+@inlined
+def _highest(p: float, rate: float, later: float, later_rate: float, length: float) -> float:
+    """Bound abs(p) over a step: where it turns once, it stays below the tangents of both ends."""
+    ends = max(abs(p), abs(later))
+    if rate * later_rate >= 0.0:
+        return ends
+    return max(ends, min(abs(p) + length * abs(rate), abs(later) + length * abs(later_rate)))
 
 
 @kernel_without_refcount

@@ -3,7 +3,6 @@
 from ..collision import FRESH, LEAST_TOLERANCE, LONGEST, Collision, CollisionTables
 from ..contact import (
     ARGUMENT,
-    DEEPEST,
     HELD,
     LEFT,
     LOGGED,
@@ -17,7 +16,15 @@ from ..flight import NEVER, SERIES_TERMS, first_contact, polynomial_at, touched_
 from ..kernels import Table, Vector, inlined, kernel_without_refcount
 from ..model import Outcome
 from ._cell_collision import collide_cell, is_hertz
-from ._cell_contact import begin_pressing, log_moment, motion_in_series, press_cell
+from ._cell_contact import (
+    PUSHED,
+    SO_FAR,
+    SUMMARY_ONLY,
+    begin_pressing,
+    log_moment,
+    motion_in_series,
+    press_cell,
+)
 from ._cell_flow import (
     CURVATURE,
     MEMORY,
@@ -89,6 +96,9 @@ def curvature_bound(series: Vector, length: float) -> float:
 @kernel_without_refcount
 def _log_now(log: Table, work: Table, cell: Vector, tau: float) -> None:
     if len(log) > 0:
+        log[0, PUSHED] += abs(cell[MEMORY] - log[0, SO_FAR])
+        log[0, SO_FAR] = cell[MEMORY]
+    if len(log) > SUMMARY_ONLY:
         node = work[ARGUMENT]
         node[W], node[R], node[T] = 0.0, cell[RATE], tau
         for k in range(MOMENTS):
@@ -151,7 +161,8 @@ def cross_window(  # noqa: C901, PLR0912 - flight, touch and the three ways thro
     touches
         Their times are added, shape (MOST_TOUCHES + 1,).
     log
-        Filled with the instants between which the motion is smooth; no rows keep nothing.
+        Filled with the instants between which the motion is smooth; one row sums up, no rows keep nothing.
+        DEEPEST is raised to the largest abs(p) in contact; under a power law, to a bound of abs(p).
     collision, collisions, struck
         As in `vibench.sim.chain.collide_cell`.
     power
@@ -164,7 +175,7 @@ def cross_window(  # noqa: C901, PLR0912 - flight, touch and the three ways thro
     tau, curvature = start, work[CURVATURE]
     fill_curvature(curvature, series)
     if len(log) > 0:
-        log[0, LOGGED] = log[0, DEEPEST] = 0.0
+        log[0, LOGGED] = log[0, PUSHED] = log[0, SO_FAR] = 0.0
         _log_now(log, work, cell, tau)
     while tau < until:
         if law.kind == POWER:
@@ -217,4 +228,4 @@ def cross_window(  # noqa: C901, PLR0912 - flight, touch and the three ways thro
             age_moments(cell, until - tau)
             tau = until
         _log_now(log, work, cell, tau)
-    return CROSSED if len(log) == 0 or log[0, LOGGED] + 1 < len(log) else STUCK
+    return CROSSED if len(log) <= SUMMARY_ONLY or log[0, LOGGED] + 1 < len(log) else STUCK

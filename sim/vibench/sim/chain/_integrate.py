@@ -110,7 +110,7 @@ def integrate_chain(
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
     if chain.size == 1:
-        start = None if initial_state is None else _start_motion(chain, initial_state)[0]
+        start = None if initial_state is None else start_motion(chain, initial_state)[0]
         run = integrate(
             chain.cells[0], drive, duration_s, accuracy, start, sample_rate_hz,
             start_time_s=start_time_s, max_impact_rate_hz=max_impact_rate_hz,
@@ -148,14 +148,13 @@ def start_chain(
 
     Raises ValueError when the state has not the shape (cells, 6), or is not finite.
     """
-    motion = _start_motion(chain, initial_state)
+    motion = start_motion(chain, initial_state)
     flat = np.concatenate([motion[:, :MASSES_PER_CELL].ravel(), motion[:, MASSES_PER_CELL:].ravel()])
     clock = clock_at(time_s)
     drive = drive_term(clock, 0.0, tables)
     phasors = np.append(tables.rows @ (flat - (drive * tables.shapes[-1]).real), drive)
     cells = chain_cells(chain.size)
-    terms, series = np.zeros_like(phasors), np.zeros((OBSERVED, SERIES_TERMS))
-    curvature = np.zeros(CURVATURE_TERMS)
+    terms, series, curvature = np.zeros_like(phasors), np.zeros(SERIES_TERMS), np.zeros(CURVATURE_TERMS)
     for place in range(chain.size):
         law, markov = law_of(tables.laws[place]), tables.markov[place, PATH]
         p = float(motion[place, 1] - motion[place, 2])
@@ -163,8 +162,8 @@ def start_chain(
         if law.kind == POWER:
             cells[place, SIDE] = 1.0
         elif not -law.lower < p < law.upper:
-            fill_observed(series, phasors, place, 1, terms, np.zeros(PIECE_TERMS), tables)
-            fill_curvature(curvature, series[PATH])
+            fill_observed(series, phasors, place, PATH, terms, np.zeros(PIECE_TERMS), tables)
+            fill_curvature(curvature, series)
             begin_pressing(
                 cells[place], math.copysign(1.0, p), p, rate, float(curvature[0]), markov, law,
                 accuracy.tolerance,
@@ -172,7 +171,8 @@ def start_chain(
     return cells, phasors
 
 
-def _start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
+def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
+    """Check a state, or take rest: shape (cells, 6)."""
     shape = (chain.size, STATES_PER_CELL)
     motion = np.zeros(shape) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
     if motion.shape != shape or not bool(np.all(np.isfinite(motion))):

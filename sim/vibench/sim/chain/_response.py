@@ -1,5 +1,6 @@
 """Responses I and II of every mass of a chain under one harmonic drive. SI units."""
 
+import cmath
 import math
 from dataclasses import dataclass
 
@@ -7,14 +8,21 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import Complex, Floats, clock_at
-from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
-from ..motion import MAX_IMPACT_RATE_HZ, whole_periods
+from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
+from ..motion import MAX_IMPACT_RATE_HZ, Response, steady_response, whole_periods
 from ._chain import MASSES_PER_CELL, Chain
-from ._integrate import impacts_of, new_chain_record, new_observations, start_chain, state_of_phasors
+from ._integrate import (
+    impacts_of,
+    new_chain_record,
+    new_observations,
+    start_chain,
+    start_motion,
+    state_of_phasors,
+)
 from ._modes import chain_impulses, chain_state_matrix
 from ._observer import NOTHING, PEAKS, PEAKS_AND_LINES
 from ._run import IMPACTS, advance_chain
-from ._tables import chain_tables
+from ._tables import ACROSS, PATH, chain_tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +37,11 @@ class ChainResponse:
     line_periods: int
     """The lines, over this many whole drive periods before the end: the most that the window holds."""
     largest_m: Floats
-    """Largest abs of x, y, z and p = y - z of every cell over the window, shape (cells, 4)."""
+    """Largest abs of x and p = y - z of every cell over the window, shape (cells, 2)."""
     lines_m: Complex
-    """Their components at the drive frequency, q = Re(line exp(i (omega t + phase))), shape (cells, 4)."""
+    """Components of x, y, z and p at the drive frequency, q = Re(line exp(i (omega t + phase))),
+    shape (cells, 4).
+    """
     impacts: NDArray[np.int64]
     """Contacts that began within the window, in each cell; shape (cells,)."""
     impacts_before: NDArray[np.int64]
@@ -42,7 +52,7 @@ class ChainResponse:
 
     @property
     def response_i(self) -> Floats:
-        """Largest abs of x, y, z, p of every cell over the drive amplitude, shape (cells, 4)."""
+        """Largest abs of x and p of every cell over the drive amplitude, shape (cells, 2)."""
         return self.largest_m / self.drive.amplitude_m
 
     @property
@@ -63,8 +73,8 @@ def chain_response(
 ) -> ChainResponse:
     """Drive a chain for a while and say how large the motion of every mass is at the end.
 
-    The defaults are those of `vibench.sim.motion.steady_response`. A long chain settles more slowly than
-    a cell.
+    The defaults are those of `vibench.sim.motion.steady_response`, which also answers for one cell. A long
+    chain settles more slowly than a cell.
 
     Parameters
     ----------
@@ -81,6 +91,13 @@ def chain_response(
 
     """
     accuracy = chosen(Accuracy, accuracy)
+    if chain.size == 1:
+        (cell,) = chain.cells
+        start = None if initial_state is None else start_motion(chain, initial_state)[0]
+        one = steady_response(
+            cell, drive, accuracy, duration_s, window_s, start, max_impact_rate_hz=max_impact_rate_hz
+        )
+        return _of_one(cell, one)
     periods = whole_periods(drive, duration_s, window_s)
     tables = chain_tables(chain, drive, accuracy)
     cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)
@@ -106,7 +123,7 @@ def chain_response(
     start = _state_against_drive(line_start, tables.shapes)
     change = _state_against_drive(phasors, tables.shapes) - start
     lines = _lines(chain, drive, observations.forces, change, line_s)
-    largest = np.column_stack([*observations.peaks[1:], observations.peaks[0]])
+    largest = observations.peaks[[ACROSS, PATH]].T
     void = 1.0 if code == Outcome.REACHED_END else math.nan
     impacts = impacts_of(chain, record).cells
     return ChainResponse(
@@ -121,6 +138,37 @@ def chain_response(
         impacts_before=np.bincount(impacts[:before], minlength=chain.size),
         final_state=state_of_phasors(chain, phasors, tables),
         outcome=Outcome(code),
+    )
+
+
+def _of_one(cell: Specimen, one: Response) -> ChainResponse:
+    """Give the response of a specimen as that of a chain of one cell.
+
+    The line of z is what the equation of motion of m0, against the drive and integrated by parts, leaves.
+    """
+    drive = one.drive
+    omega, line_s = 2.0 * math.pi * drive.frequency_hz, one.line_periods / drive.frequency_hz
+    (m0, _, _), (k0, _, k2), (c0, _, c2) = cell.masses, cell.stiffnesses, cell.dampings
+    end = cmath.exp(-1j * (omega * one.duration_s + drive.phase_rad))
+    # Over whole periods the drive's term is where it began.
+    change = (one.final_state - one.line_start_state) * end * 2.0 / line_s
+    x, p, base = one.line_x_m, one.line_p_m, -1j * drive.amplitude_m
+    moved = change[0] + 1j * omega * x
+    accelerated = change[3] + 1j * omega * moved
+    pulled = m0 * accelerated + k0 * (x - base) + c0 * (moved - 1j * omega * base) + k2 * x + c2 * moved
+    z = (pulled - c2 * change[2]) / (k2 + 1j * omega * c2)
+    return ChainResponse(
+        drive=drive,
+        accuracy=one.accuracy,
+        duration_s=one.duration_s,
+        window_s=one.window_s,
+        line_periods=one.line_periods,
+        largest_m=np.array([[one.largest_x_m, one.largest_p_m]]),
+        lines_m=np.array([[x, z + p, z, p]]),
+        impacts=np.array([one.impacts]),
+        impacts_before=np.array([one.impacts_before]),
+        final_state=one.final_state[None, :],
+        outcome=one.outcome,
     )
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact import DEEPEST
 from ..kernels import (
     Complex,
     Table,
@@ -23,10 +24,19 @@ from ..kernels import (
 )
 from ..model import Outcome
 from ._base_force import deposit_base, place_force
+from ._cell_contact import SUMMARY_ONLY
 from ._cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
 from ._cell_power import begin_power
 from ._cell_window import COUNT, CUT, cross_window
-from ._observer import NOTHING, PEAKS_AND_LINES, ChainObservations, observe_busy, observe_forces, observe_idle
+from ._observer import (
+    NOTHING,
+    PEAKS_AND_LINES,
+    ChainObservations,
+    may_be_larger,
+    observe_busy,
+    observe_forces,
+    observe_idle,
+)
 from ._tables import KIND, LOWER, OBSERVED, PATH, UPPER, ChainTables
 from ._windows import (
     Workspace,
@@ -125,11 +135,13 @@ def _advance(  # noqa: C901, PLR0912 - the kinds of window and their ends are on
             count = 0
             continue
         length, count = _choose_window(workspace, cells, phasors, clock, longest, observed, tables)
-        _prepare_busy(workspace, cells, phasors, count, length, observed, tables)
+        _prepare_busy(workspace, cells, phasors, count, length, tables)
         code, impacts = CUT, record.counts[IMPACTS]
         while code == CUT:
             record.counts[IMPACTS] = impacts
-            code = _cross(workspace, cells, count, length, clock, tables, tolerance, record, observations)
+            code = _cross(
+                workspace, cells, phasors, count, length, clock, tables, tolerance, record, observations
+            )
             if code == CUT:
                 length = workspace.touches[COUNT]
                 propagate_window(workspace, phasors, clock, length, 0, tables)
@@ -247,18 +259,17 @@ def _choose_window(
 
 @inlined
 def _prepare_busy(
-    workspace: Workspace, cells: Table, phasors: Complex, count: int, length: float, observed: int,
-    tables: ChainTables,
-) -> None:  # fmt: skip
-    """Write the motion of busy cells as series, and their rows as the window begins."""
+    workspace: Workspace, cells: Table, phasors: Complex, count: int, length: float, tables: ChainTables
+) -> None:
+    """Write p of busy cells as series, and their rows as the window begins."""
     for k in range(count):
         i = workspace.busy[k]
         cell, series, law = cells[i], workspace.series[i], law_of(tables.laws[i])
-        fill_observed(series, phasors, i, observed, workspace.terms, workspace.force, tables)
+        fill_observed(series, phasors, i, PATH, workspace.terms, workspace.force, tables)
         for m in range(MEMORY, CELL_SIZE):
             cell[m] = 0.0
         if law.kind == POWER:
-            begin_power(cell, series[PATH], length)
+            begin_power(cell, series, length)
         copy_row(workspace.before[i], cell)
 
 
@@ -280,6 +291,7 @@ def is_quiet(workspace: Workspace, cells: Table, tables: ChainTables) -> int:
 def _cross(
     workspace: Workspace,
     cells: Table,
+    phasors: Complex,
     count: int,
     length: float,
     clock: Vector,
@@ -288,26 +300,39 @@ def _cross(
     record: ChainRecord,
     observations: ChainObservations,
 ) -> int:
-    """Take every busy cell through the window; CUT where it is to be shorter, as ``touches`` then says."""
-    log = workspace.no_log if observations.mode == NOTHING else workspace.log
+    """Take every busy cell through the window; CUT where it is to be shorter, as ``touches`` then says.
+
+    Who watches has a summary kept, and crosses again with a log where that leaves room for a larger motion.
+    """
     worst = REACHED_END
     for k in range(count):
         i = workspace.busy[k]
         cell, series, markov = cells[i], workspace.series[i], tables.markov[i, PATH]
-        copy_row(cell, workspace.before[i])
-        workspace.touches[COUNT] = 0.0
-        code = cross_window(
-            cell, 0.0, length, series[PATH], markov, workspace.reach[PATH, i], law_of(tables.laws[i]),
-            tolerance, workspace.later, workspace.work, workspace.touches, log, tables.collision,
-            tables.collisions, tables.struck[i], workspace.power, tables.cuts,
-        )  # fmt: skip
+        log = workspace.no_log if observations.mode == NOTHING else workspace.summary
+        while True:
+            copy_row(cell, workspace.before[i])
+            workspace.touches[COUNT] = 0.0
+            if len(log) > 0:
+                log[0, DEEPEST] = observations.peaks[PATH, i]
+            code = cross_window(
+                cell, 0.0, length, series, markov, workspace.reach[PATH, i], law_of(tables.laws[i]),
+                tolerance, workspace.later, workspace.work, workspace.touches, log, tables.collision,
+                tables.collisions, tables.struck[i], workspace.power, tables.cuts,
+            )  # fmt: skip
+            if (
+                code != REACHED_END
+                or len(log) != SUMMARY_ONLY
+                or not may_be_larger(observations, i, workspace, length, log[0], tables)
+            ):
+                break
+            log = workspace.log
         if code == CUT:
             worst = CUT
             break
         if code == REACHED_END:
             code = _record_touches(workspace.touches, i, clock, record)
         if observations.mode != NOTHING:
-            observe_busy(observations, i, series, log, tables)
+            observe_busy(observations, i, workspace, phasors, log, tables)
         worst = max(worst, code)
     return worst
 
@@ -372,7 +397,7 @@ def _sample(
             workspace.touches[COUNT] = 0.0
             if later > reached:
                 cross_window(
-                    workspace.before[i], reached, later, workspace.series[i, PATH], tables.markov[i, PATH],
+                    workspace.before[i], reached, later, workspace.series[i], tables.markov[i, PATH],
                     workspace.reach[PATH, i], law_of(tables.laws[i]), tolerance,
                     workspace.later, workspace.work, workspace.touches, workspace.no_log,
                     tables.collision, tables.collisions, tables.struck[i], workspace.power, 0,

@@ -23,9 +23,9 @@ from ._cell_flow import MARKOV_TERMS, POWER, WINDOW_TURN, YIELDING
 from ._chain import MASSES_PER_CELL, Chain
 from ._modes import chain_impulses, chain_modal_form, chain_state_matrix, chain_transmissibility
 
-PATH, ACROSS, INNER, MIDDLE = range(4)
-"""What is observed of a cell: p, x, y, z."""
-OBSERVED = 4
+PATH, ACROSS = range(2)
+"""What is observed of a cell: p, x."""
+OBSERVED = 2
 
 KIND, LOWER, UPPER, LINEAR, CONTACT, LOSS, INVERSE_REFERENCE, HALVES = range(8)
 """Places of a cell's law; from HALVES on the power terms' halves, then their forces."""
@@ -54,9 +54,9 @@ class ChainTables(NamedTuple):
     shapes: Complex
     """V_j, shape (n+1, 6 cells): motion of a unit phasor."""
     observed: Complex
-    """Shape (cells, 4, n+1): what a unit phasor adds to p, x, y, z of a cell."""
+    """Shape (cells, 2, n+1): what a unit phasor adds to p and x of a cell."""
     real: Table
-    """The same, real and imaginary part and magnitude, shape (n+1, 4, cells): rows to take at once."""
+    """The same, real and imaginary part and magnitude, shape (n+1, 2, cells): rows to take at once."""
     imaginary: Table
     reaches: Table
     curvatures: Table
@@ -66,9 +66,7 @@ class ChainTables(NamedTuple):
     push: Complex
     """Shape (cells, n): what a unit impulse in a cell, along its p, adds to the phasors."""
     markov: Table
-    """g_k of `vibench.sim.chain` for p, x, y, z of the cell itself, shape (cells, 4,
-    MARKOV_TERMS).
-    """
+    """g_k of `vibench.sim.chain` for p and x of the cell itself, shape (cells, 2, MARKOV_TERMS)."""
     laws: Table
     """Shape (cells, LAW_SIZE)."""
     windows: Vector
@@ -88,7 +86,7 @@ class ChainTables(NamedTuple):
     base_push: Complex
     """Shape (n,): what a unit impulse on the first m0 adds to the phasors."""
     base_markov: Table
-    """Taylor coefficients of p, x, y, z of every cell after it, shape (cells, 4, SERIES_TERMS)."""
+    """Taylor coefficients of p and x of every cell after it, shape (cells, 2, SERIES_TERMS)."""
     pieces: Table
     """Of a drive that is not harmonic: the force on the first m0, cut into polynomials; else none."""
     piece_start: float
@@ -107,7 +105,7 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
     shapes = np.vstack([modes.shapes, motion])
     displacement = shapes[:, : MASSES_PER_CELL * chain.size].reshape(len(rates), chain.size, MASSES_PER_CELL)
     path = displacement[:, :, 1] - displacement[:, :, 2]
-    observed = np.concatenate([path[:, :, None], displacement], axis=2)
+    observed = np.stack([path, displacement[:, :, 0]], axis=2)
     reaches = np.ascontiguousarray(np.abs(observed).transpose(0, 2, 1))
     between = markov_between(chain)
     fastest = float(np.max(np.abs(rates)))
@@ -145,21 +143,20 @@ def chain_tables(chain: Chain, drive: Harmonic, accuracy: Accuracy) -> ChainTabl
 
 
 def markov_between(chain: Chain) -> Table:
-    """Taylor coefficients of p, x, y, z of every cell after a unit impulse in every cell.
+    """Taylor coefficients of p and x of every cell after a unit impulse in every cell.
 
-    Shape (MARKOV_TERMS, 4, answering cells, struck cells).
+    Shape (MARKOV_TERMS, 2, answering cells, struck cells).
     """
     return _answers(chain, chain_impulses(chain), MARKOV_TERMS)
 
 
 def _answers(chain: Chain, impulses: Table, terms: int) -> Table:
-    """Taylor coefficients after impulses, shape (terms, 4, cells, impulses)."""
+    """Taylor coefficients after impulses, shape (terms, 2, cells, impulses)."""
     system, _ = chain_state_matrix(chain)
     answer, moved_by = impulses, np.zeros((terms, OBSERVED, chain.size, impulses.shape[1]))
     for k in range(terms):
         moved = answer[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL, -1)
-        moved_by[k, ACROSS:] = moved.transpose(1, 0, 2)
-        moved_by[k, PATH] = moved[:, 1] - moved[:, 2]
+        moved_by[k, PATH], moved_by[k, ACROSS] = moved[:, 1] - moved[:, 2], moved[:, 0]
         answer = system @ answer
     return moved_by
 
@@ -170,7 +167,7 @@ def _base_markov(chain: Chain) -> Table:
 
 
 def _own_markov(between: Table) -> Table:
-    """Of every cell after an impulse in itself, shape (cells, 4, MARKOV_TERMS)."""
+    """Of every cell after an impulse in itself, shape (cells, 2, MARKOV_TERMS)."""
     return np.ascontiguousarray(np.diagonal(between, axis1=2, axis2=3).transpose(2, 1, 0))
 
 

@@ -20,7 +20,7 @@ from ..kernels import (
 from ..model import MOST_TERMS
 from ..slots import PowerTerms
 from ._base_force import PIECE_TERMS, add_base_series, base_curvature, deposit_base
-from ._cell_contact import cell_workspace
+from ._cell_contact import SUMMARY_ONLY, cell_workspace
 from ._cell_flow import CELL_SIZE, MEMORY, MOMENTS, POWER, SIDE, WIDTH, CellLaw
 from ._cell_power import POINTS, ROWS
 from ._cell_window import LOG_ROWS, MOST_TOUCHES
@@ -53,10 +53,10 @@ class Workspace(NamedTuple):
     weights: Vector
     """abs of the phasors, shape (n+1,)."""
     motion: Table
-    """p, x, y, z of every cell at the window's start, shape (4, cells); at its end, without forces in it."""
+    """p and x of every cell at the window's start, shape (2, cells); at its end, without forces in it."""
     motion_end: Table
     reach: Table
-    """Bounds of p, x, y, z of every cell from now on, while no force acts, shape (4, cells)."""
+    """Bounds of p and x of every cell from now on, while no force acts, shape (2, cells)."""
     curvature: Table
     """The same of their accelerations."""
     busy: NDArray[np.int64]
@@ -64,9 +64,11 @@ class Workspace(NamedTuple):
     busy_count: NDArray[np.int64]
     """How many they are, shape (1,)."""
     series: NDArray[np.float64]
-    """p, x, y, z of the busy cells without forces in the window, shape (cells, 4, SERIES_TERMS)."""
+    """p of the busy cells without forces in the window, shape (cells, SERIES_TERMS)."""
+    watched: Vector
+    """The same of p or x of a cell that is looked at."""
     floor: Table
-    """Between floor and ceiling at both ends of a window a motion calls for no closer look; (4, cells)."""
+    """Between floor and ceiling at both ends of a window a motion calls for no closer look; (2, cells)."""
     ceiling: Table
     before: Table
     """Rows of all cells at the window's start."""
@@ -74,6 +76,8 @@ class Workspace(NamedTuple):
     work: Table
     touches: Vector
     log: Table
+    summary: Table
+    """A log of one row."""
     no_log: Table
     power: Table
     """Memory of steps under a power law."""
@@ -98,7 +102,8 @@ def workspace_for(tables: ChainTables) -> Workspace:
         np.zeros((OBSERVED, cells)),
         np.zeros(cells, np.int64),
         np.zeros(1, np.int64),
-        np.zeros((cells, OBSERVED, SERIES_TERMS)),
+        np.zeros((cells, SERIES_TERMS)),
+        np.zeros(SERIES_TERMS),
         np.zeros((OBSERVED, cells)),
         np.zeros((OBSERVED, cells)),
         np.zeros((cells, CELL_SIZE)),
@@ -106,6 +111,7 @@ def workspace_for(tables: ChainTables) -> Workspace:
         cell_workspace(),
         np.zeros(MOST_TOUCHES + 1),
         np.zeros((LOG_ROWS, WIDTH)),
+        np.zeros((SUMMARY_ONLY, WIDTH)),
         np.zeros((0, WIDTH)),
         np.zeros((ROWS, POINTS)),
         np.zeros(2),
@@ -138,7 +144,7 @@ def drive_term(clock: Vector, later: float, tables: ChainTables) -> complex:
 
 @inlined
 def place_observed(motion: Table, phasors: Complex, observed: int, tables: ChainTables) -> None:
-    """Write the first ``observed`` of p, x, y, z of every cell."""
+    """Write the first ``observed`` of p and x of every cell."""
     for what in range(observed):
         for i in range(motion.shape[1]):
             motion[what, i] = 0.0
@@ -175,7 +181,7 @@ def is_bounded(workspace: Workspace) -> int:
 
 @inlined
 def weigh(workspace: Workspace, phasors: Complex, observed: int, tables: ChainTables) -> None:
-    """Bound the motion and acceleration of the first ``observed`` of p, x, y, z, until a force acts."""
+    """Bound the motion and acceleration of the first ``observed`` of p and x, until a force acts."""
     for what in range(observed):
         for i in range(workspace.reach.shape[1]):
             workspace.reach[what, i] = workspace.curvature[what, i] = 0.0
@@ -281,20 +287,19 @@ def neighbours_clash(busy: NDArray[np.int64], count: int, distance: int) -> int:
 
 @inlined
 def fill_observed(
-    series: Table,
+    series: Vector,
     phasors: Complex,
     cell: int,
-    observed: int,
+    what: int,
     terms: Complex,
     force: Vector,
     tables: ChainTables,
 ) -> None:
-    """Write p (and x, y, z) of a cell as polynomials in the time since the window began."""
-    for what in range(observed):
-        for j in range(len(phasors)):
-            terms[j] = phasors[j] * tables.observed[cell, what, j]
-        _fill_series(series[what], terms, tables.rates)
-        add_base_series(series[what], force, cell, what, tables)
+    """Write p or x of a cell as a polynomial in the time since the window began."""
+    for j in range(len(phasors)):
+        terms[j] = phasors[j] * tables.observed[cell, what, j]
+    _fill_series(series, terms, tables.rates)
+    add_base_series(series, force, cell, what, tables)
 
 
 @inlined

@@ -50,6 +50,8 @@ class Response:
     """Contacts that began within the window."""
     impacts_before: int
     """Contacts that began before the window."""
+    line_start_state: Floats
+    """x, y, z, vx, vy, vz where the lines begin, shape (6,)."""
     final_state: Floats
     """x, y, z, vx, vy, vz at the end, shape (6,): where the next point of a sweep may start."""
     outcome: Outcome
@@ -103,10 +105,10 @@ def steady_response(
     record = new_record(0.0, duration_s, None, max_impact_rate_hz)
     line_s = periods / drive.frequency_hz
     code = advance_harmonic(state, clock, float(duration_s - window_s), tables, accuracy.tolerance, record)
-    before = int(record.counts[IMPACTS])
+    before, line_start = int(record.counts[IMPACTS]), state[:6].copy()
     for mode, until in ((PEAKS, duration_s - line_s), (PEAKS_AND_LINES, float(duration_s))):
         if code == Outcome.REACHED_END:
-            record.observations[MODE] = mode
+            record.observations[MODE], line_start = mode, state[:6].copy()
             code = advance_harmonic(state, clock, until, tables, accuracy.tolerance, record)
     observations = (
         record.observations if code == Outcome.REACHED_END else np.full_like(record.observations, np.nan)
@@ -125,6 +127,7 @@ def steady_response(
         line_p_m=scale * complex(observations[LINE_P_RE], observations[LINE_P_IM]),
         impacts=int(record.counts[IMPACTS]) - before,
         impacts_before=before,
+        line_start_state=line_start,
         final_state=state[:6].copy(),
         outcome=Outcome(code),
     )
