@@ -159,7 +159,7 @@ def _mean_spectra(data: Reals, nominal_period: float) -> Complexes:
     The nominal period will do for the magnitudes h1 and h2 are formed of: 20 ppm lose 2e-5 of a line.
     """
     periods = int(data.shape[1] / nominal_period + 1e-3)
-    return np.stack([period_spectra(each, nominal_period, periods).mean(axis=0) for each in data[1:]])
+    return np.asarray(period_spectra(data[1:], nominal_period, periods).mean(axis=1))
 
 
 def _least_squares(

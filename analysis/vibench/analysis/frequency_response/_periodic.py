@@ -191,10 +191,9 @@ class PeriodicSums:
             sizes = f"{drive.size}, {base.size} and {response.size}"
             raise InvalidRequest(f"drive, base and response hold {sizes} samples; they must be equally long")
         repetition = measured_repetition(drive, self._sample_rate_hz / self._repetition_hz)
-        spectra = [
-            period_spectra(x, repetition.period_samples, repetition.periods) for x in (drive, base, response)
-        ]
-        motion = np.stack(spectra[1:])
+        channels = np.stack([drive, base, response])
+        spectra = period_spectra(channels, repetition.period_samples, repetition.periods)
+        motion = spectra[1:]
         deviation = motion - motion.mean(axis=1, keepdims=True)
         freedom = repetition.periods * (repetition.periods - 1)
         covariance = np.einsum("ipk,jpk->ijk", np.conj(deviation), deviation) / freedom

@@ -13,8 +13,8 @@ _SHORTFALL = 1e-3
 _WEAKEST_LINE = 1e-3
 """A line is driven when its amplitude is within 60 dB of the strongest; quantisation lies below."""
 _ITERATIONS = 8
-_CONVERGED = 1e-13
-"""Relative change of the period that rounding explains."""
+_CONVERGED = 1e-8
+"""Relative change of the period behind which a further pass moves it by less than 1e-11."""
 _LARGEST_OFFSET = 200e-6
 """Relative clock offset that is looked for: two oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
@@ -67,21 +67,22 @@ def whole_periods(samples: int, period_samples: float) -> int:
 def period_spectra(samples: Reals, period_samples: float, periods: int) -> Complexes:
     """Fourier coefficients of each period, at exact multiples of the repetition frequency.
 
-    The periods are resampled to a whole number of points, so a transform of each has no leakage
-    (below 1e-8) although a period need not be a whole number of samples.
+    Of samples of shape (n,), or (channels, n) of channels recorded together. The periods are resampled to a
+    whole number of points, so a transform of each has no leakage (below 1e-8) although a period need not be
+    a whole number of samples.
 
     Returns
     -------
-    Amplitudes (a sine of amplitude 1 has magnitude 1), shape (periods, lines); line k is k times the
+    Amplitudes (a sine of amplitude 1 has magnitude 1), shape (..., periods, lines); line k is k times the
     repetition frequency; lines past `TRUSTED_BAND` of the sample rate are left out.
 
     """
     points = fft.next_fast_len(int(np.ceil(period_samples)), real=True)
     start, extended = _extended(samples, period_samples, periods)
     positions = start + np.arange(periods * points, dtype=np.float64) * (period_samples / points)
-    cut = interpolated(extended, positions).reshape(periods, points)
+    cut = interpolated(extended, positions).reshape(*samples.shape[:-1], periods, points)
     lines = int(TRUSTED_BAND * period_samples) + 1
-    return np.asarray(fft.rfft(cut, axis=1)[:, :lines] * (2 / points))
+    return np.asarray(fft.rfft(cut, axis=-1)[..., :lines] * (2 / points))
 
 
 def driven_lines(spectra: Complexes) -> Flags:
@@ -96,10 +97,11 @@ def driven_lines(spectra: Complexes) -> Flags:
 
 def _extended(samples: Reals, period: float, periods: int) -> tuple[int, Reals]:
     """Continue a periodic record by its own neighbouring periods, as far as the interpolation reaches."""
-    missing = max(0, int(np.ceil(periods * period)) - samples.size)
+    size = samples.shape[-1]
+    missing = max(0, int(np.ceil(periods * period)) - size)
     before = interpolated(samples, np.arange(-REACH, 0, dtype=np.float64) + period)
-    after = interpolated(samples, samples.size + np.arange(REACH + missing, dtype=np.float64) - period)
-    return REACH, np.concatenate((before, samples, after))
+    after = interpolated(samples, size + np.arange(REACH + missing, dtype=np.float64) - period)
+    return REACH, np.concatenate((before, samples, after), axis=-1)
 
 
 def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from ..tones import (
     drive_level,
     noise_bias,
     order_label,
+    order_turns,
     peaks,
     steady_phase,
     tracked_orders,
@@ -203,8 +204,7 @@ def _clean(motion: Reals, phase: Reals, noise_m: float, orders: tuple[float, ...
     fit = tracked_orders(motion, phase, interval_samples=motion.size, orders=orders)
     if fit.residual_rms[0] > _EXPLAINED * noise_m:
         return motion
-    turned = np.exp(1j * np.outer(orders, phase))
-    return np.asarray(np.real(fit.value[:, 0] @ turned))
+    return np.asarray(np.real(fit.value[:, 0] @ order_turns(phase, orders)))
 
 
 def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) -> tuple[Line, ...]:

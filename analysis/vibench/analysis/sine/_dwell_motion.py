@@ -92,11 +92,12 @@ def stroboscope(
         )
     positions = (turns - offset) / per_sample + delay
     inside = slice(first, last + 1)
+    motion = interpolated(np.stack([displacement.samples, velocity.samples]), positions)
     return Section(
         drive_hz=sine.frequency_hz,
         phase_rad=phase_rad,
-        displacement_m=interpolated(displacement.samples, positions),
-        velocity_m_per_s=interpolated(velocity.samples, positions),
+        displacement_m=motion[0],
+        velocity_m_per_s=motion[1],
         orbit_displacement_m=displacement.samples[inside],
         orbit_velocity_m_per_s=velocity.samples[inside],
         time_s=positions / sample_rate_hz,

@@ -13,6 +13,7 @@ from ._order_tracking import (
     TrackedOrders as TrackedOrders,
     cycles_needed as cycles_needed,
     order_label as order_label,
+    order_turns as order_turns,
     tracked_orders as tracked_orders,
 )
 from ._peaks import (

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from fractions import Fraction
+from math import lcm
 
 import numpy as np
 
@@ -13,13 +14,14 @@ ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
 """Impacting systems answer at half orders as well as at whole ones."""
 ALL_ORDERS = (1 / 3, 0.5, 2 / 3, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
 """With thirds and high harmonics: they need intervals of twelve drive cycles."""
+_LARGEST_DENOMINATOR = 12
 _BATCH_INTERVALS = 256
 """Intervals solved at once: some ten megabytes."""
 
 
 def order_label(order: float) -> str:
     """Write an order as a reader says it: ``"order 1/3"``, ``"order 2"``."""
-    return f"order {Fraction(order).limit_denominator(12)}"
+    return f"order {Fraction(order).limit_denominator(_LARGEST_DENOMINATOR)}"
 
 
 def cycles_needed(orders: tuple[float, ...]) -> float:
@@ -92,12 +94,34 @@ def tracked_orders(
     return TrackedOrders(orders, value, sd, residual)
 
 
+def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> Complexes:
+    """Give exp(i order phase) for each order, shape (orders, ...).
+
+    Orders that are fractions of small numbers are powers of one turning number: a product costs a tenth of
+    a sine and a cosine.
+    """
+    fractions = [Fraction(order).limit_denominator(_LARGEST_DENOMINATOR) for order in orders]
+    if min(orders) <= 0 or not np.allclose([float(each) for each in fractions], orders, rtol=1e-15, atol=0.0):
+        return np.asarray(np.exp(1j * np.multiply.outer(np.asarray(orders), phase_rad)))
+    together = lcm(*(each.denominator for each in fractions))
+    powers = {1: np.exp(1j / together * phase_rad)}
+    return np.stack([_power(int(each * together), powers) for each in fractions])
+
+
+def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
+    """Give a power of ``powers[1]``, by its halves; what was made is kept."""
+    if exponent not in powers:
+        half = exponent // 2
+        powers[exponent] = _power(half, powers) * _power(exponent - half, powers)
+    return powers[exponent]
+
+
 def _fit(signal: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Complexes, Reals, Reals]:
     samples = signal.shape[1]
-    angles = phase[np.newaxis] * np.asarray(orders)[:, np.newaxis, np.newaxis]
-    ramp = np.linspace(-1.0, 1.0, samples)
-    first = np.stack((ramp * np.cos(phase), ramp * np.sin(phase), np.ones_like(phase)))
-    basis = np.concatenate((np.cos(angles), np.sin(angles), first)).transpose(1, 0, 2)
+    turned = order_turns(phase, (*orders, 1.0))
+    changing = np.linspace(-1.0, 1.0, samples) * turned[-1]
+    first = np.stack((changing.real, changing.imag, np.ones_like(phase)))
+    basis = np.concatenate((turned[:-1].real, turned[:-1].imag, first)).transpose(1, 0, 2)
     normal = basis @ basis.transpose(0, 2, 1)
     target = basis @ signal[:, :, np.newaxis]
     try:

@@ -1,0 +1,33 @@
+"""Values between samples, of one channel or of several at the same places."""
+
+import numpy as np
+import pytest
+
+from vibench.analysis.signals import REACH, interpolated
+
+RNG = np.random.default_rng(5)
+SAMPLES = 3000
+
+
+def tones(positions):
+    """Three channels of tones below the trusted band."""
+    cycles = np.array([[0.013], [0.21], [0.39]])
+    return np.cos(2 * np.pi * cycles * positions + np.array([[0.3], [1.0], [2.0]]))
+
+
+def test_channels_together_have_the_values_of_the_signals_they_sample():
+    positions = RNG.uniform(REACH, SAMPLES - 1 - REACH, 4000)
+    found = interpolated(tones(np.arange(SAMPLES)), positions)
+    assert found == pytest.approx(tones(positions), abs=2e-9)
+
+
+@pytest.mark.parametrize("tiny", [0.0, 1e-18, -1e-18, 1e-12])
+def test_channels_together_are_each_alone_also_at_samples_and_beyond_the_ends(tiny):
+    samples = tones(np.arange(SAMPLES))
+    positions = np.concatenate([np.arange(-80.0, SAMPLES + 80) + tiny, RNG.uniform(-80, SAMPLES + 80, 300)])
+    together = interpolated(samples, positions)
+    assert np.array_equal(together, np.stack([interpolated(each, positions) for each in samples]))
+    outside = (positions < -REACH - 1) | (positions > SAMPLES + REACH)
+    assert not together[:, outside].any()
+    inside = slice(80, 80 + SAMPLES)
+    assert together[:, inside] == pytest.approx(samples, abs=1e-10)
