@@ -211,12 +211,13 @@ def _differing(file: h5py.File, manifest: Manifest, depth: SealDepth) -> Iterato
 def _described(item: h5py.HLObject) -> str:
     """Checksum of an object's attributes, type and shape."""
     described: dict[str, Any] = {}
-    for name in item.attrs:
+    attributes = item.attrs
+    for name in attributes:
         if name in LINKS or name in RESULT_MARKS:
             continue
-        if item.attrs.get_id(name).dtype.kind not in READ_KINDS:
+        if attributes.get_id(name).dtype.kind not in READ_KINDS:
             raise ValueError(f"the attribute {name!r} of {item.name} is neither number nor text")
-        value = np.asarray(item.attrs[name])
+        value = np.asarray(attributes[name])
         described[name] = [value.dtype.str, list(value.shape), value.tobytes().hex()]
     if isinstance(item, h5py.Dataset):
         described["/"] = [item.dtype.str, list(item.shape)]

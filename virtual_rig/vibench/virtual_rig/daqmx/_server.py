@@ -69,7 +69,7 @@ class DaqServer:
         guards = () if token is None else (TokenRequired(token),)
         self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)
         self._server.add_generic_rpc_handlers(
-            (_service(self._unary_calls(), self._listening_calls()), *handlers)
+            (_Service(self._unary_calls(), self._listening_calls()), *handlers)
         )
         try:
             port = self._server.add_insecure_port(address)
@@ -220,9 +220,18 @@ def _metadata(refusal: DaqmxRefusal) -> Metadata:
     return tuple((key, str(value)) for key, value in entries if value is not None)
 
 
-def _service(unary: dict[str, Handler], listening: dict[str, Handler]) -> grpc.GenericRpcHandler:
-    handlers = {method.name: _rpc(method, unary, listening) for method in SERVICE.methods}
-    return grpc.method_handlers_generic_handler(SERVICE.full_name, handlers)
+class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
+    """The methods of the service: a program calls some thirty of 451, so each is made ready when called."""
+
+    def __init__(self, unary: dict[str, Handler], listening: dict[str, Handler]) -> None:
+        self._unary = unary
+        self._listening = listening
+
+    def service(self, handler_call_details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler | None:
+        """Give what answers a call; None where it is another service's."""
+        service, _, name = handler_call_details.method.removeprefix("/").partition("/")
+        method = SERVICE.methods_by_name.get(name) if service == SERVICE.full_name else None
+        return None if method is None else _rpc(method, self._unary, self._listening)
 
 
 def _rpc(method: Any, unary: dict[str, Handler], listening: dict[str, Handler]) -> grpc.RpcMethodHandler:
