@@ -87,3 +87,13 @@ def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench_
     assert result.returncode == 1
     assert "close every quotation mark" in result.stderr
     assert not list(tmp_path.glob("out/*.h5*"))
+
+
+def test_an_estimate_says_that_a_bench_lacks_what_a_plan_is_played_with(vibench_here, tmp_path):
+    result = vibench_here(
+        "measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate", cwd=tmp_path
+    )
+    assert result.returncode == 1
+    assert "branch_3um needs a real-time controller, and this bench has none" in result.stderr
+    assert result.stdout == ""
+    assert not (tmp_path / "out").exists()

@@ -4,7 +4,7 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..plan import BYTES_PER_SAMPLE, Campaign, measured_s
+from ..plan import BYTES_PER_SAMPLE, Campaign, measured_s, require_played
 from ..rig import Rig, channels_of
 from ._opening import planned_recordings
 from ._point_outcome import ExistingRecordings
@@ -54,8 +54,12 @@ def estimate_campaign(
     ------
     RecordingError
         When the folder holds recordings of the campaign and ``existing`` refuses that.
+    ConfigurationError
+        When the rig lacks what a measurement is played with.
 
     """
+    for each in campaign.measurements:
+        require_played(each, rig)
     planned = planned_recordings(campaign, folder, existing)
     missing = [each.measurement for each in planned if not each.is_complete]
     durations_s = [measured_s(each) for each in missing]

@@ -55,6 +55,7 @@ from ._drive_source import (
     DriveSource,
     drive_source_of,
     lowest_setting_vpp,
+    require_played,
 )
 from ._limits import (
     LimitCheck,
@@ -167,6 +168,7 @@ __all__ = [
     "predicted_loads",
     "preview_measurement",
     "ramp",
+    "require_played",
     "require_within_limits",
     "rows_by_kind",
     "shortest_ramp_s",

@@ -2,6 +2,7 @@
 
 from enum import StrEnum
 
+from ..errors import ConfigurationError
 from ..excitation import LoopTone, Play, Stream, Tone, Waveform
 from ..instruments import Sweep
 from ..rig import OutputUse, Rig, generator_driver
@@ -22,6 +23,24 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
     return next((each for each in others if each in drive_sources), DriveSource.GENERATOR)
+
+
+def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
+    """Give what plays a measurement on a rig; raises ConfigurationError where the rig has none."""
+    source = drive_source_of(measurement, rig)
+    match source:
+        case DriveSource.CONTROLLER if rig.controller is None:
+            raise ConfigurationError(
+                f"{measurement.name} needs a real-time controller, and this bench has none. Nothing was "
+                "played; add [controller] to the hardware configuration"
+            )
+        case DriveSource.OUTPUT if rig.daq.output is None:
+            raise ConfigurationError(
+                f"{measurement.name} needs an analogue output, and this bench has none: its function "
+                "generator repeats one waveform. Nothing was played; add [daq.output] to the hardware "
+                "configuration, or use multisine_noise with more realisations"
+            )
+    return source
 
 
 LEAST_SHARE = 1e-4

@@ -7,7 +7,7 @@ from ..bench import RunBench
 from ..errors import ConfigurationError
 from ..excitation import Tone
 from ..instruments import LoopBlock
-from ..plan import DriveSource, Measurement, Phase, drive_source_of, known_phases
+from ..plan import DriveSource, Measurement, Phase, known_phases, require_played
 from ._generator_drive import DeadMan, GeneratorDrive
 from ._loop_drive import LoopDrive
 from ._stream_drive import StreamDrive
@@ -70,25 +70,12 @@ class Drive(Protocol):
 def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
     """Choose what plays a measurement.
 
-    Raises ConfigurationError when it needs an analogue output and the bench has none.
+    Raises ConfigurationError when the bench has none.
     """
-    source = drive_source_of(measurement, bench.rig)
-    match source, bench.output, bench.controller:
-        case DriveSource.CONTROLLER, _, None:
-            raise ConfigurationError(
-                f"{measurement.name} needs a real-time controller, and this bench has none. Nothing was "
-                "played; add [controller] to the hardware configuration"
-            )
+    match require_played(measurement, bench.rig), bench.output, bench.controller:
         case DriveSource.CONTROLLER, _, controller if controller is not None:
             return LoopDrive(controller, measurement)
-    match source, bench.output:
-        case DriveSource.OUTPUT, None:
-            raise ConfigurationError(
-                "streamed noise needs an analogue output, and this bench has none: its function generator "
-                "repeats one waveform. Nothing was played; add [daq.output] to the hardware configuration, "
-                "or use multisine_noise with more realisations"
-            )
-        case DriveSource.OUTPUT, output if output is not None:
+        case DriveSource.OUTPUT, output, _ if output is not None:
             return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())
         case _:
             return GeneratorDrive(bench.generator, measurement, _dead_man(bench, measurement))
