@@ -23,6 +23,7 @@ def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
         PlugInKind.GENERATOR: {rig.generator.driver},
         PlugInKind.DIGITIZER: {rig.daq.driver},
         PlugInKind.OUTPUT: set() if rig.daq.output is None else {rig.daq.driver},
+        PlugInKind.CONTROLLER: set() if rig.controller is None else {rig.controller.driver},
         PlugInKind.SENSOR: {sensor_name(channel) for channel in rig.daq.channels},
     }
 

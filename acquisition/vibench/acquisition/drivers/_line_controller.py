@@ -76,14 +76,19 @@ class LineController:
     def close(self) -> None:
         """Silence, and end the connection; where it is gone already, its watchdog silences it."""
         if self._is_open:
-            self._is_open = False
             try:
                 self.silence(_LEAVING_S)
             finally:
+                self._is_open = False
                 self._link.close()
 
     def _asked(self, request: LoopRequest, kind: type[Answer]) -> Answer:
         where = self._config.resource
+        if not self._is_open:
+            raise InstrumentError(
+                f"the connection to the real-time controller at {where} was closed, and it was told to "
+                f"{request.ask}. It is silent; open the bench again"
+            )
         try:
             self._link.write(request.model_dump_json(exclude_defaults=False))
             line = self._link.read_raw()
