@@ -79,7 +79,7 @@ def test_the_solver_follows_a_curve_through_both_folds():
 
     def seen(unknowns):
         found, ratio = hardening_resonator(solver.setting(unknowns))
-        one = Seen(unknowns, np.array([found / level - 1]), ratio)
+        one = Seen(unknowns, np.array([found / level - 1]), ratio, np.zeros(3))
         solver.learn(one)
         return one
 

@@ -9,7 +9,9 @@ Vector = NDArray[np.float64]
 Coefficients = NDArray[np.complex128]
 
 _LEARNT = 1e-4
-"""A change shorter than this tells nothing but noise."""
+"""A change of the unknowns shorter than this tells nothing."""
+_DOUBTED = 0.05
+"""How far the derivative may be from what is believed of it: against this the noise of a look counts."""
 _REFERENCE_STEP = 0.15
 """Change of the first coefficient, over itself, that counts as one step."""
 _RATIO_STEP = 1.0
@@ -38,6 +40,8 @@ class Seen:
     """What of the base is wrong, over its level."""
     ratio: complex
     """Fundamental of m0 over that of the base."""
+    noise: Vector
+    """Standard error of each number of the residual, and of both parts of the ratio."""
 
     @property
     def place(self) -> Vector:
@@ -128,13 +132,18 @@ class BranchSolver:
             changed = _outputs(seen) - _outputs(self._last)
             length = float(moved @ moved)
             if length > _LEARNT**2:
-                self._slope += np.outer(changed - self._slope @ moved, moved) / length
+                told = length + (np.hypot(seen.noise, self._last.noise) / _DOUBTED) ** 2
+                self._slope += np.outer((changed - self._slope @ moved) / told, moved)
         self._last = seen
 
     def probe(self, column: int, here: Seen, beside: Seen) -> None:
         """Take what one unknown does, alone, from two looks."""
         moved = beside.unknowns[column] - here.unknowns[column]
-        self._slope[:, column] = (_outputs(beside) - _outputs(here)) / moved
+        found = (_outputs(beside) - _outputs(here)) / moved
+        noise = np.hypot(beside.noise, here.noise) / moved
+        believed = self._slope[:, column]
+        doubt = np.maximum(np.abs(found - believed), _DOUBTED)
+        self._slope[:, column] += (found - believed) * doubt**2 / (doubt**2 + noise**2)
         self._last = beside
 
     def corrected(self, seen: Seen, foreseen: Foreseen) -> Vector:
@@ -174,6 +183,11 @@ def residual_of(base_m: Coefficients, level_m: float) -> Vector:
     """
     rest = base_m[1:] / level_m
     return np.concatenate([[abs(base_m[0]) / level_m - 1.0], np.column_stack([rest.real, rest.imag]).ravel()])
+
+
+def noise_of(base_u: Vector, ratio_u: float) -> Vector:
+    """Give the standard errors of residual and ratio, from those of the base's harmonics over its level."""
+    return np.concatenate([base_u[:1], np.repeat(base_u[1:], 2), [ratio_u, ratio_u]])
 
 
 def _outputs(seen: Seen) -> Vector:

@@ -1,15 +1,13 @@
 """Following a branch with a fast loop: predicted along the arc, corrected until the base is a sine."""
 
-from collections.abc import Generator
-from dataclasses import dataclass
-from math import degrees, pi
+from math import degrees
 
 import numpy as np
 
-from ..excitation import BranchContinuation, LoopTone, Segment
-from ..instruments import LoopBlock, LoopProgram
+from ..excitation import BranchContinuation
 from ..plan import HUSH_S, Phase, RunState, ramp
 from ..recording import BranchEnd, BranchEndNote, BranchPointNote
+from ._branch_player import BranchPlayer
 from ._branch_solver import (
     BranchSolver,
     Foreseen,
@@ -17,15 +15,13 @@ from ._branch_solver import (
     Seen,
     Vector,
     is_new,
+    noise_of,
     residual_of,
 )
-from ._closed_loop_check import require_answer
-from ._control_action import ControlAction, Controller, PhaseSamples
-from ._fast_loop import Coefficients, FastLoop, fast_loop, level_at, require_held
+from ._control_action import Controller
+from ._fast_loop import FastLoop, fast_loop, level_at, require_held
 from ._sine_loop import SineLoop
 
-_BLOCK_PERIODS = 10
-_GLIDE_S = 0.1
 _MOST_TRIES = 8
 _FIRST_TRIES = 30
 """Of the first point, which the model without stops may be far from."""
@@ -33,9 +29,6 @@ _SHORTEST_STEP = 1 / 64
 """Of the plan's step."""
 _GROWTH, _EASY = 1.5, 3
 """A step grows by this factor where a point took so many tries or fewer."""
-_MOST_LOOKS = 6
-_AGREED = 0.25
-"""Looks at one setting until its blocks agree to this part of the tolerance."""
 _PROBES = (-0.05, -0.05)
 """Changes of frequency and first coefficient by which both are probed, in steps."""
 _BELOW = 5.0
@@ -47,82 +40,6 @@ _TOLD = 0.01
 _CLOSER, _CLOSE = 0.3, 0.7
 """Parts of the tolerance that a point must keep when it is found: a fold moves with the level."""
 _BEND_HZ = 0.05
-_HIGHEST = 9
-"""Harmonic that is looked at."""
-
-
-@dataclass(frozen=True, eq=False)
-class LoopLook:
-    """What base and m0 did under a setting."""
-
-    base_m: Coefficients
-    """From the first harmonic on."""
-    m0_m: Coefficients
-    spread: float
-    """Between the blocks it is the mean of, over the fundamental of the base."""
-
-
-class BranchPlayer:
-    """Plays settings, and looks at what they make of base and m0."""
-
-    def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
-        self.plan = plan
-        self.fast = fast
-        self._loop = loop
-        self._feedback = fast.feedback
-
-    def tone(self, setting: LoopSetting) -> LoopTone:
-        """Give what the controller is told."""
-        program = LoopProgram(
-            frequency_hz=setting.frequency_hz,
-            reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
-            feedback=self._feedback,
-            glide_s=_GLIDE_S,
-            block_periods=_BLOCK_PERIODS,
-            harmonics=max(_HIGHEST, self.plan.harmonics),
-        )
-        level = 2 * abs(setting.reference_v[0]) / self._loop.most_vpp
-        return LoopTone(setting.frequency_hz, min(float(level), 1.0), program)
-
-    def looked(self, setting: LoopSetting) -> Generator[ControlAction, PhaseSamples, LoopLook]:
-        """Play a setting until two looks in a row agree."""
-        tone = self.tone(setting)
-        look_s = self.plan.look_periods / setting.frequency_hz
-        samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
-        look = self._look(samples.coefficients, setting)
-        for _ in range(_MOST_LOOKS - 1):
-            if look.spread <= _AGREED * self.plan.tolerance:
-                break
-            samples = yield from self.run(Phase(RunState.SETTLING, tone, look_s))
-            look = self._look(samples.coefficients, setting)
-        acceleration = abs(look.base_m[0]) * (2 * pi * setting.frequency_hz) ** 2
-        require_answer(
-            self.fast.rig, setting.frequency_hz, 2 * abs(setting.reference_v[0]) * 0.1, acceleration
-        )
-        return look
-
-    def recorded(
-        self, setting: LoopSetting, segment: Segment
-    ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
-        """Record a setting that has been played."""
-        tone = self.tone(setting)
-        samples = yield from self.run(Phase(RunState.RECORDING, tone, self.plan.record_s, segment))
-        return self._look(samples.coefficients, setting)
-
-    def run(self, phase: Phase) -> Generator[ControlAction, PhaseSamples, PhaseSamples]:
-        """Have a phase played, with what is to be noted."""
-        return (yield from self._loop.run_phase(phase))
-
-    def _look(self, blocks: tuple[LoopBlock, ...], setting: LoopSetting) -> LoopLook:
-        count = max(2, self.plan.look_periods // _BLOCK_PERIODS)
-        steady = [block for block in blocks if block.steady][-count:]
-        if not steady:
-            steady = list(blocks[-1:])
-        base, m0 = self.fast.motions(steady, setting.frequency_hz)
-        seen = np.column_stack([base[:, 0], m0[:, 0]])
-        spread = np.ptp(seen.real, axis=0).sum() + np.ptp(seen.imag, axis=0).sum()
-        scale = np.abs(seen.mean(axis=0)).max()
-        return LoopLook(base.mean(axis=0), m0.mean(axis=0), float(spread / scale))
 
 
 def follow_branch(loop: SineLoop, plan: BranchContinuation) -> Controller[None]:
@@ -227,9 +144,12 @@ def _corrected(
 
 def _seen(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[Seen]:
     plan, setting = player.plan, solver.setting(unknowns)
-    look = yield from player.looked(setting)
-    residual = residual_of(look.base_m[: plan.harmonics], level_at(plan, setting.frequency_hz))
-    seen = Seen(unknowns, residual, complex(look.m0_m[0] / look.base_m[0]))
+    level_m = level_at(plan, setting.frequency_hz)
+    look = yield from player.looked(setting, level_m)
+    residual = residual_of(look.base_m[: plan.harmonics], level_m)
+    seen = Seen(
+        unknowns, residual, look.ratio, noise_of(look.base_u[: plan.harmonics] / level_m, look.ratio_u)
+    )
     solver.learn(seen)
     return seen
 
@@ -245,8 +165,10 @@ def _recorded(
             point=number,
             frequency_hz=setting.frequency_hz,
             base_m=float(abs(look.base_m[0])),
+            base_u_m=float(look.base_u[0]),
             m0_m=float(abs(look.m0_m[0])),
-            phase_deg=degrees(float(np.angle(look.m0_m[0] / look.base_m[0]))),
+            m0_u_m=float(look.m0_u[0]),
+            phase_deg=degrees(float(np.angle(look.ratio))),
             residue=float(np.linalg.norm(share)),
             residue_acceleration=float(np.linalg.norm(share * orders**2)),
             reference_v=float(abs(setting.reference_v[0])),

@@ -251,7 +251,10 @@ class BranchPointNote(AbstractNote):
     """From 0."""
     frequency_hz: SixFigures
     base_m: SixFigures
+    base_u_m: SixFigures = 0.0
+    """Standard uncertainty by the scatter of what it is the mean of; 0 where a recording does not say."""
     m0_m: SixFigures
+    m0_u_m: SixFigures = 0.0
     phase_deg: SixFigures
     """Of m0 over the base, as displacements."""
     residue: SixFigures
