@@ -51,7 +51,7 @@ TIGHT, LOOSE = 1e-13, 1e-11
 FORGOTTEN = 1e-3
 """Where two tolerances differ by more, relatively, the start is forgotten."""
 RESOLVED = 5e-11
-"""Relative error of the independent code at its best: peaks of a closed form come out up to 4e-11 too high."""
+"""Relative error of the independent code at its best: peaks of a closed form come out 4e-11 too high."""
 DRAWS = 5
 NUDGE = 1e-9
 FAR = 10.0
