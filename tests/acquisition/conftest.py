@@ -351,9 +351,9 @@ class LoopbackBench:
         self.idled_s += duration_s
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def rig() -> Rig:
-    """The default rig, sampling slowly."""
+    """The default rig, sampling slowly; nobody can change it."""
     shipped = load_rig(ROOT / "hardware_configs" / "virtual_rig.toml")
     return shipped.model_copy(
         update={"daq": shipped.daq.model_copy(update={"sample_rate_hz": SAMPLE_RATE_HZ})}
@@ -376,7 +376,7 @@ def streaming_bench(rig: Rig) -> LoopbackBench:
     return bench
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def new_bench() -> Callable[[Rig], LoopbackBench]:
     """Make benches, for tests that need more than one."""
     return LoopbackBench

@@ -72,11 +72,18 @@ DAMAGES = (
 )  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def recorded(new_bench, rig, tmp_path_factory):
+    folder, bench = tmp_path_factory.mktemp("recorded"), new_bench(rig)
+    run_campaign(bench, CAMPAIGN, folder)
+    run_campaign(bench, CAMPAIGN, folder / "older")
+    return folder
+
+
 @pytest.fixture
-def folder(bench, tmp_path):
-    run_campaign(bench, CAMPAIGN, tmp_path)
-    run_campaign(bench, CAMPAIGN, tmp_path / "older")
-    return tmp_path
+def folder(recorded, tmp_path):
+    """The recordings, for one test to damage: file times and all, as their catalogue knows them."""
+    return shutil.copytree(recorded, tmp_path, dirs_exist_ok=True)
 
 
 def outcomes(point_results):
