@@ -1,5 +1,7 @@
 """A generator that takes its time for a setting, while samples are converted."""
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 
@@ -110,27 +112,47 @@ def test_a_drive_that_falls_behind_ends_the_run_and_says_where(bench, tmp_path):
     with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
         next(each for each in run if each.frequency_hz is not None and each.frequency_hz > 180.0)
         bench.world.latency_s = 0.2
-        with pytest.raises(DriveLate, match=r"s behind its plan at 18.* Hz, where a step lasts 0.05 s"):
+        with pytest.raises(
+            DriveLate, match=r"^the drive was 1.* s behind its plan at 1.* Hz, .* lasts 0.05 s"
+        ):
             for _ in run:
                 pass
     assert bench.recorder.ending[0] is RecordingState.FAILED
     assert not bench.world.is_on
     late = [text for _, kind, text in bench.recorder.events if kind == "late"]
-    assert len(late) == 4
+    assert len(late) > 4, "what is over sooner was a busy computer"
 
 
-def test_one_late_moment_is_noted_and_the_run_goes_on(bench, tmp_path):
+@pytest.mark.parametrize("stall_s", [0.25, 0.8])
+def test_one_late_moment_is_noted_and_the_run_goes_on(bench, tmp_path, stall_s):
     bench.world.latency_s = 0.02
     plan = sweep(0.1)
     with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
         next(each for each in run if each.frequency_hz is not None and each.frequency_hz > 180.0)
-        bench.world.convert(round(0.25 * RATE))
+        bench.world.convert(round(stall_s * RATE))
         for _ in run:
             pass
     assert bench.recorder.ending[0] is RecordingState.COMPLETE
-    assert [kind for _, kind, _ in bench.recorder.events].count("late") in (2, 3, 4)
+    assert [kind for _, kind, _ in bench.recorder.events].count("late") in range(2, round(stall_s / 0.1) + 5)
     # What the pause lost is made up: the end is as late as the command alone makes it, and that is noted.
     late = 0.02 * (plan.excitation.stop_hz - plan.excitation.start_hz)
     assert cycles(stretch(bench, "sweep")) == pytest.approx(plan.excitation.cycles(4.0) - late, abs=0.1)
     *_, last = (text for _, kind, text in bench.recorder.events if kind == "late")
     assert "cycles from its plan" in last
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_stalls_of_a_busy_computer_make_up_no_frequency_far_from_the_plan(bench, tmp_path, seed):
+    """A sweep from 20 Hz to 600 Hz asked its generator for -186 Hz after some stalls, others for 1,451 Hz."""
+    chance = np.random.default_rng(seed)
+    plan = sweep(0.1)
+    plan = plan.model_copy(update={"excitation": plan.excitation.model_copy(update={"start_hz": 20.0})})
+    bench.world.latency_s = 0.005
+    with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
+        with suppress(DriveLate):
+            for progress in run:
+                if progress.frequency_hz is not None and chance.uniform() < 0.1:
+                    bench.world.convert(round(chance.uniform(0.05, 1.2) * RATE))
+    asked = [each[1] for each in bench.world.calls if each[0] == "set_frequency"]
+    assert min(asked) > 10.0
+    assert max(asked) < 270.0

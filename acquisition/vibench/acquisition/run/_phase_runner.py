@@ -24,7 +24,8 @@ HOLD_LONGEST_S = HOLD_ROOM_S
 LATEST = 0.5
 """How late a glide from step to step may be, in steps."""
 LATE_STEPS = 4
-"""So many in a row are no moment in which the computer was busy: a part of the end would not be played."""
+LATE_FOR_S = 2.0
+"""So many steps in a row, their length and their lateness together, are no moment of a busy computer [s]."""
 LEARNT = 0.05
 """Least share of a lateness by which the commands of a glide are given earlier from then on; of the first
 ones it is more, so that the mean is learnt."""
@@ -92,7 +93,7 @@ class PhaseRunner:
         self._glides = 0
         self._late_steps = 0
         self._lost_cycles = 0.0
-        self._glided_hz = 0.0
+        self._glided_hz = self._planned_hz = 0.0
 
     @property
     def coefficients(self) -> tuple[LoopBlock, ...]:
@@ -113,6 +114,7 @@ class PhaseRunner:
             self._tell_lost_cycles()
             yield from self._read(0.0)
             self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
+            self._planned_hz = self._glided_hz
         if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
             yield from self._catch_up()  # its first sample is that of the trigger
         if phase.segment != self.loop.segment:
@@ -163,10 +165,12 @@ class PhaseRunner:
             return phase
         planned_hz, left_s = phase.play.frequency_hz, phase.duration_s - late_s
         self._lost_cycles += (planned_hz - self._glided_hz) * late_s
-        most_hz = MOST_MADE_UP * abs(planned_hz - self._glided_hz)
-        more_hz = min(max(self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s), -most_hz), most_hz)
+        # Of the plan's own step: what was made up before must not grow from one step to the next.
+        most_hz = min(MOST_MADE_UP * abs(planned_hz - self._planned_hz), LEAST_LEFT * planned_hz)
+        wanted_hz = self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s)
+        more_hz = min(max(wanted_hz, -most_hz), most_hz) if left_s > 0 else 0.0
         self._lost_cycles -= more_hz * left_s
-        self._glided_hz = planned_hz + more_hz
+        self._planned_hz, self._glided_hz = planned_hz, planned_hz + more_hz
         return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
 
     def _tell_lost_cycles(self) -> None:
@@ -198,9 +202,10 @@ class PhaseRunner:
             f"the drive was {late_s:.3g} s behind its plan at {at}, where a step lasts {phase.duration_s:g} s"
         )
         self.loop.log(EventKind.LATE, text)
-        if self._late_steps == LATE_STEPS:
+        late_for_s = late_s + self._late_steps * phase.duration_s
+        if self._late_steps >= LATE_STEPS and late_for_s > LATE_FOR_S:
             raise DriveLate(
-                f"{text}, {LATE_STEPS} times in a row. The run was ended, and what was played is kept; "
+                f"{text}, {self._late_steps} times in a row. The run was ended, and what was played is kept; "
                 "give a longer step_s, or shorten generator.settle_s if the instrument allows it"
             )
         return late_s
