@@ -32,6 +32,7 @@ from vibench.acquisition.engine._state import ConnectionRole
 from vibench.acquisition.engine._verbs import VERBS
 from vibench.acquisition.engine._wire import send
 from vibench.acquisition.errors import InstrumentBusy
+from vibench.acquisition.plan import Campaign
 from vibench.acquisition.recording import RecordingState
 from vibench.virtual_rig import VirtualRig
 
@@ -236,6 +237,31 @@ class TestRefusals:
             assert fault.code == InstrumentBusy.__name__
             assert str(os.getpid()) in fault.what
             mine.close()
+
+
+def test_a_long_campaign_is_armed_although_its_limits_take_longer_than_an_answer_may(
+    shared_engine, client, shipped_rig, tmp_path
+):
+    """On a busy computer sixty sweeps took more than the five seconds of any answer; the window gave up."""
+    client.open(shipped_rig)
+    until_state(client, EngineState.READY)
+    sweeps = [
+        {
+            "name": f"s{number}",
+            "excitation": {
+                "kind": "sine_sweep", "amplitude_vpp": 0.5, "start_hz": 20 + number, "stop_hz": 600,
+                "duration_s": 40,
+            },
+        }
+        for number in range(60)
+    ]  # fmt: skip
+    many = Campaign.model_validate({"name": "many", "measurements": sweeps})
+    with EngineClient.attach(shared_engine.address, ConnectionRole.ATTENDING, patience_s=0.3) as hasty:
+        begun_s = time.monotonic()
+        plan = hasty.arm(many, tmp_path)
+        assert time.monotonic() - begun_s > 0.3
+        assert "60 recordings" in plan.lines[0]
+        hasty.disarm()
 
 
 class TestNobodyLooks:

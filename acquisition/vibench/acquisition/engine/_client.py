@@ -76,4 +76,4 @@ class EngineClient(EngineVerbs, ClosedOnLeaving):
         """Send a request and wait for its answer."""
         request = verb.message(**arguments)
         with self._asking:
-            return verb.answer.read(*exchanged(self._connection, request))
+            return verb.answer.read(*exchanged(self._connection, request, verb.work_s))

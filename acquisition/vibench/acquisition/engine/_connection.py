@@ -45,8 +45,12 @@ def connected(address: EngineAddress, role: ConnectionRole, patience_s: float = 
     return connection
 
 
-def exchanged(connection: socket.socket, request: Message) -> tuple[dict[str, Any], bytes]:
+def exchanged(
+    connection: socket.socket, request: Message, work_s: float = 0.0
+) -> tuple[dict[str, Any], bytes]:
     """Send a request and wait for its answer: the parsed text, and the bytes behind it.
+
+    ``work_s`` [s] is what the answer may take beyond the patience of the connection.
 
     Raises
     ------
@@ -58,10 +62,13 @@ def exchanged(connection: socket.socket, request: Message) -> tuple[dict[str, An
         What the engine refuses with.
 
     """
-    patience_s = connection.gettimeout() or PATIENCE_S
+    usual_s = connection.gettimeout()
+    patience_s = (usual_s or PATIENCE_S) + work_s
     try:
         send(connection, request)
+        connection.settimeout(patience_s)
         answer = receive(connection, ANSWERS)
+        connection.settimeout(usual_s)
     except TimeoutError as error:
         # An answer that comes late must not be taken for that to the next question.
         connection.close()

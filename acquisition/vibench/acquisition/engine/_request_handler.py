@@ -53,10 +53,10 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     checks: list[tuple[str, LimitCheck]] = []
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
-    # Repeats share their measurement: judged once, or a long campaign would keep whoever asks waiting.
-    for name, measurement in {
-        id(point.measurement): (point.name, point.measurement) for point in points
-    }.values():
+    # What is played alike is judged once, or a long campaign would keep whoever asks waiting.
+    once = {id(point.measurement): point for point in points}.values()
+    alike = {each.measurement.model_dump_json(exclude={"name"}): each for each in once}
+    for name, measurement in ((each.name, each.measurement) for each in alike.values()):
         checks += [(name, check) for check in require_within_limits(measurement, bench.rig)]
         drive_for(bench, measurement)  # refuses what nothing on this bench can play
     planned = planned_recordings(campaign, folder, request.existing)

@@ -64,6 +64,8 @@ class Verb(Generic[A]):
     answer: Answer[A]
     states: tuple[EngineState, ...]
     """Where the engine must stand; empty: legal in every state, and never made to wait."""
+    work_s: float
+    """What is to be worked out before the answer may take so long [s]; 0: it is held ready."""
 
     def message(self, **arguments: object) -> Message:
         """Put a request on the wire."""
@@ -71,18 +73,20 @@ class Verb(Generic[A]):
         return Message(request.model_dump_json().encode())
 
 
+ARMING_S = 300.0
+"""To hold a campaign of a hundred sweeps against the limits takes seconds, on a busy computer a minute."""
 VERBS: dict[str, Verb[Any]] = {}
 """Every verb, by its word."""
 
 
 def verb(
-    word: str, answer: Answer[A], *states: EngineState
+    word: str, answer: Answer[A], *states: EngineState, work_s: float = 0.0
 ) -> Callable[[Callable[Concatenate[Any, P], A]], Callable[Concatenate[Any, P], A]]:
     """Declare a verb by the signature of its call; the call then asks for it."""
 
     def declared(call: Callable[Concatenate[Any, P], A]) -> Callable[Concatenate[Any, P], A]:
         parameters = signature(call)
-        row = Verb(word, call.__name__, _request(word, call), answer, states)
+        row = Verb(word, call.__name__, _request(word, call), answer, states, work_s)
         VERBS[word] = row
 
         @wraps(call)
@@ -167,7 +171,7 @@ class EngineVerbs:
     def check(self, folder: AbsolutePath = Path()) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
 
-    @verb("arm", PLAN, EngineState.READY, EngineState.ARMED)
+    @verb("arm", PLAN, EngineState.READY, EngineState.ARMED, work_s=ARMING_S)
     def arm_request(self, campaign_request: AbsoluteRequest) -> ArmedPlan:
         """Get ready to carry out a campaign, or be refused with the reasons."""
         raise NotImplementedError
