@@ -33,12 +33,12 @@ import numpy as np
 
 from vibench.acquisition import CheckRule, StopLevel
 from vibench.acquisition.engine import (
+    Attendant,
     CampaignRequest,
     EngineClient,
     EngineError,
     EngineProcess,
     EngineState,
-    Heartbeat,
     StopDelivery,
     start_engine,
     stop_engine,
@@ -118,10 +118,7 @@ class Laboratory:
         self.engine: EngineProcess | None = None
         self.client: EngineClient
         self._number = 0
-        self._beats = threading.Event()
-        self._beats.set()
-        self._heart: Heartbeat | None = None
-        threading.Thread(target=self._attend, daemon=True).start()
+        self._attendant: Attendant | None = None
 
     @property
     def pid(self) -> int:
@@ -135,8 +132,9 @@ class Laboratory:
             self.close()
         if self.engine is None:
             self.engine = start_engine()
-            self._heart = Heartbeat(self.engine.address)
-        self._beats.set()
+        if self._attendant is None:
+            self._attendant = Attendant(self.engine.address)
+            threading.Thread(target=self._attend, args=(self._attendant,), daemon=True).start()
         self.client = EngineClient.attach(self.engine.address)
         if self.client.status().state in (EngineState.CLOSED, EngineState.FAULT):
             knobs = self.virtual.rig.knobs
@@ -194,23 +192,20 @@ class Laboratory:
 
     def forget_viewer(self) -> None:
         """Attend no more."""
-        self._beats.clear()
+        attendant, self._attendant = self._attendant, None
+        if attendant is not None:
+            attendant.close()
 
     def close(self) -> None:
         """End the engine."""
-        heart, self._heart = self._heart, None
-        if heart is not None:
-            heart.close()
+        self.forget_viewer()
         if self.engine is not None:
             self.engine.close()
             self.engine = None
 
-    def _attend(self) -> None:
-        while True:
-            self._beats.wait()
-            heart = self._heart
-            if heart is not None:
-                heart.beat()
+    def _attend(self, attendant: Attendant) -> None:
+        while self._attendant is attendant:
+            attendant.live()
             time.sleep(0.05)
 
 

@@ -20,7 +20,7 @@ PLAN = {
 }
 
 
-def main(folder: Path, config: Path, attendance: Supervision) -> None:
+def main(folder: Path, config: Path, attendance: Supervision, patience_s: float) -> None:
     """Open the window, and let it measure until it is killed."""
     rig = load_rig(config)
     rig = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
@@ -42,7 +42,7 @@ def main(folder: Path, config: Path, attendance: Supervision) -> None:
                         campaign=Campaign.model_validate(PLAN),
                         folder=folder / "recordings",
                         attendance=attendance,
-                        longest_patience_s=window.context.patience_s,
+                        longest_patience_s=patience_s,
                     )
                 )
             case ["armed"], EngineState.ARMED:
@@ -59,4 +59,4 @@ def main(folder: Path, config: Path, attendance: Supervision) -> None:
 
 
 if __name__ == "__main__":  # the window's own workers import this file
-    main(Path(sys.argv[1]), Path(sys.argv[2]), Supervision(sys.argv[3]))
+    main(Path(sys.argv[1]), Path(sys.argv[2]), Supervision(sys.argv[3]), float(sys.argv[4]))

@@ -148,11 +148,13 @@ def test_stalls_of_a_busy_computer_make_up_no_frequency_far_from_the_plan(bench,
     plan = sweep(0.1)
     plan = plan.model_copy(update={"excitation": plan.excitation.model_copy(update={"start_hz": 20.0})})
     bench.world.latency_s = 0.005
-    with Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run:
-        with suppress(DriveLate):
-            for progress in run:
-                if progress.frequency_hz is not None and chance.uniform() < 0.1:
-                    bench.world.convert(round(chance.uniform(0.05, 1.2) * RATE))
+    with (
+        suppress(DriveLate),
+        Run(bench, plan, tmp_path / "run.h5", LowLevelCheck.AT_LOW_LEVEL, bench.recorder.create) as run,
+    ):
+        for progress in run:
+            if progress.frequency_hz is not None and chance.uniform() < 0.1:
+                bench.world.convert(round(chance.uniform(0.05, 1.2) * RATE))
     asked = [each[1] for each in bench.world.calls if each[0] == "set_frequency"]
     assert min(asked) > 10.0
     assert max(asked) < 270.0

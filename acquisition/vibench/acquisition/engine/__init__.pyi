@@ -3,6 +3,9 @@ from ._announcement import (
     announced_engines as announced_engines,
     the_engine as the_engine,
 )
+from ._attendant import (
+    Attendant as Attendant,
+)
 from ._campaign_request import (
     CampaignRequest as CampaignRequest,
 )
@@ -16,9 +19,6 @@ from ._errors import (
     EngineError as EngineError,
     EngineGone as EngineGone,
     EngineSilent as EngineSilent,
-)
-from ._heartbeat import (
-    Heartbeat as Heartbeat,
 )
 from ._job_queue import (
     JobQueue as JobQueue,

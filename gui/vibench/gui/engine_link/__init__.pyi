@@ -1,6 +1,5 @@
 from ._bridge import (
     Bridge as Bridge,
-    SignOfLife as SignOfLife,
 )
 from ._engine_line import (
     Starter as Starter,

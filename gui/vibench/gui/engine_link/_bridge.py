@@ -6,8 +6,7 @@ from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QObject, QTimer, Signal
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import QObject, QTimer, Signal
 
 from vibench.acquisition import AcquisitionError, StopLevel
 from vibench.acquisition.engine import (
@@ -128,13 +127,10 @@ class Bridge(QObject):
             self._line.ask(Urgency.LOOK, self._look_question(), self._looked, self._look_refused)
 
     def beat(self) -> None:
-        """Note that the window's own thread is alive; another one tells the engine.
-
-        It may be called while something is painted: no answer is fetched, so nothing is changed.
-        """
-        pulse = None if self._line is None else self._line.pulse
-        if pulse is not None:
-            pulse.live()
+        """Note that the window's own thread is alive; a process of its own tells the engine."""
+        attendant = None if self._line is None else self._line.attendant
+        if attendant is not None:
+            attendant.live()
 
     def open(self, rig: Rig, confirmations: KnobSheet | None) -> None:
         """Open the bench of a rig, with an engine of its own if there is none yet."""
@@ -320,22 +316,3 @@ def _done(_: object) -> None:
 def _notice(message: EngineMessage) -> Notice:
     kind = NoticeKind(message.kind.value)
     return Notice(kind, message.what, message.done, message.next_step, message.code)
-
-
-class SignOfLife(QObject):
-    """Tells the engine, at every picture that is painted, that the window has not frozen.
-
-    It acts in the window's own thread, and only when that gets something done: a frozen window is
-    as silent with it as without it.
-    """
-
-    def __init__(self, application: QApplication, bridge: Bridge, parent: QObject) -> None:
-        super().__init__(parent)
-        self._bridge = bridge
-        application.installEventFilter(self)
-
-    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
-        """Look at what is painted, and let everything pass."""
-        if event.type() is QEvent.Type.Paint:
-            self._bridge.beat()
-        return False

@@ -6,50 +6,14 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from itertools import count
 from queue import Empty, PriorityQueue, SimpleQueue
-from time import monotonic
 from typing import Any
 
 from vibench.acquisition import AcquisitionError
-from vibench.acquisition.engine import AdoptedEngine, EngineClient, EngineProcess, Heartbeat, start_engine
+from vibench.acquisition.engine import AdoptedEngine, Attendant, EngineClient, EngineProcess, start_engine
 
 Starter = Callable[[], EngineProcess | AdoptedEngine]
 Question = Callable[[EngineClient], Any]
 Listener = Callable[[Any], None]
-
-
-BEAT_S = 0.04
-"""How often the engine is told that the window lives [s]."""
-
-
-class Pulse:
-    """Beats from a thread of its own, and says with each beat for how long the window has stood still.
-
-    Painting, a busy computer or another thread of Python do not hold it up; a window that has frozen for good
-    is told as such, and a process that stands still as a whole falls silent.
-    """
-
-    def __init__(self, heartbeat: Heartbeat) -> None:
-        self._heartbeat = heartbeat
-        self._lived_s = monotonic()
-        self._closing = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="pulse", daemon=True)
-        self._thread.start()
-
-    def live(self) -> None:
-        """Note that the window's own thread gets something done; only that thread may say so."""
-        self._lived_s = monotonic()
-
-    def close(self) -> None:
-        """Beat no more."""
-        self._closing.set()
-        self._thread.join()
-        self._heartbeat.close()
-
-    def _run(self) -> None:
-        while not self._closing.wait(BEAT_S):
-            # Before the clock is read: the window may live in between.
-            lived_s = self._lived_s
-            self._heartbeat.beat(monotonic() - lived_s)
 
 
 class Urgency(IntEnum):
@@ -83,7 +47,7 @@ class EngineLine:
         self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._numbers = count()
         self._engine: EngineProcess | AdoptedEngine | None = None
-        self._pulse: Pulse | None = None
+        self._attendant: Attendant | None = None
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -93,9 +57,9 @@ class EngineLine:
         return None if self._engine is None else self._engine.pid
 
     @property
-    def pulse(self) -> Pulse | None:
+    def attendant(self) -> Attendant | None:
         """Tells the engine that the window is alive; None before there is an engine."""
-        return self._pulse
+        return self._attendant
 
     def ask(
         self,
@@ -128,8 +92,8 @@ class EngineLine:
     def _run(self) -> None:
         while (call := self._calls.get()).urgency not in (Urgency.END, Urgency.LEAVE):
             self._answer(call)
-        if self._pulse is not None:
-            self._pulse.close()
+        if self._attendant is not None:
+            self._attendant.close()
         if self._engine is None:
             return
         if call.urgency is Urgency.LEAVE:
@@ -141,7 +105,7 @@ class EngineLine:
         try:
             if self._engine is None:
                 self._engine = self._start()
-                self._pulse = Pulse(Heartbeat(self._engine.address))
+                self._attendant = Attendant(self._engine.address)
             answer = call.question(self._engine.client)
         except AcquisitionError as error:
             refusal = error

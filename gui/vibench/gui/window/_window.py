@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
 
-from ..engine_link import SignOfLife, Urgency
+from ..engine_link import Urgency
 from ..page import AppContext, Page, Remembered, UserActions, file_kind
 from ..widgets import RUN, Notice, NoticeKind, Theme, notice_of, palette, style_sheet
 from ._banner import Banner
@@ -202,7 +202,6 @@ class Window(QMainWindow):
         application = QApplication.instance()
         assert isinstance(application, QApplication)
         self.abort_key = AbortKey(application, self)
-        self.sign_of_life = SignOfLife(application, self.context.bridge, self)
         self.abort_key.pressed.connect(self.user_actions.abort)
         self.banner.stop_wanted.connect(self.user_actions.stop)
         self.context.bridge.armed.connect(lambda _plan: self.show_page(RUN))

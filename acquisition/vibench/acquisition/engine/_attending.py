@@ -1,0 +1,82 @@
+"""``python -m vibench.acquisition.engine._attending``: the process of an `Attendant`, which loads little.
+
+Its input is a line that says where the engine is, then a byte at every sign of life of the program that
+started it, and ends with that program.
+"""
+
+import json
+import os
+import socket
+import sys
+from contextlib import suppress
+from pathlib import Path
+from threading import Event, Thread
+from time import monotonic
+
+from ._wire import ANSWERS, Message, receive, send
+
+BEAT_S = 0.04
+"""How often the engine is told that the program is there [s]."""
+STOPPED = ("T", "t", "Z", "X")
+"""States of a Linux process that does nothing until somebody else makes it, or never again."""
+LEAST_OWN = 0.25
+"""Of the time without a sign of life, so much counts even where the system gave it all to others."""
+
+
+class _Program:
+    """Whoever started this process, as far as it can be seen from here: better where there is ``/proc``."""
+
+    def __init__(self) -> None:
+        self._folder = Path(f"/proc/{os.getppid()}")
+        self._sign_s = (monotonic(), self._waiting_s)
+        Thread(target=self._follow, name="follow program", daemon=True).start()
+
+    @property
+    def still_s(self) -> float:
+        """For how long it has given no sign of life, without its main thread's wait for a processor [s]."""
+        lived_s, waited_s = self._sign_s  # before the clock is read: the next one may come in between
+        passed_s = monotonic() - lived_s
+        return max(passed_s - max(0.0, self._waiting_s - waited_s), LEAST_OWN * passed_s)
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the system keeps it from running."""
+        return self._told("stat").rpartition(") ")[2].startswith(STOPPED)
+
+    @property
+    def _waiting_s(self) -> float:
+        _, waited_ns, *_ = [*self._told("schedstat").split(), "0", "0"]
+        return 1e-9 * int(waited_ns)
+
+    def _told(self, name: str) -> str:
+        try:
+            return (self._folder / name).read_text()
+        except OSError:
+            return ""
+
+    def _follow(self) -> None:
+        while os.read(sys.stdin.fileno(), 65536):
+            self._sign_s = (monotonic(), self._waiting_s)
+        os._exit(0)  # whatever the other thread waits for
+
+
+def main() -> None:
+    """Beat until the engine or the program has ended."""
+    told = json.loads(sys.stdin.buffer.readline())
+    program, clock = _Program(), Event()
+    with suppress(OSError), socket.create_connection(told["address"]) as connection:
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        _exchange(connection, told["hello"])
+        while True:
+            if not program.is_stopped:
+                _exchange(connection, json.dumps({"ask": "beat", "still_s": program.still_s}))
+            clock.wait(BEAT_S)
+
+
+def _exchange(connection: socket.socket, text: str) -> None:
+    send(connection, Message(text.encode()))
+    receive(connection, ANSWERS)
+
+
+if __name__ == "__main__":
+    main()

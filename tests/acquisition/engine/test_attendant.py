@@ -1,0 +1,102 @@
+"""An attendant alone keeps an attended run going; it says when its program stands still, and ends with it."""
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+from threading import Event
+from time import monotonic
+
+import pytest
+
+from vibench.acquisition.engine import DRIVING, VIEWER_PATIENCE_S, Attendant, EngineClient, EngineState
+from vibench.acquisition.engine._state import HUNG_FACTOR
+
+from .conftest import campaign, until, until_state
+
+PROGRAM = """
+import sys
+from threading import Event, Thread
+from vibench.acquisition.engine import Attendant, the_engine
+attendant, hanging = Attendant(the_engine(int(sys.argv[1])).address), Event()
+print(attendant.pid, flush=True)
+Thread(target=lambda: (sys.stdin.readline(), hanging.set()), daemon=True).start()
+while not hanging.wait(0.03):
+    attendant.live()
+Event().wait()
+"""
+
+
+def running(process, rig, folder):
+    """Whom to ask about a run that plays, without attending to it."""
+    client = process.client
+    client.open(rig)
+    until_state(client, EngineState.READY)
+    client.arm(campaign("attended"), folder)
+    client.start()
+    until(client, lambda status: status.samples > 0)
+    return EngineClient.attach(process.address)
+
+
+@contextmanager
+def attending(process):
+    """A program that lives until it is told to hang, and the number of its attendant's process."""
+    with subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(process.pid)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as program:
+        try:
+            yield program, int(program.stdout.readline())
+        finally:
+            program.kill()
+
+
+def test_an_attendant_keeps_a_run_going_that_nobody_asks_about_and_tells_of_a_program_that_hangs(
+    engine, shipped_rig, tmp_path
+):
+    process = engine()
+    with attending(process) as (program, _), running(process, shipped_rig, tmp_path) as visitor:
+        Event().wait(2.0)
+        assert visitor.status().state in DRIVING
+        hung_s = monotonic()
+        print(file=program.stdin, flush=True)
+        status = until_state(visitor, EngineState.READY)
+    assert "stands still" in status.rows[0].reason
+    assert monotonic() - hung_s > HUNG_FACTOR * VIEWER_PATIENCE_S
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a stopped program hangs")
+def test_an_attendant_is_silent_for_a_stopped_program(engine, shipped_rig, tmp_path):
+    process = engine()
+    with attending(process) as (program, _), running(process, shipped_rig, tmp_path) as visitor:
+        os.kill(program.pid, signal.SIGSTOP)
+        status = until_state(visitor, EngineState.READY)
+    assert "nobody has looked" in status.rows[0].reason
+    assert "stands still" not in status.rows[0].reason
+
+
+def test_an_attendant_ends_with_a_program_that_is_killed(engine, shipped_rig, tmp_path):
+    process = engine()
+    with attending(process) as (program, pid), running(process, shipped_rig, tmp_path) as visitor:
+        program.kill()
+        status = until_state(visitor, EngineState.READY)
+    assert "nobody has looked" in status.rows[0].reason
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def test_an_attendant_that_was_killed_is_replaced(engine):
+    attendant, clock = Attendant(engine().address), Event()
+    first = attendant.pid
+    os.kill(first, signal.SIGTERM)
+    for _ in range(200):
+        attendant.live()
+        if attendant.pid != first:
+            break
+        clock.wait(0.05)
+    assert attendant.pid != first
+    attendant.close()
+    attendant.close()
