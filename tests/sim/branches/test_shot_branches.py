@@ -231,6 +231,7 @@ def test_a_level_that_is_none_is_refused(amplitudes, frequencies):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.1", "power:7", "rigid:0.9"])
 def test_fifty_random_points_of_each_law_come_back(contact):
     specimen = gong2025(contact=contact)

@@ -48,5 +48,5 @@ def test_an_impossible_number_of_cells_is_refused_in_one_sentence(cells):
 def test_rigid_stops_are_refused_and_the_cell_is_named():
     soft = gong2025()
     rigid = Specimen(soft.masses, soft.stiffnesses, soft.dampings, soft.gap_m, RigidStops(0.8))
-    with pytest.raises(ValueError, match=r"^Cell 2 has rigid stops, .* use HuntCrossley\.$"):
+    with pytest.raises(ValueError, match=r"^Cell 2 has rigid stops, .* such as hunt_crossley:0\.5\.$"):
         Chain((soft, rigid))

@@ -12,6 +12,7 @@ from vibench.sim import (
     Hertz,
     HuntCrossley,
     LinearGap,
+    LinearSweep,
     Outcome,
     PowerLaw,
     Sampled,
@@ -290,10 +291,15 @@ def test_a_motion_too_large_for_any_statement_ends_as_not_finite():
         ({"duration_s": 1.0, "start_time_s": -1.0}, r"^Start time -1\.0 s is not allowed: .*\.$"),
         ({"duration_s": 1.0, "sample_rate_hz": 0.0}, r"^Sample rate 0\.0 Hz is not allowed: .*\.$"),
         ({"duration_s": 1.0, "max_impact_rate_hz": -1.0}, r"^Impact rate -1\.0 Hz is not allowed: .*\.$"),
+        ({"duration_s": 1e12}, r"^1e\+12 s of 2 cells are not allowed: .* 1e\+10 are the most; .*\.$"),
+        (
+            {"duration_s": 1.0, "drive": LinearSweep(100.0, 1e12, 1.0, 1e-6)},
+            r"^1 s of 2 cells are not allowed",
+        ),
         ({"duration_s": 1.0, "initial_state": np.zeros(6)}, r"shape \(6,\) is not allowed: .*\(2, 6\)\.$"),
         ({"duration_s": 1.0, "initial_state": np.full((2, 6), np.nan)}, r"is not allowed: give finite"),
     ],
 )
 def test_what_is_not_allowed_is_refused_in_one_sentence(options, sentence):
     with pytest.raises(ValueError, match=sentence):
-        integrate_chain(chain_of(gong2025(), 2), HARD, **options)
+        integrate_chain(chain_of(gong2025(), 2), **{"drive": HARD, **options})

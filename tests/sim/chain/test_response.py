@@ -96,6 +96,14 @@ def test_a_run_that_does_not_reach_its_end_has_no_response():
     assert np.all(np.isnan(response.response_ii))
 
 
+@pytest.mark.parametrize(("drive", "duration_s"), [(PERIODIC, 1e12), (Harmonic(1e10, 1e-6), 2.0)])
+def test_a_run_of_more_windows_than_anybody_waits_for_is_refused(drive, duration_s):
+    with pytest.raises(
+        ValueError, match=r"^[\de+]+ s of 2 cells are not allowed: they take .* shorten the run"
+    ):
+        chain_response(chain_of(gong2025(), 2), drive, duration_s=duration_s, window_s=1.0)
+
+
 @pytest.mark.parametrize(
     ("drive", "window_s", "sentence"),
     [

@@ -97,14 +97,16 @@ def _steady(chain: Chain, request: ChainRequest, drive: Harmonic) -> ChainRun:
     """Responses are observed in a run from rest; energies and the picture over some time after it."""
     whole_s = request.settle_s + request.duration_s
     found = chain_response(chain, drive, request.accuracy, whole_s, request.duration_s)
+    if found.outcome is not Outcome.REACHED_END:
+        return _lost(chain, found.outcome, found.impacts, whole_s, drive.frequency_hz)
     after_s = min(request.duration_s, ENERGY_S)
     after_s = max(1.0, math.floor(after_s * drive.frequency_hz)) / drive.frequency_hz
     run = integrate_chain(
         chain, drive, after_s, request.accuracy, found.final_state,
         _rate_hz(chain, drive.frequency_hz, after_s), start_time_s=whole_s,
     )  # fmt: skip
-    if max(found.outcome, run.outcome) is not Outcome.REACHED_END:
-        return _lost(chain, max(found.outcome, run.outcome), found.impacts, whole_s, drive.frequency_hz)
+    if run.outcome is not Outcome.REACHED_END:
+        return _lost(chain, run.outcome, found.impacts, whole_s, drive.frequency_hz)
     exponent = error = math.nan
     if request.exponent_s > 0.0:
         growth = chain_lyapunov_exponent(

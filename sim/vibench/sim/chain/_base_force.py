@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..flight import SERIES_TERMS
 from ..kernels import Complex, Table, Vector, inlined, kernel_without_refcount, time_until
-from ..model import LinearSweep, LogarithmicSweep, Sampled, Specimen
+from ..model import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled, Specimen
 from ..motion import sampled_motion
 from ._cell_flow import MOMENTS, WINDOW_TURN
 from ._tables import PATH, ChainTables
@@ -48,6 +48,16 @@ def with_pieces(
         if until >= end_s:
             return
         begin = stop
+
+
+def longest_window_s(tables: ChainTables, drive: Drive) -> float:
+    """Give the most time that a window may take: none reaches beyond a piece of the drive."""
+    window = float(tables.windows[0])
+    match drive:
+        case Harmonic():
+            return window
+        case _:
+            return min(window, _grid(tables, drive)[0])
 
 
 def _grid(tables: ChainTables, drive: BaseDrive) -> tuple[float, int]:

@@ -35,7 +35,10 @@ class Chain:
         for place, cell in enumerate(self.cells, start=1):
             match cell.contact:
                 case RigidStops():
-                    msg = f"Cell {place} has rigid stops, which a chain cannot follow: use HuntCrossley."
+                    msg = (
+                        f"Cell {place} has rigid stops, which a chain cannot follow: take stops that yield, "
+                        "such as hunt_crossley:0.5."
+                    )
                     raise ValueError(msg)
                 case _:
                     pass

@@ -19,7 +19,7 @@ from ..motion import (
     check_within,
     integrate,
 )
-from ._base_force import PIECE_TERMS, with_pieces
+from ._base_force import PIECE_TERMS, longest_window_s, with_pieces
 from ._cell_contact import begin_pressing
 from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
 from ._chain import MASSES_PER_CELL, Chain
@@ -28,6 +28,10 @@ from ._run import IMPACTS, NEXT_SAMPLE, ChainRecord, advance_chain, chain_cells
 from ._tables import OBSERVED, PATH, ChainTables, chain_tables
 from ._windows import drive_term, fill_observed, law_of
 
+MOST_CELL_WINDOWS = 10**10
+"""Windows of a run times its cells: hours."""
+MOST_IMPACTS = 1 << 26
+"""As of one specimen: beyond, their times fill the memory."""
 STATES_PER_CELL = 2 * MASSES_PER_CELL
 """x, y, z, vx, vy, vz."""
 
@@ -104,7 +108,7 @@ def integrate_chain(
     Raises
     ------
     ValueError
-        When an argument is not allowed, or the drive is over before the run is.
+        When an argument is not allowed, the run would take hours, or the drive is over before the run is.
 
     """
     accuracy = chosen(Accuracy, accuracy)
@@ -118,6 +122,7 @@ def integrate_chain(
         return _of_one(run)
     harmonic = drive if isinstance(drive, Harmonic) else Harmonic(1.0, 0.0)
     tables = chain_tables(chain, harmonic, accuracy)
+    check_work(chain, duration_s, longest_window_s(tables, drive))
     cells, phasors = start_chain(chain, initial_state, start_time_s, tables, accuracy)
     clock, end = clock_at(start_time_s), start_time_s + duration_s
     record = new_chain_record(chain, start_time_s, duration_s, sample_rate_hz, max_impact_rate_hz)
@@ -127,6 +132,18 @@ def integrate_chain(
         if code != Outcome.REACHED_END:
             break
     return _trajectory(chain, phasors, float(clock[0]), tables, record, Outcome(code), accuracy)
+
+
+def check_work(chain: Chain, duration_s: float, window_s: float) -> None:
+    """Refuse a run of more windows, each ``window_s`` at most, than anybody waits for."""
+    work = duration_s / window_s * chain.size
+    if work > MOST_CELL_WINDOWS:
+        msg = (
+            f"{duration_s:g} s of {chain.size} cells are not allowed: they take {work:.2g} windows of "
+            f"{window_s:.2g} s, one for each cell, and {MOST_CELL_WINDOWS:.0e} are the most; shorten the "
+            "run, or lower the highest frequency of drive and cells."
+        )
+        raise ValueError(msg)
 
 
 def _batches(
@@ -210,7 +227,7 @@ def new_chain_record(
 ) -> ChainRecord:
     """Make what a run fills: room for its samples and for the impacts that are allowed."""
     count = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
-    impacts = chain.size * (math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS)
+    impacts = min(chain.size * (math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS), MOST_IMPACTS)
     return ChainRecord(
         start=start_s,
         sample_rate=1.0 if sample_rate_hz is None else sample_rate_hz,

@@ -16,8 +16,16 @@ from ..exponents import BlockedMean, blocked_mean
 from ..kernels import Floats, Table, clock_at
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
 from ..motion import MAX_IMPACT_RATE_HZ
+from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
-from ._integrate import integrate_chain, new_chain_record, new_observations, start_chain, state_of_phasors
+from ._integrate import (
+    check_work,
+    integrate_chain,
+    new_chain_record,
+    new_observations,
+    start_chain,
+    state_of_phasors,
+)
 from ._observer import NOTHING
 from ._run import IMPACTS, advance_chain
 from ._tables import ChainTables, chain_tables
@@ -77,7 +85,8 @@ def chain_lyapunov_exponent(
     Raises
     ------
     ValueError
-        When an argument is not allowed, or the duration holds too few intervals for an error.
+        When an argument is not allowed, the run would take hours, or the duration holds too few intervals
+        for an error.
 
     """
     accuracy = chosen(Accuracy, accuracy)
@@ -89,10 +98,13 @@ def chain_lyapunov_exponent(
             f"it must be finite and hold {FEWEST_INTERVALS} intervals of {interval_s} s."
         )
         raise ValueError(msg)
+    tables = chain_tables(chain, drive, accuracy)
+    # Two motions; one cell goes by windows here, too.
+    check_work(chain, 2.0 * intervals * interval_s, longest_window_s(tables, drive))
     settled = integrate_chain(
         chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz
     )
-    pair = _Pair(chain, chain_tables(chain, drive, accuracy), accuracy, max_impact_rate_hz)
+    pair = _Pair(chain, tables, accuracy, max_impact_rate_hz)
     first = settled.final_state
     second = _put_near(chain, first, first + np.random.default_rng(seed).normal(size=first.shape), drive)
     growths, impacts, outcome = [], 0, settled.outcome

@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from ..kernels import Complex, Floats, clock_at
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
 from ..motion import MAX_IMPACT_RATE_HZ, Response, steady_response, whole_periods
+from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import (
+    check_work,
     impacts_of,
     new_chain_record,
     new_observations,
@@ -87,7 +89,8 @@ def chain_response(
     Raises
     ------
     ValueError
-        When the drive has no amplitude, or the window is longer than the run or shorter than one period.
+        When the drive has no amplitude, the window is longer than the run or shorter than one period, or the
+        run would take hours.
 
     """
     accuracy = chosen(Accuracy, accuracy)
@@ -100,6 +103,7 @@ def chain_response(
         return _of_one(cell, one)
     periods = whole_periods(drive, duration_s, window_s)
     tables = chain_tables(chain, drive, accuracy)
+    check_work(chain, duration_s, longest_window_s(tables, drive))
     cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)
     clock, line_s = clock_at(0.0), periods / drive.frequency_hz
     record = new_chain_record(chain, 0.0, duration_s, None, max_impact_rate_hz)
