@@ -7,7 +7,7 @@ import sqlite3
 import pytest
 
 from vibench.acquisition import RecordingError
-from vibench.acquisition.campaign import JournalPointState, ReasonCode, read_journal
+from vibench.acquisition.campaign import JournalPointState, ReasonCode, list_recordings, read_journal
 from vibench.acquisition.campaign._bench_identity import BenchIdentity
 from vibench.acquisition.campaign._journal import Journal, journal_path
 from vibench.acquisition.campaign._journal_database import is_begun
@@ -125,3 +125,37 @@ def test_what_is_no_journal_or_a_newer_one_is_refused(journal, tmp_path):
     plain.close()
     with pytest.raises(RecordingError, match="newer version"):
         Journal.open(journal.path)
+
+
+@pytest.fixture
+def connections(monkeypatch):
+    """Every connection to a database that is made."""
+    made, connect = [], sqlite3.connect
+    monkeypatch.setattr(sqlite3, "connect", lambda *at, **how: made.append(connect(*at, **how)) or made[-1])
+    return made
+
+
+def opened(path):
+    with Journal.open(path):
+        pass
+
+
+@pytest.mark.parametrize("use", [opened, is_begun, read_journal, lambda path: list_recordings(path.parent)])
+def test_a_file_that_is_refused_is_let_go(connections, tmp_path, use):
+    path = tmp_path / "catalogue.sqlite"
+    path.write_text("no database " * 100)
+    with pytest.raises(RecordingError) as caught:
+        use(path)
+    assert "catalogue.sqlite" in str(caught.value)
+    assert connections
+    for connection in connections:
+        with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+            connection.execute("SELECT 1")
+
+
+def test_a_journal_that_cannot_be_begun_is_let_go(journal, connections):
+    with pytest.raises(RecordingError, match="already exists"):
+        Journal.begin(journal.path, CAMPAIGN, journal.bench)
+    (connection,) = connections
+    with pytest.raises(sqlite3.ProgrammingError, match="closed"):
+        connection.execute("SELECT 1")

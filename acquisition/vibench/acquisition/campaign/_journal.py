@@ -16,7 +16,15 @@ from ..errors import RecordingError
 from ..host import ClosedOnLeaving
 from ..plan import Campaign, Point
 from ._bench_identity import BenchIdentity
-from ._journal_database import SCHEMA, VERSION, brought_up, connected, require_version, sentences
+from ._journal_database import (
+    SCHEMA,
+    VERSION,
+    brought_up,
+    closed_on_error,
+    connected,
+    require_version,
+    sentences,
+)
 from ._journal_point import JournalPoint, JournalPointState, points_of
 from ._point_outcome import ReasonCode
 
@@ -38,9 +46,9 @@ class Journal(ClosedOnLeaving):
     @classmethod
     def begin(cls, path: Path, campaign: Campaign, bench: BenchIdentity) -> Self:
         """Write down the whole plan, in one transaction, before anything is done."""
-        journal = cls(path, connected(path))
         points = campaign.points()
-        with journal._transaction() as connection:
+        journal = cls(path, connected(path))
+        with closed_on_error(journal._connection), journal._transaction() as connection:
             for statement in filter(str.strip, SCHEMA.split(";")):
                 connection.execute(statement)
             facts = {
@@ -60,15 +68,11 @@ class Journal(ClosedOnLeaving):
 
         Raises RecordingError when the file is no journal, or of a newer version.
         """
-        connection = connected(path)
-        try:
+        with closed_on_error(connected(path)) as connection:
             require_version(path, connection)
             with sentences(path):
                 brought_up(connection)
-        except RecordingError:
-            connection.close()
-            raise
-        return cls(path, connection)
+            return cls(path, connection)
 
     @property
     def campaign(self) -> Campaign:

@@ -75,8 +75,7 @@ def is_begun(path: Path) -> bool:
 
 def connected(path: Path) -> sqlite3.Connection:
     """Open a database to write, so that what it has committed survives a kill and a power cut."""
-    with sentences(path):
-        connection = opened(path.resolve().as_uri())
+    with sentences(path), closed_on_error(opened(path.resolve().as_uri())) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
@@ -90,17 +89,27 @@ def opened(uri: str) -> sqlite3.Connection:
     return connection
 
 
+@contextmanager
+def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+    """Let the file go when a new connection is of no use: Windows lets nobody move or delete an open one."""
+    try:
+        yield connection
+    except BaseException:
+        connection.close()
+        raise
+
+
 def opened_to_look(path: Path) -> sqlite3.Connection:
     """Open a database to read it, also where nothing may be written."""
     address = path.resolve().as_uri()
     try:
         # One that may write tidies up behind itself when it was the last to look.
-        connection = opened(f"{address}?mode=rw")
-        connection.execute("PRAGMA query_only = ON")
-        connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+        with closed_on_error(opened(f"{address}?mode=rw")) as connection:
+            connection.execute("PRAGMA query_only = ON")
+            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+            return connection
     except sqlite3.OperationalError:
         return opened(f"{address}?mode=ro")
-    return connection
 
 
 def brought_up(connection: sqlite3.Connection) -> None:
