@@ -12,7 +12,7 @@ from vibench.acquisition import (
     run_campaign,
     run_measurement,
 )
-from vibench.acquisition.campaign import AfterFailure, ExistingRecordings, PointOutcome, _opening
+from vibench.acquisition.campaign import AfterFailure, ExistingRecordings, PointOutcome, _attempts, _opening
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState
 from vibench.acquisition.recording import RecordingState
@@ -65,6 +65,21 @@ def test_a_point_and_its_repeats_are_held_against_the_limits_once(bench, tmp_pat
         bench, Campaign(name="c", measurements=(repeated, CAMPAIGN.measurements[1])), tmp_path / "out"
     )
     assert [each.name for each in checked] == ["one", "two"]
+
+
+def test_a_recording_may_be_moved_as_soon_as_it_is_complete(bench, tmp_path, monkeypatch):
+    def measured_and_moved(*arguments, **named):
+        outcome = run_measurement(*arguments, **named)
+        if outcome.path.name == "two.h5":
+            outcome.path.rename(tmp_path / "elsewhere.h5")
+        return outcome
+
+    monkeypatch.setattr(_attempts, "run_measurement", measured_and_moved)
+    point_results = run_campaign(bench, CAMPAIGN, tmp_path / "out")
+    assert [each.outcome for each in point_results] == [PointOutcome.RECORDED] * 3
+    monkeypatch.undo()
+    again = run_campaign(bench, CAMPAIGN, tmp_path / "out", existing=ExistingRecordings.RESUME)
+    assert [each.outcome for each in again] == [PointOutcome.KEPT, PointOutcome.RECORDED, PointOutcome.KEPT]
 
 
 def test_every_measurement_becomes_one_complete_recording(bench, tmp_path):

@@ -219,7 +219,9 @@ def _seal_of(path: Path) -> str:
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:
-    """Say which inputs were near full scale while it counted; empty when none was."""
+    """Say which inputs were near full scale while it counted; empty when none was, or it is gone."""
+    if not path.exists():  # a complete recording belongs to the user, who may have moved it already
+        return ""
     with open_recording(path) as recording:
         counting = [each for each in recording.segments if each.label in labels]
         roles = {
