@@ -188,7 +188,7 @@ def _resonance(
             f"--resonance {resonance} goes over the level; give --amplitude START:STOP beside it, and "
             "neither --frequency nor --like"
         )
-    band = range_of(resonance, Parameter.FREQUENCY, (2,))
+    band = range_of(resonance, Parameter.FREQUENCY, (2,), "resonance")
     levels = range_of(amplitude, Parameter.AMPLITUDE, (2,))
     return (), {
         "along": Parameter.AMPLITUDE,

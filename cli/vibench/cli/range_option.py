@@ -30,8 +30,10 @@ class Range:
     step: float | None = None
 
 
-def range_of(text: str, parameter: Parameter, parts: tuple[int, ...]) -> Range:
+def range_of(text: str, parameter: Parameter, parts: tuple[int, ...], option: str | None = None) -> Range:
     """Read ``260``, ``50:600`` or ``50:600:1``, whichever numbers of parts are allowed.
+
+    ``option`` names it where it is not called as its parameter.
 
     Raises InvalidRequest when it is none of them.
     """
@@ -39,7 +41,9 @@ def range_of(text: str, parameter: Parameter, parts: tuple[int, ...]) -> Range:
         return Range(*_rising(text, parts))
     except ValueError as error:
         allowed = " or ".join(_EXAMPLES[parameter][part] for part in parts)
-        raise InvalidRequest(f"--{parameter.value} was given as {text!r}: {error}; give {allowed}") from error
+        raise InvalidRequest(
+            f"--{option or parameter.value} was given as {text!r}: {error}; give {allowed}"
+        ) from error
 
 
 def _rising(text: str, parts: tuple[int, ...]) -> list[float]:

@@ -86,7 +86,13 @@ def test_what_branches_cannot_be_asked_is_refused_in_a_sentence(options, said):
 
 
 @pytest.mark.parametrize(
-    ("options", "said"), [({"start": 9.0, "stop": 8.0}, "does not ascend"), ({"step": 1e-9}, "at most 20000")]
+    ("options", "said"),
+    [
+        ({"start": 9.0, "stop": 8.0}, "does not ascend"),
+        ({"step": 1e-9}, "at most 20000"),
+        ({"duration_s": 1e12}, "duration_s\n.*less than or equal to 100000"),
+        ({"settle_s": 1e12}, "settle_s\n.*less than or equal to 100000"),
+    ],
 )
 def test_what_exponents_cannot_be_asked_is_refused_in_a_sentence(options, said):
     with pytest.raises(ValidationError, match=said):

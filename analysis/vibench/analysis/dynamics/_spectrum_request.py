@@ -14,6 +14,8 @@ from ..tables import plain
 from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
+LONGEST_S = 1e5
+"""Of an average: its intervals are kept, some hundreds of megabytes of them."""
 ROUNDING = 1e-9
 """A step that fits into the range but for rounding fits."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
@@ -37,9 +39,9 @@ class SpectrumRequest(SpecimenChoice):
     """Between neighbouring points, in Hz or in m."""
     accuracy: Accuracy = Accuracy.REFERENCE
     """Of contacts; the sum of the exponents is as exact."""
-    duration_s: PositiveFloat = 25.0
+    duration_s: Annotated[float, Field(gt=0.0, le=LONGEST_S)] = 25.0
     """Over which exponents are averaged."""
-    settle_s: Annotated[float, Field(ge=0.0)] = 5.0
+    settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = 5.0
     """Left out before, from rest."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
     """Of the intervals."""
