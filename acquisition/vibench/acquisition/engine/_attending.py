@@ -28,25 +28,37 @@ class _Program:
 
     def __init__(self) -> None:
         self._folder = Path(f"/proc/{os.getppid()}")
-        self._sign_s = (monotonic(), self._waiting_s)
+        self._lived_s, self._own_s = monotonic(), 0.0
+        self._seen_s = (self._lived_s, self._lived_s, self._worked_s)
         Thread(target=self._follow, name="follow program", daemon=True).start()
 
-    @property
     def still_s(self) -> float:
-        """For how long it has given no sign of life, without its main thread's wait for a processor [s]."""
-        lived_s, waited_s = self._sign_s  # before the clock is read: the next one may come in between
-        passed_s = monotonic() - lived_s
-        return max(passed_s - max(0.0, self._waiting_s - waited_s), LEAST_OWN * passed_s)
+        """Look for how long it has given no sign of life, without its main thread's wait for a processor [s].
+
+        That thread either works or waits while it could run; Linux tells of a wait when it is over, too late.
+        """
+        lived_s = self._lived_s  # before the clock is read: the next sign may come in between
+        now_s, worked_s = monotonic(), self._worked_s
+        seen_s, lived_then_s, worked_then_s = self._seen_s
+        self._seen_s = (now_s, lived_s, worked_s)
+        if lived_s != lived_then_s:
+            self._own_s = 0.0
+        passed_s = now_s - max(seen_s, lived_s)
+        self._own_s += min(passed_s, worked_s - worked_then_s) if self._state == "R" else passed_s
+        return max(self._own_s, LEAST_OWN * (now_s - lived_s))
 
     @property
     def is_stopped(self) -> bool:
         """Whether the system keeps it from running."""
-        return self._told("stat").rpartition(") ")[2].startswith(STOPPED)
+        return self._state in STOPPED
 
     @property
-    def _waiting_s(self) -> float:
-        _, waited_ns, *_ = [*self._told("schedstat").split(), "0", "0"]
-        return 1e-9 * int(waited_ns)
+    def _state(self) -> str:
+        return self._told("stat").rpartition(") ")[2][:1]
+
+    @property
+    def _worked_s(self) -> float:
+        return 1e-9 * int((self._told("schedstat").split() or ["0"])[0])
 
     def _told(self, name: str) -> str:
         try:
@@ -56,7 +68,7 @@ class _Program:
 
     def _follow(self) -> None:
         while os.read(sys.stdin.fileno(), 65536):
-            self._sign_s = (monotonic(), self._waiting_s)
+            self._lived_s = monotonic()
         os._exit(0)  # whatever the other thread waits for
 
 
@@ -69,7 +81,7 @@ def main() -> None:
         _exchange(connection, told["hello"])
         while True:
             if not program.is_stopped:
-                _exchange(connection, json.dumps({"ask": "beat", "still_s": program.still_s}))
+                _exchange(connection, json.dumps({"ask": "beat", "still_s": program.still_s()}))
             clock.wait(BEAT_S)
 
 
