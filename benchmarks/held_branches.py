@@ -1,24 +1,57 @@
 """Branches of the virtual rig held by its real-time controller, beside those of the model.
 
     python benchmarks/held_branches.py [--noise 10] [--wrong 1.1] [--latency 5e-4] [--seed 1] [--out DIR]
+    python benchmarks/held_branches.py --stops
+    python benchmarks/held_branches.py --latencies 0.3,1,1.2,1.5,2 --draw docs/images/held_latency.png
 
 Follows the branch of campaigns/branch.toml on the virtual rig with a controller, every noise of its
 virtual section times ``--noise``, and prints how far what was measured lies from the model's branch. With
 ``--wrong`` the host believes in springs stiffer and a coil stronger by that factor than those that move.
+
+With ``--stops`` the specimen is the paper's, and the branch one with impacts, begun from above.
+
+With ``--latencies`` [ms] each branch is begun though the loop would not hold it (the refusal is taken out
+here), and where it was lost is printed beside where the loop's largest multiplier passes one by the model.
 """
 
 import argparse
 import tempfile
 import time
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from vibench.acquisition import load_campaign, open_bench, open_recording, run_measurement
+from vibench.acquisition import (
+    AcquisitionError,
+    load_campaign,
+    open_bench,
+    open_recording,
+    run_measurement,
+)
+from vibench.acquisition.control import _continuation_controller
+from vibench.acquisition.excitation import BaseLevel
 from vibench.acquisition.plan import BranchContinuation
 from vibench.acquisition.recording import BranchEndNote, BranchPointNote, feedback_note
-from vibench.acquisition.rig import Rig, confirm_simulated, load_rig, specimen_of
+from vibench.acquisition.rig import (
+    Rig,
+    amplifier_of,
+    confirm_simulated,
+    load_rig,
+    shaker_of,
+    specimen_of,
+)
+from vibench.analysis.figures._style import MEASURED, SIMULATED, new_figure, styled
+from vibench.sim import Specimen
+from vibench.sim.feedback import (
+    Begin,
+    LoopTiming,
+    SampledPlant,
+    designed_law,
+    impact_branch,
+    loop_multipliers,
+)
 from vibench.sim.periodic import (
     Branch,
     FrequencyPath,
@@ -108,6 +141,133 @@ def compare(points: list[BranchPointNote], branch: Branch, level_m: float) -> No
         print(f"{name}: {len(points[held])} points, m0 within {max(away, default=0.0):.2%}")
 
 
+STOPS = BranchContinuation(
+    amplitude_vpp=4.0, base_level=BaseLevel(displacement_m=1e-6), start_hz=97.5, low_hz=96.9, high_hz=100.0,
+    begin_from="above", step_hz=0.25, harmonics=7, record_s=0.3,
+)  # fmt: skip
+
+
+def compare_stops(points: list[BranchPointNote], specimen: Specimen) -> None:
+    """Print how far motions with impacts lie from the model's, and how unstable those are."""
+    level_m = STOPS.base_level.displacement_m
+    range_hz = STOPS.low_hz - 0.4, STOPS.high_hz
+    branch = impact_branch(specimen, level_m, STOPS.start_hz, range_hz, Begin.ABOVE)
+    fold = next(each for each in branch.events if each.kind.value == "fold")
+    hertz = np.array([each.frequency_hz for each in points])
+    turn = int(np.argmax(hertz))
+    print(
+        f"points {len(points)}, looks {sum(each.tries for each in points)}; "
+        f"behind the fold {len(points) - turn - 1}"
+    )
+    print(f"fold held {hertz[turn]:.3f} Hz, model {fold.frequency_hz:.3f} Hz")
+    print(f"base over its level: within {max(abs(each.base_m / level_m - 1) for each in points):.2%}")
+    print(
+        f"harmonics of the base: displacement {max(each.residue for each in points):.2%}, "
+        f"acceleration {max(each.residue_acceleration for each in points):.1%}"
+    )
+    behind = slice(fold.index + 1, None)
+    f, sizes = branch.frequencies_hz[behind][::-1], np.abs(branch.multipliers[behind, 0])[::-1]
+    ratio = branch.response_ii[behind, 0][::-1]
+    rows = [
+        (
+            each.m0_m / level_m / np.interp(each.frequency_hz, f, ratio) - 1,
+            np.interp(each.frequency_hz, f, sizes),
+        )
+        for each in points[turn + 1 :]
+    ]
+    print(
+        f"unstable: m0 within {max(abs(away) for away, _ in rows):.1%}, multipliers by the model "
+        f"{min(size for _, size in rows):.3g} to {max(size for _, size in rows):.3g}"
+    )
+
+
+def lost_at(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
+    """Follow the branch beyond its first fold at a latency; give the highest frequency held, and the end."""
+    measurement = load_campaign("branch").measurements[0]
+    plan = measurement.excitation.model_copy(update={"step_hz": 2.0, "most_points": 24})
+    controller = rig.controller.model_copy(update={"latency_s": latency_s})
+    with open_bench(rig.model_copy(update={"controller": controller}), confirm=confirm_simulated) as bench:
+        path = folder / f"late_{1e6 * latency_s:.0f}us.h5"
+        try:
+            run_measurement(bench, measurement.model_copy(update={"excitation": plan}), path)
+        except AcquisitionError as error:
+            ended = f"{error}".partition(". ")[0]
+        else:
+            ended = "the branch was followed"
+    with open_recording(next(folder.glob(f"{path.stem}*"))) as recording:
+        notes = [feedback_note(event) for event in recording.events]
+    hertz = [each.frequency_hz for each in notes if isinstance(each, BranchPointNote)]
+    return max(hertz, default=plan.start_hz), ended
+
+
+def multipliers_at(rig: Rig, branch: Branch, latency_s: float) -> np.ndarray:
+    """Give the largest multiplier of the loop at each motion of the model's branch."""
+    table = amplifier_of(rig), shaker_of(rig), specimen_of(rig)
+    plant = SampledPlant(*table, LoopTiming(rig.controller.rate_hz, latency_s))
+    law, spring = designed_law(plant), spring_of(plant.specimen)
+    found = []
+    for frequency_hz, amplitude_m in zip(
+        branch.frequencies_hz, branch.response_ii[:, -1] * branch.amplitudes_m, strict=True
+    ):
+        count = round(10 * rig.controller.rate_hz / frequency_hz)
+        p = amplitude_m * np.cos(20 * np.pi * np.arange(count) / count)
+        found.append(float(loop_multipliers(plant, law, [spring.stiffness(p, p)], 10)[0]))
+    return np.array(found)
+
+
+def late(latencies_ms: list[float], draw: Path | None, folder: Path) -> None:
+    """Print and draw where branches are lost, beside where the model loses them."""
+    rig = load_rig(Path("virtual_rig_controller"))
+    branch = model_of(rig, load_campaign("branch").measurements[0].excitation)
+    fold = next(each.index for each in branch.events if each.kind.value == "fold")
+    leg = slice(0, fold + 1, max(1, fold // 40))
+    up = replace(
+        branch,
+        **{name: getattr(branch, name)[leg] for name in ("frequencies_hz", "response_ii", "amplitudes_m")},
+    )
+    # A host refuses these plans; what happens otherwise is what is measured here.
+    _continuation_controller.require_held = lambda *_: None
+    rows = []
+    for each in latencies_ms:
+        held_hz, ended = lost_at(rig, 1e-3 * each, folder)
+        multipliers = multipliers_at(rig, up, 1e-3 * each)
+        beyond = np.flatnonzero(multipliers > 1)
+        model_hz = float(up.frequencies_hz[beyond[0]]) if beyond.size else np.nan
+        rows.append((each, held_hz, model_hz, multipliers.max()))
+        print(
+            f"{each:g} ms: held to {held_hz:.5g} Hz ({ended}); by the model to {model_hz:.5g} Hz, "
+            f"largest multiplier {multipliers.max():.3g}",
+            flush=True,
+        )
+    if draw is not None:
+        picture(np.array(rows), float(up.frequencies_hz.max()), draw)
+
+
+def picture(rows: np.ndarray, fold_hz: float, path: Path) -> None:
+    """Draw frequency of the loss over latency, held and by the model."""
+    with styled():
+        figure = new_figure(3.2)
+        left, right = figure.subplots(1, 2)
+        lost = np.isnan(rows[:, 2])
+        left.plot(
+            rows[:, 0],
+            np.where(lost, fold_hz, rows[:, 2]),
+            color=SIMULATED,
+            linestyle="--",
+            label="model: multiplier of the loop 1",
+        )
+        left.plot(rows[:, 0], rows[:, 1], color=MEASURED, marker="o", linestyle="none", label="held up to")
+        left.axhline(fold_hz, color="0.6", linewidth=0.8)
+        left.set_xlabel("latency [ms]")
+        left.set_ylabel("drive frequency [Hz]")
+        left.legend(frameon=False)
+        right.plot(rows[:, 0], rows[:, 3], color=SIMULATED, linestyle="--", marker=".")
+        right.axhline(1.0, color="0.6", linewidth=0.8)
+        right.set_xlabel("latency [ms]")
+        right.set_ylabel("largest multiplier to the fold, model")
+        figure.savefig(path, dpi=150)
+
+
 def main() -> None:
     """Follow, compare, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -116,9 +276,19 @@ def main() -> None:
     parser.add_argument("--latency", type=float)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--stops", action="store_true")
+    parser.add_argument("--latencies", type=lambda text: [float(each) for each in text.split(",")])
+    parser.add_argument("--draw", type=Path)
     given = parser.parse_args()
+    if given.latencies:
+        with tempfile.TemporaryDirectory() as temporary:
+            late(given.latencies, given.draw, Path(temporary))
+        return
     true = changed(load_rig(Path("virtual_rig_controller")), given.noise, given.seed, given.latency)
     measurement = load_campaign("branch").measurements[0]
+    if given.stops:
+        true = true.model_copy(update={"specimen": load_rig(Path("virtual_rig")).specimen})
+        measurement = measurement.model_copy(update={"excitation": STOPS})
     plan = measurement.excitation
     with ExitStack() as stack:
         folder = given.out or Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -138,6 +308,9 @@ def main() -> None:
     )
     print("; ".join(each.end.value for each in notes if isinstance(each, BranchEndNote)))
     points = [each for each in notes if isinstance(each, BranchPointNote)]
+    if given.stops:
+        compare_stops(points, specimen_of(true))
+        return
     compare(points, model_of(true, plan), plan.base_level.displacement_m)
 
 

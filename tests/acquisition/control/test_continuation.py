@@ -13,6 +13,7 @@ from vibench.acquisition.instruments import LoopState
 from vibench.acquisition.plan import BranchContinuation, Measurement, RunState
 from vibench.acquisition.recording import BranchEnd, BranchEndNote, BranchPointNote, feedback_note
 from vibench.acquisition.rig import ControllerConfig, confirm_simulated, specimen_of
+from vibench.sim.feedback import Begin, impact_branch
 from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
 from vibench.virtual_rig import VirtualRig
 
@@ -154,6 +155,29 @@ def test_motions_near_grazing_are_refused_with_their_growth_time(rig):
     plan = plan.model_copy(update={"base_level": BaseLevel(displacement_m=3e-6)})
     with pytest.raises(LimitExceeded, match=r"grows by e in .* ms, and a loop with 0.3 ms of latency"):
         require_held(fast, plan)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_motions_with_impacts_are_held_behind_their_fold(rig, tmp_path):
+    """The paper's specimen: begun from above, at least 10 unstable motions, up to a multiplier of 2."""
+    stops = hardening(rig).model_copy(update={"specimen": rig.specimen})
+    plan = continuation(
+        start_hz=97.5, low_hz=96.9, high_hz=100, begin_from="above", step_hz=0.25, harmonics=7
+    ).model_copy(update={"base_level": BaseLevel(displacement_m=1e-6)})
+    points, notes = followed(stops, plan, tmp_path / "stops.h5")
+    assert notes[-1].end is BranchEnd.RANGE, notes
+    branch = impact_branch(specimen_of(stops), 1e-6, 97.5, (96.8, 100.0), Begin.ABOVE)
+    fold = next(each for each in branch.events if each.kind.value == "fold")
+    hertz = np.array([each.frequency_hz for each in points])
+    turn = int(np.argmax(hertz))
+    assert hertz[turn] == pytest.approx(fold.frequency_hz, abs=0.1)
+    behind = points[turn + 1 :]
+    f, sizes = branch.frequencies_hz[fold.index + 1 :][::-1], np.abs(branch.multipliers[fold.index + 1 :, 0])
+    held = np.interp([each.frequency_hz for each in behind], f, sizes[::-1])
+    assert np.count_nonzero(held > 1) >= 10
+    assert held.max() > 1.9
+    assert all(each.base_m == pytest.approx(1e-6, rel=0.005) for each in behind)
 
 
 NOISES = ("generator_noise_v", "amplifier_noise_v", "accelerometer_noise_m_per_s2")

@@ -8,10 +8,12 @@ import pytest
 
 from vibench.sim import Harmonic, gong2025, integrate
 from vibench.sim.feedback import (
+    Begin,
     LinearLaw,
     LoopTiming,
     SampledPlant,
     designed_law,
+    impact_branch,
     loop_multipliers,
     loop_transfer,
 )
@@ -138,3 +140,11 @@ def test_what_is_played_moves_the_base_as_the_transfer_says():
     tail = slice(-10_240, None)
     found = 2 * np.mean(np.array(shown[tail]) * np.array(turns[tail]))
     assert found == pytest.approx(loop_transfer(model, law, 130.0), rel=1e-3)
+
+
+@pytest.mark.parametrize(("begin", "ratio"), [(Begin.REST, 0.42), (Begin.ABOVE, 2.79)])
+def test_a_branch_among_stops_is_the_one_of_the_side_from_which_its_level_is_met(begin, ratio):
+    branch = impact_branch(gong2025(), 1e-6, 97.5, (97.4, 97.6), begin)
+    at = np.argmin(np.abs(branch.frequencies_hz - 97.5))
+    assert branch.response_ii[at, 0] == pytest.approx(ratio, rel=0.02)
+    assert np.abs(branch.multipliers[at, 0]) < 1

@@ -1,5 +1,6 @@
 """Following a branch with a fast loop: predicted along the arc, corrected until the base is a sine."""
 
+from dataclasses import replace
 from math import degrees
 
 import numpy as np
@@ -33,6 +34,11 @@ _PROBES = (-0.05, -0.05)
 """Changes of frequency and first coefficient by which both are probed, in steps."""
 _BELOW = 5.0
 """Steps of the first coefficient below the model's from which it is raised."""
+_ABOVE = 8.0
+"""Those above it from which it is lowered: a factor of three."""
+_LOWERED, _CALM = 0.3, 0.03
+"""Steps by which it is lowered at most, and harmonics of the base, over its level, above which it is not:
+a motion with impacts is soon lost."""
 _SLOPES = 0.05, 1.0
 """Least and largest change of the base's level in a step of the first coefficient, while it is raised."""
 _TOLD = 0.01
@@ -104,8 +110,9 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
     """Raise what is played until the base has its level: the first motion that is met from rest."""
     foreseen = solver.first()
     unknowns = foreseen.unknowns.copy()
-    unknowns[1] -= _BELOW
-    slope, before = _SLOPES[0], None
+    unknowns[1] += {"rest": -_BELOW, "above": _ABOVE}[player.plan.begin_from]
+    above = player.plan.begin_from == "above"
+    slope, before, most = _SLOPES[0], None, _LOWERED if above else 1.0
     for tries in range(1, _FIRST_TRIES + 1):
         seen: Seen = yield from _seen(player, solver, unknowns)
         wrong = float(seen.residual[0])
@@ -113,9 +120,12 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
             return seen, tries
         if before is not None and abs(moved := seen.unknowns[1] - before.unknowns[1]) > _TOLD:
             slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
-        before, unknowns = seen, solver.corrected(seen, foreseen)
+        harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
+        before, unknowns = seen, solver.corrected(harmonics, foreseen)
         # A secant of its own: harmonics that are not yet zero move the level too, and no bracket lasts.
-        unknowns[1] = seen.unknowns[1] - min(max(wrong / slope, -1.0), 1.0)
+        unknowns[1] = seen.unknowns[1]
+        if not above or np.abs(seen.residual[1:]).max() <= _CALM:
+            unknowns[1] -= min(max(wrong / slope, -most), most)
     return None
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vibench.sim.branches import least_growth_time_s
 from vibench.sim.feedback import (
+    Begin,
     LinearLaw,
     LoopTiming,
     SampledPlant,
@@ -92,7 +93,8 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
 
     """
     level_m = level_at(plan, plan.start_hz)
-    hold = branch_hold(fast.plant, fast.law, level_m, plan.start_hz, plan.band_hz)
+    begin = Begin(plan.begin_from)
+    hold = branch_hold(fast.plant, fast.law, level_m, plan.start_hz, plan.band_hz, begin)
     timing = fast.plant.timing
     loop = f"{1e3 * timing.latency_s:.3g} ms of latency at {timing.rate_hz:g} samples a second"
     if hold.multiplier is not None and hold.multiplier > LARGEST_MULTIPLIER:

@@ -37,6 +37,9 @@ class BranchContinuation(AbstractFeedback):
     """The branch is left where its frequency rises above [Hz]."""
     begin: Literal["up", "down"] = "up"
     """Which way it is begun."""
+    begin_from: Literal["rest", "above"] = "rest"
+    """From which side the level is met at the start: from rest, or from three times what the model without
+    stops asks for, which is where motions with impacts are found."""
     step_hz: PositiveFloat = 1.0
     """Longest step from point to point [Hz]; shorter in folds and where points are hard to find."""
     most_points: int = Field(default=60, ge=1, le=1000)

@@ -1,6 +1,8 @@
 from ._branch import (
+    Begin as Begin,
     BranchHold as BranchHold,
     branch_hold as branch_hold,
+    impact_branch as impact_branch,
 )
 from ._law import (
     LawWeights as LawWeights,

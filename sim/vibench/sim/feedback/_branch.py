@@ -1,11 +1,12 @@
 """How a law holds a whole branch, by the model: before anything moves."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 from math import inf
 
 import numpy as np
 
-from ..model import Harmonic
+from ..model import Harmonic, Specimen
 from ..periodic import (
     BalanceEnd,
     Branch,
@@ -26,6 +27,8 @@ from ._plant import SampledPlant
 _POINTS = 8
 """Unstable motions of a branch that are looked at."""
 _PERIODS = 10
+_FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
+"""Levels, over the one that is asked for, along which motions among stops are led down to it."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,21 @@ class BranchHold:
     """In which the least stable motion grows by e where the base moves as a sine; infinite for none [s]."""
 
 
+class Begin(StrEnum):
+    """From which side the level is met where a branch begins."""
+
+    REST = "rest"
+    ABOVE = "above"
+    """From three times the level, which is where motions with impacts are found."""
+
+
 def branch_hold(
-    plant: SampledPlant, law: LinearLaw, level_m: float, start_hz: float, range_hz: tuple[float, float]
+    plant: SampledPlant,
+    law: LinearLaw,
+    level_m: float,
+    start_hz: float,
+    range_hz: tuple[float, float],
+    begin: Begin = Begin.REST,
 ) -> BranchHold:
     """Follow the model's branch under one level of the base, and see how a law holds it.
 
@@ -52,11 +68,16 @@ def branch_hold(
     level_m
         Amplitude of the base's displacement [m].
     start_hz, range_hz
-        Where the branch begins from rest, and where it is left [Hz].
+        Where the branch begins, and where it is left [Hz].
+    begin
+        From which side the level is met there; where there are no stops, from rest.
 
     """
     smooth = _smooth_spring(plant)
-    branch = _branch(plant, smooth, level_m, start_hz, range_hz)
+    if smooth is None:
+        branch = impact_branch(plant.specimen, level_m, start_hz, range_hz, begin)
+    else:
+        branch = _smooth_branch(plant.specimen, smooth, level_m, start_hz, range_hz)
     if branch is None:
         return BranchHold(None, start_hz, inf)
     sizes = np.abs(branch.multipliers[:, 0])
@@ -82,24 +103,31 @@ def _smooth_spring(plant: SampledPlant) -> RestoringForce | None:
     return None if spring.kinks else spring
 
 
-def _branch(
-    plant: SampledPlant,
-    smooth: RestoringForce | None,
+def _smooth_branch(
+    specimen: Specimen,
+    smooth: RestoringForce,
     level_m: float,
     start_hz: float,
     range_hz: tuple[float, float],
 ) -> Branch | None:
-    path, specimen = FrequencyPath((level_m,)), plant.specimen
-    if smooth is not None:
-        structure = structure_of(specimen)
-        start = balance(structure, smooth, start_hz, level_m)
-        if start.outcome is BalanceEnd.NO_SOLUTION:
-            return None
-        return balance_branch_within(structure, smooth, start, path, *range_hz)
-    orbit = periodic_orbit(specimen, Harmonic(start_hz, level_m))
-    if orbit.outcome is not ShootingEnd.CONVERGED:
+    structure = structure_of(specimen)
+    start = balance(structure, smooth, start_hz, level_m)
+    if start.outcome is BalanceEnd.NO_SOLUTION:
         return None
-    return periodic_branch_within(orbit, path, *range_hz)
+    return balance_branch_within(structure, smooth, start, FrequencyPath((level_m,)), *range_hz)
+
+
+def impact_branch(
+    specimen: Specimen, level_m: float, start_hz: float, range_hz: tuple[float, float], begin: Begin
+) -> Branch | None:
+    """Follow the branch that a loop would begin among stops; None where no motion repeats at its start."""
+    state = None
+    for factor in (1.0,) if begin is Begin.REST else _FROM_ABOVE:
+        orbit = periodic_orbit(specimen, Harmonic(start_hz, factor * level_m), start=state)
+        if orbit.outcome is not ShootingEnd.CONVERGED:
+            return None
+        state = orbit.state
+    return periodic_branch_within(orbit, FrequencyPath((level_m,)), *range_hz)
 
 
 def _multiplier(
