@@ -22,6 +22,9 @@ from vibench.sim.branches import BranchOrigin, MotionSearch, shot_branches
 from vibench.sim.motion import state_scales
 from vibench.sim.periodic import OrbitShape, PeriodMap
 
+pytestmark = pytest.mark.timeout(300)
+"""Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""
+
 FEW = MotionSearch(places=2, starts=2)
 LEVEL = FrequencyPath((5e-6,))
 

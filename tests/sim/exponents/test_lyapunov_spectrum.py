@@ -12,6 +12,9 @@ from vibench.sim.exponents._lyapunov_spectrum import kaplan_yorke
 from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
 from vibench.sim.model import state_matrix
 
+pytestmark = pytest.mark.timeout(300)
+"""Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""
+
 CHAOS = Harmonic(260.0, 5e-6)
 LARGE = Harmonic(430.0, 50e-6)
 

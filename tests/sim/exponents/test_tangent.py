@@ -11,6 +11,9 @@ from vibench.sim.stepping import advance_harmonic, harmonic_tables, new_state
 
 DRIVE = Harmonic(130.0, 20e-6)
 DURATION_S = 0.02
+pytestmark = pytest.mark.timeout(300)
+"""Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""
+
 ELASTIC = ["hertz", "linear_gap", "linear", "power:5", "power:3+5+7", "power:47", "rigid:1"]
 GAPS = [45e-6, (30e-6, 45e-6), (20e-6, np.inf)]
 SCALES = np.repeat([1e-4, 0.1], 3)
