@@ -31,6 +31,10 @@ def reached(kind, period=None, factor=1.0, scatter=None):
         (reached(PERIODIC, 3), reached(CHAOS, None, 1.05, 0.05), False),
         (reached(TORUS, None, 1.0, 1e-6), reached(OPEN, None, 1.0001, 1e-6), True),
         (reached(CHAOS, None, 1.0, 0.02), reached(CHAOS, None, 1.08, 0.02), True),
+        (reached(CHAOS, None, 1.0, 0.02), reached(OPEN, None, 1.03, 0.02), True),
+        (reached(CHAOS, None, 1.0, 0.02), reached(TORUS, None, 1.03, 0.02), True),
+        (reached(CHAOS, None, 1.0, 0.02), reached(TORUS, None, 1.03, 1e-6), False),
+        (reached(CHAOS, None, 1.0, 0.02), reached(OPEN, None, 1.03), False),
         (reached(CHAOS, None, 1.0, 0.02), reached(CHAOS, None, 1.5, 0.02), False),
     ],
 )
@@ -42,3 +46,11 @@ def test_two_starts_came_to_the_same_motion(one, other, same):
 def test_a_motion_is_named_by_the_start_that_shows_it_best():
     (motion,) = motions_among([reached(OPEN, None, 1.0, 1e-6), reached(TORUS, None, 1.0, 1e-6)])
     assert motion[0].motion is TORUS
+
+
+def test_weak_chaos_that_some_starts_take_for_a_torus_is_named_by_most_of_them():
+    starts = [reached(TORUS, None, 1.0, 0.01), reached(OPEN, None, 1.01, 0.01)]
+    starts += [reached(CHAOS, None, factor, 0.01) for factor in (0.99, 1.0, 1.01)]
+    (motion,) = motions_among(starts)
+    assert motion[0].motion is CHAOS
+    assert len(motion) == 5

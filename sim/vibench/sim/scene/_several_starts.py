@@ -265,7 +265,7 @@ APART = 2.0
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
-"""A motion is named by the start that shows it best, in this order."""
+"""A motion is named by the start that shows it best, in this order; without a period, by most starts."""
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
@@ -277,7 +277,16 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
             groups.append([each])
         else:
             same.append(each)
-    return groups
+    return [_named_by_most(group) for group in groups]
+
+
+def _named_by_most(group: list[ReachedMotion]) -> list[ReachedMotion]:
+    """Put a start first that shows the kind of motion which most starts show, of those that show one."""
+    kinds = [each.motion for each in group if each.motion in CLEAREST]
+    if group[0].period is not None or not kinds:
+        return group
+    named = max(CLEAREST, key=kinds.count)
+    return sorted(group, key=lambda each: each.motion is not named)
 
 
 def _clearness(one: ReachedMotion) -> int:
@@ -288,18 +297,22 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
     """Whether two starts came to the same motion, or to its symmetric partner.
 
     Motions are known by their period and all four responses, and by these alone where one start has come to
-    it too late to be seen to repeat, or to be told from chaos. Of chaos only the largest value is compared,
-    within what its windows scatter by: two chaotic motions that differ by less count as one.
+    it too late to be seen to repeat, or to be told from chaos. Of motions that do not repeat only the largest
+    value is compared, within what windows scatter by: two chaotic motions that differ by less count as one.
+    Weak chaos is called undecided or quasi-periodic by some starts; what tells that it is one motion is that
+    all of them scatter alike, so that of two kinds the smaller scatter counts.
     """
     if one.period is not None and other.period is not None and one.period != other.period:
         return False
     difference = np.abs(one.responses_m - other.responses_m)
     if np.all(difference <= SAME * np.maximum(one.responses_m, other.responses_m)):
         return True
-    if one.motion is not other.motion or one.period is not None:
+    if one.period is not None or other.period is not None:
         return False
+    is_one_kind = one.motion is other.motion
     if one.scatter is None or other.scatter is None:
-        return True
+        return is_one_kind
+    counts = max if is_one_kind else min
     largest = max(one.responses_m[0], other.responses_m[0])
-    allowed = SAME + APART * max(one.scatter.between_runs, other.scatter.between_runs)
+    allowed = SAME + APART * counts(one.scatter.between_runs, other.scatter.between_runs)
     return bool(difference[0] <= allowed * largest)
