@@ -55,16 +55,15 @@ def test_a_file_where_the_folder_should_be_is_refused_before_anything_plays(benc
     assert not any(name == "start" for name, _, _ in bench.world.calls)
 
 
-def test_a_point_and_its_repeats_are_held_against_the_limits_once(bench, tmp_path, monkeypatch):
+def test_points_that_are_played_alike_are_held_against_the_limits_once(bench, tmp_path, monkeypatch):
     checked = []
     monkeypatch.setattr(
         _opening, "require_within_limits", lambda measurement, rig: checked.append(measurement)
     )
     repeated = CAMPAIGN.measurements[0].model_copy(update={"repeats": 3})
-    run_campaign(
-        bench, Campaign(name="c", measurements=(repeated, CAMPAIGN.measurements[1])), tmp_path / "out"
-    )
-    assert [each.name for each in checked] == ["one", "two"]
+    planned = (repeated, CAMPAIGN.measurements[1], dwell("louder", 1.2))
+    run_campaign(bench, Campaign(name="c", measurements=planned), tmp_path / "out")
+    assert [each.name for each in checked] == ["one", "louder"]
 
 
 def test_a_recording_may_be_moved_as_soon_as_it_is_complete(bench, tmp_path, monkeypatch):

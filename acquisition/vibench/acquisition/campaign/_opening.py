@@ -10,7 +10,7 @@ from typing import assert_never
 
 from ..bench import RunBench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
-from ..plan import Campaign, Measurement, Point, require_within_limits
+from ..plan import Campaign, Measurement, Point, played_alike, require_within_limits
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run import drive_for
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
@@ -108,10 +108,10 @@ class PlannedRecording:
 def require_all_within_limits(points: tuple[Point, ...], bench: RunBench) -> None:
     """Refuse a campaign of which any point passes a limit, or cannot be played; raises LimitExceeded."""
     complaints: dict[str, None] = {}
-    for measurement in dict.fromkeys(point.measurement for point in points):  # repeats are one
+    for point in played_alike(points):
         try:
-            require_within_limits(measurement, bench.rig)
-            drive_for(bench, measurement)  # refuses what nothing on this bench can play
+            require_within_limits(point.measurement, bench.rig)
+            drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
         except LimitExceeded as error:
             complaints[str(error)] = None
     if complaints:

@@ -12,7 +12,7 @@ from ..campaign import planned_recordings
 from ..check import CheckRule, require_on_record
 from ..errors import CheckFailed
 from ..instruments import Knob
-from ..plan import LimitCheck, require_within_limits
+from ..plan import LimitCheck, played_alike, require_within_limits
 from ..rig import Confirm, KnobSheet, Rig
 from ..run import drive_for
 from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
@@ -54,11 +54,9 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
     # What is played alike is judged once, or a long campaign would keep whoever asks waiting.
-    once = {id(point.measurement): point for point in points}.values()
-    alike = {each.measurement.model_dump_json(exclude={"name"}): each for each in once}
-    for name, measurement in ((each.name, each.measurement) for each in alike.values()):
-        checks += [(name, check) for check in require_within_limits(measurement, bench.rig)]
-        drive_for(bench, measurement)  # refuses what nothing on this bench can play
+    for point in played_alike(points):
+        checks += [(point.name, check) for check in require_within_limits(point.measurement, bench.rig)]
+        drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
     planned = planned_recordings(campaign, folder, request.existing)
     missing = [each for each in planned if not each.is_complete]
     tightest, closest = max(checks, key=lambda named: named[1].use)

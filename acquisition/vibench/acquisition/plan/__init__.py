@@ -50,7 +50,7 @@ from ._axis import (
     RangeSpacing,
 )
 from ._base_motion import BaseMotion, base_motion
-from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign
+from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign, played_alike
 from ._drive_source import (
     DriveSource,
     drive_source_of,
@@ -165,6 +165,7 @@ __all__ = [
     "measured_s",
     "needed_vpp",
     "phases",
+    "played_alike",
     "predicted_loads",
     "preview_measurement",
     "ramp",

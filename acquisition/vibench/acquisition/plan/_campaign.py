@@ -113,6 +113,14 @@ class Campaign(FrozenModel):
         return round(_recorded_s(self.points()) * sample_rate_hz) * channels * BYTES_PER_SAMPLE
 
 
+def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    """Give the first of all points that are played alike: what limits say of it holds for the others."""
+    first: dict[str, Point] = {}
+    for point in points:
+        first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats"}), point)
+    return tuple(first.values())
+
+
 def _recorded_s(points: tuple[Point, ...]) -> float:
     return sum(measured_s(point.measurement) for point in points)
 
