@@ -72,8 +72,8 @@ def flat_periods(
     return _flat_periods(tuple(lines.tolist()), realisations, seed, points)
 
 
-# Limits, preview and playing ask for the waveforms of a plan; all its levels have the same.
-@lru_cache(maxsize=2)
+# Limits, preview and playing ask for the waveforms of a plan in turn; all its levels have the same.
+@lru_cache(maxsize=1)
 def _flat_periods(lines: tuple[int, ...], realisations: int, seed: int, points: int) -> tuple[Samples, ...]:
     excited = np.array(lines, dtype=np.int64)
     periods = [_smoothest(excited, realisation, seed, points) for realisation in range(realisations)]
