@@ -110,8 +110,8 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
     """Raise what is played until the base has its level: the first motion that is met from rest."""
     foreseen = solver.first()
     unknowns = foreseen.unknowns.copy()
-    unknowns[1] += {"rest": -_BELOW, "above": _ABOVE}[player.plan.begin_from]
     above = player.plan.begin_from == "above"
+    unknowns[1] += _ABOVE if above else -_BELOW
     slope, before, most = _SLOPES[0], None, _LOWERED if above else 1.0
     for tries in range(1, _FIRST_TRIES + 1):
         seen: Seen = yield from _seen(player, solver, unknowns)
