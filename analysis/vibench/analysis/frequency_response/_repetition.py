@@ -13,8 +13,8 @@ _SHORTFALL = 1e-3
 _WEAKEST_LINE = 1e-3
 """A line is driven when its amplitude is within 60 dB of the strongest; quantisation lies below."""
 _ITERATIONS = 8
-_CONVERGED = 1e-8
-"""Relative change of the period behind which a further pass moves it by less than 1e-11."""
+_CONVERGED = 1e-9
+"""Relative change of the period behind which all further passes move it by less than a tenth of that."""
 _LARGEST_OFFSET = 200e-6
 """Relative clock offset that is looked for: two oscillators of 50 to 100 ppm each."""
 _LEAST_SIMILARITY = 0.5
