@@ -26,7 +26,8 @@ def test_numbers_are_read_as_people_write_them(text, unit, value):
 
 
 @pytest.mark.parametrize(
-    ("text", "unit"), [("5 Hz", "s"), ("fast", "Hz"), ("1.2.3", "V"), ("5 g", "m/s²"), ("", "s")]
+    ("text", "unit"),
+    [("5 Hz", "s"), ("fast", "Hz"), ("1.2.3", "V"), ("5 G", "m/s²"), ("5 g", "m"), ("", "s")],
 )
 def test_other_units_and_words_are_refused(text, unit):
     with pytest.raises(ConfigurationError, match=r"number|unit"):

@@ -15,7 +15,7 @@ from vibench.gui.widgets import LIGHT
 
 @pytest.fixture
 def plot(qapp, qtbot):
-    made = Plot("a plot", TIME, PlotAxis("Velocity of the mass", "mm/s", 1e3, short="v (mm/s)"), LIGHT)
+    made = Plot("a plot", TIME, PlotAxis("Velocity of the mass", "mm/s", 1e3, short="v"), LIGHT)
     qtbot.addWidget(made)
     made.resize(400, 300)
     return made

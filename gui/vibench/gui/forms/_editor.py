@@ -10,9 +10,12 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent, QPaintEvent, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QWidget
 
+from vibench.acquisition import ConfigurationError
+
+from ..widgets import CHOICES
 from ._field_edge import LineField, draw_edge
 from ._field_facts import FieldFacts
-from ._quantity_edit import QuantityEdit
+from ._quantity_edit import QuantityEdit, parsed_quantity, quantity_text
 
 
 class Editor(Protocol):
@@ -167,13 +170,19 @@ class SuggestionEditor:
 
 
 class ListEditor:
-    """Numbers or anything else that a file would hold, as a line of text: ``95, 266, 500``."""
+    """Numbers or anything else that a file would hold, as a line of text: ``95, 266, 500``.
 
-    def __init__(self, changed: Callable[..., None]) -> None:
+    Numbers with a unit that may be chosen are read as in a field of one.
+    """
+
+    def __init__(self, unit: str, changed: Callable[..., None]) -> None:
+        self._unit = unit if unit in CHOICES else ""
         self._line = LineField()
         self._line.setPlaceholderText("none; or for example 95, 266, 500")
         self._line.editingFinished.connect(changed)
         self._complaint = ""
+        self._shown: tuple[str, list[Any]] = ("", [])
+        """What was last shown, and its values with every digit."""
         self.widget = self._line
 
     @property
@@ -184,18 +193,26 @@ class ListEditor:
 
     def content(self) -> Any:
         """Give the values."""
-        self._complaint = ""
+        self._complaint, text = "", self._line.text()
+        if text == self._shown[0]:
+            return self._shown[1]
         try:
-            return json.loads(f"[{self._line.text()}]")
+            if self._unit:
+                return [parsed_quantity(each, self._unit) for each in text.split(",") if text.strip()]
+            return json.loads(f"[{text}]")
         except json.JSONDecodeError as error:
-            self._complaint = (
-                f"{self._line.text()!r} is not a list ({error.msg}); write for example 95, 266, 500"
-            )
-            return []
+            self._complaint = f"{text!r} is not a list ({error.msg}); write for example 95, 266, 500"
+        except ConfigurationError as error:
+            self._complaint = str(error)
+        return []
 
     def show_content(self, content: Any) -> None:
         """Show values."""
-        self._line.setText(json.dumps(list(content or ()))[1:-1])
+        values = list(content or ())
+        texts = (quantity_text(each, self._unit) for each in values)
+        text = ", ".join(texts) if self._unit else json.dumps(values)[1:-1]
+        self._shown = (text, values)
+        self._line.setText(text)
 
 
 def unwrapped(annotation: Any) -> tuple[Any, bool]:
@@ -219,7 +236,7 @@ def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None
     if isinstance(plain, type) and issubclass(plain, Enum):
         return ChoiceEditor(tuple(member.value for member in plain), changed)
     if get_origin(plain) in (tuple, list):
-        return ListEditor(changed)
+        return ListEditor(facts.unit, changed)
     if plain is str:
         return SuggestionEditor(facts.examples, changed) if facts.examples else TextEditor(changed)
     raise TypeError(f"{facts.name} is a {annotation}, and no form can edit that; add an editor for it")

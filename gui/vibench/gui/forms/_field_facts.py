@@ -16,7 +16,9 @@ from pydantic.fields import FieldInfo
 
 from vibench.acquisition import ChosenFrom
 
-UNITS = (
+from ..widgets import CHOICES, UNITS
+
+_ENDINGS = (
     ("_m_per_s2", "m/s²"),
     ("_m_per_s", "m/s"),
     ("_per_s", "1/s"),
@@ -41,38 +43,49 @@ class FieldFacts:
     name: str
     label: str
     unit: str
-    limits: str
+    """SI, or a plain one."""
+    allowed: str
     """``"above 0, at most 60 s"``; empty when anything goes."""
     explanation: str
     examples: tuple[str, ...] = ()
     """Texts to choose from; another one may be typed."""
 
     @property
+    def shown_unit(self) -> str:
+        """That of a plain number in the field."""
+        return UNITS.in_field(self.unit)
+
+    @property
+    def limits(self) -> str:
+        """What is allowed, in the units that people chose."""
+        return UNITS.told(self.allowed)
+
+    @property
     def tooltip(self) -> str:
         """Explanation and limits."""
         limits = f"Allowed: {self.limits}" if self.limits else ""
-        return "\n".join(part for part in (self.explanation, limits) if part)
+        return "\n".join(part for part in (UNITS.told(self.explanation), limits) if part)
 
     @property
     def named(self) -> str:
         """Label and unit, as a complaint begins."""
-        return f"{self.label} ({self.unit})" if self.unit else self.label
+        return f"{self.label} ({self.shown_unit})" if self.unit else self.label
 
     @property
     def spoken(self) -> str:
         """Name for screen readers."""
-        return f"{self.label} in {self.unit}" if self.unit else self.label
+        return f"{self.label} in {self.shown_unit}" if self.unit else self.label
 
 
 def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFacts:
     """Say what a form must know of a field."""
-    suffix, unit = next(((s, u) for s, u in UNITS if name.endswith(s)), ("", ""))
+    suffix, unit = next(((s, u) for s, u in _ENDINGS if name.endswith(s)), ("", ""))
     words = name.removesuffix(suffix).replace("_", " ")
     return FieldFacts(
         name=name,
         label=words[:1].upper() + words[1:],
         unit=unit,
-        limits=_limits(field, unit),
+        allowed=_limits(field, unit),
         explanation=_plain(_explanation(model, name)),
         examples=tuple(
             each for mark in field.metadata if isinstance(mark, ChosenFrom) for each in mark.texts()
@@ -114,23 +127,25 @@ def _explanations(module: str) -> Mapping[tuple[str, str], str]:
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
-    said = ", ".join(_limit_texts(field))
-    return f"{said} {unit}".strip() if said else ""
+    """Say each bound with its unit where that may be chosen, and otherwise once."""
+    each = f" {unit}" if unit in CHOICES else ""
+    said = ", ".join(_limit_texts(field, each))
+    return said if each or not said else f"{said} {unit}".strip()
 
 
-def _limit_texts(field: FieldInfo) -> Iterator[str]:
+def _limit_texts(field: FieldInfo, unit: str) -> Iterator[str]:
     constraints = (*field.metadata, *_inner(field.annotation))
     # Lower bounds before upper ones.
     for constraint in sorted(constraints, key=lambda each: isinstance(each, (Le, Lt))):
         match constraint:
             case Ge(ge):
-                yield f"at least {ge:g}"
+                yield f"at least {ge:g}{unit}"
             case Gt(gt):
-                yield f"above {gt:g}"
+                yield f"above {gt:g}{unit}"
             case Le(le):
-                yield f"at most {le:g}"
+                yield f"at most {le:g}{unit}"
             case Lt(lt):
-                yield f"below {lt:g}"
+                yield f"below {lt:g}{unit}"
 
 
 def _inner(annotation: Any) -> Iterator[object]:

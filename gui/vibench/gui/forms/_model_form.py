@@ -9,6 +9,7 @@ from pydantic.fields import FieldInfo
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
+from ..widgets import CHOICES, UNITS, SentenceLabel
 from ._editor import ChoiceEditor, Editor, unwrapped, value_editor
 from ._field_facts import FieldFacts, field_facts
 
@@ -20,6 +21,15 @@ class _Row:
     facts: FieldFacts
     editor: Editor
     complaint: QLabel
+    label: QLabel | None
+
+    def explain(self) -> None:
+        """Say what the field is and takes, in the units that are shown."""
+        for each in (self.editor.widget, self.label):
+            if each is not None:
+                each.setToolTip(self.facts.tooltip)
+        self.editor.widget.setAccessibleName(self.facts.spoken)
+        self.editor.widget.setAccessibleDescription(self.facts.tooltip)
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
@@ -57,6 +67,7 @@ class ModelForm(QWidget):
                 self._fixed[name] = get_args(plain)[0]
             else:
                 self._add(name, field)
+        UNITS.changed.connect(self._explain)
 
     @property
     def editors(self) -> dict[str, Editor]:
@@ -118,24 +129,26 @@ class ModelForm(QWidget):
     def _add(self, name: str, field: FieldInfo) -> None:
         facts = field_facts(self.model, name, field)
         editor = editor_for(field, facts, lambda *_: self._changed(name))
-        complaint = QLabel()
-        complaint.setProperty("rank", "complaint")
-        complaint.setWordWrap(True)
+        complaint = SentenceLabel(rank="complaint")
         complaint.hide()
         complaint.setAccessibleName(f"Complaint about {facts.label}")
         widget = editor.widget
-        widget.setToolTip(facts.tooltip)
-        widget.setAccessibleName(facts.spoken)
-        widget.setAccessibleDescription(facts.tooltip)
-        if isinstance(editor, GroupEditor):
+        label = None if isinstance(editor, GroupEditor) else QLabel(facts.label)
+        if label is None:
             self._layout.addRow(widget)
         else:
-            label = QLabel(facts.label)
             label.setBuddy(widget)
-            label.setToolTip(facts.tooltip)
             self._layout.addRow(label, widget)
         self._layout.addRow(complaint)
-        self._rows[name] = _Row(facts, editor, complaint)
+        self._rows[name] = _Row(facts, editor, complaint, label)
+        self._rows[name].explain()
+
+    def _explain(self) -> None:
+        """Write values and what is said of them in other units; what cannot be read stays as it was typed."""
+        for row in self._rows.values():
+            row.explain()
+            if row.facts.unit in CHOICES and not row.editor.complaint:
+                row.editor.show_content(row.editor.content())
 
     def _changed(self, name: str) -> None:
         row = self._rows.get(name)
@@ -293,7 +306,7 @@ def _after_kind(editor: Editor, loc: Loc) -> Loc:
 
 def _sentence(text: str, facts: FieldFacts) -> str:
     """Say a complaint of the model's in words of a form."""
-    unit = f" in {facts.unit}" if facts.unit else ""
+    unit = f" in {facts.shown_unit}" if facts.unit else ""
     if text == "Field required":
         return f"nothing is given; type a value{unit}"
     allowed = f"; allowed is {facts.limits}" if facts.limits else unit and f"; give it{unit}"
@@ -319,15 +332,14 @@ class JudgedForm(QWidget, Generic[Model]):
         self._model = model
         self._value: Model | None = None
         self.form = ModelForm(model, hidden)
-        self._complaint = QLabel()
-        self._complaint.setProperty("rank", "complaint")
-        self._complaint.setWordWrap(True)
+        self._complaint = SentenceLabel(rank="complaint")
         self._complaint.setAccessibleName(f"Complaint about the {name}")
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.form)
         layout.addWidget(self._complaint)
-        self.form.changed.connect(self._judge)
+        self.form.changed.connect(self._take)
+        UNITS.changed.connect(self._judge)
         self.form.show_content({})
 
     @property
@@ -344,7 +356,12 @@ class JudgedForm(QWidget, Generic[Model]):
         """Show other content."""
         self.form.show_content(value.model_dump(mode="json"))
 
+    def _take(self) -> None:
+        self._judge()
+        self.changed.emit()
+
     def _judge(self) -> None:
+        """Say what is not allowed, in the units that are shown."""
         complaints: dict[Loc, str] = {}
         self._value = None
         try:
@@ -355,4 +372,3 @@ class JudgedForm(QWidget, Generic[Model]):
             self._value = value if self.form.is_read else None
         self._complaint.setText("; ".join(self.form.complain(complaints)))
         self._complaint.setVisible(bool(self._complaint.text()))
-        self.changed.emit()

@@ -9,25 +9,22 @@ from PySide6.QtWidgets import QAbstractSpinBox, QWidget
 
 from vibench.acquisition import ConfigurationError
 
+from ..widgets import CHOICES, POWERS, STANDARD_GRAVITY, UNITS
 from ._field_edge import draw_edge
 
-PREFIXES = {"p": 1e-12, "n": 1e-9, "µ": 1e-6, "u": 1e-6, "μ": 1e-6, "m": 1e-3, "": 1.0, "k": 1e3, "M": 1e6}
-_SHOWN = ((1e-12, "p"), (1e-9, "n"), (1e-6, "µ"), (1e-3, "m"))
 _NUMBER = re.compile(r"^\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*$")
-PREFIXED = frozenset({"m", "V", "Vpp", "s", "m/s", "A", "N", "Hz", "g", "kg"})
-"""Units that are shown with a prefix where the number would be small."""
 
 
 def quantity_text(value: float, unit: str) -> str:
-    """Write a value with its unit, with every digit it has."""
-    if unit in PREFIXED and unit != "kg" and 0 < abs(value) < 1e-2:
-        size, prefix = next(
-            ((size, prefix) for size, prefix in reversed(_SHOWN) if abs(value) >= size), _SHOWN[0]
-        )
+    """Write a value given in SI in the unit of its field, with every digit it has."""
+    shown = UNITS.of(unit, value if abs(value) < _SMALL else 1.0)
+    if shown.per_si != 1.0:
         # Twelve digits hide that 4.5e-05 / 1e-06 is not quite 45; parsing must give the same value back.
-        shown = f"{value / size:.12g}"
-        if parsed_quantity(f"{shown} {prefix}{unit}", unit) == value:
-            return f"{shown} {prefix}{unit}"
+        text = shown.text(value, 12)
+        if parsed_quantity(text, unit) == value:
+            return text
+        if UNITS.in_field(unit) != unit:
+            return shown.text(value, _DIGITS)
     number = f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
     return f"{number} {unit}".strip()
 
@@ -35,19 +32,23 @@ def quantity_text(value: float, unit: str) -> str:
 def parsed_quantity(text: str, unit: str, example: str = "") -> float:
     """Read a value in SI; a comma is a decimal point, a unit may carry a prefix.
 
+    A plain number is in the unit that the field shows.
+
     Raises ConfigurationError when it is no number, or its unit is another one.
     """
-    match = _NUMBER.match(text)
+    match, shown = _NUMBER.match(text), UNITS.in_field(unit)
     if match is None:
-        example = example or f"12.5 {unit}".strip()
+        example = example or f"12.5 {shown}".strip()
         raise ConfigurationError(f"{_short(text)} is not a number; write for example {example}")
-    number, given = match[1].replace(",", "."), match[2]
-    if given in ("", unit):
+    number, given = match[1].replace(",", "."), match[2] or shown
+    if given == unit:
         return float(number)
-    if unit and given.endswith(unit) and given.removesuffix(unit) in PREFIXES:
+    if given == "g" and unit in CHOICES and "g" in CHOICES[unit]:
+        return float(number) * STANDARD_GRAVITY
+    if unit and given.endswith(unit) and given.removesuffix(unit) in POWERS:
         return _scaled(number, given.removesuffix(unit))
     raise ConfigurationError(
-        f"{_short(given)} is not a unit of this field; give {unit or 'a plain number'}"
+        f"{_short(given)} is not a unit of this field; give {shown or 'a plain number'}"
         + (f", for example {example}" if example else "")
     )
 
@@ -58,12 +59,15 @@ def _short(text: str) -> str:
 
 def _scaled(number: str, prefix: str) -> float:
     """Move the decimal point in the text, so that 45 µm is the same number as 45e-6."""
-    power = {"p": -12, "n": -9, "µ": -6, "u": -6, "μ": -6, "m": -3, "": 0, "k": 3, "M": 6}[prefix]
     mantissa, _, exponent = number.lower().partition("e")
-    return float(f"{mantissa}e{int(exponent or 0) + power}")
+    return float(f"{mantissa}e{int(exponent or 0) + POWERS[prefix]}")
 
 
 _LONGEST_SHOWN = 40
+_SMALL = 1e-2
+"""Larger ones are written without a prefix."""
+_DIGITS = 6
+"""Of a value that is no short number in the unit that was chosen; the value itself keeps all."""
 MOST_WHOLE = 1 << 53
 """Larger whole numbers cannot be told from their neighbours."""
 STEP = 0.05

@@ -1,5 +1,6 @@
 """What all pages share: the bridge, what is meant, settings, background work, and the way to the window."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
@@ -8,7 +9,7 @@ from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, st
 
 from ..background import Background
 from ..engine_link import Bridge, Starter
-from ..widgets import LIGHT, THEMES, Notice, Theme
+from ..widgets import CHOICES, LIGHT, THEMES, UNITS, Notice, Theme
 from ._selection import Selection
 from ._settings import Remembered, Settings
 
@@ -54,6 +55,7 @@ class AppContext(QObject):
         self.background = Background(WORKERS, self)
         self.looks = Background(1, self.background)
         """For what must come at once, whatever takes long beside it: previews."""
+        UNITS.choose(dict(zip(CHOICES, settings.text(Remembered.UNITS).split(), strict=False)))
         self._theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
 
     @property
@@ -66,6 +68,11 @@ class AppContext(QObject):
         self._theme = theme
         self.settings.keep_text(Remembered.THEME, theme.name)
         self.theme_changed.emit(theme)
+
+    def choose_units(self, chosen: Mapping[str, str]) -> None:
+        """Show quantities in these units from now on, and next time; by the SI unit of each."""
+        UNITS.choose(chosen)
+        self.settings.keep_text(Remembered.UNITS, " ".join(UNITS.chosen.values()))
 
     @property
     def patience_s(self) -> float:

@@ -19,6 +19,7 @@ class Remembered(StrEnum):
     FOLDER = "recordings/folder"
     PATIENCE = "run/patience_s"
     FONT = "window/font_points"
+    UNITS = "window/units"
     RECENT = "files/recent"
     SCENES = "simulate/scene"
 

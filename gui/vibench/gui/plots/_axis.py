@@ -10,7 +10,7 @@ from PySide6.QtCore import QLineF
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QGraphicsItem, QGraphicsSceneResizeEvent
 
-from ..widgets import Theme
+from ..widgets import CHOICES, UNITS, ShownUnit, Theme
 
 
 class Scale(Enum):
@@ -33,17 +33,31 @@ class PlotAxis:
 
     label: str
     unit: str = ""
-    """As written on the label."""
+    """Of what is plotted, in SI, where people choose what it is shown in; else as written on the label."""
     factor: float = 1.0
-    """Shown value per plotted value: 1e6 shows metres as micrometres."""
+    """Shown value per plotted value, where there is no choice: 1e3 shows seconds as milliseconds."""
     scale: Scale = Scale.LINEAR
     short: str = ""
-    """What stands there where the label has no room; the unit, if nothing is given."""
+    """What stands there, with the unit, where the label has no room."""
+
+    @property
+    def shown(self) -> ShownUnit:
+        """The unit that is written, and how many of it one of the plotted values is."""
+        return UNITS.on_axis(self.unit) if self.unit in CHOICES else ShownUnit(self.unit, self.factor)
 
     @property
     def text(self) -> str:
         """Label and unit."""
-        return f"{self.label} ({self.unit})" if self.unit else self.label
+        return self._with_unit(self.label)
+
+    @property
+    def short_text(self) -> str:
+        """Text for little room: a short label, or the unit alone."""
+        return self._with_unit(self.short) if self.short else self.shown.name
+
+    def _with_unit(self, label: str) -> str:
+        unit = self.shown.name
+        return f"{label} ({unit})" if label and unit else label or unit
 
 
 FREQUENCY = PlotAxis("Frequency", "Hz")
@@ -65,7 +79,8 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         """Places of the ticks that were painted last, major ones first."""
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
-        self._axis, self._factor = axis, axis.factor
+        self._axis = axis
+        UNITS.changed.connect(self._show_other_unit)
         # Painted when it changes, and copied otherwise: its text is the dearest part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
@@ -76,7 +91,10 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def show_unit(self, axis: PlotAxis) -> None:
         """Change what the axis shows."""
-        self._axis, self._factor = axis, axis.factor
+        self._axis = axis
+        self._show_other_unit()
+
+    def _show_other_unit(self) -> None:
         self._fit_label()
         self.update()
 
@@ -114,7 +132,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def _fit_label(self) -> None:
         room = self.size().height() if self._is_upright else self.size().width()
         metrics = QFontMetricsF(self.label.font())
-        texts = (self._axis.text, self._axis.short or self._axis.unit, "")
+        texts = (self._axis.text, self._axis.short_text, "")
         text = next(each for each in texts if metrics.horizontalAdvance(each) <= room or not each)
         if text != self.labelText:
             self._is_fitting = True
@@ -133,13 +151,13 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
-            factor = self._factor
+            factor = self._axis.shown.per_si
             # The labelled level alone: each line of a grid costs time in every frame.
             step, values = super().tickValues(low * factor, high * factor, size)[0]
             if self._is_upright:
                 step, values = thinned(step, values, self._most_labels(size))
             return [(step / factor, [value / factor for value in values])]
-        shift = log10(self._factor)
+        shift = log10(self._axis.shown.per_si)
         ticks = logarithmic_ticks(low + shift, high + shift)
         if len(ticks[0][1]) > self._most_labels(size):
             ticks = [thinned(1.0, ticks[0][1], self._most_labels(size)), *ticks[1:]]
@@ -150,9 +168,10 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         if self._blankness is Blankness.BLANK:
             return [""] * len(values)
         if not self.logMode:
-            factor = self._factor
+            factor = self._axis.shown.per_si
             return list(super().tickStrings([v * factor for v in values], scale, spacing * factor))
-        return [number_text(10**value * self._factor) for value in values]
+        factor = self._axis.shown.per_si
+        return [number_text(10**value * factor) for value in values]
 
     def _most_labels(self, size: float) -> int:
         """How many labels find room above or beside one another."""

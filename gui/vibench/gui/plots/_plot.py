@@ -8,7 +8,7 @@ from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
-from ..widgets import Theme, paint_hint
+from ..widgets import UNITS, Theme, paint_hint
 from ._axis import AxisItem, Blankness, Grid, PlotAxis, Scale
 from ._band import Band
 from ._legend import LegendEntry, LegendLine
@@ -102,6 +102,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         add_actions(self)
         self.scene().sigMouseMoved.connect(self.reading.follow)
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
+        UNITS.changed.connect(self._tell_anew)
         self.retheme(theme)
 
     def with_legend(self) -> "Plot":
@@ -350,13 +351,18 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         for axis in self._blanked:
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
+    def _tell_anew(self) -> None:
+        """Tell names and readings in other units."""
+        self._relegend()
+        self.reading.again()
+
     def _relegend(self) -> None:
         """Write the legend anew: its colours follow the theme."""
         if self._legend is None:
             return
         self._legend.show_entries(
             tuple(
-                LegendEntry(sign, line_style.colour(self.theme), name)
+                LegendEntry(sign, line_style.colour(self.theme), UNITS.told(name))
                 for line_style, sign, name in self._legend_entries
             )
         )

@@ -9,7 +9,7 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QPalette
 from PySide6.QtWidgets import QLabel
 
-from ..widgets import Theme
+from ..widgets import UNITS, Theme
 from ._axis import PlotAxis, Scale
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Reading:
         nearest = self._nearest(point)
         if nearest is not None:
             name, height = nearest
-            said.append(f"{name or 'curve'}: {_shown(height, axes[1])}")
+            said.append(f"{UNITS.told(name) or 'curve'}: {_shown(height, axes[1])}")
         if self._marked is not None:
             changes = [now - then for now, then in zip(self.place, self._marked, strict=True)]
             said.append("Δ " + ", ".join(map(_shown, changes, axes)))
@@ -164,4 +164,5 @@ def _value(drawn: float, scale: Scale) -> float:
 
 
 def _shown(value: float, axis: PlotAxis) -> str:
-    return f"{value * axis.factor:.5g} {axis.unit or axis.short}".strip()
+    shown = axis.shown
+    return f"{value * shown.per_si:.5g} {shown.name or axis.short}".strip()

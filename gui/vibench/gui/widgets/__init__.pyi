@@ -42,3 +42,14 @@ from ._theme import (
 from ._timed_bar import (
     TimedBar as TimedBar,
 )
+from ._units import (
+    AUTOMATIC as AUTOMATIC,
+    CHOICES as CHOICES,
+    POWERS as POWERS,
+    STANDARD_GRAVITY as STANDARD_GRAVITY,
+    UNITS as UNITS,
+    SentenceLabel as SentenceLabel,
+    ShownUnit as ShownUnit,
+    fitted_unit as fitted_unit,
+    plain_unit as plain_unit,
+)

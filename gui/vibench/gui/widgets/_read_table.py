@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTab
 
 from ._hint import paint_hint
 from ._table_copy import offer_copies
+from ._units import UNITS
 
 _WIDEST_LETTERS = 36
 """Of a column that takes the room it needs; longer text is wrapped."""
@@ -56,23 +57,33 @@ class ReadTable(QTableWidget):
         header.setSectionResizeMode(range(len(columns))[wide], QHeaderView.ResizeMode.Stretch)
         header.setMaximumSectionSize(_WIDEST_LETTERS * self.fontMetrics().averageCharWidth())
         self._hint = hint
-        self._shown: tuple[tuple[str, ...], ...] = ()
+        self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
+        UNITS.changed.connect(self._write)
         # A change of width comes with many steps: rows are measured once, after them.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._fit_rows)
 
-    def show_rows(self, rows: Sequence[Sequence[str]]) -> None:
-        """Show rows; nothing is touched while nothing changes."""
-        wanted = tuple(tuple(row) for row in rows)
+    def show_rows(self, rows: Sequence[Sequence[str]], tips: Sequence[str] = ()) -> None:
+        """Show rows, with a tip for each or none; nothing is touched while nothing changes."""
+        wanted = tuple(tuple(row) for row in rows), tuple(tips)
         if wanted == self._shown:
             return
         self._shown = wanted
-        self.setRowCount(len(wanted))
-        for number, row in enumerate(wanted):
+        self.setRowCount(len(rows))
+        for number, row in enumerate(rows):
+            for column in range(len(row)):
+                self.setItem(number, column, QTableWidgetItem())
+        self._write()
+
+    def _write(self) -> None:
+        """Write every cell in the chosen units."""
+        rows, tips = self._shown
+        for number, row in enumerate(rows):
             for column, text in enumerate(row):
-                item = QTableWidgetItem(text)
-                item.setToolTip(text)
-                self.setItem(number, column, item)
+                item = self.item(number, column)
+                if isinstance(item, QTableWidgetItem):
+                    item.setText(UNITS.told(text))
+                    item.setToolTip(UNITS.told(tips[number] if tips else text))
         self._later.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

@@ -2,9 +2,9 @@
 
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPlainTextEdit, QPushButton, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QPushButton, QSizePolicy, QWidget
 
-from ..widgets import Notice, NoticeKind, Tone
+from ..widgets import Notice, NoticeKind, SentenceLabel, Tone
 
 SYMBOLS = {NoticeKind.INFO: "ℹ", NoticeKind.WARNING: "⚠", NoticeKind.FAULT: "✖"}
 TONES = {NoticeKind.INFO: Tone.CALM, NoticeKind.WARNING: Tone.CAUTION, NoticeKind.FAULT: Tone.DANGER}
@@ -26,8 +26,7 @@ class MessageStrip(QFrame):
         self._notices: list[Notice] = []
         self._is_said = False
         self._hint = ""
-        self._text = QLabel()
-        self._text.setWordWrap(True)
+        self._text = SentenceLabel()
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self._text.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
         self._details = QPlainTextEdit(self)

@@ -12,7 +12,7 @@ from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S
 
 from ..forms import JudgedForm
 from ..page import AppContext, Remembered
-from ..widgets import THEMES
+from ..widgets import THEMES, UNITS
 
 
 def whole_path(folder: str) -> str:
@@ -29,6 +29,12 @@ class Preferences(FrozenModel):
     """Colours of the window; figures of exports are light."""
     font_pt: Annotated[int, Field(ge=7, le=24)]
     """Height of the letters; what is open already takes it as far as it goes, all of it the next start."""
+    displacements_in: Literal["automatic", "µm", "mm", "m"]
+    """On axes, in fields, tables and sentences; files and reports keep their own. A field takes any unit."""
+    velocities_in: Literal["mm/s", "m/s"]
+    """On axes, in tables and sentences."""
+    accelerations_in: Literal["m/s²", "g"]
+    """g is 9.80665 m/s²."""
     patience_s: Annotated[float, Field(ge=VIEWER_PATIENCE_S, le=LONGEST_PATIENCE_S)]
     """How long a test far from every limit may go on while the window does not answer."""
     recordings_folder: Annotated[str, AfterValidator(whole_path)]
@@ -57,6 +63,9 @@ class SettingsDialog(QDialog):
             Preferences(
                 theme=context.theme.name,
                 font_pt=QApplication.font().pointSize(),
+                displacements_in=UNITS.chosen["m"],
+                velocities_in=UNITS.chosen["m/s"],
+                accelerations_in=UNITS.chosen["m/s²"],
                 patience_s=context.patience_s,
                 recordings_folder=str(context.folder),
             )
@@ -71,6 +80,9 @@ class SettingsDialog(QDialog):
             self._context.choose_theme(THEMES[wanted.theme])
         self._context.settings.keep_text(Remembered.PATIENCE, f"{wanted.patience_s:g}")
         self._context.settings.keep_text(Remembered.FONT, str(wanted.font_pt))
+        self._context.choose_units(
+            {"m": wanted.displacements_in, "m/s": wanted.velocities_in, "m/s²": wanted.accelerations_in}
+        )
         font = QFont(QApplication.font())
         font.setPointSize(wanted.font_pt)
         QApplication.setFont(font)

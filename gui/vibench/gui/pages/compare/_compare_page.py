@@ -159,7 +159,7 @@ class ComparePage(Page):
         shown = self.curves.shown()
         self.pair_box.offer(self.curves.curves, tuple(each for each, _ in shown))
         self.plots.show_curves(shown, self.pair_box.difference())
-        self.peaks.show_rows(PEAK_HEADINGS, peak_rows(tuple(each for each, _ in shown)))
+        self.peaks.show_numbers(PEAK_HEADINGS, peak_rows(tuple(each for each, _ in shown)))
         self._export.setEnabled(bool(shown))
         self._report.setEnabled(bool(shown))
         self._read()
@@ -167,7 +167,7 @@ class ComparePage(Page):
     def _read(self) -> None:
         markers_hz = self.plots.markers_hz
         curves = tuple(each for each, _ in self.curves.shown()) if markers_hz else ()
-        self.readings.show_rows(marker_headings(markers_hz), marker_rows(curves, markers_hz))
+        self.readings.show_numbers(marker_headings(markers_hz), marker_rows(curves, markers_hz))
 
     def _choose_recordings(self) -> None:
         chosen, _ = QFileDialog.getOpenFileNames(

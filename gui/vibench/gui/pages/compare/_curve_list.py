@@ -10,7 +10,7 @@ from vibench.analysis import AnalysisError, Curve, CurveDifference, CurveKind, C
 
 from ...forms import Choice
 from ...plots import Dash, LineStyle, curve_style
-from ...widgets import Theme, paint_hint
+from ...widgets import UNITS, SentenceLabel, Theme, paint_hint
 
 _DASHES = {
     CurveOrigin.MEASURED: Dash.SOLID,
@@ -37,6 +37,7 @@ class CurveList(QListWidget):
         self._theme = theme
         self._curves: list[Curve] = []
         self.itemChanged.connect(lambda _item: self.changed.emit())
+        UNITS.changed.connect(self._tell_anew)
 
     @property
     def curves(self) -> tuple[Curve, ...]:
@@ -96,15 +97,20 @@ class CurveList(QListWidget):
             self.item(row).setIcon(_swatch(self.line_style(each), theme))
         self.blockSignals(blocked)
 
+    def _tell_anew(self) -> None:
+        """Name them in other units."""
+        ticked = {each.name for each, _ in self.shown()}
+        self._list(lambda each: each.name in ticked)
+
     def _list(self, is_ticked: Callable[[Curve], bool]) -> None:
         blocked = self.blockSignals(True)
         self.clear()
         for each in self._curves:
-            item = QListWidgetItem(each.name)
+            item = QListWidgetItem(UNITS.told(each.name))
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             wanted = is_ticked(each)
             item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
-            item.setToolTip(each.note)
+            item.setToolTip(UNITS.told(each.note))
             item.setIcon(_swatch(self.line_style(each), self._theme))
             self.addItem(item)
         self.blockSignals(blocked)
@@ -157,7 +163,7 @@ class PairBox(QGroupBox):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Difference in dB", parent)
         self._curves: dict[str, Curve] = {}
-        self._curve, self._reference, self._said = Choice(), Choice(), QLabel("")
+        self._curve, self._reference, self._said = Choice(), Choice(), SentenceLabel(rank="second")
         form = QFormLayout(self)
         form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
         for text, choice in (("C&urve", self._curve), ("Ov&er", self._reference)):
@@ -168,8 +174,6 @@ class PairBox(QGroupBox):
             choice.setMinimumContentsLength(16)
             choice.currentIndexChanged.connect(lambda _index: self.changed.emit())
             form.addRow(label, choice)
-        self._said.setProperty("rank", "second")
-        self._said.setWordWrap(True)
         form.addRow(self._said)
 
     @property
@@ -179,7 +183,7 @@ class PairBox(QGroupBox):
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
         """Let these be chosen; what was chosen stays."""
-        self._curves = {each.name: each for each in curves}
+        self._curves = {UNITS.told(each.name): each for each in curves}
         names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):
             if names == [box.itemText(number) for number in range(1, box.count())]:
@@ -188,7 +192,7 @@ class PairBox(QGroupBox):
             blocked = box.blockSignals(True)
             box.clear()
             box.addItems([_NOBODY, *names])
-            default = shown[place].name if len(shown) > 1 else _NOBODY
+            default = UNITS.told(shown[place].name) if len(shown) > 1 else _NOBODY
             box.setCurrentText(chosen if chosen in names else default)
             box.blockSignals(blocked)
 

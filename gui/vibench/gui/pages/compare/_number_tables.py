@@ -3,50 +3,33 @@
 from math import isfinite
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem, QWidget
 
 from vibench.analysis import Curve, curve_peaks, readings
 
-from ...widgets import offer_copies, paint_hint
+from ...widgets import ReadTable
 
 PEAK_HEADINGS = ("Curve", "Peak at (Hz)", "|x / U|", "±", "Width at -3 dB (Hz)", "Damping ratio (%)")
 
 
-class NumberTable(QTableWidget):
-    """A table to read and to copy, with other headings each time."""
+class NumberTable(ReadTable):
+    """A table to read and to copy, with other headings each time; names take the room that is left."""
 
     def __init__(self, name: str, hint: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._hint = hint
-        self.setAccessibleName(name)
-        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setAlternatingRowColors(True)
-        offer_copies(self)
-        self.setTabKeyNavigation(False)
-        self.verticalHeader().hide()
-        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        super().__init__(name, PEAK_HEADINGS[:1], hint, parent=parent)
+        self.setShowGrid(True)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectItems)
 
-    def show_rows(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    def show_numbers(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
         """Show other numbers."""
         self.setColumnCount(len(headings))
-        self.setRowCount(len(rows))
         self.setHorizontalHeaderLabels(list(headings))
-        # Names take what is left: numbers stand together at the right.
-        self.horizontalHeader().setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        for row, cells in enumerate(rows):
-            for column, cell in enumerate(cells):
-                item = QTableWidgetItem(cell)
-                if column:
+        self.show_rows(rows)
+        for row in range(len(rows)):
+            for column in range(1, len(headings)):
+                item = self.item(row, column)
+                if isinstance(item, QTableWidgetItem):
                     item.setTextAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-                self.setItem(row, column, item)
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        """Say the hint where there is no row."""
-        super().paintEvent(event)
-        if self.rowCount() == 0:
-            colour = self.palette().placeholderText().color()
-            paint_hint(QPainter(self.viewport()), self.viewport().rect(), self._hint, colour)
 
 
 def peak_rows(curves: tuple[Curve, ...]) -> list[tuple[str, ...]]:

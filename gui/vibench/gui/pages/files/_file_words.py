@@ -35,15 +35,6 @@ def duration_text(duration_s: float) -> str:
     return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
 
 
-UNITS = {"m s-1": "m/s", "m s-2": "m/s²", "m": "m", "V": "V", "N": "N"}
-"""UDUNITS text of a file, and as it stands on an axis."""
-
-
-def unit_text(unit: str) -> str:
-    """Write a unit as people do."""
-    return UNITS.get(unit, unit)
-
-
 def role_text(role: str) -> str:
     """``"m0 velocity"``."""
     return role.replace("_", " ")

@@ -21,7 +21,7 @@ from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, ke
 from ...background import Job
 from ...forms import LineField
 from ...page import AppContext, FileKind, Page, Remembered, Shown
-from ...widgets import COMPARE, FILES, Notice, NoticeKind, Theme, notice_of, push_button
+from ...widgets import COMPARE, FILES, Notice, NoticeKind, SentenceLabel, Theme, notice_of, push_button
 from ._file_words import facts_text
 from ._listing import Levels, Listing, listed, made_levels, thumbnails
 from ._recording_table import CampaignChoice, RecordingTable
@@ -301,9 +301,7 @@ class FilesPage(Page):
         viewer.setAccessibleName("Recording")
         self._title = QLabel("No recording is open")
         self._title.setProperty("rank", "title")
-        self._facts = QLabel("Choose one in the list above.")
-        self._facts.setProperty("rank", "second")
-        self._facts.setWordWrap(True)
+        self._facts = SentenceLabel("Choose one in the list above.", rank="second")
         bar = QHBoxLayout()
         self._view = QLabel("")
         self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)

@@ -20,11 +20,11 @@ from ...background import Background, LatestRequest
 from ...forms import Choice
 from ...page import Shown
 from ...plots import LIMIT, TIME, Dash, Plot, PlotAxis, curve_style
-from ...widgets import Theme
+from ...widgets import SentenceLabel, Theme
 
 _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
-_RELATIVE = PlotAxis("p = y - z", "µm", factor=1e6, short="p")
+_RELATIVE = PlotAxis("p = y - z", "m", short="p")
 _ANOTHER = "another file…"
 _CHOOSE = "Choose a recording in the list above."
 
@@ -39,9 +39,7 @@ class HiddenMotionView(QWidget):
         self.tracked = self.plot.curve(curve_style(0), "tracked")
         self.free = self.plot.curve(curve_style(1, Dash.DOTTED), "without a contact model")
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
-        self.said = QLabel("")
-        self.said.setProperty("rank", "second")
-        self.said.setWordWrap(True)
+        self.said = SentenceLabel(rank="second")
         self.specimen = Choice()
         self.specimen.setAccessibleName("Specimen of the hidden motion")
         self.specimen.setToolTip("Whose springs, masses and stops the motion is told with")

@@ -23,8 +23,8 @@ from ...background import Background, LatestRequest
 from ...forms import Choice
 from ...page import Shown
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
-from ...widgets import Theme
-from ._file_words import role_text, unit_text
+from ...widgets import Theme, plain_unit
+from ._file_words import role_text
 from ._hidden_motion_view import HiddenMotionView
 from ._time_histories import RecordingTimeHistories
 
@@ -222,7 +222,7 @@ class _Image:
         known = found.decibel[np.isfinite(found.decibel)]
         strongest = float(np.max(known)) if known.size else 0.0
         self.bar.setLevels((strongest - _SHOWN_DB, strongest))
-        self.bar.axis.setLabel(f"dB re 1 ({unit_text(found.unit)})²/Hz")
+        self.bar.axis.setLabel(f"dB re 1 ({plain_unit(found.unit)})²/Hz")
         self.bar.show()
         self._plot.with_hint("")
         self._plot.setXRange(left, right, padding=0.0)

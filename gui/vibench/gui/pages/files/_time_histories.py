@@ -11,9 +11,9 @@ from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
 from vibench.acquisition.recording import ChannelHeader, Recording
 from vibench.analysis.live import RecordingOverview, zigzag
 
-from ...plots import LIMIT, Dash, LineStyle, Plot, PlotAxis, curve_style
-from ...widgets import Theme
-from ._file_words import role_text, unit_text
+from ...plots import LIMIT, TIME, Dash, LineStyle, Plot, PlotAxis, curve_style
+from ...widgets import Theme, plain_unit
+from ._file_words import role_text
 
 LEAST_SAMPLES = 8
 """The closest look."""
@@ -174,10 +174,8 @@ class RecordingTimeHistories(QWidget):
         """Give the plot of a channel, as it was left by another recording, or a new one."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
-            unit = unit_text(channel.unit)
-            plot = Plot(
-                f"{role_text(channel.role)} over time", PlotAxis("Time", "s"), PlotAxis(unit), self._theme
-            )
+            up = PlotAxis("", plain_unit(channel.unit))
+            plot = Plot(f"{role_text(channel.role)} over time", TIME, up, self._theme)
             plot.setMouseEnabled(x=True, y=False)
             plot.setFocusProxy(self)
             left = _LEFT_EM * self.fontMetrics().height()

@@ -16,7 +16,7 @@ from vibench.analysis.simulation import MapPicture
 from ...plots import FREQUENCY, LineStyle, Plot, PlotAxis, Scale
 from ...widgets import Theme
 
-AMPLITUDE = PlotAxis("Base amplitude A0", "µm", factor=1e6, scale=Scale.LOGARITHMIC)
+AMPLITUDE = PlotAxis("Base amplitude A0", "m", scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
 """Over the colours of a map, which are the same in every theme."""
 HINT = "What motions there are; drawn as it is computed. A click shows the motion there."

@@ -21,7 +21,7 @@ from vibench.analysis.simulation import (
 from ...background import Job
 from ...forms import Choice, JudgedForm
 from ...page import AppContext, Page, Shown, SideAndPicture, Simulator
-from ...widgets import MAPS, SIMULATE, Notice, NoticeKind, Theme, push_button
+from ...widgets import MAPS, SIMULATE, Notice, NoticeKind, SentenceLabel, Theme, push_button
 from ._map_plot import COLOURINGS, MapPlot
 from ._motion_view import MotionView
 
@@ -230,8 +230,7 @@ class MapsPage(Page):
         self.quantity.addItems(list(COLOURINGS))
         self.quantity.setAccessibleName("What the colours of the map say")
         self.quantity.currentIndexChanged.connect(self._recolour)
-        self._state = QLabel("Nothing has been computed yet.")
-        self._state.setWordWrap(True)
+        self._state = SentenceLabel("Nothing has been computed yet.")
         self._state.setAccessibleName("How far the map is")
         self._open = push_button(
             "&Open in Simulate",

@@ -1,15 +1,15 @@
 """The motion at one point of a map: over time, its portrait, and its spectrum."""
 
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from vibench.analysis.simulation import SettledMotion
 
 from ...plots import FREQUENCY, TIME, Plot, PlotAxis, Scale, curve_style
-from ...widgets import Theme
+from ...widgets import SentenceLabel, Theme
 
-RELATIVE = PlotAxis("p = y - z", "µm", 1e6, short="p (µm)")
-DISPLACEMENT = PlotAxis("m0 displacement", "µm", 1e6, short="x (µm)")
-LINE = PlotAxis("|x|", "µm", 1e6, scale=Scale.LOGARITHMIC)
+RELATIVE = PlotAxis("p = y - z", "m", short="p")
+DISPLACEMENT = PlotAxis("m0 displacement", "m", short="x")
+LINE = PlotAxis("|x|", "m", scale=Scale.LOGARITHMIC)
 SHOWN_PERIODS = 12
 HIGHEST_MULTIPLE = 6.0
 """Of the drive frequency: the end of the spectrum."""
@@ -20,8 +20,7 @@ class MotionView(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.said = QLabel("A click on the map shows the motion there.")
-        self.said.setWordWrap(True)
+        self.said = SentenceLabel("A click on the map shows the motion there.")
         self.said.setAccessibleName("The motion at the point that was clicked")
         self.plots = (
             Plot("Motion of m1 between its stops", TIME, RELATIVE, theme),

@@ -34,7 +34,7 @@ from vibench.acquisition.rig import Rig
 from ...background import LatestRequest
 from ...forms import Choice
 from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
-from ...widgets import Notice, NoticeKind, ReadTable, clock, notice_of
+from ...widgets import Notice, NoticeKind, ReadTable, SentenceLabel, clock, notice_of
 from ._draft import moved_up, with_measurement, with_sweep, without
 from ._row_words import CampaignPreview, point_rows, preview_campaign
 from ._sweep_form import SweepForm
@@ -66,8 +66,7 @@ class QueuePage(Page):
             "Each recording of the campaign is listed here, with how it stands.",
         )
         self.sweep = SweepForm()
-        self.summary = QLabel()
-        self.summary.setWordWrap(True)
+        self.summary = SentenceLabel()
         self.summary.setAccessibleName("Summary of the campaign")
         self.progress = QProgressBar()
         self.progress.setAccessibleName("Progress of the campaign")

@@ -1,7 +1,7 @@
 """The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check."""
 
 from collections.abc import Callable, Mapping
-from math import floor, isfinite, log10
+from math import isfinite
 from pathlib import Path
 
 from PySide6.QtCore import Qt
@@ -20,13 +20,9 @@ from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, l
 from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
 
 from ...page import AppContext, FileKind, Page, Remembered, UserActions
-from ...widgets import Notice, NoticeKind, ReadTable, moment_text, notice_of
+from ...widgets import Notice, NoticeKind, ReadTable, SentenceLabel, fitted_unit, moment_text, notice_of
 from ._knob_sheet import KnobSheetForm
 from ._rig_choice import RigChoice
-
-_PREFIXED = frozenset({"V", "A", "s", "m", "Hz", "W"})
-_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
-_PLAIN_FROM, _PLAIN_TO = 0.01, 1e5
 
 
 def finding_name(finding: Finding) -> str:
@@ -37,15 +33,13 @@ def finding_name(finding: Finding) -> str:
 def measured_text(finding: Finding) -> str:
     """``"20 µV"`` for 1.997e-05 V; everything else as the check says it."""
     number = finding.number
-    if number is None or finding.unit not in _PREFIXED or not isfinite(number) or number == 0.0:
+    if number is None or not isfinite(number):
         return finding.value
-    if _PLAIN_FROM <= abs(number) < _PLAIN_TO:
+    unit = fitted_unit(finding.unit, number)
+    if unit.per_si == 1.0:
         return finding.value
-    power = min(max(3 * floor(log10(abs(number)) / 3), min(_PREFIXES)), max(_PREFIXES))
-    unit = f"{_PREFIXES[power]}{finding.unit}"
-    scale = 10.0**-power
-    spread = "" if finding.uncertainty is None else f" ± {finding.uncertainty * scale:.1g}"
-    return f"{number * scale:.3g}{spread} {unit}"
+    spread = "" if finding.uncertainty is None else f" ± {finding.uncertainty * unit.per_si:.1g}"
+    return f"{number * unit.per_si:.3g}{spread} {unit.name}"
 
 
 def expected_text(finding: Finding) -> str:
@@ -70,9 +64,7 @@ class RigPage(Page):
         self._actions = UserActions(context, self)
         self.choice = RigChoice()
         self.knobs = KnobSheetForm()
-        self.about = QLabel()
-        self.about.setWordWrap(True)
-        self.about.setProperty("rank", "second")
+        self.about = SentenceLabel(rank="second")
         self.open_button = self._button("&Open bench", "Open every instrument; the generator stays silent")
         self.open_button.setProperty("rank", "first")
         self.close_button = self._button("Close bench", "Silence everything and close the instruments")
@@ -90,11 +82,8 @@ class RigPage(Page):
             ("", "finding", "measured", "expected"),
             "Noise, gains, clocks and the answer to a small sine, each beside what is expected of it.",
         )
-        self.verdict = QLabel()
-        self.verdict.setWordWrap(True)
-        self.first_steps = QLabel(FIRST_STEPS)
-        self.first_steps.setWordWrap(True)
-        self.first_steps.setProperty("rank", "second")
+        self.verdict = SentenceLabel()
+        self.first_steps = SentenceLabel(FIRST_STEPS, rank="second")
         self._lay_out()
         self._connect()
         self._choose_first()

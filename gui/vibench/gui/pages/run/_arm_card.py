@@ -1,9 +1,11 @@
 """Arming in plain words: what is going to happen, then a second, explicit act to start it."""
 
 from PySide6.QtCore import Signal, SignalInstance
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QLabel, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import DRIVING, EngineState, EngineStatus
+
+from ...widgets import SentenceLabel
 
 _HINTS = {
     EngineState.CLOSED: "No bench is open. Open one on the Rig page (Ctrl+1).",
@@ -23,8 +25,7 @@ class ArmCard(QGroupBox):
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("What will happen", parent)
-        self._words = QLabel()
-        self._words.setWordWrap(True)
+        self._words = SentenceLabel()
         self._words.setAccessibleName("What will happen")
         self.arm_button = self._button(
             "A&rm…  (Ctrl+Return)", "Say in words what will happen", self.arm_wanted
@@ -73,7 +74,7 @@ class ArmCard(QGroupBox):
         self._was_armed = is_armed
 
     def _say(self, text: str) -> None:
-        if self._words.text() != text:
+        if self._words.sentence != text:
             self._words.setText(text)
 
     def _button(self, text: str, tip: str, wanted: SignalInstance) -> QPushButton:

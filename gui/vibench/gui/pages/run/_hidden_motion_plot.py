@@ -4,15 +4,15 @@ from functools import partial
 from math import nan
 
 import numpy as np
-from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import EngineStatus, TwinStatus
 
 from ...plots import LIMIT, Dash, LineStyle, Plot, PlotAxis, curve_style
-from ...widgets import Colour, Theme
+from ...widgets import Colour, SentenceLabel, Theme
 
-_ACROSS = PlotAxis("Time from the newest sample", "ms", 1e3, short="t (ms)")
-_UP = PlotAxis("p = y - z", "µm", 1e6, short="p (µm)")
+_ACROSS = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
+_UP = PlotAxis("p = y - z", "m", short="p")
 _SHADES = 5
 """Of a forecast; the last one is nearly gone where its error is a quarter of the gap, and it ends."""
 _WORTH_OF_GAP = 0.25
@@ -39,9 +39,7 @@ class HiddenMotionPlot(QWidget):
             self.plot.curve(LineStyle(partial(_faded, number), Dash.SOLID)) for number in range(_SHADES)
         ]
         self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
-        self.said = QLabel("")
-        self.said.setProperty("rank", "second")
-        self.said.setWordWrap(True)
+        self.said = SentenceLabel(rank="second")
         self.said.setAccessibleName("What the live twin says")
         self._end = (0, -1)
         self.plot.setXRange(-_BACK_S, _AHEAD_S, padding=0)

@@ -9,8 +9,8 @@ from vibench.analysis.live import LiveView, Portrait
 from ...plots import Plot, PlotAxis, curve_style
 from ...widgets import Theme
 
-_ACROSS = PlotAxis("m0 displacement", "µm", 1e6, short="x (µm)")
-_UP = PlotAxis("m0 velocity", "mm/s", 1e3, short="v (mm/s)")
+_ACROSS = PlotAxis("m0 displacement", "m", short="x")
+_UP = PlotAxis("m0 velocity", "m/s", short="v")
 
 
 def extent(values: NDArray[np.floating]) -> tuple[float, float]:

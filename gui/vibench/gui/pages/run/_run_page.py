@@ -16,7 +16,7 @@ from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
 from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, Shown, UserActions
-from ...widgets import FILES, Theme
+from ...widgets import FILES, SentenceLabel, Theme
 from ._arm_card import ArmCard
 from ._hidden_motion_plot import HiddenMotionPlot
 from ._portrait_plot import PortraitPlot
@@ -57,8 +57,7 @@ class RunPage(Page):
         self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
         self.look_button = QPushButton("Look at the recording")
         self.look_button.setToolTip("Show the last recording on the Files page")
-        self.summary = QLabel()
-        self.summary.setWordWrap(True)
+        self.summary = SentenceLabel()
         self.summary.setAccessibleName("How the last run ended")
         self._lay_out()
         self._connect()

@@ -7,10 +7,9 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from vibench.analysis.live import LiveView
 
 from ...plots import LOG_FREQUENCY, Plot, PlotAxis, Scale, curve_style
-from ...widgets import Theme
+from ...widgets import UNITS, Theme
 from ._time_histories import channel_word
 
-_UNITS = {"m s-2": "m/s²", "m s-1": "m/s"}
 _LEAST = 1e-12
 
 
@@ -28,6 +27,8 @@ class SpectrumPlot(QWidget):
         self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()
         self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []
+        self._view: LiveView | None = None
+        UNITS.changed.connect(self._draw_anew)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.plot)
@@ -37,15 +38,24 @@ class SpectrumPlot(QWidget):
         found = view.spectrum()
         if found is None:
             return
-        for row in range(len(self._curves), len(view.channels)):
-            channel = view.channels[row]
-            name = f"{channel_word(channel.role)} ({_UNITS.get(channel.unit, channel.unit)})"
+        self._view = view
+        units = [UNITS.on_axis(channel.unit) for channel in view.channels]
+        for row in range(len(self._curves), len(units)):
+            name = f"{channel_word(view.channels[row].role)} ({units[row].name})"
             self._curves.append(self.plot.curve(curve_style(row), name))
-        for curve, density in zip(self._curves, found.amplitude_density, strict=False):
-            curve.setData(found.frequency_hz[1:], np.maximum(density[1:], _LEAST))
+        for curve, density, unit in zip(self._curves, found.amplitude_density, units, strict=False):
+            curve.setData(found.frequency_hz[1:], unit.per_si * np.maximum(density[1:], _LEAST))
+
+    def _draw_anew(self) -> None:
+        """Draw in other units: the axis has that of each channel."""
+        self.plot.wipe()
+        self._curves.clear()
+        if self._view is not None:
+            self.show_view(self._view)
 
     def clear(self) -> None:
         """Forget the last run."""
+        self._view = None
         for curve in self._curves:
             curve.clear()
 

@@ -69,9 +69,7 @@ class SweepEnvelopePlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.plot = Plot(
-            "Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "mm/s", 1e3), theme
-        ).with_legend()
+        self.plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "m/s"), theme).with_legend()
         self.plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
         self._stripes = self.plot.stripes(LineStyle(lambda theme: theme.traces[3], filled=0.15))
         self._upper = self.plot.curve(curve_style(3), "largest")

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from vibench.analysis.live import LiveView, zigzag
 
 from ...plots import Plot, PlotAxis, curve_style
-from ...widgets import Theme
+from ...widgets import Theme, plain_unit
 
 _WORDS = {
     "drive_voltage": "drive",
@@ -17,7 +17,6 @@ _WORDS = {
     "m0_velocity": "m0",
 }
 _SHORT = {"amplifier_voltage": "amp."}
-_UNITS = {"V": ("V", 1.0), "m s-2": ("m/s²", 1.0), "m s-1": ("mm/s", 1e3)}
 
 
 def channel_word(role: str) -> str:
@@ -26,11 +25,8 @@ def channel_word(role: str) -> str:
 
 
 def channel_axis(role: str, unit: str) -> PlotAxis:
-    """Give a channel's axis: its word, in a unit whose numbers are easy to read."""
-    shown, factor = _UNITS.get(unit, (unit, 1.0))
-    return PlotAxis(
-        channel_word(role), shown, factor, short=f"{_SHORT.get(role, channel_word(role))} ({shown})"
-    )
+    """Give a channel's axis: its word, in the unit that is shown."""
+    return PlotAxis(channel_word(role), plain_unit(unit), short=_SHORT.get(role, channel_word(role)))
 
 
 AGO = PlotAxis("Time before now", "s")

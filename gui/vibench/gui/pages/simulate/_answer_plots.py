@@ -15,10 +15,10 @@ from ...plots import GUIDE, LIMIT, LOG_FREQUENCY, Dash, LineStyle, Plot, PlotAxi
 from ...widgets import Theme
 
 RESPONSE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
-EXPONENT = PlotAxis("Largest Lyapunov exponent", "1/s", short="Exponent (1/s)")
+EXPONENT = PlotAxis("Largest Lyapunov exponent", "1/s", short="Exponent")
 DIFFERENCE = PlotAxis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
 TIME = PlotAxis("Time, to the end of the run", "ms", factor=1e3)
-DISPLACEMENT = PlotAxis("Displacement", "µm", factor=1e6)
+DISPLACEMENT = PlotAxis("Displacement", "m")
 _COLLIDING = LineStyle(lambda theme: theme.muted, filled=0.14)
 _EDGE = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _HINTS = (

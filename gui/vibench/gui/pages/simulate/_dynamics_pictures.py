@@ -11,7 +11,7 @@ from vibench.sim import Parameter
 from ...plots import GUIDE, LOG_FREQUENCY, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
 
-LEVEL = PlotAxis("Base amplitude A0", "µm", factor=1e6)
+LEVEL = PlotAxis("Base amplitude A0", "m")
 RESPONSES = (
     ("response_i", PlotAxis("Response I of m0, max |x| / A0", short="Response I", scale=Scale.LOGARITHMIC)),
     (
@@ -19,7 +19,7 @@ RESPONSES = (
         PlotAxis("Response II of m0, |x at f| / A0", short="Response II", scale=Scale.LOGARITHMIC),
     ),
 )
-EXPONENT = PlotAxis("Lyapunov exponents", "1/s", short="Exponents (1/s)")
+EXPONENT = PlotAxis("Lyapunov exponents", "1/s", short="Exponents")
 DIMENSION = PlotAxis("Kaplan-Yorke dimension", short="Dimension")
 ACROSS = {Parameter.FREQUENCY: LOG_FREQUENCY, Parameter.AMPLITUDE: LEVEL}
 _SPECIAL = ("fold", "period doubling", "Neimark-Sacker", "symmetry breaking", "grazing")

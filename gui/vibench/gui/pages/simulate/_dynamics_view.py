@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from vibench.analysis import Curve
 from vibench.analysis.dynamics import SpecimenChoice
@@ -13,7 +13,7 @@ from vibench.analysis.simulation import Asked, PartialResult, Trouble
 
 from ...forms import JudgedForm
 from ...page import AppContext, Shown, SideAndPicture, Simulator
-from ...widgets import COMPARE, Notice, NoticeKind, Theme, push_button
+from ...widgets import COMPARE, Notice, NoticeKind, SentenceLabel, Theme, push_button
 
 Request = TypeVar("Request", bound=SpecimenChoice)
 Answer = TypeVar("Answer")
@@ -172,9 +172,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
     def _side(self) -> QWidget:
         scene = QGroupBox("Scene")
         QVBoxLayout(scene).addWidget(self.form)
-        before = QLabel(self.kind.before)
-        before.setWordWrap(True)
-        before.setProperty("rank", "second")
+        before = SentenceLabel(self.kind.before, rank="second")
         self._begin = push_button("Find", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._cancel = push_button("Cancel", "Want no more; what has been found stays", self.cancel)
@@ -192,8 +190,7 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         return side
 
     def _right(self) -> QWidget:
-        self._state = QLabel("Nothing has been asked yet.")
-        self._state.setWordWrap(True)
+        self._state = SentenceLabel("Nothing has been asked yet.")
         self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
         self._compare = push_button(
             "Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare

@@ -24,7 +24,17 @@ from vibench.analysis.simulation import (
 
 from ...forms import JudgedForm
 from ...page import AppContext, Page, Remembered, Shown, SideAndPicture, Simulator
-from ...widgets import COMPARE, SIMULATE, Notice, NoticeKind, ReadTable, Theme, TimedBar, push_button
+from ...widgets import (
+    COMPARE,
+    SIMULATE,
+    Notice,
+    NoticeKind,
+    ReadTable,
+    SentenceLabel,
+    Theme,
+    TimedBar,
+    push_button,
+)
 from ._answer_plots import AnswerPlots
 from ._chain_picture import ChainPicture
 from ._dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
@@ -204,8 +214,7 @@ class SimulatePage(Page):
         scene = QGroupBox("Scene")
         QVBoxLayout(scene).addWidget(self.form)
         cost = QGroupBox("Cost and error of this accuracy")
-        self._cost = QLabel("")
-        self._cost.setWordWrap(True)
+        self._cost = SentenceLabel()
         self._cost.setAccessibleName("Cost and error of this accuracy")
         QVBoxLayout(cost).addWidget(self._cost)
         self._begin = push_button("&Simulate", "Compute what the form says, in another process", self.begin)

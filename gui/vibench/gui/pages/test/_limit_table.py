@@ -6,12 +6,11 @@ from PySide6.QtWidgets import QTableWidgetItem, QWidget
 from vibench.acquisition.plan import LimitCheck, LimitSide
 
 from ...plots import SHARE_ROLE, BarDelegate
-from ...widgets import ReadTable
+from ...widgets import ReadTable, fitted_unit
 
 _USED = 0
 _LEAST_LETTERS = 10
 _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
-_UNITS = {"m s-2": "m/s²", "m/s2": "m/s²", "m s-1": "m/s"}
 
 
 class LimitTable(ReadTable):
@@ -27,26 +26,28 @@ class LimitTable(ReadTable):
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
         """Show what was held against the rig."""
+        units = [fitted_unit(check.unit, check.limit) for check in checks]
         self.show_rows(
             [
                 (
                     f"{100 * check.use:.1f} %",
                     f"{_mark(check)}{_short(check.what)}",
-                    f"{check.value:.3g} {_unit(check.unit)}",
-                    f"{_SIGNS[check.side]} {check.limit:.3g} {_unit(check.unit)}",
+                    unit.text(check.value),
+                    f"{_SIGNS[check.side]} {unit.text(check.limit)}",
                 )
-                for check in checks
-            ]
+                for check, unit in zip(checks, units, strict=True)
+            ],
+            [f"{check.what}\nLimit from: {check.source}{_remedy(check)}" for check in checks],
         )
         for row, check in enumerate(checks):
-            for column in range(self.columnCount()):
-                item = self.item(row, column)
-                if isinstance(item, QTableWidgetItem):
-                    remedy = "" if check.is_kept else f"\nTo do: {check.remedy}"
-                    item.setToolTip(f"{check.what}\nLimit from: {check.source}{remedy}")
-                    item.setData(SHARE_ROLE, float(check.use) if column == _USED else None)
-                    if column == _USED:
-                        item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
+            item = self.item(row, _USED)
+            if isinstance(item, QTableWidgetItem):
+                item.setData(SHARE_ROLE, float(check.use))
+                item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
+
+
+def _remedy(check: LimitCheck) -> str:
+    return "" if check.is_kept else f"\nTo do: {check.remedy}"
 
 
 def _mark(check: LimitCheck) -> str:
@@ -57,7 +58,3 @@ def _mark(check: LimitCheck) -> str:
 
 def _short(what: str) -> str:
     return what.removeprefix("the ").replace("(at ", "(").replace("(about, at ", "(about, ").replace("_", " ")
-
-
-def _unit(unit: str) -> str:
-    return _UNITS.get(unit, unit)

@@ -25,7 +25,7 @@ from vibench.acquisition.rig import BaseQuantity, Rig
 from ...background import LatestRequest
 from ...forms import Choice
 from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
-from ...widgets import Notice, NoticeKind, Theme, clock, notice_of
+from ...widgets import Notice, NoticeKind, SentenceLabel, Theme, clock, fitted_unit, notice_of
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
@@ -41,7 +41,6 @@ _SHOWN = {
     BaseQuantity.FORCE: "force",
     BaseQuantity.AMPLIFIER_VOLTAGE: "amplifier's voltage",
 }
-_UNITS = {"m": ("mm", 1e3), "m/s2": ("m/s²", 1.0), "N": ("N", 1.0), "V": ("V", 1.0)}
 
 
 def summary_text(seen: MeasurementPreview) -> str:
@@ -65,8 +64,8 @@ def summary_text(seen: MeasurementPreview) -> str:
 
 
 def _load(check: LimitCheck, name: str) -> str:
-    unit, factor = _UNITS.get(check.unit, (check.unit, 1.0))
-    return f"{name} {check.value * factor:.3g} of {check.limit * factor:.3g} {unit}"
+    unit = fitted_unit(check.unit, check.limit)
+    return f"{name} {unit.text(check.value)} of {unit.text(check.limit)}"
 
 
 Asked = tuple[Measurement | None, Rig | None] | None
@@ -88,18 +87,13 @@ class TestPage(Page):
         self._tests: tuple[NamedTest, ...] = ()
         self.choice = Choice()
         self.form = TestForm()
-        self.summary = QLabel("")
-        self.summary.setWordWrap(True)
+        self.summary = SentenceLabel()
         self.summary.setAccessibleName("Summary of the test")
         self.plots = PreviewPlots(context.theme)
         self.limits = LimitTable()
         self.prediction = PredictionPlot(context.theme)
-        self.prediction_note = QLabel()
-        self.prediction_note.setWordWrap(True)
-        self.prediction_note.setProperty("rank", "second")
-        self.expectation = QLabel()
-        self.expectation.setWordWrap(True)
-        self.expectation.setProperty("rank", "second")
+        self.prediction_note = SentenceLabel(rank="second")
+        self.expectation = SentenceLabel(rank="second")
         self.arm_button = QPushButton("A&rm the test…  (Ctrl+Return)")
         self.arm_button.setProperty("rank", "first")
         self.arm_button.setToolTip("Show in words what will happen; nothing plays before Start")

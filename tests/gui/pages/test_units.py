@@ -1,0 +1,254 @@
+"""Units are chosen once: no page keeps a number in the old one, and no value changes."""
+
+import re
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QAbstractSpinBox,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QTableView,
+    QWidget,
+)
+
+from vibench.acquisition import shipped
+from vibench.acquisition.engine import ArmedPlan, EngineState, EngineStatus, Supervision, TwinStatus
+from vibench.acquisition.plan import EXCITATION_KINDS, Dwell, HeldDwell, Measurement
+from vibench.acquisition.rig import load_rig
+from vibench.analysis import Curve, CurveKind, CurveOrigin
+from vibench.analysis.simulation import SettledMotion
+from vibench.gui.forms import JudgedForm
+from vibench.gui.forms._quantity_edit import QuantityEdit, parsed_quantity, quantity_text
+from vibench.gui.page import AppContext, Settings
+from vibench.gui.pages.test._test_form import TestForm as FormOfATest
+from vibench.gui.pages.test._test_preview import TestPreview as Previewed, preview_test
+from vibench.gui.plots import Plot
+from vibench.gui.widgets import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST, UNITS
+from vibench.gui.widgets._units import CHOICES, fitted_unit
+from vibench.gui.window._settings_dialog import SettingsDialog
+
+OLD = re.compile(r"(?:\d|\()\s?(?:µm|m/s²|m/s2|m s-[12]|mm/s)(?![\w/²·])")
+"""A number, or the label of an axis, in a unit that was not chosen."""
+DWELL = Dwell(amplitude_vpp=0.5, frequency_hz=260.0, settle_s=1.0, duration_s=6.0)
+OTHERS = {"displacements_in": "mm", "velocities_in": "m/s", "accelerations_in": "g"}
+USUAL = {"displacements_in": "automatic", "velocities_in": "mm/s", "accelerations_in": "m/s²"}
+
+
+@pytest.fixture(autouse=True)
+def _usual_again():
+    yield
+    UNITS.choose({})
+
+
+@pytest.fixture
+def filled(window, record, tmp_path, qtbot):
+    """Something that has displacements, velocities and accelerations on every page."""
+    pages, context = window.pages, window.context
+    rig = load_rig(shipped("hardware_configs/virtual_rig.toml"))
+    context.selection.choose_rig(rig)
+    form = pages[TEST].form
+    form.form.editors["excitation"].kind_choice.setCurrentText("held dwell")
+    measurement = form.value
+    pages[TEST]._looked(preview_test(Previewed(measurement, rig)))
+    lines = ("base held at 5 µm", "stroke 0.05 mm of 5 mm", "acceleration 12.5 m/s² of 60 m/s²")
+    armed = ArmedPlan(
+        campaign="held",
+        folder="",
+        lines=lines,
+        expires_in_s=30.0,
+        attendance=Supervision.ATTENDED,
+        patience_s=2.0,
+    )
+    status = EngineStatus(state=EngineState.ARMED, attendance=Supervision.ATTENDED, armed=armed)
+    pages[RUN].arm_card.show_status(status, "held", "")
+    twin = TwinStatus(
+        state="tracked", run_id=1, end_sample=9, step_s=1e-4, p_m=(0.0, 1e-6), stops_m=(-4e-5, 4e-5),
+        forecast_m=(), forecast_error_m=(), numbers=(("lower gap", "(44.001 ± 0.005) µm"),),
+    )  # fmt: skip
+    pages[RUN].hidden_motion.show_status(status.model_copy(update={"twin": twin}))
+    path = record(tmp_path, "a")
+    context.recording_wanted.emit(path)
+    frequency_hz = np.linspace(200.0, 300.0, 50)
+    for name in ("model hertz, 5 µm", "model linear, 10 to 20 µm"):
+        curve = Curve(
+            name, CurveOrigin.PREDICTED, CurveKind.RESPONSE_I, frequency_hz,
+            np.hypot(1.0, (frequency_hz - 250.0) / 9.0), np.full(50, 0.01), "A0 = 5 µm", 5e-6 * len(name),
+        )  # fmt: skip
+        pages[COMPARE].add_prediction((curve,))
+    pages[SIMULATE].form.form.show_content({})
+    shown = np.linspace(0.0, 1e-5, 50)
+    said = "260 Hz, 5 µm, from rest: periodic; gaps 45 and 45 µm"
+    pages[MAPS].motion.show_motion(
+        SettledMotion(260.0, 5e-6, said, shown, shown, shown, (4.5e-5, 4.5e-5), shown * 1e7, shown)
+    )
+    pages[QUEUE].open_file(shipped("campaigns/paper.toml"))
+    qtbot.waitUntil(lambda: bool(pages[FILES].time_histories.plots), timeout=60_000)
+    return window
+
+
+def chosen_in(window, units):
+    dialog = SettingsDialog(window.context, window)
+    dialog.form.form.show_content({**dialog.form.form.content(), **units})
+    dialog.accept()
+    dialog.deleteLater()
+
+
+def texts_of(page):
+    """Everything that a page writes: labels, fields, lists, tables, axes, tips."""
+    for widget in (page, *page.findChildren(QWidget)):
+        yield widget.toolTip()
+        match widget:
+            case QLabel() | QLineEdit():
+                yield widget.text()
+            case QAbstractSpinBox():
+                yield widget.lineEdit().text()
+            case QComboBox():
+                yield from (widget.itemText(n) for n in range(widget.count()))
+            case QAbstractItemView() if widget.model() is not None:
+                model = widget.model()
+                columns = range(model.columnCount() if isinstance(widget, QTableView) else 1)
+                places = [model.index(row, each) for row in range(model.rowCount()) for each in columns]
+                for role in (Qt.ItemDataRole.DisplayRole, Qt.ItemDataRole.ToolTipRole):
+                    yield from (str(model.data(place, role) or "") for place in places)
+            case Plot():
+                for axis in (widget.across, widget.up):
+                    yield axis.axis.text
+                    yield axis.axis.short_text
+                    yield axis.labelText
+
+
+def form_of_a_kind(qtbot, kind):
+    form = FormOfATest()
+    qtbot.addWidget(form)
+    form.show_value(Measurement(name="trial", excitation=DWELL))
+    form.form.editors["excitation"].kind_choice.setCurrentText(kind.replace("_", " "))
+    return form
+
+
+def numbers_of(page):
+    return [edit.value() for edit in page.findChildren(QuantityEdit)]
+
+
+def test_no_number_on_any_page_stays_in_the_old_unit_and_all_come_back(filled):
+    before = {name: list(texts_of(page)) for name, page in filled.pages.items()}
+    values = {name: numbers_of(page) for name, page in filled.pages.items()}
+    told = {name for name, texts in before.items() if any(map(OLD.search, texts))}
+    assert told >= {TEST, RUN, FILES, COMPARE, SIMULATE, MAPS}
+    chosen_in(filled, OTHERS)
+    for name, page in filled.pages.items():
+        left = [text for text in texts_of(page) if OLD.search(text)]
+        assert left == [], name
+        assert numbers_of(page) == values[name], name
+    now = " | ".join(text for page in filled.pages.values() for text in texts_of(page))
+    for text in (
+        "stroke 0.05 mm of 5 mm",
+        "acceleration 1.27 g of 6.12 g",
+        "(0.044001 ± 0.000005) mm",
+        "(g)",
+    ):
+        assert text in now, text
+    chosen_in(filled, USUAL)
+    assert {name: list(texts_of(page)) for name, page in filled.pages.items()} == before
+
+
+@pytest.mark.parametrize("kind", EXCITATION_KINDS)
+def test_every_field_of_a_test_is_in_the_new_unit_and_takes_what_it_shows(qtbot, kind):
+    form = form_of_a_kind(qtbot, kind)
+    before = form.value
+    assert before is not None, form.complaint
+    UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
+    assert [text for text in texts_of(form) if OLD.search(text)] == []
+    for edit in (*form.findChildren(QuantityEdit), *form.findChildren(QLineEdit)):
+        edit.editingFinished.emit()
+    assert form.value == before
+    UNITS.choose({"m": "m"})
+    assert form.value == before
+
+
+def test_numbers_of_a_list_are_read_in_the_unit_that_is_shown(qtbot):
+    form = form_of_a_kind(qtbot, "resonance_tracking")
+    levels = form.form.editors["excitation"].form.editors["accelerations_m_per_s2"]
+    UNITS.choose({"m/s²": "g"})
+    levels.widget.setText("0.1, 0.2 g, 3 m/s²")
+    levels.widget.editingFinished.emit()
+    assert form.value.excitation.accelerations_m_per_s2 == (0.980665, 1.96133, 3.0)
+    levels.widget.setText("0.1, 2 mm")
+    levels.widget.editingFinished.emit()
+    assert "Accelerations (g): 'mm' is not a unit of this field; give g" in form.complaint
+
+
+def test_a_chosen_unit_is_there_again_after_a_start(filled, tmp_path):
+    chosen_in(filled, OTHERS)
+    UNITS.choose({})
+    again = AppContext(Settings(tmp_path / "window.ini"))
+    assert tuple(UNITS.chosen.values()) == tuple(OTHERS.values())
+    again.background.close()
+
+
+def test_an_axis_says_the_number_of_its_unit(filled):
+    plot = next(each for each in filled.pages[FILES].time_histories.plots if "m/s²" in each.up.labelText)
+    usual = plot.up.tickStrings([0.0, STANDARD := 9.80665], 1.0, STANDARD)
+    chosen_in(filled, OTHERS)
+    assert plot.up.labelText == "g"
+    assert plot.up.tickStrings([0.0, STANDARD], 1.0, STANDARD) == ["0", "1"] != usual
+
+
+@pytest.mark.parametrize(
+    ("unit", "shown", "text", "value"),
+    [
+        ("m", "mm", "0.045", 45e-6),
+        ("m", "mm", "45 µm", 45e-6),
+        ("m", "µm", "45", 45e-6),
+        ("m", "m", "45e-6", 45e-6),
+        ("m", "automatic", "45e-6", 45e-6),
+        ("m/s²", "g", "0.5", 0.5 * 9.80665),
+        ("m/s²", "g", "3 m/s²", 3.0),
+        ("m/s²", "m/s²", "1 g", 9.80665),
+    ],
+)
+def test_a_field_takes_what_it_shows_and_any_unit_that_is_named(unit, shown, text, value):
+    UNITS.choose({unit: shown})
+    assert parsed_quantity(text, unit) == value
+    assert parsed_quantity(quantity_text(value, unit), unit) == pytest.approx(value, rel=1e-5)
+
+
+def test_a_value_keeps_its_digits_through_a_unit_that_cannot_write_them(qtbot):
+    form = JudgedForm(HeldDwell, "dwell")
+    qtbot.addWidget(form)
+    form.form.show_content({"base_level": {"acceleration_m_per_s2": 1.2345678901234}})
+    edit = form.form.editors["base_level"].form.editors["acceleration_m_per_s2"].widget
+    UNITS.choose({"m/s²": "g"})
+    assert edit.lineEdit().text() == "0.125891 g"
+    edit.editingFinished.emit()
+    UNITS.choose({})
+    assert edit.value() == 1.2345678901234
+
+
+@pytest.mark.parametrize(
+    ("sentence", "told"),
+    [
+        ("gaps 45 and 45 µm, 12.5 to 20 µm", "gaps 0.045 and 0.045 mm, 0.0125 to 0.020 mm"),
+        ("(12.3 ± 0.4) µm at 260 Hz and 5 µm", "(0.0123 ± 0.0004) mm at 260 Hz and 0.005 mm"),
+        ("range 20 mm/s/V, m0 at 3 m0", "range 20 mm/s/V, m0 at 3 m0"),
+        ("base 2.5 m/s2 (3 m/s² expected)", "base 0.255 g (0.306 g expected)"),
+        ("dB re 1 (m/s²)²/Hz, 12 g, 3 s, 5 µs", "dB re 1 (m/s²)²/Hz, 12 g, 3 s, 5 µs"),
+        ("0.25 m/s, -12 mm/s", "0.25 m/s, -0.012 m/s"),
+    ],
+)
+def test_a_sentence_is_told_in_the_chosen_units_and_nothing_else_of_it_changes(sentence, told):
+    UNITS.choose({"m": "mm", "m/s": "m/s", "m/s²": "g"})
+    assert UNITS.told(sentence) == told
+
+
+@pytest.mark.parametrize("unit", CHOICES)
+@pytest.mark.parametrize("value", [3e-7, 4.5e-5, 0.02, 1.5, 1234.0])
+def test_every_choice_writes_the_same_quantity(unit, value):
+    for name in CHOICES[unit]:
+        UNITS.choose({unit: name})
+        fitted = fitted_unit(unit, value)
+        said = UNITS.told(fitted.text(value, 6))
+        assert parsed_quantity(said, unit) == pytest.approx(value, rel=2e-3), name
