@@ -1,6 +1,7 @@
 """Pictures of every page, light and dark, in several sizes, made by the window while it measures."""
 
 import gc
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -20,10 +21,11 @@ from vibench.analysis.live import RowSpacing
 from ..page import AppContext, Remembered, Settings
 from ..pages.compare import ComparePage
 from ..pages.files import FilesPage
+from ..pages.maps import MapsPage
 from ..pages.queue import QueuePage
 from ..pages.simulate import SimulatePage
 from ..pages.test import TestPage
-from ..widgets import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST, THEMES, Theme
+from ..widgets import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST, THEMES, Theme
 from ._open_window import application
 from ._page_catalogue import PAGES
 from ._window import Window
@@ -53,6 +55,12 @@ SHOWN_TOO = Measurement(
     excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, duration_s=3),
 )
 CAMPAIGN = "campaigns/paper.toml"
+MAP = {"columns": 61, "rows": 41}
+MOTION = (300.0, 20e-6)
+"""Frequency [Hz] and amplitude [m] of the motion beside the map."""
+BRANCHES = {"start": 88.0, "stop": 101.0, "places": 3}
+"""Around the first resonance."""
+CHAIN = {"start_hz": 200.0, "stop_hz": 220.0, "step_hz": 10.0, "duration_s": 1.0, "settle_s": 1.0}
 
 
 def make_screenshots(bench: Path | None, folder: Path) -> int:
@@ -76,10 +84,14 @@ def make_screenshots(bench: Path | None, folder: Path) -> int:
             _measure(window, SHOWN, lambda: _picture(window, (RUN,), folder))
             _fill(window)
             _picture(window, tuple(name for name in window.pages if name != RUN), folder)
+            _picture_tabs(window, folder)
             _picture_spectrogram(window, folder)
             for width, height in OTHER_SIZES:
                 window.resize(width, height)
                 _picture(window, tuple(window.pages), folder / f"{width}x{height}")
+        except TimeoutError as error:
+            sys.stderr.write(f"The pictures are not complete: {error}.\n")
+            return 1
         finally:
             window.close()
     return 0
@@ -115,15 +127,22 @@ def _elapsed_s(window: Window) -> float:
 
 
 def _fill(window: Window) -> None:
-    """Simulate what the form says at first, lay it over what was measured, and take over a campaign."""
-    compare, simulation, queue = (window.pages[name] for name in (COMPARE, SIMULATE, QUEUE))
+    """Simulate and map what the forms say at first, lay it over what was measured, take over a campaign."""
+    compare, simulation, queue, maps = (window.pages[name] for name in (COMPARE, SIMULATE, QUEUE, MAPS))
     assert isinstance(compare, ComparePage)
     assert isinstance(simulation, SimulatePage)
     assert isinstance(queue, QueuePage)
+    assert isinstance(maps, MapsPage)
+    for view, asked in ((maps, MAP), (simulation.branches, BRANCHES), (simulation.chain, CHAIN)):
+        view.form.form.show_content({**view.form.form.content(), **asked})
+        view.begin()
     simulation.begin()
-    compare.add_recordings(tuple(sorted(window.context.folder.glob("sweep*.h5"))))
+    window.context.comparison_wanted.emit(tuple(sorted(window.context.folder.glob("sweep*.h5"))))
     queue.open_file(shipped(CAMPAIGN))
-    _wait(lambda: not simulation.simulator.is_busy and not compare.is_busy)
+    asked_for = [each.simulator for each in (maps, simulation, simulation.branches, simulation.chain)]
+    _wait(lambda: not any(each.is_busy for each in asked_for) and not compare.is_busy)
+    maps.pick(*MOTION)
+    _wait(lambda: maps.shown[1].inputs == maps.shown[1].wanted)
     for path in window.context.folder.glob("sweep*.h5"):
         window.context.recording_wanted.emit(path)
     if simulation.progress is not None:
@@ -137,6 +156,17 @@ def _picture(window: Window, pages: tuple[str, ...], folder: Path) -> None:
         window.show_page(page)
         _save(window, folder, page.lower())
     _themed(window, first)
+
+
+def _picture_tabs(window: Window, folder: Path) -> None:
+    """Save the tabs of the Simulate page that have pictures of their own."""
+    simulation = window.pages[SIMULATE]
+    assert isinstance(simulation, SimulatePage)
+    window.show_page(SIMULATE)
+    for view in (simulation.branches, simulation.chain):
+        simulation.tabs.setCurrentWidget(view)
+        _save(window, folder, view.kind.name)
+    simulation.tabs.setCurrentIndex(0)
 
 
 def _picture_spectrogram(window: Window, folder: Path) -> None:
@@ -181,7 +211,11 @@ def _themed(window: Window, theme: Theme) -> None:
 
 def _wait(is_so: Callable[[], bool]) -> None:
     give_up_s = monotonic() + PATIENCE_S
-    while not is_so() and monotonic() < give_up_s:
+    while not is_so():
+        if monotonic() > give_up_s:
+            raise TimeoutError(
+                f"the window was not ready within {PATIENCE_S / 60:g} min; make them on a freer computer"
+            )
         QApplication.processEvents(QEventLoop.ProcessEventsFlag.AllEvents, 20)
 
 

@@ -13,7 +13,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QProgressBar,
-    QPushButton,
     QVBoxLayout,
     QWidget,
 )
@@ -34,7 +33,7 @@ from vibench.acquisition.rig import Rig
 from ...background import LatestRequest
 from ...forms import Choice
 from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
-from ...widgets import Notice, NoticeKind, ReadTable, SentenceLabel, clock, notice_of
+from ...widgets import Notice, NoticeKind, ReadTable, SentenceLabel, clock, notice_of, push_button
 from ._draft import moved_up, with_measurement, with_sweep, without
 from ._row_words import CampaignPreview, point_rows, preview_campaign
 from ._sweep_form import SweepForm
@@ -72,9 +71,9 @@ class QueuePage(Page):
         self.progress.setAccessibleName("Progress of the campaign")
         self.progress.setRange(0, 1000)
         self.progress.setFormat("not running")
-        self.arm_button = self._button("Arm the ca&mpaign…", "Say in words what will happen", self._arm)
+        self.arm_button = push_button("Arm the ca&mpaign…", "Say in words what will happen", self._arm)
         self.arm_button.setProperty("rank", "first")
-        self.resume_button = self._button(
+        self.resume_button = push_button(
             "Resume: arm what is missin&g…",
             "Keep what is complete in its folder, make the rest",
             self._arm_missing,
@@ -85,7 +84,7 @@ class QueuePage(Page):
             "from a terminal.\nWithout the tick the drive is brought down when the window does not answer."
         )
         self.left_alone.setChecked(True)
-        self.hold_button = self._button(
+        self.hold_button = push_button(
             "Hold (drive on)", "Stay where the run is; the drive stays on", self._hold
         )
         self._looking = LatestRequest(
@@ -297,12 +296,6 @@ class QueuePage(Page):
         self.sweep.wanted.connect(self._add_sweep)
         self.sweep.refused.connect(lambda text: self._warn(text, "Correct the sweep."))
 
-    def _button(self, text: str, tip: str, act: object) -> QPushButton:
-        button = QPushButton(text)
-        button.setToolTip(tip)
-        button.clicked.connect(act)
-        return button
-
     def _lay_out(self) -> None:
         title = QLabel("Queue")
         title.setProperty("rank", "title")
@@ -312,15 +305,15 @@ class QueuePage(Page):
         for path in all_shipped("campaigns"):
             self.choice.addItem(path.stem.replace("_", " "))
         files = QGridLayout()
-        files.addWidget(self._button("Open…", "Open a campaign from a TOML file", self._open), 0, 0)
-        files.addWidget(self._button("Save as…", "Save the campaign as a TOML file", self._save), 0, 1)
+        files.addWidget(push_button("Open…", "Open a campaign from a TOML file", self._open), 0, 0)
+        files.addWidget(push_button("Save as…", "Save the campaign as a TOML file", self._save), 0, 1)
         edits = QHBoxLayout()
         for text, tip, act in (
             ("&Add the test", "Add the test of the Test page", self._add_test),
             ("Move &up", "Move the chosen entry up", self._move_up),
             ("&Remove", "Remove the chosen entry", self._remove),
         ):
-            edits.addWidget(self._button(text, tip, act))
+            edits.addWidget(push_button(text, tip, act))
         left = QVBoxLayout()
         left.addWidget(title)
         left.addWidget(self.choice)

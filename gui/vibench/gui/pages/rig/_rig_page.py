@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QScrollArea,
     QSizePolicy,
     QVBoxLayout,
@@ -20,7 +19,16 @@ from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, l
 from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
 
 from ...page import AppContext, FileKind, Page, Remembered, UserActions
-from ...widgets import Notice, NoticeKind, ReadTable, SentenceLabel, fitted_unit, moment_text, notice_of
+from ...widgets import (
+    Notice,
+    NoticeKind,
+    ReadTable,
+    SentenceLabel,
+    fitted_unit,
+    moment_text,
+    notice_of,
+    push_button,
+)
 from ._knob_sheet import KnobSheetForm
 from ._rig_choice import RigChoice
 
@@ -65,13 +73,19 @@ class RigPage(Page):
         self.choice = RigChoice()
         self.knobs = KnobSheetForm()
         self.about = SentenceLabel(rank="second")
-        self.open_button = self._button("&Open bench", "Open every instrument; the generator stays silent")
-        self.open_button.setProperty("rank", "first")
-        self.close_button = self._button("Close bench", "Silence everything and close the instruments")
-        self.check_button = self._button(
-            "Check bench  (F6)", "A small sine for some seconds: noise, gains, clocks"
+        self.open_button = push_button(
+            "&Open bench", "Open every instrument; the generator stays silent", self.open_bench
         )
-        self.find_button = self._button("Find instruments", "List every instrument that can be seen")
+        self.open_button.setProperty("rank", "first")
+        self.close_button = push_button(
+            "Close bench", "Silence everything and close the instruments", self._close
+        )
+        self.check_button = push_button(
+            "Check bench  (F6)", "A small sine for some seconds: noise, gains, clocks", self._actions.check
+        )
+        self.find_button = push_button(
+            "Find instruments", "List every instrument that can be seen", self._find
+        )
         self.instruments = ReadTable(
             "Instruments",
             ("part", "what answered"),
@@ -210,15 +224,6 @@ class RigPage(Page):
     def _connect(self) -> None:
         self.choice.chosen.connect(self._chosen)
         self.choice.refused.connect(lambda error: self.context.say(notice_of(error)))
-        self.open_button.clicked.connect(self.open_bench)
-        self.close_button.clicked.connect(self._close)
-        self.check_button.clicked.connect(self._actions.check)
-        self.find_button.clicked.connect(self._find)
-
-    def _button(self, text: str, tip: str) -> QPushButton:
-        button = QPushButton(text)
-        button.setToolTip(tip)
-        return button
 
     def _lay_out(self) -> None:
         left = QVBoxLayout()

@@ -1,11 +1,11 @@
 """Arming in plain words: what is going to happen, then a second, explicit act to start it."""
 
-from PySide6.QtCore import Signal, SignalInstance
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import DRIVING, EngineState, EngineStatus
 
-from ...widgets import SentenceLabel
+from ...widgets import SentenceLabel, push_button
 
 _HINTS = {
     EngineState.CLOSED: "No bench is open. Open one on the Rig page (Ctrl+1).",
@@ -27,14 +27,16 @@ class ArmCard(QGroupBox):
         super().__init__("What will happen", parent)
         self._words = SentenceLabel()
         self._words.setAccessibleName("What will happen")
-        self.arm_button = self._button(
-            "A&rm…  (Ctrl+Return)", "Say in words what will happen", self.arm_wanted
+        self.arm_button = push_button(
+            "A&rm…  (Ctrl+Return)", "Say in words what will happen", self.arm_wanted.emit
         )
         self.arm_button.setProperty("rank", "first")
-        self.cancel_button = self._button("Cancel", "Disarm; nothing was played", self.cancel_wanted)
-        self.start_button = self._button("▶ Start  (F5)", "Start the drive", self.start_wanted)
+        self.cancel_button = push_button("Cancel", "Disarm; nothing was played", self.cancel_wanted.emit)
+        self.start_button = push_button("▶ Start  (F5)", "Start the drive", self.start_wanted.emit)
         self.start_button.setProperty("rank", "first")
-        self.hold_button = self._button("Hold", "Stay where the run is; the drive stays on", self.hold_wanted)
+        self.hold_button = push_button(
+            "Hold", "Stay where the run is; the drive stays on", self.hold_wanted.emit
+        )
         buttons = QHBoxLayout()
         buttons.addWidget(self.cancel_button)
         buttons.addWidget(self.start_button)
@@ -76,9 +78,3 @@ class ArmCard(QGroupBox):
     def _say(self, text: str) -> None:
         if self._words.sentence != text:
             self._words.setText(text)
-
-    def _button(self, text: str, tip: str, wanted: SignalInstance) -> QPushButton:
-        button = QPushButton(text)
-        button.setToolTip(tip)
-        button.clicked.connect(lambda _checked=False: wanted.emit())
-        return button

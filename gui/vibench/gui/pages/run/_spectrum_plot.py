@@ -21,9 +21,8 @@ class SpectrumPlot(QWidget):
 
     def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        up = PlotAxis(
-            "Amplitude density", "channel's unit / √Hz", scale=Scale.LOGARITHMIC, short="unit / √Hz"
-        )
+        label = "Amplitude density, channel's unit / √Hz"
+        up = PlotAxis(label, scale=Scale.LOGARITHMIC, short="unit / √Hz")
         self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()
         self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []

@@ -7,12 +7,11 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis.dynamics import ChainAnswer, ChainDrive, ChainRun
 
-from ...plots import FREQUENCY, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
+from ...plots import FREQUENCY, TIME, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme
 
 ACROSS = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 PLACE = PlotAxis("Cell, from the base", short="Cell")
-TIME = PlotAxis("Time", "s")
 ENERGY = PlotAxis("Mean energy of a cell", "µJ", factor=1e6, short="Energy", scale=Scale.LOGARITHMIC)
 _GAP = LineStyle(lambda theme: theme.muted, filled=0.14)
 _SMALLEST = 1e-8

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import (
     QGroupBox,
     QHBoxLayout,
     QLabel,
-    QPushButton,
     QSizePolicy,
     QSplitter,
     QVBoxLayout,
@@ -25,7 +24,7 @@ from vibench.acquisition.rig import BaseQuantity, Rig
 from ...background import LatestRequest
 from ...forms import Choice
 from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
-from ...widgets import Notice, NoticeKind, SentenceLabel, Theme, clock, fitted_unit, notice_of
+from ...widgets import Notice, NoticeKind, SentenceLabel, Theme, clock, fitted_unit, notice_of, push_button
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
@@ -94,9 +93,12 @@ class TestPage(Page):
         self.prediction = PredictionPlot(context.theme)
         self.prediction_note = SentenceLabel(rank="second")
         self.expectation = SentenceLabel(rank="second")
-        self.arm_button = QPushButton("A&rm the test…  (Ctrl+Return)")
+        self.arm_button = push_button(
+            "A&rm the test…  (Ctrl+Return)",
+            "Show in words what will happen; nothing plays before Start",
+            self._actions.arm_test,
+        )
         self.arm_button.setProperty("rank", "first")
-        self.arm_button.setToolTip("Show in words what will happen; nothing plays before Start")
         self._looking = LatestRequest(
             context.looks, preview_test, self._looked, self._look_failed, LOOK_MS, self
         )
@@ -278,7 +280,6 @@ class TestPage(Page):
         self.choice.activated.connect(self._take)
         self.form.changed.connect(self._changed)
         self.context.selection.rig_changed.connect(self._changed)
-        self.arm_button.clicked.connect(self._actions.arm_test)
 
     def _lay_out(self) -> None:
         title = QLabel("Test")
@@ -290,10 +291,7 @@ class TestPage(Page):
             ("Open…", "Open a test from a TOML file", self._open),
             ("Save as…", "Save this test as a TOML file", self._save),
         ):
-            button = QPushButton(text)
-            button.setToolTip(tip)
-            button.clicked.connect(act)
-            files.addWidget(button)
+            files.addWidget(push_button(text, tip, act))
         left = QWidget()
         column = QVBoxLayout(left)
         column.addWidget(title)
