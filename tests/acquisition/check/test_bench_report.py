@@ -45,6 +45,33 @@ def test_a_healthy_bench_fails_nothing_and_its_figures_are_those_of_the_configur
 
 
 @pytest.mark.parametrize(
+    ("masses_kg", "stiffnesses_n_per_m", "dampings_ns_per_m", "gap_m"),
+    [
+        ((4.076e-3, 2.409e-3, 1.830e-3), (16538.6, 453.8, 7581.2), (0.386, 0.0096, 0.148), (12.2e-6, 41e-6)),
+        ((6.092e-3, 2.690e-3, 2.106e-3), (14489.5, 462.2, 17626.2), (0.349, 0.0105, 0.179), (16.2e-6, 48e-6)),
+        ((9.585e-3, 1.350e-3, 3.375e-3), (14452.5, 645.7, 10895.4), (0.888, 0.0143, 0.191), (11.8e-6, 22e-6)),
+        ((10.04e-3, 1.134e-3, 2.805e-3), (12976.7, 425.9, 20127.5), (0.276, 0.0094, 0.371), (26.4e-6, 32e-6)),
+    ],
+)
+def test_a_heavy_specimen_near_its_resonance_is_no_fault(
+    rig, tmp_path, checked, masses_kg, stiffnesses_n_per_m, dampings_ns_per_m, gap_m
+):
+    own = {
+        "masses_kg": masses_kg,
+        "single_frequencies_hz": None,
+        "stiffnesses_n_per_m": stiffnesses_n_per_m,
+        "damping_time_s": None,
+        "dampings_ns_per_m": dampings_ns_per_m,
+        "gap_m": gap_m,
+    }
+    heavy = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=own)})
+    report = checked(heavy, tmp_path)
+    assert failed(report) == set()
+    assert report["base acceleration"].verdict is Verdict.OK
+    assert report["sign of base_acceleration"].verdict is Verdict.OK
+
+
+@pytest.mark.parametrize(
     ("fault", "name", "advice"),
     [
         (lambda v: v.faults.turn_amplifier_gain(20.0), "amplifier gain", "set the gain"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from scipy.signal import lsim
 
 from vibench.acquisition import LimitExceeded
@@ -21,14 +21,20 @@ from vibench.acquisition.plan._limits import limit_checks
 from vibench.acquisition.rig import BaseQuantity, RigModel, shaker_of
 
 
+@pytest.fixture
+def linear_rig(rig):
+    """A rig whose specimen strikes no stops."""
+    return rig.model_copy(update={"specimen": rig.specimen.model_copy(update={"contact": "linear"})})
+
+
 def plan(excitation, **fields):
     return Measurement(name="plan", excitation=excitation, **fields)
 
 
 def test_a_sine_s_loads_are_its_amplitude_times_the_model(rig):
-    loads = predicted_loads(Dwell(amplitude_vpp=3.0, frequency_hz=260, duration_s=1), rig)
+    loads = predicted_loads(Dwell(amplitude_vpp=0.1, frequency_hz=260, duration_s=1), rig)
     for quantity in BaseQuantity:
-        expected = 1.5 * rig.generator.terminal_factor() * abs(RigModel(rig).transfer(quantity, 260.0))
+        expected = 0.05 * rig.generator.terminal_factor() * abs(RigModel(rig).transfer(quantity, 260.0))
         assert loads[quantity].peak == pytest.approx(float(expected), rel=1e-12)
         assert loads[quantity].rms == pytest.approx(float(expected) / np.sqrt(2), rel=1e-12)
 
@@ -37,7 +43,7 @@ def test_far_above_the_suspension_the_acceleration_is_force_over_mass(rig):
     loads = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=1500, duration_s=1), rig)
     mass = rig.shaker.moving_mass_kg + rig.shaker.fixture_mass_kg
     assert loads[BaseQuantity.ACCELERATION].peak == pytest.approx(
-        loads[BaseQuantity.FORCE].peak / mass, rel=1e-3
+        loads[BaseQuantity.FORCE].peak / mass, rel=5e-3
     )
 
 
@@ -51,7 +57,9 @@ def test_a_sweep_is_judged_where_the_rig_answers_most(rig):
 
 
 def test_a_waveform_s_peaks_are_those_of_an_integration_in_time(rig):
-    """The Fourier prediction against a step-by-step solution of the shaker's equations."""
+    """The Fourier prediction against a step-by-step solution of the shaker's equations, nearly unladen."""
+    light = {"masses_kg": tuple(1e-6 * each for each in rig.specimen.masses_kg), "contact": "linear"}
+    rig = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=light)})
     noise = MultisineNoise(
         amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=200, repetition_hz=2, realisations=1
     )
@@ -80,22 +88,19 @@ def test_streamed_noise_reaches_the_terminal_s_range_and_no_more(rig):
 
 
 @given(factor=st.floats(0.01, 5))
-def test_loads_grow_with_the_setting(factor):
-    from pathlib import Path
-
-    from vibench.acquisition.rig import load_rig
-
-    rig = load_rig(Path(__file__).parent.parent.parent.parent / "hardware_configs" / "virtual_rig.toml")
-    one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), rig)
-    more = predicted_loads(Dwell(amplitude_vpp=factor, frequency_hz=50, duration_s=1), rig)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_loads_grow_with_the_setting(linear_rig, factor):
+    one = predicted_loads(Dwell(amplitude_vpp=1.0, frequency_hz=50, duration_s=1), linear_rig)
+    more = predicted_loads(Dwell(amplitude_vpp=factor, frequency_hz=50, duration_s=1), linear_rig)
     for quantity in BaseQuantity:
         assert more[quantity].peak == pytest.approx(factor * one[quantity].peak, rel=1e-12)
 
 
-def test_a_wrong_load_setting_doubles_every_load(rig):
-    at_50_ohm = rig.model_copy(update={"generator": rig.generator.model_copy(update={"load_ohm": 50.0})})
+def test_a_wrong_load_setting_doubles_every_load(linear_rig):
+    generator = linear_rig.generator.model_copy(update={"load_ohm": 50.0})
+    at_50_ohm = linear_rig.model_copy(update={"generator": generator})
     sine = Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=1)
-    open_load = predicted_loads(sine, rig)[BaseQuantity.FORCE].peak
+    open_load = predicted_loads(sine, linear_rig)[BaseQuantity.FORCE].peak
     assert predicted_loads(sine, at_50_ohm)[BaseQuantity.FORCE].peak == pytest.approx(
         2 * open_load, rel=1e-12
     )

@@ -1,4 +1,4 @@
-"""The linear chain against closed forms."""
+"""The chain without a specimen against closed forms; with one: tests/sim/shaker/test_linear_motion.py."""
 
 from pathlib import Path
 
@@ -6,18 +6,20 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, shaker_of, suspended_mass_kg
+from vibench.acquisition.rig import BaseQuantity, OnTable, RigModel, load_rig, shaker_of, suspended_mass_kg
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-MODEL = RigModel(RIG)
+MODEL = RigModel(RIG, OnTable.NOTHING)
 
 
 def with_amplifier(**changes):
-    return RigModel(RIG.model_copy(update={"amplifier": RIG.amplifier.model_copy(update=changes)}))
+    return RigModel(
+        RIG.model_copy(update={"amplifier": RIG.amplifier.model_copy(update=changes)}), OnTable.NOTHING
+    )
 
 
 def with_shaker(**changes):
-    return RigModel(RIG.model_copy(update={"shaker": RIG.shaker.model_copy(update=changes)}))
+    return RigModel(RIG.model_copy(update={"shaker": RIG.shaker.model_copy(update=changes)}), OnTable.NOTHING)
 
 
 def test_a_direct_coupled_amplifier_holds_the_table_at_its_static_deflection():
@@ -93,7 +95,7 @@ def test_the_state_equations_and_the_transfer_are_the_same_system(frequency_hz):
 
 @given(st.floats(1.0, 5e3))
 def test_electrical_power_in_is_heat_and_friction(frequency_hz):
-    # Mean power of a sine from peak phasors; the specimen is not in this model.
+    # Mean power of a sine from peak phasors; no specimen takes any.
     shaker = RIG.shaker
     voltage, current, velocity = (
         complex(MODEL.transfer(q, frequency_hz))

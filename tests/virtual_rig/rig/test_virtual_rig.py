@@ -110,8 +110,7 @@ def test_a_sine_set_by_pyvisa_is_read_by_nidaqmx_through_the_whole_chain(switch_
     assert amplifier == pytest.approx(voltage * into_amplifier, rel=5e-3)
     acceleration = abs(complex(model.transfer(BaseQuantity.ACCELERATION, 160.0)))
     base = amplitude(volts[BASE]) / RIG.accelerometer.sensitivity_v_per_m_per_s2
-    # The specimen, 10 g on 127 g, is not in the model.
-    assert base == pytest.approx(acceleration * into_amplifier, rel=0.1)
+    assert base == pytest.approx(acceleration * into_amplifier, rel=0.01)
     assert amplitude(volts[LASER]) > 100 * np.std(volts[LASER][:-1] - volts[LASER][1:]) / RATE_HZ
 
 

@@ -83,6 +83,7 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_says(frequency_h
     assert amplifier * RIG.daq.channels[AMPLIFIER].attenuation == pytest.approx(
         voltage * amplitude_v, rel=1e-3
     )
+    moved_table = complex(model.transfer(BaseQuantity.ACCELERATION, frequency_hz)) * amplitude_v
     s = 2j * np.pi * frequency_hz
     acceleration = base / RIG.accelerometer.sensitivity_v_per_m_per_s2
     delay = np.exp(-s * RIG.vibrometer.delay_s)
@@ -91,6 +92,7 @@ def test_every_channel_shows_what_the_model_of_rig_and_specimen_says(frequency_h
     # The coupling capacitor of the accelerometer's channel leads by its cut over the frequency.
     coupling = s / (s + 2 * np.pi * 0.5)
     resonance = 1 / (1 - (frequency_hz / RIG.accelerometer.resonance_hz) ** 2)
+    assert acceleration / coupling / resonance == pytest.approx(moved_table, rel=2e-3)
     assert velocity * s == pytest.approx(acceleration / coupling / resonance * moved, rel=1e-3)
 
 

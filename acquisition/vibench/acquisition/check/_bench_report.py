@@ -10,14 +10,14 @@ from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, judged
 from ..errors import CheckStopped
 from ..excitation import Dwell, Tone
 from ..instruments import AnalogOutput, IdleOutput, Samples
-from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState
+from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState, check_amplitude_vpp
 from ..rig import Channel, calibrations
 from ..run import BLOCK_S, Drive, drive_for
 from ..stopping import StopSwitch
 from ._loop import LoopCheck
 
 CHECK_SHARE = 0.02
-"""Level of the sine, of the bench's amplitude limit: far below anything that collides or clips."""
+"""Level of the sine at most, of the bench's amplitude limit: far below anything that clips."""
 # An AC coupling of 0.5 Hz has forgotten a step after this time.
 _SETTLE_S = 1.5
 _READ_S = 2.0
@@ -52,12 +52,12 @@ def bench_report(
     switch
         Lets others end the check, within a block of samples.
     amplitude_vpp
-        Of the sine; absent, two per cent of the amplitude limit [V].
+        Of the sine; absent, two per cent of the amplitude limit, or less, so that no stop is touched [V].
 
     """
     findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
     if amplitude_vpp is None:
-        amplitude_vpp = CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp
+        amplitude_vpp = check_amplitude_vpp(CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp, bench.rig)
     drive = drive_for(bench, _small_sine(amplitude_vpp))
     reader = _BlockReader(bench, StopSwitch() if switch is None else switch)
     bench.generator.stop()

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..bench import Bench, Bounds, Finding, Verdict, judged
 from ..instruments import Samples
-from ..plan import CHECK_FREQUENCY_HZ
-from ..rig import BaseQuantity, RigModel, Role
+from ..plan import CHECK_FREQUENCY_HZ, base_under_check, nearest_expected
+from ..rig import BaseQuantity, ComplexArray, RigModel, Role
 
 _PPM = 1e6
 _WINDOWS = 20
@@ -136,7 +136,10 @@ class LoopCheck:
         self._rows = dict(zip(self._channels, during, strict=True))
         self._after = dict(zip(self._channels, after, strict=True))
         self._terminal_v = 0.5 * amplitude_vpp * bench.rig.generator.terminal_factor()
-        self._model = RigModel(bench.rig)
+        self._amplifier_modelled = np.atleast_1d(
+            RigModel(bench.rig).transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ)
+        )
+        self._base_modelled = base_under_check(bench.rig, self._terminal_v)
 
     def findings(self) -> list[Finding]:
         """Answer what can be answered with the channels that there are."""
@@ -147,11 +150,11 @@ class LoopCheck:
         if self._detects(Role.DRIVE_VOLTAGE):
             found.append(self._clocks())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.AMPLIFIER_VOLTAGE):
-            found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, BaseQuantity.AMPLIFIER_VOLTAGE)]
+            found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, self._amplifier_modelled)]
         if self._detects(Role.BASE_ACCELERATION):
             found.append(self._base())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.BASE_ACCELERATION):
-            found.append(self._sign(Role.BASE_ACCELERATION, BaseQuantity.ACCELERATION))
+            found.append(self._sign(Role.BASE_ACCELERATION, self._base_modelled))
         return found
 
     def _detects(self, role: Role) -> bool:
@@ -224,9 +227,7 @@ class LoopCheck:
             (drive.uncertainty / drive.amplitude) ** 2 + (output.uncertainty / output.amplitude) ** 2
         )
         gain_db = _db(output.amplitude / drive.amplitude)
-        expected_db = _db(
-            abs(complex(self._model.transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ)))
-        )
+        expected_db = _db(abs(complex(self._amplifier_modelled[0])))
         verdict = GAIN_DB.verdict(abs(gain_db - expected_db))
         advice = f"set the gain of the {self._rig.amplifier.model} to {self._rig.amplifier.gain_db:g} dB"
         expected = f"{expected_db:.2f} dB within {GAIN_DB.well:g} dB"
@@ -234,18 +235,17 @@ class LoopCheck:
 
     def _base(self) -> Finding:
         fit = self._fit(Role.BASE_ACCELERATION)
-        transfer = abs(complex(self._model.transfer(BaseQuantity.ACCELERATION, CHECK_FREQUENCY_HZ)))
-        modelled = self._terminal_v * transfer
+        modelled = nearest_expected(fit.amplitude, self._base_modelled)
         verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
         expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
-        advice = "check the accelerometer's sensitivity, the fixture's mass, the amplifier's power and gain"
+        advice = "check the accelerometer's sensitivity, fixture, specimen, the amplifier's power and gain"
         return judged(BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
 
-    def _sign(self, role: Role, quantity: BaseQuantity) -> Finding:
+    def _sign(self, role: Role, modelled: ComplexArray) -> Finding:
         """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""
         turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
-        modelled_rad = float(np.angle(self._model.transfer(quantity, CHECK_FREQUENCY_HZ)))
-        off_deg = np.rad2deg((turned_rad - modelled_rad + pi) % (2 * pi) - pi)
+        each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
+        off_deg = each_deg[np.argmin(np.abs(each_deg))]
         advice = {
             Role.BASE_ACCELERATION: "turn the accelerometer round, or swap the wires of coil or amplifier",
         }.get(role, "swap the two wires of this input, or see whether the amplifier inverts")

@@ -2,7 +2,7 @@
 
 from ..errors import LimitExceeded
 from ..plan import needed_vpp
-from ..rig import Rig
+from ..rig import OnTable, Rig
 
 LEAST_ANSWER = 0.05
 """Share of the linear model's acceleration below which the loop is taken to be open. A specimen on its
@@ -23,7 +23,7 @@ def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, accelerati
         The run then ramps down.
 
     """
-    modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz)
+    modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
     if acceleration < LEAST_ANSWER * modelled:
         raise LimitExceeded(
             f"the base moved with {acceleration:.3g} m/s2 at {frequency_hz:g} Hz where the model says "

@@ -10,7 +10,7 @@ from ..excitation import HeldNoise, Waveform, density_at, shaped_period
 from ..instruments import Samples
 from ..plan import Phase, RunState, ramp
 from ..recording import NoiseNote
-from ..rig import BaseQuantity, RigModel
+from ..rig import BaseQuantity, OnTable, RigModel
 from ._closed_loop_check import LEAST_ANSWER
 from ._control_action import ControlAction, Controller
 from ._sine_loop import SineLoop
@@ -44,7 +44,7 @@ class Equaliser:
         self._channels = loop.channels
         self._factor = loop.rig.generator.terminal_factor()
         self.frequency_hz = plan.lines * plan.repetition_hz
-        transfer = RigModel(loop.rig).transfer(BaseQuantity.ACCELERATION, self.frequency_hz)
+        transfer = RigModel(loop.rig, OnTable.NOTHING).transfer(BaseQuantity.ACCELERATION, self.frequency_hz)
         self._modelled = np.abs(transfer) ** 2
         self._gain = self._modelled
         self._to_response: Samples | None = None

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..excitation import GLIDE_TONE_S, BaseLevel
 from ..plan import RunState, needed_vpp
+from ..rig import OnTable
 from ._closed_loop_check import require_answer
 from ._control_action import Controller
 from ._gain_estimator import GainEstimator
@@ -19,7 +20,7 @@ def started(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> Con
     """Ramp up at a frequency: to the level, as the rig's model has it, or to the plan's setting."""
     setting_vpp = loop.most_vpp
     if level is not None:
-        guess_vpp = needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
+        guess_vpp = _bare_vpp(loop, level, frequency_hz)
         setting_vpp = loop.bounded_vpp(guess_vpp)
     loop.change(frequency_hz, setting_vpp)
     yield from loop.listen_to_silence()
@@ -42,7 +43,7 @@ def moved(loop: SineLoop, frequency_hz: float, level: BaseLevel | None) -> None:
     """Play another frequency: the setting follows the rig's model from where it is."""
     setting_vpp = loop.setting.setting_vpp
     if level is not None:
-        setting_vpp *= needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
+        setting_vpp *= _bare_vpp(loop, level, frequency_hz)
         setting_vpp /= _modelled_vpp(loop, level)
     _change(loop, frequency_hz, setting_vpp, level)
 
@@ -54,7 +55,7 @@ def tracked(
     if level is None or not estimator.is_known:
         moved(loop, frequency_hz, level)
         return
-    modelled_vpp = needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
+    modelled_vpp = _bare_vpp(loop, level, frequency_hz)
     gain = estimator.gain_at(loop.elapsed_s + 0.5 * duration_s)
     _change(loop, frequency_hz, modelled_vpp / gain, level)
 
@@ -73,9 +74,12 @@ def followed(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) 
 
 
 def _modelled_vpp(loop: SineLoop, level: BaseLevel) -> float:
-    """Give the setting that the model needs for the level at the frequency of now [V]."""
-    frequency_hz = loop.setting.frequency_hz
-    return needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz)
+    """Give the setting that the bare table needs for the level at the frequency of now [V]."""
+    return _bare_vpp(loop, level, loop.setting.frequency_hz)
+
+
+def _bare_vpp(loop: SineLoop, level: BaseLevel, frequency_hz: float) -> float:
+    return needed_vpp(loop.rig, level.acceleration_at(frequency_hz), frequency_hz, OnTable.NOTHING)
 
 
 def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseLevel | None) -> None:

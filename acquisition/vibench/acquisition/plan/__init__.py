@@ -2,7 +2,7 @@
 
 A `Measurement` is one excitation with its ramps and limits while running; a `Campaign` an ordered list of
 them and of nested sweeps, read from TOML. Before anything moves, a plan is held against the limits of the
-rig by its linear model (`predicted_loads`, `MeasurementPreview`) and laid out in phases of time
+rig by its model (`predicted_loads`, `MeasurementPreview`) and laid out in phases of time
 (`duration_s`). All are frozen and validated. Frequencies in Hz, times in s, amplitudes peak to peak in V.
 Plans open no instrument and know no bench and no run. Chains of points:
 docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
@@ -51,6 +51,13 @@ from ._axis import (
 )
 from ._base_motion import BaseMotion, base_motion
 from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign, played_alike
+from ._check_level import (
+    base_under_check,
+    check_amplitude_vpp,
+    check_phases,
+    nearest_expected,
+    run_check_vpp,
+)
 from ._drive_source import (
     DriveSource,
     drive_source_of,
@@ -82,8 +89,6 @@ from ._schedule import (
     CHECK_S,
     HUSH_S,
     Phase,
-    check_amplitude_vpp,
-    check_phases,
     duration_s,
     half_cosine,
     known_phases,
@@ -150,6 +155,7 @@ __all__ = [
     "StreamedNoise",
     "SweepAxis",
     "base_motion",
+    "base_under_check",
     "check_amplitude_vpp",
     "check_phases",
     "drive_source_of",
@@ -163,6 +169,7 @@ __all__ = [
     "loop_time_s",
     "lowest_setting_vpp",
     "measured_s",
+    "nearest_expected",
     "needed_vpp",
     "phases",
     "played_alike",
@@ -172,6 +179,7 @@ __all__ = [
     "require_played",
     "require_within_limits",
     "rows_by_kind",
+    "run_check_vpp",
     "shortest_ramp_s",
     "stairs",
 ]

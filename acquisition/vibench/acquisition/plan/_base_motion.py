@@ -22,20 +22,19 @@ class BaseMotion:
 def base_motion(excitation: Excitation, rig: Rig, frequency_hz: NDArray[np.float64]) -> BaseMotion:
     """Predict the base's motion, shape of ``frequency_hz``: a level that feedback holds is met exactly.
 
-    A setting is followed through the rig's linear model; noise is stood for by a sine of its rms.
+    A setting is followed through the rig's model, specimen included; noise is stood for by a sine of its rms.
     """
     levels = [excitation.level_at(float(each)) for each in frequency_hz]
-    per_setting_m = terminal_volts(excitation, rig) * np.abs(
-        RigModel(rig).transfer(BaseQuantity.STROKE, frequency_hz)
-    )
+    model, terminal_v = RigModel(rig), terminal_volts(excitation, rig)
     amplitudes_m = []
     noise_m: float | None = None
-    for level, at_hz, stroke_m in zip(levels, frequency_hz, per_setting_m, strict=True):
+    for level, at_hz in zip(levels, frequency_hz, strict=True):
         match level:
             case HeldAcceleration(acceleration):
                 amplitudes_m.append(acceleration / (2 * np.pi * at_hz) ** 2)
             case RelativeSetting(share):
-                amplitudes_m.append(share * stroke_m)
+                stroke = model.under_sines(BaseQuantity.STROKE, at_hz, share * terminal_v)
+                amplitudes_m.append(abs(complex(stroke)))
             case RmsSetting():
                 if noise_m is None:
                     noise_m = np.sqrt(2) * predicted_loads(excitation, rig)[BaseQuantity.STROKE].rms

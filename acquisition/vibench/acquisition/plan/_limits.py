@@ -21,9 +21,8 @@ from ..rig import (
     suspended_mass_kg,
 )
 from ._drive_source import DriveSource, drive_source_of, lowest_setting_vpp
-from ._loads import needed_vpp, predicted_loads
+from ._loads import Loads, needed_vpp, predicted_loads
 from ._measurement import Measurement, OnOverload
-from ._specimen_loads import predicted_specimen_loads
 
 RAMP_PERIODS = 3.0
 """A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""
@@ -93,7 +92,12 @@ class LimitCheck:
 
 def limit_checks(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
     """Every predicted load of ``measurement`` beside the limit of ``rig`` it must keep."""
-    return (*_settings(measurement, rig), *_loads(measurement, rig), *_specimen(measurement, rig))
+    loads = predicted_loads(measurement.excitation, rig)
+    return (
+        *_settings(measurement, rig),
+        *_loads(measurement, rig, loads),
+        *_specimen(measurement, rig, loads),
+    )
 
 
 def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitCheck, ...]:
@@ -247,8 +251,7 @@ def _streaming(measurement: Measurement, rig: Rig, output: OutputConfig) -> Iter
     )
 
 
-def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
-    loads = predicted_loads(measurement.excitation, rig)
+def _loads(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
     limits = rig.shaker.limits
     less = "lower amplitude_vpp"
     gentler = "lower amplitude_vpp or raise the lowest frequency"
@@ -278,13 +281,13 @@ def _loads(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     )
 
 
-def _specimen(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
+def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[LimitCheck]:
     """Check the estimate of the specimen's motion against its springs and the vibrometer."""
-    loads = predicted_specimen_loads(measurement.excitation, rig)
+    amplitude, velocity = loads[BaseQuantity.AMPLITUDE], loads[BaseQuantity.M0_VELOCITY]
     limit = rig.specimen.amplitude_limit_m
     yield LimitCheck(
-        f"the specimen's amplitude (about, {loads.amplitude.cause})",
-        loads.amplitude.peak,
+        f"the specimen's amplitude (about, {amplitude.cause})",
+        amplitude.peak,
         limit.value,
         "m",
         limit.source,
@@ -294,8 +297,8 @@ def _specimen(measurement: Measurement, rig: Rig) -> Iterator[LimitCheck]:
     for channel in channels_of(rig):
         if channel.role is Role.M0_VELOCITY:
             yield LimitCheck(
-                f"the velocity of m0 (about, {loads.velocity.cause})",
-                loads.velocity.peak,
+                f"the velocity of m0 (about, {velocity.cause})",
+                velocity.peak,
                 channel.full_scale_v * channel.units_per_volt,
                 channel.unit,
                 f"range of {channel.physical} and of the vibrometer",

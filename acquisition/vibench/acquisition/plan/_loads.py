@@ -1,9 +1,11 @@
-"""What a plan will do to the rig, before anything moves: peaks through the rig's linear model.
+"""What a plan will do to the rig, before anything moves: peaks through the rig's model.
 
-The generator's setting that a level of the base needs, by the rig's linear model.
+Exact where p stays inside the gap; where it does not, the fundamental of a motion whose p is held at the gap.
+Impacts add to it; tests/acquisition/plan/test_specimen_loads.py says how much. What moves in fact is watched
+while it runs.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TypeAlias
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation import Excitation, Play, SampleSource, Stream, Tone, Waveform, held_lines
-from ..rig import BaseQuantity, ComplexArray, Rig, RigModel
+from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4
 """A held waveform is followed to twice its playback rate: the images above are below 1/20 of the band
@@ -20,8 +22,9 @@ and the table answers them ever less."""
 BAND_POINTS = 2000
 """Frequencies over which the mean square of streamed noise is summed."""
 
-Transfer: TypeAlias = Callable[[NDArray[np.float64]], ComplexArray]
-"""Phasor of a quantity per volt at the generator's terminal, by frequency [Hz]."""
+Floats: TypeAlias = NDArray[np.float64]
+Transfer: TypeAlias = Callable[[Floats], ComplexArray]
+"""Phasor of a quantity at the plan's largest setting, by frequency [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -36,24 +39,29 @@ class Load:
     """What in the plan does it: ``"at 150 Hz"``."""
 
 
-def predicted_loads(excitation: Excitation, rig: Rig) -> dict[BaseQuantity, Load]:
-    """Peak and rms of every quantity of the rig while ``excitation`` plays, steady state.
+Loads: TypeAlias = Mapping[BaseQuantity, Load]
+"""Every quantity of rig and specimen."""
 
-    Exact for the linear model: by frequency for sines, by Fourier lines summed in time for periodic
-    waveforms (the images of the generator's hold included). Streamed noise is Gaussian: its peak is
-    taken as its own crest factor times the rms value. Ramps stay below by their half-cosine shape.
+
+def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
+    """Peak and rms of every quantity of rig and specimen while ``excitation`` plays, steady state.
+
+    By frequency for sines, by Fourier lines summed in time for periodic waveforms (the images of the
+    generator's hold included). Streamed noise is Gaussian: its peak is taken as its own crest factor times
+    the rms value. Ramps stay below by their half-cosine shape.
     """
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
     tones, waveforms, sources = plays_of(excitation)
+    broad = [
+        _BroadPlay(model, terminal_v, partial(_of_waveform, each, number), _lines_hz(each))
+        for number, each in enumerate(waveforms)
+    ]
+    broad += [_BroadPlay(model, terminal_v, partial(_of_source, each), _band_hz(each)) for each in sources]
 
     def worst(quantity: BaseQuantity) -> Load:
-        transfer = partial(model.transfer, quantity)
-        loads = [_of_tones(transfer, tones)] if tones else []
-        loads += [of_waveform(transfer, each, number) for number, each in enumerate(waveforms)]
-        loads += [of_source(transfer, each) for each in sources]
-        per_volt = max(loads, key=lambda load: load.peak)
-        return Load(per_volt.peak * terminal_v, per_volt.rms * terminal_v, per_volt.cause)
+        loads = [_of_tones(model, quantity, tones, terminal_v)] if tones else []
+        return max([*loads, *(play.load(quantity) for play in broad)], key=lambda load: load.peak)
 
     return {quantity: worst(quantity) for quantity in BaseQuantity}
 
@@ -84,16 +92,52 @@ def _sorted(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[Sam
     return sorted(tones, key=lambda tone: tone.frequency_hz), waveforms, sources
 
 
-def _of_tones(transfer: Transfer, tones: list[Tone]) -> Load:
-    levels = np.array([tone.level for tone in tones])
-    peaks = levels * np.abs(transfer(np.array([tone.frequency_hz for tone in tones])))
+def _of_tones(model: RigModel, quantity: BaseQuantity, tones: list[Tone], terminal_v: float) -> Load:
+    hz = np.array([tone.frequency_hz for tone in tones])
+    volts = terminal_v * np.array([tone.level for tone in tones])
+    peaks = np.abs(model.under_sines(quantity, hz, volts))
     worst = int(np.argmax(peaks))
     peak = float(peaks[worst])
     return Load(peak, peak / np.sqrt(2), f"at {tones[worst].frequency_hz:g} Hz")
 
 
-def of_waveform(transfer: Transfer, waveform: Waveform, number: int) -> Load:
-    """Peak and rms per volt over one period of realisation ``number``."""
+class _BroadPlay:
+    """A waveform or stream: the specimen is free where its p stays inside the gap, else held by the stops."""
+
+    def __init__(
+        self, model: RigModel, terminal_v: float, follow: Callable[[Transfer], Load], band_hz: Floats
+    ) -> None:
+        self._model = model
+        self._terminal_v = terminal_v
+        self._follow = follow
+        self._band_hz = band_hz
+        self._touches = self._through(model.transfer, BaseQuantity.P).peak > model.gap_m
+
+    def load(self, quantity: BaseQuantity) -> Load:
+        if not self._touches:
+            return self._through(self._model.transfer, quantity)
+        stuck = self._through(self._model.stuck_transfer, quantity)
+        # A p at the gap, wherever in the band it moves.
+        lever = self._model.lever(quantity, self._band_hz)
+        pushed = self._model.gap_m * float(np.sqrt(np.mean(np.abs(lever) ** 2)))
+        return Load(stuck.peak + pushed, float(np.hypot(stuck.rms, pushed / np.sqrt(2))), stuck.cause)
+
+    def _through(
+        self, transfer: Callable[[BaseQuantity, Floats], ComplexArray], quantity: BaseQuantity
+    ) -> Load:
+        return self._follow(lambda hz: self._terminal_v * transfer(quantity, hz))
+
+
+def _lines_hz(waveform: Waveform) -> Floats:
+    return np.arange(1, len(waveform.values) // 2, dtype=np.float64) * np.float64(waveform.repetition_hz)
+
+
+def _band_hz(source: SampleSource) -> Floats:
+    return np.linspace(source.band_start_hz, source.band_stop_hz, BAND_POINTS, dtype=np.float64)
+
+
+def _of_waveform(waveform: Waveform, number: int, transfer: Transfer) -> Load:
+    """Peak and rms over one period of realisation ``number``."""
     lines = held_lines(waveform.values, HELD_SPANS)
     frequency_hz = np.arange(len(lines), dtype=np.float64) * np.float64(waveform.repetition_hz)
     answer = lines * transfer(frequency_hz)
@@ -107,27 +151,28 @@ def of_waveform(transfer: Transfer, waveform: Waveform, number: int) -> Load:
     return Load(peak, rms, f"in realisation {number}")
 
 
-def of_source(transfer: Transfer, source: SampleSource) -> Load:
-    """Peak and rms per volt of streamed noise."""
-    band_hz = np.linspace(source.band_start_hz, source.band_stop_hz, BAND_POINTS, dtype=np.float64)
-    gain = float(np.sqrt(np.mean(np.abs(transfer(band_hz)) ** 2)))
+def _of_source(source: SampleSource, transfer: Transfer) -> Load:
+    """Peak and rms of streamed noise."""
+    gain = float(np.sqrt(np.mean(np.abs(transfer(_band_hz(source))) ** 2)))
     return Load(gain, gain / source.crest_factor, "streamed noise")
 
 
-def needed_vpp(rig: Rig, acceleration: float, frequency_hz: float) -> float:
+def needed_vpp(
+    rig: Rig, acceleration: float, frequency_hz: float, on_table: OnTable = OnTable.SPECIMEN
+) -> float:
     """Give the setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
-
-    The specimen is not in the model: where it pushes back, more or less is needed.
 
     Parameters
     ----------
     rig
-        Its linear model is asked.
+        Its model is asked.
     acceleration
         Amplitude of the base [m/s2].
     frequency_hz
         Of the sine.
+    on_table
+        Feedback asks for the bare table, smooth over frequency, and measures what the specimen does to it.
 
     """
-    per_volt = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, frequency_hz)))
-    return 2 * acceleration / (per_volt * rig.generator.terminal_factor())
+    terminal_v = float(RigModel(rig, on_table).volts_for(acceleration, frequency_hz)[0])
+    return 2 * terminal_v / rig.generator.terminal_factor()

@@ -43,23 +43,8 @@ class Phase:
         return 0.0 if self.play is None or self.state is RunState.RAMPING_DOWN else 1.0
 
 
-def check_phases(measurement: Measurement) -> tuple[Phase, Phase, Phase]:
-    """Lay out the check of the bench: listen in silence, let a small sine settle, listen to it."""
-    planned_vpp = measurement.excitation.amplitude_vpp
-    amplitude_vpp = check_amplitude_vpp(planned_vpp)
-    tone = Tone(CHECK_FREQUENCY_HZ, amplitude_vpp / planned_vpp)
-    segment = Segment(
-        SegmentLabel.CHECK, {"frequency_hz": CHECK_FREQUENCY_HZ, "amplitude_vpp": amplitude_vpp}
-    )
-    return (
-        Phase(RunState.CHECKING, None, CHECK_QUIET_S, segment),
-        Phase(RunState.CHECKING, tone, CHECK_SETTLE_S, segment),
-        Phase(RunState.CHECKING, tone, CHECK_LISTEN_S, segment),
-    )
-
-
 def phases(measurement: Measurement) -> Iterator[Phase]:
-    """Lay out ``measurement`` from the first ramp up to the last ramp down, without the bench check.
+    """Lay out ``measurement`` from the first ramp up to the last ramp down, without the check of the bench.
 
     A change of waveform is a change of everything at once: it happens in silence, between a ramp
     down and a ramp up. A change of frequency keeps the phase and the amplitude and needs neither.
@@ -163,8 +148,3 @@ def half_cosine(progress: float) -> float:
 
     """
     return 0.5 * (1 - cos(pi * progress))
-
-
-def check_amplitude_vpp(amplitude_vpp: float) -> float:
-    """Amplitude of the bench check for a plan at ``amplitude_vpp``, never above it [V]."""
-    return min(amplitude_vpp, max(CHECK_FRACTION * amplitude_vpp, CHECK_LOWEST_VPP))

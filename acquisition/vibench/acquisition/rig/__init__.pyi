@@ -42,6 +42,7 @@ from ._load_rig import (
 from ._model import (
     BaseQuantity as BaseQuantity,
     ComplexArray as ComplexArray,
+    OnTable as OnTable,
     RigModel as RigModel,
     amplifier_of as amplifier_of,
     shaker_of as shaker_of,

@@ -2,18 +2,21 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vibench.sim import Specimen
-from vibench.sim.shaker import Amplifier, Shaker
+from vibench.sim import NoContact, Specimen
+from vibench.sim.shaker import SINE_COLUMNS, Amplifier, LinearMotion, Shaker, linear_motion
 
-from ._configuration import AmplifierConfig, Rig, ShakerConfig
+from ._configuration import Rig, ShakerConfig
 
 ComplexArray = NDArray[np.complex128]
 _PEAK_OVER_RMS = 2.0**0.5
 """The current limiter's setting is the rms of the largest sine it lets pass."""
+_VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 
 class BaseQuantity(StrEnum):
@@ -31,73 +34,111 @@ class BaseQuantity(StrEnum):
     """Of the table [m/s]."""
     ACCELERATION = "acceleration"
     """Of the table [m/s2]."""
+    AMPLITUDE = "amplitude"
+    """Of the specimen: displacement of m0 against the table [m]."""
+    M0_VELOCITY = "m0_velocity"
+    """Of m0, absolute, as a vibrometer sees it [m/s]."""
+    P = "p"
+    """Of m1 against m2 [m]."""
+
+
+class OnTable(StrEnum):
+    """What stands on the table."""
+
+    SPECIMEN = "specimen"
+    NOTHING = "nothing"
+    """Smooth over frequency: for feedback, which measures what the specimen does."""
 
 
 @dataclass(frozen=True)
 class RigModel:
-    """Linear model of a rig, from the generator's terminal to the table, for limits before energising.
+    """A rig from the generator's terminal to table and specimen, linear but for the specimen's stops.
 
-    The coil and the suspended table are coupled by the force constant G (an electrodynamic
-    transducer, Beranek, Acoustics, ch. 3)::
-
-        m x'' + d x' + k x = G i          L i' + R i + G x' = u
-
-    with m the moving mass and the fixture. The amplifier is its gain between two first-order band
-    edges. Not in it: the specimen (some 10 g on more than half a kilogram, whose resonances notch and
-    raise the table's motion locally), clipping, the current limiter, the table's stops and its axial
+    Coil, table and specimen answer a voltage together (`vibench.sim.shaker`): the specimen notches and raises
+    the table's motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops
+    are in it to first order. Not in it: clipping, the current limiter, the table's stops and its axial
     resonance above 15 kHz. Those belong to the virtual rig or to the check with the rig itself.
     """
 
     rig: Rig
+    on_table: OnTable = OnTable.SPECIMEN
+
+    @property
+    def gap_m(self) -> float:
+        """Smaller clearance of m1 at rest [m]; infinite without stops."""
+        specimen = specimen_of(self.rig)
+        without = self.on_table is OnTable.NOTHING or isinstance(specimen.contact, NoContact)
+        return inf if without else min(specimen.gaps_m)
 
     def transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
         """Peak of ``quantity`` per volt at the generator's terminal, with phase, shape of ``frequency_hz``.
 
-        Time goes as exp(+i omega t). Zero hertz is allowed: a direct-coupled amplifier holds the table
-        deflected, one with a lower band edge does not.
+        While no stop is touched. Time goes as exp(+i omega t). Zero hertz is allowed: a direct-coupled
+        amplifier holds the table deflected, one with a lower band edge does not.
         """
-        s = np.asarray(2j * np.pi * np.asarray(frequency_hz, dtype=np.float64), dtype=np.complex128)
-        shaker = self.rig.shaker
-        voltage = amplifier_gain(self.rig.amplifier, s)
-        force_constant = shaker.force_constant_n_per_a
-        dynamic_stiffness = _dynamic_stiffness(shaker, s)
-        impedance = shaker.coil_resistance_ohm + s * shaker.coil_inductance_h
-        # Multiplied out by the dynamic stiffness, which may vanish: the current never divides by it.
-        coupled = impedance * dynamic_stiffness + s * force_constant**2
-        stroke = force_constant * voltage / coupled
+        return self._of(quantity, frequency_hz, self._motion(frequency_hz).per_volt)
+
+    def stuck_transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
+        """Give `transfer` while the stops hold m1 to m2."""
+        return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck)
+
+    def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
+        """Peak of ``quantity`` per metre of a p that the stops bring about, shape of ``frequency_hz``."""
+        return self._of(quantity, frequency_hz, self._motion(frequency_hz).lever)
+
+    def under_sines(
+        self, quantity: BaseQuantity, frequency_hz: ArrayLike, terminal_v: ArrayLike
+    ) -> ComplexArray:
+        """Peak of ``quantity`` under sines of these voltages at the terminal, peak, shape of both [V]."""
+        return self._of(quantity, frequency_hz, self._motion(frequency_hz).under(terminal_v, self.gap_m))
+
+    def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:
+        """Give the peak at the terminal [V] that holds the table's acceleration [m/s2], shape (n,)."""
+        hz = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        base_m = np.asarray(acceleration, dtype=np.float64) / (2 * np.pi * hz) ** 2
+        return self._motion(hz).volts_for(base_m, self.gap_m)
+
+    def _motion(self, frequency_hz: ArrayLike) -> LinearMotion:
+        specimen = None if self.on_table is OnTable.NOTHING else specimen_of(self.rig)
+        hz = np.ascontiguousarray(frequency_hz, dtype=np.float64)
+        return _kept_motion(amplifier_of(self.rig), shaker_of(self.rig), specimen, hz.tobytes())
+
+    def _of(self, quantity: BaseQuantity, frequency_hz: ArrayLike, moved: ComplexArray) -> ComplexArray:
+        hz = np.asarray(frequency_hz, dtype=np.float64)
+        s = 2j * np.pi * hz.ravel()
         match quantity:
             case BaseQuantity.AMPLIFIER_VOLTAGE:
-                result = voltage
+                result = moved[:, _VOLTAGE]
             case BaseQuantity.CURRENT:
-                result = dynamic_stiffness * voltage / coupled
+                result = moved[:, _CURRENT]
             case BaseQuantity.FORCE:
-                result = force_constant * dynamic_stiffness * voltage / coupled
+                result = self.rig.shaker.force_constant_n_per_a * moved[:, _CURRENT]
             case BaseQuantity.STROKE:
-                result = stroke
+                result = moved[:, _BASE]
             case BaseQuantity.VELOCITY:
-                result = s * stroke
+                result = s * moved[:, _BASE]
             case BaseQuantity.ACCELERATION:
-                result = s**2 * stroke
-        return np.asarray(result, dtype=np.complex128)
+                result = s**2 * moved[:, _BASE]
+            case BaseQuantity.AMPLITUDE:
+                result = moved[:, _M0] - moved[:, _BASE]
+            case BaseQuantity.M0_VELOCITY:
+                result = s * moved[:, _M0]
+            case BaseQuantity.P:
+                result = moved[:, _P]
+        return np.asarray(result.reshape(hz.shape), dtype=np.complex128)
+
+
+@lru_cache(maxsize=16)
+def _kept_motion(
+    amplifier: Amplifier, shaker: Shaker, specimen: Specimen | None, frequency_hz: bytes
+) -> LinearMotion:
+    """Solve once for what is asked of the same lines quantity by quantity."""
+    return linear_motion(amplifier, shaker, specimen, np.frombuffer(frequency_hz, dtype=np.float64))
 
 
 def suspended_mass_kg(shaker: ShakerConfig) -> float:
     """Everything rigid that the coil moves [kg]: moving element and fixture, without the specimen."""
     return shaker.moving_mass_kg + shaker.fixture_mass_kg
-
-
-def amplifier_gain(amplifier: AmplifierConfig, s: ComplexArray) -> ComplexArray:
-    """Output volts per input volt at the Laplace variable ``s`` [rad/s], shape of ``s``."""
-    above = 1.0 + s / (2 * np.pi * amplifier.high_cut_hz)
-    low_cut = 2 * np.pi * amplifier.low_cut_hz
-    below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
-    return np.asarray(amplifier.gain * below / above, dtype=np.complex128)
-
-
-def _dynamic_stiffness(shaker: ShakerConfig, s: ComplexArray) -> ComplexArray:
-    damping = shaker.suspension_damping_ns_per_m
-    stiffness = shaker.suspension_stiffness_n_per_m
-    return np.asarray(stiffness + s * damping + s**2 * suspended_mass_kg(shaker))
 
 
 def specimen_of(rig: Rig) -> Specimen:

@@ -7,13 +7,13 @@ import numpy as np
 
 from ..errors import CheckFailed
 from ..instruments import Samples
-from ..plan import CHECK_FREQUENCY_HZ
-from ..rig import BaseQuantity, Channel, Rig, RigModel, Role
+from ..plan import CHECK_FREQUENCY_HZ, base_under_check, nearest_expected
+from ..rig import Channel, Rig, Role
 
 DRIVE_TOLERANCE = 0.15
 """How far the measured drive may lie from the setting: a wrong load is a factor of 2, a cable is nothing."""
 BASE_FACTOR = 10 ** (3 / 20)
-"""How far the base acceleration may lie from the model: 3 dB, either way."""
+"""How far the base acceleration may lie from the model, specimen included: 3 dB, either way."""
 WRONG_LOAD = 2.0
 QUIET_SHARE = 0.25
 """Share of the expected signal that may be there before anything plays."""
@@ -73,14 +73,13 @@ def judged(
     drive = _row(channels, Role.DRIVE_VOLTAGE)
     base = _row(channels, Role.BASE_ACCELERATION)
     terminal_v = 0.5 * amplitude_vpp * rig.generator.terminal_factor()
-    accelerance = abs(complex(RigModel(rig).transfer(BaseQuantity.ACCELERATION, CHECK_FREQUENCY_HZ)))
 
     def measured(volts: Samples, row: int) -> float:
         return sine_amplitude(volts[row], CHECK_FREQUENCY_HZ, sample_rate_hz) * channels[row].units_per_volt
 
-    figures = CheckFigures(
-        measured(during, drive), terminal_v, measured(during, base), terminal_v * accelerance
-    )
+    moved = measured(during, base)
+    expected = nearest_expected(moved, base_under_check(rig, terminal_v))
+    figures = CheckFigures(measured(during, drive), terminal_v, moved, expected)
     _require_quiet("the drive voltage", measured(quiet, drive), figures.expected_drive_v, "V")
     _require_quiet("the base acceleration", measured(quiet, base), figures.expected_base_m_per_s2, "m/s2")
     _require_drive(figures)
@@ -153,5 +152,6 @@ def _require_base(figures: CheckFigures) -> None:
     raise CheckFailed(
         f"the base moves with {figures.base_m_per_s2:.3g} m/s2 where the model says "
         f"{figures.expected_base_m_per_s2:.3g} m/s2, 3 dB off is allowed. The output was turned off; "
-        "check the amplifier's gain and power, the accelerometer and its sensitivity, and the moving mass"
+        "check the amplifier's gain and power, the accelerometer and its sensitivity, the moving mass, and "
+        "whether the specimen is the one that the rig names"
     )

@@ -16,13 +16,13 @@ from ..plan import (
     Measurement,
     Phase,
     RunState,
-    check_amplitude_vpp,
     check_phases,
     drive_source_of,
     duration_s,
     known_phases,
     phases,
     require_within_limits,
+    run_check_vpp,
     shortest_ramp_s,
 )
 from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, create_recording
@@ -253,7 +253,7 @@ class Run(ClosedOnLeaving):
         loop.log(EventKind.PLAYER, self._drive.drive_source.value)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
-                self._begin(check_phases(self._measurement))
+                self._begin(check_phases(self._measurement, self._bench.rig))
                 yield from self._checked(runner)
                 self._drive.announce(known_phases(self._measurement))
                 pause_s = self._drive.pause_s
@@ -285,7 +285,7 @@ class Run(ClosedOnLeaving):
     def _checked(self, runner: PhaseRunner) -> Iterator[Progress]:
         before: list[Block] = []
         during: list[Block] = []
-        silence, settling, measuring = check_phases(self._measurement)
+        silence, settling, measuring = check_phases(self._measurement, self._bench.rig)
         yield from runner.run_phase(silence, before)
         self._silence.learn_hum(phase_samples(before).volts)
         yield from runner.run_phase(settling)
@@ -296,7 +296,7 @@ class Run(ClosedOnLeaving):
             phase_samples(before).volts,
             phase_samples(during).volts,
             self._bench.digitizer.sample_rate_hz,
-            check_amplitude_vpp(self._measurement.excitation.amplitude_vpp),
+            run_check_vpp(self._measurement.excitation.amplitude_vpp, self._bench.rig),
         )
         runner.loop.log(EventKind.CHECK, figures.text())
 

@@ -185,9 +185,8 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
 def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
     """Say whether p of the linear specimen reaches a stop: Gaussian, some thousand turns long."""
     grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
-    base_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.STROKE, grid)) / np.sqrt(high_hz - low_hz)
-    relative = np.abs(base_transmissibility(specimen, grid)[:, 3])
-    rms_m = float(np.sqrt(np.sum((base_m * relative) ** 2) * _GRID_HZ))
+    p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
+    rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
     return _HIGHEST_TURN * rms_m > min(specimen.gaps_m)
 
 

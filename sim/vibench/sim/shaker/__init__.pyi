@@ -1,3 +1,8 @@
+from ._linear_motion import (
+    SINE_COLUMNS as SINE_COLUMNS,
+    LinearMotion as LinearMotion,
+    linear_motion as linear_motion,
+)
 from ._loaded_shaker import (
     MOTION_COLUMNS as MOTION_COLUMNS,
     LoadedShaker as LoadedShaker,
