@@ -61,6 +61,7 @@ from .results import (
     recorded_response as recorded_response,
     recordings_in as recordings_in,
     result_summary as result_summary,
+    spectral_functions as spectral_functions,
 )
 from .signals import (
     Window as Window,

@@ -6,7 +6,13 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import open_recording
-from vibench.analysis.exchange import Format, Results, excerpt, export_samples
+from vibench.analysis import (
+    FrequencyResponseRequest,
+    MagnitudeScale,
+    quantities_named,
+    spectral_functions,
+)
+from vibench.analysis.exchange import Format, Results, excerpt, export_functions, export_samples
 
 from .external_data import AllowExternal, external_data
 from .output import console
@@ -33,14 +39,34 @@ def export(
     results: Annotated[
         bool, typer.Option("--results", help="Results that were saved in the recording, too.")
     ] = False,
+    spectra: Annotated[
+        bool,
+        typer.Option(
+            "--spectra",
+            help="Densities of the channels, and of noise the frequency response, in place of samples (uff).",
+        ),
+    ] = False,
+    quantity: Annotated[
+        str,
+        typer.Option("--quantity", help="Of m0 over base, for --spectra: as in 'vibench analyse'."),
+    ] = "displacement",
     allow_external: AllowExternal = False,
 ) -> None:
-    """Write a recording's samples, with units and times, as a file that other programs read."""
+    """Write a recording's samples or spectra, with units, as a file that other programs read."""
     with external_data(allow_external), open_recording(recording) as opened:
         chosen = excerpt(opened, tuple(channels.split(",")) if channels else (), from_s, to_s)
         path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
+        if spectra:
+            view = quantities_named(quantity, MagnitudeScale.LOG)
+            functions = spectral_functions(chosen, FrequencyResponseRequest(view=view))
+            _tell(export_functions(chosen, functions, to, path))
+            return
         included = Results.INCLUDED if results else Results.LEFT_OUT
         with transfer_bar(f"export as {to.value}", chosen.values) as observer:
             written = export_samples(chosen, to, path, included, observer)
+    _tell(written)
+
+
+def _tell(written: tuple[Path, ...]) -> None:
     for each in written:
         console.print(f"wrote {each}")

@@ -3,11 +3,13 @@ from ._crate import (
     pack_folder as pack_folder,
 )
 from ._excerpt import (
+    Excerpt as Excerpt,
     excerpt as excerpt,
 )
 from ._export import (
     Format as Format,
     Results as Results,
+    export_functions as export_functions,
     export_samples as export_samples,
 )
 from ._import_recording import (
@@ -27,6 +29,11 @@ from ._source import (
 )
 from ._source_channel import (
     SourceChannel as SourceChannel,
+)
+from ._uff_functions import (
+    FunctionAxis as FunctionAxis,
+    FunctionType as FunctionType,
+    UniversalFunction as UniversalFunction,
 )
 from ._xarray_dataset import (
     xarray_dataset as xarray_dataset,

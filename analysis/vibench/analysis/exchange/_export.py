@@ -1,12 +1,13 @@
 """An excerpt of a recording becomes a file that other programs read."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, StrEnum, auto
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol
 
+from ..errors import InvalidRequest
 from ..recordings import require_intact
 from ._csv import write_csv_samples
 from ._excerpt import Excerpt, TransferObserver, unobserved
@@ -16,6 +17,7 @@ from ._new_file import new_file, require_unused
 from ._nexus import write_nexus
 from ._result_export import matlab_results, result_paths, write_result_tables
 from ._uff import write_uff
+from ._uff_functions import UniversalFunction, write_uff_functions
 from ._wav import require_sound, write_wav
 
 
@@ -25,7 +27,7 @@ class Format(StrEnum):
     CSV = "csv"
     """Text with units in its headings."""
     UFF = "uff"
-    """Universal file, dataset 58, binary."""
+    """Universal file, datasets 58: samples binary, spectra as text."""
     MAT = "mat"
     """MATLAB 5: a struct for each channel."""
     NEXUS = "nxs"
@@ -80,8 +82,53 @@ def export_samples(
     return EXPORTERS[to].export(excerpt, path, results, observer)
 
 
+def export_functions(
+    excerpt: Excerpt, functions: Sequence[UniversalFunction], to: Format, path: Path
+) -> tuple[Path, ...]:
+    """Write frequency responses and spectra of an excerpt as ``path``, and its facts beside it.
+
+    Parameters
+    ----------
+    excerpt
+        What they were estimated from.
+    functions
+        In the order in which they are to stand.
+    to
+        A format that has a place for them.
+    path
+        The new file.
+
+    Raises
+    ------
+    InvalidRequest
+        When the format has no place for them, a name is taken, or the disk refuses; nothing is left of it.
+
+    """
+    write = EXPORTERS[to].write_functions
+    if write is None:
+        able = " and ".join(each.value for each, row in EXPORTERS.items() if row.write_functions is not None)
+        raise InvalidRequest(
+            f"spectra were asked for as {to.value}, which is written for samples; ask for {able}, or take "
+            "the tables that vibench analyse writes"
+        )
+    facts = facts_path(path)
+    require_unused(facts)
+    with new_file(path) as unfinished:
+        write(excerpt, functions, unfinished)
+    with new_file(facts) as unfinished:
+        write_facts(excerpt, unfinished)
+    return path, facts
+
+
+WriteFunctions = Callable[[Excerpt, Sequence[UniversalFunction], Path], None]
+
+
 class Exporter(Protocol):
     """A row of `EXPORTERS`: how an excerpt becomes files of one format."""
+
+    @property
+    def write_functions(self) -> WriteFunctions | None:
+        """Writes frequency responses and spectra; None where the format has no place for them."""
 
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
@@ -100,6 +147,7 @@ class SamplesFile:
     write: Callable[[Excerpt, Path, TransferObserver], None]
     require: Callable[[Excerpt], None] = _accept
     """Raises InvalidRequest for what the format cannot hold."""
+    write_functions: WriteFunctions | None = None
 
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
@@ -125,6 +173,7 @@ class WholeFile:
 
     write: Callable[[Excerpt, Path, Mapping[str, Any], TransferObserver], None]
     require: Callable[[Excerpt], None] = _accept
+    write_functions: WriteFunctions | None = None
 
     def export(
         self, excerpt: Excerpt, path: Path, results: Results, observer: TransferObserver
@@ -140,7 +189,7 @@ class WholeFile:
 EXPORTERS: Mapping[Format, Exporter] = MappingProxyType(
     {
         Format.CSV: SamplesFile(write_csv_samples),
-        Format.UFF: SamplesFile(write_uff),
+        Format.UFF: SamplesFile(write_uff, write_functions=write_uff_functions),
         Format.MAT: WholeFile(write_mat, require_small),
         Format.NEXUS: SamplesFile(write_nexus),
         Format.WAV: SamplesFile(write_wav, require_sound),

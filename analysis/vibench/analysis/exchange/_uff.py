@@ -106,24 +106,26 @@ def _header(excerpt: Excerpt, channel: ChannelHeader, number: int) -> Iterator[s
     yield f"{58:6d}b{1:6d}{2:6d}{11:12d}{excerpt.samples * DOUBLE_BYTES:12d}{0:6d}{0:6d}{0:12d}{0:12d}"
     yield id_line(channel.role)
     yield id_line(f"{excerpt.name} {recording.recording_id}")
-    yield id_line(_date(recording.started_utc))
+    yield id_line(date_line(recording.started_utc))
     yield id_line(str(recording.plan.get("name", "")))
     yield id_line(rate_line(rate, excerpt.start, recording.origin))
     point = f" {'NONE':<10}{number:10d}{SCALAR:4d} {'NONE':<10}{0:10d}{0:4d}"
     yield f"{TIME_RESPONSE:5d}{number:10d}{0:5d}{0:10d}{point}"
     times = f"{excerpt.start / rate:13.5E}{1 / rate:13.5E}{0:13.5E}"
     yield f"{REAL_DOUBLE:10d}{excerpt.samples:10d}{EVENLY_SPACED:10d}{times}"
-    yield _axis(TIME_AXIS, (0, 0, 0), "time", "s")
-    yield _axis(kind, exponents, channel.role, channel.unit)
-    yield _axis(0, (0, 0, 0), "NONE", "NONE")
-    yield _axis(0, (0, 0, 0), "NONE", "NONE")
+    yield axis_record(TIME_AXIS, (0, 0, 0), "time", "s")
+    yield axis_record(kind, exponents, channel.role, channel.unit)
+    yield axis_record(0, (0, 0, 0), "NONE", "NONE")
+    yield axis_record(0, (0, 0, 0), "NONE", "NONE")
 
 
-def _axis(kind: int, exponents: "tuple[int, ...] | list[int]", label: str, unit: str) -> str:
+def axis_record(kind: int, exponents: "tuple[int, ...] | list[int]", label: str, unit: str) -> str:
+    """Write one of records 8 to 11: data type, exponents of length, force and temperature, label, unit."""
     return f"{kind:10d}{''.join(f'{each:5d}' for each in exponents)} {label:<20.20} {unit:<20.20}"
 
 
-def _date(started_utc: str) -> str:
+def date_line(started_utc: str) -> str:
+    """Write ID line 3: ``"22-NOV-26 21:04:05"``."""
     moment = datetime.fromisoformat(started_utc)
     return f"{moment.day:02d}-{MONTHS[moment.month - 1]}-{moment:%y} {moment:%H:%M:%S}"
 

@@ -21,6 +21,7 @@ from ._periodic import (
 )
 from ._request import (
     FrequencyResponseRequest as FrequencyResponseRequest,
+    FrequencyResponseView as FrequencyResponseView,
     MagnitudeScale as MagnitudeScale,
     quantities_named as quantities_named,
 )

@@ -20,6 +20,9 @@ from ._measurement_analysis import (
     UNOBSERVED as UNOBSERVED,
     analyse as analyse,
 )
+from ._spectral_functions import (
+    spectral_functions as spectral_functions,
+)
 from ._summary import (
     budget_sentences as budget_sentences,
     budgets_of as budgets_of,
