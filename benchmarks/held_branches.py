@@ -1,12 +1,16 @@
 """Branches of the virtual rig held by its real-time controller, beside those of the model.
 
     python benchmarks/held_branches.py [--noise 10] [--wrong 1.1] [--latency 5e-4] [--seed 1] [--out DIR]
+    python benchmarks/held_branches.py --stability 0.02 [--noise 3]
     python benchmarks/held_branches.py --stops
     python benchmarks/held_branches.py --latencies 0.3,1,1.2,1.5,2 --draw docs/images/held_latency.png
 
 Follows the branch of campaigns/branch.toml on the virtual rig with a controller, every noise of its
 virtual section times ``--noise``, and prints how far what was measured lies from the model's branch. With
 ``--wrong`` the host believes in springs stiffer and a coil stronger by that factor than those that move.
+
+With ``--stability`` small changes of that size tell how stable each point is, beside the model's Floquet
+multipliers.
 
 With ``--stops`` the specimen is the paper's, and the branch one with impacts, begun from above.
 
@@ -17,6 +21,7 @@ here), and where it was lost is printed beside where the loop's largest multipli
 import argparse
 import tempfile
 import time
+from collections import Counter
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +38,13 @@ from vibench.acquisition import (
 from vibench.acquisition.control import _continuation_controller
 from vibench.acquisition.excitation import BaseLevel
 from vibench.acquisition.plan import BranchContinuation
-from vibench.acquisition.recording import BranchEndNote, BranchPointNote, feedback_note
+from vibench.acquisition.recording import (
+    BranchEndNote,
+    BranchPointNote,
+    BranchStabilityNote,
+    FeedbackNote,
+    feedback_note,
+)
 from vibench.acquisition.rig import (
     Rig,
     amplifier_of,
@@ -42,7 +53,7 @@ from vibench.acquisition.rig import (
     shaker_of,
     specimen_of,
 )
-from vibench.analysis.figures._style import MEASURED, SIMULATED, new_figure, styled
+from vibench.analysis.figures._style import MEASURED, SIMULATED, legend_above, new_figure, styled
 from vibench.sim import Specimen
 from vibench.sim.feedback import (
     Begin,
@@ -71,6 +82,8 @@ NOISES = (
 )
 BESIDE_HZ = 0.2
 """So near to a fold m0 is not compared: the branch is steep there."""
+FINE = 25
+"""Latencies of the model's curve."""
 
 
 def changed(rig: Rig, noise: float, seed: int, latency_s: float | None) -> Rig:
@@ -139,6 +152,36 @@ def compare(points: list[BranchPointNote], branch: Branch, level_m: float) -> No
             if f.min() + BESIDE_HZ < each.frequency_hz < f.max() - BESIDE_HZ
         ]
         print(f"{name}: {len(points[held])} points, m0 within {max(away, default=0.0):.2%}")
+
+
+def compare_stability(notes: list[FeedbackNote | None], branch: Branch, level_m: float) -> None:
+    """Print what small changes told of each point, beside the model's largest multiplier there."""
+    points = [each for each in notes if isinstance(each, BranchPointNote)]
+    hertz = np.array([each.frequency_hz for each in points])
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(hertz)))) + 1
+    folds = [each.index for each in branch.events if each.kind.value == "fold"]
+    legs = [slice(0, folds[0] + 1), slice(folds[0] + 1, folds[1] + 1), slice(folds[1] + 1, None)]
+    model, counts = np.abs(branch.multipliers[:, 0]), Counter[str]()
+    inside = away = 0.0
+    told = [each for each in notes if isinstance(each, BranchStabilityNote) and each.multiplier is not None]
+    for each in told:
+        point = points[each.point]
+        leg = legs[int(np.searchsorted(turns[:2], each.point))]
+        far_hz = np.hypot(
+            branch.frequencies_hz[leg] - point.frequency_hz,
+            20 * np.log(branch.response_ii[leg, 0] * level_m / point.m0_m),
+        )
+        true = float(model[leg][np.argmin(far_hz)])
+        wrong = each.multiplier - true
+        inside += abs(wrong) < 2.1 * each.multiplier_u
+        away = max(away, each.moved)
+        counts[f"{'unstable' if true > 1 else 'stable'} by the model, told {each.stability.value}"] += 1
+        print(
+            f"{point.frequency_hz:8.3f} Hz: {each.multiplier:.4f} +- {each.multiplier_u:.4f}, model "
+            f"{true:.4f}, {each.stability.value}"
+        )
+    print(f"{len(told)} points, in bounds of 95 %: {inside / max(len(told), 1):.0%}; m0 moved by {away:.2%}")
+    print("; ".join(f"{name}: {count}" for name, count in sorted(counts.items())))
 
 
 STOPS = BranchContinuation(
@@ -228,43 +271,46 @@ def late(latencies_ms: list[float], draw: Path | None, folder: Path) -> None:
     # A host refuses these plans; what happens otherwise is what is measured here.
     _continuation_controller.require_held = lambda *_: None
     rows = []
-    for each in latencies_ms:
+    for each in sorted(latencies_ms):
         held_hz, ended = lost_at(rig, 1e-3 * each, folder)
-        multipliers = multipliers_at(rig, up, 1e-3 * each)
-        beyond = np.flatnonzero(multipliers > 1)
-        model_hz = float(up.frequencies_hz[beyond[0]]) if beyond.size else np.nan
-        rows.append((each, held_hz, model_hz, multipliers.max()))
+        model_hz, largest = model_loss(rig, up, each)
+        rows.append((each, held_hz))
         print(
             f"{each:g} ms: held to {held_hz:.5g} Hz ({ended}); by the model to {model_hz:.5g} Hz, "
-            f"largest multiplier {multipliers.max():.3g}",
+            f"largest multiplier {largest:.3g}",
             flush=True,
         )
     if draw is not None:
-        picture(np.array(rows), float(up.frequencies_hz.max()), draw)
+        fine = np.linspace(min(latencies_ms), max(latencies_ms), FINE)
+        model = np.array([(each, *model_loss(rig, up, each)) for each in fine])
+        picture(np.array(rows), model, float(up.frequencies_hz.max()), draw)
 
 
-def picture(rows: np.ndarray, fold_hz: float, path: Path) -> None:
-    """Draw frequency of the loss over latency, held and by the model."""
+def model_loss(rig: Rig, up: Branch, latency_ms: float) -> tuple[float, float]:
+    """Give where the loop's largest multiplier passes 1, else the fold, and the largest up to the fold."""
+    multipliers = multipliers_at(rig, up, 1e-3 * latency_ms)
+    beyond = np.flatnonzero(multipliers > 1)
+    lost_hz = up.frequencies_hz[beyond[0]] if beyond.size else up.frequencies_hz.max()
+    return float(lost_hz), float(multipliers.max())
+
+
+def picture(rows: np.ndarray, model: np.ndarray, fold_hz: float, path: Path) -> None:
+    """Draw frequency of the loss over latency, held and by the model, and the model's largest multiplier."""
     with styled():
         figure = new_figure(3.2)
         left, right = figure.subplots(1, 2)
-        lost = np.isnan(rows[:, 2])
+        left.axhline(fold_hz, color="0.6", linewidth=0.8, label="fold of the branch")
         left.plot(
-            rows[:, 0],
-            np.where(lost, fold_hz, rows[:, 2]),
-            color=SIMULATED,
-            linestyle="--",
-            label="model: multiplier of the loop 1",
+            *model[:, :2].T, color=SIMULATED, linestyle="--", label="model: multiplier of the loop is 1"
         )
-        left.plot(rows[:, 0], rows[:, 1], color=MEASURED, marker="o", linestyle="none", label="held up to")
-        left.axhline(fold_hz, color="0.6", linewidth=0.8)
-        left.set_xlabel("latency [ms]")
+        left.plot(*rows.T, color=MEASURED, marker="o", markersize=4, linestyle="none", label="held up to")
         left.set_ylabel("drive frequency [Hz]")
-        left.legend(frameon=False)
-        right.plot(rows[:, 0], rows[:, 3], color=SIMULATED, linestyle="--", marker=".")
         right.axhline(1.0, color="0.6", linewidth=0.8)
-        right.set_xlabel("latency [ms]")
-        right.set_ylabel("largest multiplier to the fold, model")
+        right.plot(model[:, 0], model[:, 2], color=SIMULATED, linestyle="--")
+        right.set_ylabel("largest multiplier of the loop")
+        for axes in (left, right):
+            axes.set_xlabel("latency [ms]")
+        legend_above(figure, [left], columns=3)
         figure.savefig(path, dpi=150)
 
 
@@ -276,6 +322,7 @@ def main() -> None:
     parser.add_argument("--latency", type=float)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--stability", type=float, default=0.0)
     parser.add_argument("--stops", action="store_true")
     parser.add_argument("--latencies", type=lambda text: [float(each) for each in text.split(",")])
     parser.add_argument("--draw", type=Path)
@@ -289,7 +336,8 @@ def main() -> None:
     if given.stops:
         true = true.model_copy(update={"specimen": load_rig(Path("virtual_rig")).specimen})
         measurement = measurement.model_copy(update={"excitation": STOPS})
-    plan = measurement.excitation
+    plan = measurement.excitation.model_copy(update={"perturbation": given.stability})
+    measurement = measurement.model_copy(update={"excitation": plan})
     with ExitStack() as stack:
         folder = given.out or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         folder.mkdir(parents=True, exist_ok=True)
@@ -311,7 +359,10 @@ def main() -> None:
     if given.stops:
         compare_stops(points, specimen_of(true))
         return
-    compare(points, model_of(true, plan), plan.base_level.displacement_m)
+    branch = model_of(true, plan)
+    compare(points, branch, plan.base_level.displacement_m)
+    if given.stability:
+        compare_stability(notes, branch, plan.base_level.displacement_m)
 
 
 if __name__ == "__main__":

@@ -1,20 +1,37 @@
 """Control-based continuation: on a curve that folds, and on the whole virtual rig."""
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, LimitExceeded, open_bench, open_recording, run_measurement
+from vibench.acquisition.control._branch_player import LoopLook
 from vibench.acquisition.control._branch_solver import BranchSolver, LoopSetting, Seen, is_new
+from vibench.acquisition.control._branch_stability import stability_note
 from vibench.acquisition.control._fast_loop import fast_loop, require_held
 from vibench.acquisition.excitation import BaseLevel
 from vibench.acquisition.instruments import LoopState
 from vibench.acquisition.plan import BranchContinuation, Measurement, RunState
-from vibench.acquisition.recording import BranchEnd, BranchEndNote, BranchPointNote, feedback_note
+from vibench.acquisition.recording import (
+    BranchEnd,
+    BranchEndNote,
+    BranchPointNote,
+    BranchStabilityNote,
+    Stability,
+    feedback_note,
+)
 from vibench.acquisition.rig import ControllerConfig, confirm_simulated, load_rig, specimen_of
-from vibench.sim.feedback import Begin, impact_branch
+from vibench.sim.feedback import (
+    Begin,
+    OpenLoopMultiplier,
+    PerturbedMotion,
+    envelope_deviation,
+    impact_branch,
+    open_loop_multiplier,
+)
 from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
 from vibench.virtual_rig import VirtualRig
 
@@ -137,6 +154,41 @@ def test_a_branch_is_begun_from_rest_and_its_base_is_a_sine_of_the_level(rig, tm
         assert each.m0_m == pytest.approx(m0, rel=0.01)
 
 
+def test_small_changes_tell_a_points_stability_and_leave_it_where_it_was(rig, tmp_path):
+    hard = hardening(rig)
+    path = tmp_path / "perturbed.h5"
+    points, notes = followed(hard, continuation(start_hz=94, most_points=1, perturbation=0.02), path)
+    told = [each for each in notes if isinstance(each, BranchStabilityNote)]
+    branch, _ = model_of(hard)
+    size = np.interp(94.0, branch.frequencies_hz[:60], np.abs(branch.multipliers[:60, 0]))
+    assert [each.point for each in told] == [0]
+    assert told[0].stability is Stability.STABLE
+    assert told[0].multiplier == pytest.approx(size, abs=2.1 * told[0].multiplier_u)
+    assert told[0].multiplier_u < 0.015
+    assert told[0].moved < 2e-3
+    with open_recording(path) as recording:
+        (changed,) = [each for each in recording.segments if each.label == "perturbed"]
+        lasted_s = (changed.stop - changed.first_sample) / recording.sample_rate_hz
+        base = recording.read("base_acceleration", changed.first_sample, changed.stop)
+        m0 = recording.read("m0_velocity", changed.first_sample, changed.stop)
+    assert lasted_s == pytest.approx(220 / 94, abs=0.01), "time-bounded"
+    period = recording.sample_rate_hz / points[0].frequency_hz
+    again = open_loop_multiplier(PerturbedMotion(base, m0, period, round(15 * period), 100))
+    assert again.size == pytest.approx(told[0].multiplier, abs=1e-4), "the recording tells it once more"
+    assert max(envelope_deviation(each, period) for each in (base, m0)) == pytest.approx(0.02, rel=0.6)
+
+
+def test_a_motion_that_is_another_one_afterwards_is_not_determined():
+    look = LoopLook(np.array([3e-6 + 0j]), np.array([9e-6 + 0j]), np.array([1e-9]), np.array([1e-9]))
+    moved = replace(look, m0_m=1.02 * look.m0_m)
+    surely = OpenLoopMultiplier(1.2, 0.01)
+    assert stability_note(surely, 3, 0.02, look, look).stability is Stability.UNSTABLE
+    assert stability_note(surely, 3, 0.02, look, moved).stability is Stability.OPEN
+    nothing = stability_note(OpenLoopMultiplier(float("nan"), float("nan")), 3, 0.02, look, look)
+    assert nothing.stability is Stability.OPEN
+    assert nothing.multiplier is None
+
+
 def test_a_bench_without_a_controller_says_so(rig, tmp_path):
     with open_bench(rig) as bench, pytest.raises(ConfigurationError, match=r"add \[controller\]"):
         run_measurement(bench, measurement(continuation()), tmp_path / "none.h5")
@@ -200,7 +252,8 @@ def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tm
             "specimen": true.specimen.model_copy(update={"single_frequencies_hz": stiffer}),
         }
     )
-    points, notes = followed(believed, continuation(most_points=110), tmp_path / "branch.h5", true)
+    plan = continuation(most_points=110, perturbation=0.02)
+    points, notes = followed(believed, plan, tmp_path / "branch.h5", true)
     branch, folds = model_of(true)
     hertz = np.array([each.frequency_hz for each in points])
     assert isinstance(notes[-1], BranchEndNote)
@@ -217,3 +270,10 @@ def test_a_branch_is_held_through_both_folds_by_a_law_from_a_wrong_model(rig, tm
         assert each.residue < 0.005
         if f[0] + 0.2 < each.frequency_hz < f[-1] - 0.2:
             assert each.m0_m == pytest.approx(LEVEL_M * np.interp(each.frequency_hz, f, ratio), rel=0.02)
+    told = {each.point: each.stability for each in notes if isinstance(each, BranchStabilityNote)}
+    behind = [told[each] for each in range(top + 2, bottom - 1)]
+    assert Stability.STABLE not in behind
+    beside = (*range(top - 1), *range(bottom + 2, len(points)))
+    assert Stability.UNSTABLE not in [told[each] for each in beside]
+    if noise == 1.0:
+        assert behind.count(Stability.UNSTABLE) >= 0.8 * len(behind)

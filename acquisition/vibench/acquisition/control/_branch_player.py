@@ -68,13 +68,13 @@ class BranchPlayer:
         self._squares, self._degrees = np.zeros(1), 0.0
         """Of deviations of blocks from their means in earlier looks, and how many there were."""
 
-    def tone(self, setting: LoopSetting) -> LoopTone:
+    def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> LoopTone:
         """Give what the controller is told."""
         program = LoopProgram(
             frequency_hz=setting.frequency_hz,
             reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
             feedback=self._feedback,
-            glide_s=_GLIDE_S,
+            glide_s=glide_s,
             block_periods=_BLOCK_PERIODS,
             harmonics=max(_HIGHEST, self.plan.harmonics),
         )

@@ -19,6 +19,7 @@ from ._branch_solver import (
     noise_of,
     residual_of,
 )
+from ._branch_stability import perturbed_stability
 from ._control_action import Controller
 from ._fast_loop import FastLoop, fast_loop, level_at, require_held
 from ._sine_loop import SineLoop
@@ -185,6 +186,8 @@ def _recorded(
             tries=tries,
         )
     )
+    if player.plan.perturbation:
+        loop.note((yield from perturbed_stability(player, loop.channels, setting, number, look)))
 
 
 def _is_sine(residual: Vector, tolerance: float) -> bool:

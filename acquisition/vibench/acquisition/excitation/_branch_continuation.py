@@ -12,6 +12,8 @@ from ._steps import LoopTone, Segment, Step
 
 _NO_TRIES = 12
 """Stretches of settling and looking that a point takes at most."""
+_BEFORE = 60
+"""Periods that go before those whose changes tell stability: of their size, and of a lead-in."""
 
 
 class BranchContinuation(AbstractFeedback):
@@ -55,6 +57,11 @@ class BranchContinuation(AbstractFeedback):
     """Periods of a look."""
     record_s: PositiveFloat = 0.5
     """Time recorded at each point [s]."""
+    perturbation: float = Field(default=0.0, ge=0, le=0.1)
+    """Rms change of the fundamentals of base and m0, over themselves, the larger of both, by which the
+    stability of each point is told: 0.02 where noise is low; 0 for none."""
+    perturbed_periods: int = Field(default=200, ge=100, le=5000)
+    """Periods of those changes at each point; a few more go before, to find their size."""
 
     @model_validator(mode="after")
     def _start_lies_inside(self) -> Self:
@@ -79,7 +86,8 @@ class BranchContinuation(AbstractFeedback):
     def playing_s(self) -> float:
         """All points with the longest search for each [s]."""
         look_s = self.settle_s + self.look_periods / self.low_hz
-        return self.most_points * (_NO_TRIES * look_s + self.record_s)
+        perturbed = self.perturbed_periods + _BEFORE if self.perturbation else 0
+        return self.most_points * (_NO_TRIES * look_s + self.record_s + perturbed / self.low_hz)
 
     @property
     def held_levels(self) -> tuple[BaseLevel, ...]:
@@ -89,6 +97,11 @@ class BranchContinuation(AbstractFeedback):
     def segment(self, number: int, frequency_hz: float) -> Segment:
         """Name the recording of a point."""
         return Segment(SegmentLabel.BRANCH, {"point": number, "frequency_hz": frequency_hz})
+
+    def perturbed(self, number: int, frequency_hz: float, size_v: float) -> Segment:
+        """Name the recording of a point while what is played is changed."""
+        numbers = {"point": number, "frequency_hz": frequency_hz, "size_v": size_v}
+        return Segment(SegmentLabel.PERTURBED, numbers)
 
     def steps(self) -> Iterator[Step]:
         """Both ends of the range, at the largest setting."""

@@ -266,6 +266,32 @@ class BranchPointNote(AbstractNote):
     tries: int
 
 
+class Stability(StrEnum):
+    """What a motion would do if the base moved as it should, and no feedback held it."""
+
+    STABLE = "stable"
+    UNSTABLE = "unstable"
+    OPEN = "not determined"
+    """Its bounds lie on both sides of 1, or the motion was not the same afterwards."""
+
+
+class BranchStabilityNote(AbstractNote):
+    """What small changes of what was played told of one motion of a branch."""
+
+    kind: Literal["branch_stability"] = "branch_stability"
+    point: int
+    """Of the note that has the motion."""
+    stability: Stability
+    multiplier: SixFigures | None
+    """Largest over a period under a base that moves as prescribed, magnitude; None where nothing is known."""
+    multiplier_u: SixFigures | None
+    """Standard uncertainty; bounds of 95 % are 2.1 times that away."""
+    perturbation: SixFigures
+    """Rms change of base and m0 that was asked for: fundamentals over themselves, the larger of both."""
+    moved: SixFigures
+    """How far the fundamental of m0 was afterwards from what it was before, over itself."""
+
+
 class BranchEndNote(AbstractNote):
     """How a branch ended."""
 
@@ -286,11 +312,12 @@ FeedbackNote: TypeAlias = (
     | NoiseNote
     | HeldResponseNote
     | BranchPointNote
+    | BranchStabilityNote
     | BranchEndNote
 )
 _NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
 _FOUND = ("settled", "achieved", "level", "jump", "resonance", "spectrum")
-_FOLLOWED = ("held_response", "branch_point", "branch_end")
+_FOLLOWED = ("held_response", "branch_point", "branch_stability", "branch_end")
 _KINDS = frozenset((*_FOUND, *_FOLLOWED))
 
 

@@ -17,6 +17,8 @@ class SegmentLabel(StrEnum):
     RESONANCE = "resonance"
     BRANCH = "branch"
     """A point of a branch that a fast loop holds."""
+    PERTURBED = "perturbed"
+    """Such a point while what is played is changed a little: what tells its stability."""
     CHECK = "check"
     """The small sine before the first ramp."""
     LEAD_IN = "lead_in"

@@ -1,8 +1,12 @@
 """A branch that a fast loop held, over the model's: stable motions solid, unstable ones dashed."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
+from numpy.typing import NDArray
 
+from vibench.acquisition.recording import Stability
 from vibench.sim import (
     Branch,
     FrequencyPath,
@@ -28,20 +32,17 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
     """Draw amplitude and phase of m0 over frequency, in the order held, on the model's branch."""
     found = held_branch(analysis.facts.feedback)
     scale, unit = prefixed(float(np.max(found.m0_m, initial=1e-9)), "m")
-    back = np.zeros(found.frequency_hz.size, dtype=bool)
-    for first, last in zip(found.folds[::2], found.folds[1::2], strict=False):
-        back[first + 1 : last] = True
     with styled():
         figure = new_figure(_HEIGHT_IN)
         axes: Axes = figure.subplots(1, 1)
         model = model_branch(found, specimen_of(analysis.facts.bench))
         if model is not None:
             _model(axes, model, scale)
-        for chosen, face, label in ((~back, MEASURED, "held"), (back, "white", "held, on the way back")):
+        for label, chosen, marks in _groups(found):
             if chosen.any():
                 axes.plot(
-                    found.frequency_hz[chosen], scale * found.m0_m[chosen], color=MEASURED, marker="o",
-                    markerfacecolor=face, markersize=4, linestyle="none", label=label,
+                    found.frequency_hz[chosen], scale * found.m0_m[chosen], color=MEASURED,
+                    markersize=4, linestyle="none", label=label, **marks,
                 )  # fmt: skip
         axes.set_xlabel("drive frequency [Hz]")
         axes.set_ylabel(f"amplitude of m0 [{unit}]")
@@ -54,6 +55,24 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
         figure=figure,
         tables=(table(name, **named(found, *(each for each in found.__dataclass_fields__))),),
     )
+
+
+def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
+    """Sort points, with their marks: by their stability where it was asked for, else by the turns."""
+    filled: dict[str, Any] = {"marker": "o"}
+    empty = filled | {"markerfacecolor": "white"}
+    if any(found.stability):
+        told = np.array(found.stability)
+        return (
+            ("held, stable without feedback", told == Stability.STABLE.value, filled),
+            ("held, unstable without feedback", told == Stability.UNSTABLE.value, empty),
+            ("held, stability not determined", told == Stability.OPEN.value, {"marker": "x"}),
+            ("held", told == "", {"marker": "."}),
+        )
+    back = np.zeros(found.frequency_hz.size, dtype=bool)
+    for first, last in zip(found.folds[::2], found.folds[1::2], strict=False):
+        back[first + 1 : last] = True
+    return ("held", ~back, filled), ("held, on the way back", back, empty)
 
 
 def model_branch(found: HeldBranch, specimen: Specimen) -> Branch | None:

@@ -2,10 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
-from vibench.acquisition.recording import BranchEndNote, BranchPointNote, FeedbackNote
+from vibench.acquisition.recording import (
+    BranchEndNote,
+    BranchPointNote,
+    BranchStabilityNote,
+    FeedbackNote,
+    Stability,
+)
 
 from ..signals import Reals
 from ..tables import Labelled
@@ -28,6 +35,12 @@ class HeldBranch(Labelled):
     residue: Reals
     """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
     residue_acceleration: Reals
+    stability: tuple[str, ...]
+    """Without feedback, under a base that moves as it should: a word of `Stability`; empty where unasked."""
+    multiplier: Reals
+    """Largest over a period, as small changes told it; NaN where they told nothing."""
+    multiplier_u: Reals
+    """Its standard uncertainty."""
 
     @property
     def folds(self) -> tuple[int, ...]:
@@ -41,6 +54,10 @@ class HeldBranch(Labelled):
 def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
     """Collect what a fast loop noted; empty where it held nothing."""
     points = [each for each in notes if isinstance(each, BranchPointNote)]
+    told = {each.point: each for each in notes if isinstance(each, BranchStabilityNote)}
+    asked = [told.get(each.point) for each in points]
+    sizes = [(nan, nan) if each is None else (each.multiplier, each.multiplier_u) for each in asked]
+    multiplier, multiplier_u = np.array(sizes, dtype=np.float64).reshape(-1, 2).T
     return HeldBranch(
         frequency_hz=np.array([each.frequency_hz for each in points]),
         base_m=np.array([each.base_m for each in points]),
@@ -48,6 +65,9 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
         phase_deg=np.array([each.phase_deg for each in points]),
         residue=np.array([each.residue for each in points]),
         residue_acceleration=np.array([each.residue_acceleration for each in points]),
+        stability=tuple("" if each is None else each.stability.value for each in asked),
+        multiplier=multiplier,
+        multiplier_u=multiplier_u,
     )
 
 
@@ -66,5 +86,8 @@ def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
     if found.folds:
         turns = ", ".join(f"{found.frequency_hz[each]:.5g}" for each in found.folds)
         told.append(f"The branch turned at {turns} Hz.")
+    if any(found.stability):
+        counts = ", ".join(f"{found.stability.count(each.value)} {each.value}" for each in Stability)
+        told.append(f"Without feedback they would be: {counts}, by small changes of what was played.")
     told.extend(f"It was left because {each.end.value}." for each in ends)
     return tuple(told)

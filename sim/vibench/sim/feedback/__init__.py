@@ -3,7 +3,8 @@
 A controller samples base and m0, and sets the voltage at the amplifier some latency later. `SampledPlant`
 says what a step of it makes of table, specimen and volts on their way; `designed_law` gives the linear law
 (a Kalman filter and the feedback of its estimate) that damps the specimen; `loop_multipliers` says whether
-a periodic motion is stable under it. The harmonic content of the drive is no part of the law: where the base
+a periodic motion is stable under it; `open_loop_multiplier` tells from samples of a perturbed motion
+whether it would be stable without. The harmonic content of the drive is no part of the law: where the base
 moves as a sine, the motion held is one of the specimen alone, whatever the law is. SI units.
 
 >>> from vibench.sim import gong2025

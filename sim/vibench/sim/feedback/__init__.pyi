@@ -17,3 +17,9 @@ from ._plant import (
     LoopTiming as LoopTiming,
     SampledPlant as SampledPlant,
 )
+from ._stability import (
+    OpenLoopMultiplier as OpenLoopMultiplier,
+    PerturbedMotion as PerturbedMotion,
+    envelope_deviation as envelope_deviation,
+    open_loop_multiplier as open_loop_multiplier,
+)
