@@ -86,6 +86,14 @@ def test_ticks_are_thinned_to_round_steps(most):
     assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
 
 
+@pytest.mark.parametrize("reach", [12.0, 17.0, 19.0, 26.0, 44.0])
+def test_a_low_axis_has_two_numbers_at_least_for_one_alone_says_no_scale(reach):
+    places = [5.0 * n for n in range(-8, 9) if abs(5.0 * n) <= reach]
+    step, values = thinned(5.0, places, 2)
+    assert len(values) == 2
+    assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
+
+
 def test_an_axis_that_leaves_its_numbers_to_another_stays_bare(plot, qapp):
     bare = Plot("bare", LOG_FREQUENCY, PlotAxis("x"), LIGHT)
     bare.across.show_nothing()

@@ -20,7 +20,7 @@ def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
         "–" if motion.response_i is None else f"{motion.response_i:.4g}",
         "–" if motion.response_ii is None else f"{motion.response_ii:.4g}",
         "–" if motion.error_estimate is None else f"{motion.error_estimate:.1g}",
-        f"{share.share:.0%} ({100 * share.low:.0f} to {100 * share.high:.0f} %)",
+        f"{100 * share.share:.0f} % ({100 * share.low:.0f} to {100 * share.high:.0f} %)",
         f"{motion.motion}{period}",
     )
 

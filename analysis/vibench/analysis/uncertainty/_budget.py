@@ -74,15 +74,16 @@ class Budget:
 
     @property
     def sentence(self) -> str:
-        """The same in words, the largest contribution first."""
+        """The same in words: expanded, and what adds to it as standard uncertainties, the largest first."""
         parts = sorted(
             ((each.relative, each.cause.value) for each in self.contributions if each.relative),
             reverse=True,
         )
-        said = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
+        each = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
+        said = f"standard uncertainties: {each}" if each else "nothing stated"
         missing = ", ".join(self.not_stated)
         left = f"; not stated: {missing}" if missing else ""
-        return f"{self.quantity} {self.text} (k = {COVERAGE:g}: {said or 'nothing stated'}{left})"
+        return f"{self.quantity} {self.text} (k = {COVERAGE:g}; {said}{left})"
 
     def to_dict(self) -> dict[str, object]:
         """Plain values for JSON."""

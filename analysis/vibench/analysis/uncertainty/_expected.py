@@ -76,7 +76,11 @@ class Expected:
             }[self.cause]
         if self.scatter == 0.0:
             return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, whatever the time; k = 2)"
-        told = ", ".join(f"{100 * half:.2g} % after {time_s:.3g} s" for time_s, half in self.curve if half)
+        told = ", ".join(
+            f"{100 * half:.2g} % after {time_s:.3g} s" + (" as planned" if time_s == self.time_s else "")
+            for time_s, half in self.curve
+            if half
+        )
         return f"± {told} ({self.cause.value}; k = 2)"
 
     def to_dict(self) -> dict[str, object]:

@@ -181,12 +181,19 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
 
 def thinned(step: float, values: Sequence[float], most: int) -> tuple[float, list[float]]:
-    """Leave out ticks between multiples of a larger step, until no more than ``most`` are left."""
+    """Leave out ticks between multiples of a larger step, until no more than ``most`` are left.
+
+    One number alone says no scale: the outermost two of the step before are kept then.
+    """
+    wider, kept = step, list(values)
     for every in (1, 2, 5, 10, 20, 50, 100):
-        kept = [value for value in values if _is_multiple(value, every * step)]
+        before, narrower = kept, wider
+        wider = every * step
+        kept = [value for value in values if _is_multiple(value, wider)]
         if len(kept) <= most:
             break
-    return every * step, kept or [values[0], values[-1]]
+    few = 2
+    return (wider, kept) if len(kept) >= min(few, len(values)) else (narrower, [before[0], before[-1]])
 
 
 def _is_multiple(value: float, step: float) -> bool:

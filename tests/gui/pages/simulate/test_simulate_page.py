@@ -146,7 +146,7 @@ def test_motions_that_other_starts_came_to_are_dots_and_rows_with_their_shares(p
         "2.15",
         "2.15",
         "1e-06",
-        "25% (10 to 49 %)",
+        "25 % (10 to 49 %)",
         "periodic, 2 drive periods",
     ]
     page._grow((point("a", 562.8),))

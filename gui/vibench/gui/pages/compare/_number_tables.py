@@ -9,7 +9,14 @@ from vibench.analysis import Curve, curve_peaks, readings
 
 from ...widgets import ReadTable
 
-PEAK_HEADINGS = ("Curve", "Peak at (Hz)", "|x / U|", "±", "Width at -3 dB (Hz)", "Damping ratio (%)")
+PEAK_HEADINGS = (
+    "Curve",
+    "Peak at (Hz)",
+    "|x / U|",
+    "±",
+    "Width at -3 dB (Hz)",
+    "Damping ratio if linear (%)",
+)
 
 
 class NumberTable(ReadTable):
