@@ -33,7 +33,7 @@ from ._window import Window
 SIZE = (1280, 800)
 OTHER_SIZES = ((1280, 720), (1920, 1080))
 """The smallest that everything must fit into, and a usual one; their pictures lie in folders of their own."""
-PATIENCE_S = 1200.0
+PATIENCE_S = 3600.0
 """On a busy machine; a picture of something half done would stand in the manual."""
 STILL_MS = 1200
 """Until the status line shows what a page in sight costs, and no more what it cost to get there."""
@@ -133,16 +133,20 @@ def _fill(window: Window) -> None:
     assert isinstance(simulation, SimulatePage)
     assert isinstance(queue, QueuePage)
     assert isinstance(maps, MapsPage)
-    for view, asked in ((maps, MAP), (simulation.branches, BRANCHES), (simulation.chain, CHAIN)):
+    # One after another: what each of them says of its time is to be its own.
+    for view, asked in (
+        (simulation, {}),
+        (maps, MAP),
+        (simulation.branches, BRANCHES),
+        (simulation.chain, CHAIN),
+    ):
         view.form.form.show_content({**view.form.form.content(), **asked})
         view.begin()
-    simulation.begin()
+        _wait(lambda view=view: not view.simulator.is_busy)  # type: ignore[misc]
     window.context.comparison_wanted.emit(tuple(sorted(window.context.folder.glob("sweep*.h5"))))
     queue.open_file(shipped(CAMPAIGN))
-    asked_for = [each.simulator for each in (maps, simulation, simulation.branches, simulation.chain)]
-    _wait(lambda: not any(each.is_busy for each in asked_for) and not compare.is_busy)
     maps.pick(*MOTION)
-    _wait(lambda: maps.shown[1].inputs == maps.shown[1].wanted)
+    _wait(lambda: maps.shown[1].inputs == maps.shown[1].wanted and not compare.is_busy)
     for path in window.context.folder.glob("sweep*.h5"):
         window.context.recording_wanted.emit(path)
     if simulation.progress is not None:
