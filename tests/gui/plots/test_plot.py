@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QLabel
 from vibench.gui.plots import LIMIT, LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
 from vibench.gui.plots._axis import thinned
 from vibench.gui.plots._saved_plot import numbers_of, write_plot
-from vibench.gui.widgets import LIGHT
+from vibench.gui.widgets import LIGHT, UNITS
 
 
 @pytest.fixture
@@ -92,6 +92,16 @@ def test_a_low_axis_has_two_numbers_at_least_for_one_alone_says_no_scale(reach):
     step, values = thinned(5.0, places, 2)
     assert len(values) == 2
     assert all(abs(value / step - round(value / step)) < 1e-6 for value in values)
+
+
+def test_a_closed_plot_is_let_alone_when_units_change(qtbot):
+    closed = Plot("a plot", TIME, PlotAxis("x", "m"), LIGHT).with_legend()
+    closed.curve(curve_style(0), "5 µm").setData([0.0, 1.0], [0.0, 1.0])
+    closed.close()
+    with qtbot.captureExceptions() as raised:
+        UNITS.choose({"m": "mm"})
+        UNITS.choose({})
+    assert raised == []
 
 
 def test_an_axis_that_leaves_its_numbers_to_another_stays_bare(plot, qapp):

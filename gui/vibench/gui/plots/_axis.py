@@ -95,8 +95,10 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         self._show_other_unit()
 
     def _show_other_unit(self) -> None:
-        self._fit_label()
-        self.update()
+        # pyqtgraph takes the label of a closed plot away.
+        if self.label is not None:
+            self._fit_label()
+            self.update()
 
     def resizeEvent(self, event: QGraphicsSceneResizeEvent | None = None) -> None:
         """Write as much of the label as there is room for."""

@@ -352,9 +352,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             axis.blank(Blankness.BLANK if self._is_empty else Blankness.WRITTEN)
 
     def _tell_anew(self) -> None:
-        """Tell names and readings in other units."""
-        self._relegend()
-        self.reading.again()
+        """Tell names and readings in other units, unless the plot is closed."""
+        if self.plotItem is not None:
+            self._relegend()
+            self.reading.again()
 
     def _relegend(self) -> None:
         """Write the legend anew: its colours follow the theme."""
