@@ -274,7 +274,7 @@ def test_lanes_follow_the_theme_and_name_their_channels_and_units(opened):
         "base acceleration over time",
         "m0 velocity over time",
     ]
-    assert [plot.up.labelText for plot in page.time_histories.plots] == ["V", "m/s²", "m/s"]
+    assert [plot.up.labelText for plot in page.time_histories.plots] == ["V", "m/s²", "mm/s"]
     assert page.time_histories.plots[0].backgroundBrush().color().name() == DARK.base
 
 
