@@ -55,7 +55,7 @@ def shortcomings(function):
         yield "no docstring"
     yield from undocumented_parameters(function, told)
     given = str(inspect.signature(function).return_annotation)
-    is_number = "ndarray" in given or given == "<class 'float'>" or given.startswith("tuple[float")
+    is_number = "ndarray" in given.lower() or given == "<class 'float'>" or given.startswith("tuple[float")
     if is_number and not (
         "Returns" in sections(told) or re.search(r"\[|shape \(", told) or UNIT.search(function.__name__)
     ):

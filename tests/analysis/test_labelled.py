@@ -7,8 +7,16 @@ import inspect
 import numpy as np
 import pytest
 
-from vibench.analysis import transmissibility
-from vibench.analysis.tables import Labelled, unit_of
+from vibench.analysis import (
+    dynamics,
+    hidden_motion,
+    model,
+    model_updating,
+    recordings,
+    transmissibility,
+    uncertainty,
+)
+from vibench.analysis.tables import Labelled, holds_array, unit_of
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
 ROOMS = ("frequency_response", "sine", "spectra", "model", "comparison", "tones", "recordings", "dynamics")
@@ -76,6 +84,37 @@ def test_parts_keep_their_names_axes_and_units():
     assert "part_time_s" in data.coords
 
 
+@dataclasses.dataclass(frozen=True)
+class Mode:
+    frequency_hz: float
+    name: str
+    sd_s: float | None
+    shape_m: tuple[float, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Modes(Labelled):
+    modes: tuple[Mode, ...]
+
+
+def test_parts_of_single_numbers_are_a_table():
+    first, second = Mode(95.0, "first", 0.5, (1.0, 2.0)), Mode(266.0, "second", None, (3.0, 4.0))
+    data = Modes((first, second)).to_xarray()
+    np.testing.assert_array_equal(data["modes_frequency_hz"], [95.0, 266.0])
+    np.testing.assert_array_equal(data["modes_sd_s"], [0.5, np.nan])
+    np.testing.assert_array_equal(data["modes_shape_m"], [[1.0, 2.0], [3.0, 4.0]])
+    assert data["modes_name"].to_numpy().tolist() == ["first", "second"]
+    assert data["modes_sd_s"].attrs["units"] == "s"
+    uneven = Modes((first, dataclasses.replace(second, shape_m=(3.0,)))).to_xarray()
+    np.testing.assert_array_equal(uneven["modes_2_shape_m"], [3.0])
+
+
+@pytest.mark.parametrize("name", ["numpy.ndarray[tuple[typing.Any, ...]]", "NDArray[numpy.float64]"])
+def test_arrays_are_known_by_the_names_of_old_and_new_numpy(name):
+    assert holds_array(name)
+    assert not holds_array(float)
+
+
 @pytest.mark.parametrize(
     ("name", "unit"),
     [("x_m_per_s", "m s-1"), ("rate_per_s", "s-1"), ("time_s", "s"), ("n_eff", ""), ("relative_i", "")],
@@ -90,13 +129,20 @@ def results():
         face = importlib.import_module(f"vibench.analysis.{room}")
         for name in face.__all__:
             found = getattr(face, name)
-            if inspect.isclass(found) and dataclasses.is_dataclass(found) and name not in NOT_RESULTS:
-                types = " ".join(str(each.type) for each in dataclasses.fields(found))
-                if "ndarray" in types:
-                    yield found
+            is_result = inspect.isclass(found) and dataclasses.is_dataclass(found) and name not in NOT_RESULTS
+            if is_result and any(holds_array(each.type) for each in dataclasses.fields(found)):
+                yield found
+
+
+def wholes():
+    """What a person is given whole, its arrays inside of its parts."""
+    yield from (dynamics.BranchDiagram, dynamics.ChainAnswer, dynamics.ExponentSpectrum)
+    yield from (hidden_motion.FoundSpecimen, hidden_motion.HiddenMotion, hidden_motion.TrackedMotion)
+    yield from (model.AbstractOverlay, model.MeasurementPrediction, model_updating.UpdatedSpecimen)
+    yield from (model_updating.SpecimenFit, recordings.AbstractAnalysis, uncertainty.Budget)
 
 
 def test_every_result_with_arrays_has_the_method():
-    found = set(results())
+    found = {*results(), *wholes()}
     assert len(found) > 12
     assert sorted(each.__name__ for each in found if not issubclass(each, Labelled)) == []

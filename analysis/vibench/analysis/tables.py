@@ -138,8 +138,9 @@ class Labelled:
 
         Arrays lie over the result's frequencies or times where they have as many values; bounds
         (``magnitude_lower``) and deviations (``sd_...``) stand beside their values; what is inside of a part
-        has the part's name before its own (``response_frequency_hz``). Each variable has the attribute
-        ``units`` where its name says one; texts and settings that are words are attributes.
+        has the part's name before its own (``response_frequency_hz``). Parts of single numbers, such as
+        resonances, lie below each other (``resonances_frequency_hz``); others are numbered. Each variable has
+        the attribute ``units`` where its name says one; texts and settings that are words are attributes.
 
         Raises
         ------
@@ -168,6 +169,11 @@ def unit_of(name: str) -> str:
     return UNITS[max(ends, key=len)] if ends else ""
 
 
+def holds_array(annotation: object) -> bool:
+    """Say whether a type is one of arrays: numpy 2.5 has an alias where older ones have the class itself."""
+    return "ndarray" in str(annotation).lower()
+
+
 def _is_coordinate(name: str) -> bool:
     return any(name == each or name.endswith(f"_{each}") for each in COORDINATES)
 
@@ -189,6 +195,8 @@ def _collect(part: Any, prefix: str, variables: dict[str, Any], attributes: dict
                 attributes[name] = str(value)
             case int() | float() | complex():
                 variables[name] = ((), value, {"units": unit_of(key)} if unit_of(key) else {})
+            case tuple() if value and _is_table(value):
+                _collect_rows(value, name, variables)
             case tuple() if value and all(is_dataclass(each) for each in value):
                 for row, each in enumerate(value, 1):
                     _collect(each, f"{name}_{row}_", variables, attributes)
@@ -198,11 +206,45 @@ def _collect(part: Any, prefix: str, variables: dict[str, Any], attributes: dict
                 _collect(value, f"{name}_", variables, attributes)
 
 
+def _is_table(parts: tuple[Any, ...]) -> bool:
+    """Say whether parts are of one kind and hold numbers, words and equally long lists of numbers only."""
+    if not all(is_dataclass(each) for each in parts):
+        return False
+    shapes = {_row_shape(each) for each in parts}
+    return len(shapes) == 1 and None not in shapes
+
+
+def _row_shape(part: Any) -> tuple[Any, ...] | None:
+    """Give type and length of every list of a part; None where it holds anything else."""
+    lengths = []
+    for _, value in _numbers_of(part):
+        match value:
+            case None | bool() | int() | float() | str():
+                lengths.append(0)
+            case tuple() if all(isinstance(each, int | float) for each in value):
+                lengths.append(len(value))
+            case _:
+                return None
+    return type(part), *lengths
+
+
+def _collect_rows(rows: tuple[Any, ...], name: str, variables: dict[str, Any]) -> None:
+    """Lay parts of single numbers below each other: one variable a field, NaN where a row has none."""
+    for key, _ in _numbers_of(rows[0]):
+        values = [getattr(row, key) for row in rows]
+        is_word = any(isinstance(each, str) for each in values)
+        kept = [each if each is not None else "" if is_word else math.nan for each in values]
+        attributes = {"units": unit_of(key)} if unit_of(key) and not is_word else {}
+        column = np.asarray(kept)
+        dimensions = (f"{name}_number", f"{name}_{key}_2")[: column.ndim]
+        variables[f"{name}_{key}"] = (dimensions, column, attributes)
+
+
 def _numbers_of(part: Any) -> Iterator[tuple[str, Any]]:
     """Go through the fields of a result, then the arrays that it computes from them."""
     for each in fields(part):
         yield each.name, getattr(part, each.name)
     for name, found in inspect.getmembers(type(part), lambda member: isinstance(member, property)):
-        given = str(found.fget.__annotations__.get("return", ""))
-        if not name.startswith("_") and "ndarray" in given:
+        given = found.fget.__annotations__.get("return", "")
+        if not name.startswith("_") and holds_array(given):
             yield name, getattr(part, name)

@@ -82,6 +82,15 @@ def base_under_check(rig: Rig, terminal_v: float) -> ComplexArray:
 
 
 def nearest_expected(measured: float, expected: ComplexArray) -> float:
-    """Give the amplitude among what is expected that lies nearest to a measured one."""
+    """Give the amplitude among what is expected that lies nearest to a measured one [m/s2].
+
+    Parameters
+    ----------
+    measured
+        Amplitude of the base [m/s2].
+    expected
+        As `base_under_check` gives it, shape (n,) [m/s2].
+
+    """
     sizes = np.abs(expected)
     return float(np.clip(measured, np.min(sizes), np.max(sizes)))

@@ -145,7 +145,7 @@ def _response_at(found: FoundBranch, index: int, value: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class BranchDiagram:
+class BranchDiagram(Labelled):
     """Everything that was found for one request."""
 
     request: BranchRequest

@@ -79,7 +79,7 @@ class ChainRun(Labelled):
 
 
 @dataclass(frozen=True, eq=False)
-class ChainAnswer:
+class ChainAnswer(Labelled):
     """Everything that was computed for one request."""
 
     request: ChainRequest

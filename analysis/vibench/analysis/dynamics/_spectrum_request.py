@@ -10,7 +10,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from vibench.sim import Accuracy, LyapunovSpectrum, Parameter, PowerLaw
 
 from ..signals import Reals
-from ..tables import plain
+from ..tables import Labelled, plain
 from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
@@ -156,7 +156,7 @@ def point_of(
 
 
 @dataclass(frozen=True)
-class ExponentSpectrum:
+class ExponentSpectrum(Labelled):
     """Everything that was computed for one request."""
 
     request: SpectrumRequest

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from ..signals import Reals
-from ..tables import plus_minus
+from ..tables import Labelled, plus_minus
 from ._contact_free import FITTED, FreeGap, free_gaps, free_motion, free_numbers
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
@@ -127,7 +127,7 @@ class FoundParameter:
 
 
 @dataclass(frozen=True, eq=False)
-class FoundSpecimen:
+class FoundSpecimen(Labelled):
     """What was found, and the specimen that the motion is tracked with."""
 
     tracked: TrackedSpecimen

@@ -27,7 +27,7 @@ MICRO = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class TrackedMotion:
+class TrackedMotion(Labelled):
     """p as the extended Kalman filter followed and smoothed it; NaN where it was not followed."""
 
     p: Samples

@@ -9,6 +9,7 @@ from vibench.acquisition.plan import Approach, Measurement, base_motion
 from vibench.acquisition.rig import Rig
 
 from ..signals import Flags, Reals
+from ..tables import Labelled
 from ._overlay import prediction_grid
 from ._prediction import ResponsePrediction, predicted
 
@@ -22,7 +23,7 @@ FOLLOWED_S = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class MeasurementPrediction:
+class MeasurementPrediction(Labelled):
     """Responses under sines of the base amplitude that the plan holds, or that the rig's model promises."""
 
     measurement: Measurement

@@ -26,6 +26,7 @@ from ..sine import (
     spectrum_columns,
     terminal_levels,
 )
+from ..tables import Labelled
 from ._difference import CurveDifference, logarithmic_difference
 from ._draws import Drawn, SimulatedRun
 from ._ensemble import MIXED, EnsembleCurve, Quantity, ensemble_curves
@@ -41,7 +42,7 @@ R = TypeVar("R")
 
 
 @dataclass(frozen=True, eq=False)
-class AbstractOverlay(Generic[R]):
+class AbstractOverlay(Labelled, Generic[R]):
     """A measurement, and what the model says of it."""
 
     run: SimulatedRun

@@ -11,6 +11,7 @@ from vibench.sim import Specimen
 from ..errors import InvalidRequest
 from ..frequency_response import FrequencyResponse
 from ..signals import DEFAULT_CONFIDENCE, Reals
+from ..tables import Labelled
 from ._lines import Lines, descended, lines_of
 from ._parameters import (
     ALSO_FREE,
@@ -29,7 +30,7 @@ CLOCK_RELATIVE_SD = 25e-6
 
 
 @dataclass(frozen=True, eq=False)
-class SpecimenFit:
+class SpecimenFit(Labelled):
     """A fitted specimen, or why the model fits none."""
 
     specimen: Specimen

@@ -11,7 +11,7 @@ from ..frequency_response import scatters_beyond_noise
 from ..kinds import NoiseResult
 from ..recordings import ProgressObserver, described_specimen
 from ..results import UNOBSERVED, CampaignResults
-from ..tables import named, plain, plus_minus
+from ..tables import Labelled, named, plain, plus_minus
 from ..uncertainty import stated_of
 from ._bracketed_gap import bracketed_gap
 from ._collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
@@ -25,7 +25,7 @@ _NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
 
 
 @dataclass(frozen=True, eq=False)
-class UpdatedSpecimen:
+class UpdatedSpecimen(Labelled):
     """A specimen fitted to recordings, with what could not be told and what does not fit."""
 
     specimen: Specimen

@@ -11,11 +11,12 @@ from vibench.sim.study import Study, StudyResults
 from ..figures import COLLIDING, LINEAR, frequency_axis, magnitude_axis
 from ..model import linear_transmissibility
 from ..signals import Flags, Reals
+from ..tables import Labelled
 from ._options import FigureOptions
 
 
 @dataclass(frozen=True, eq=False)
-class Responses:
+class Responses(Labelled):
     """One model at one amplitude; arrays of shape (points,)."""
 
     frequency_hz: Reals

@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..tables import plain, plus_minus
+from ..tables import Labelled, plain, plus_minus
 
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
@@ -36,7 +36,7 @@ class Contribution:
 
 
 @dataclass(frozen=True)
-class Budget:
+class Budget(Labelled):
     """One quantity of one measurement."""
 
     quantity: str
