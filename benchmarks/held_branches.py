@@ -227,7 +227,7 @@ def compare_stops(points: list[BranchPointNote], specimen: Specimen) -> None:
 def lost_at(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
     """Follow the branch beyond its first fold at a latency; give the highest frequency held, and the end."""
     measurement = load_campaign("branch").measurements[0]
-    plan = measurement.excitation.model_copy(update={"step_hz": 2.0, "most_points": 24})
+    plan = measurement.excitation.model_copy(update={"step_hz": 2.0, "most_points": 24, "perturbation": 0.0})
     controller = rig.controller.model_copy(update={"latency_s": latency_s})
     with open_bench(rig.model_copy(update={"controller": controller}), confirm=confirm_simulated) as bench:
         path = folder / f"late_{1e6 * latency_s:.0f}us.h5"
@@ -236,11 +236,12 @@ def lost_at(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
         except AcquisitionError as error:
             ended = f"{error}".partition(". ")[0]
         else:
-            ended = "the branch was followed"
+            ended = ""
     with open_recording(next(folder.glob(f"{path.stem}*"))) as recording:
         notes = [feedback_note(event) for event in recording.events]
     hertz = [each.frequency_hz for each in notes if isinstance(each, BranchPointNote)]
-    return max(hertz, default=plan.start_hz), ended
+    ends = [each.end.value for each in notes if isinstance(each, BranchEndNote)]
+    return max(hertz, default=plan.start_hz), ended or ends[0]
 
 
 def multipliers_at(rig: Rig, branch: Branch, latency_s: float) -> np.ndarray:
@@ -290,7 +291,10 @@ def model_loss(rig: Rig, up: Branch, latency_ms: float) -> tuple[float, float]:
     """Give where the loop's largest multiplier passes 1, else the fold, and the largest up to the fold."""
     multipliers = multipliers_at(rig, up, 1e-3 * latency_ms)
     beyond = np.flatnonzero(multipliers > 1)
-    lost_hz = up.frequencies_hz[beyond[0]] if beyond.size else up.frequencies_hz.max()
+    if not beyond.size:
+        return float(up.frequencies_hz.max()), float(multipliers.max())
+    about = slice(max(int(beyond[0]) - 1, 0), int(beyond[0]) + 1)
+    lost_hz = np.interp(1.0, multipliers[about], up.frequencies_hz[about])
     return float(lost_hz), float(multipliers.max())
 
 

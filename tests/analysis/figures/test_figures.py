@@ -32,6 +32,7 @@ from vibench.analysis.figures import (
 )
 from vibench.analysis.figures._dwells import spectrum_columns
 from vibench.analysis.figures._style import prefixed
+from vibench.analysis.recordings import measurement_checks
 from vibench.analysis.results import result_of
 from vibench.analysis.tables import plus_minus
 
@@ -152,6 +153,14 @@ def test_a_stepped_sine_figure_has_one_marker_a_step(stepped_file):
     measured = line(drawn.figure.axes[1], "measured, up")
     np.testing.assert_array_equal(measured.get_ydata(), found.analysis.response.response_ii)
     assert "2 steps" in drawn.caption
+
+
+def test_parts_beyond_the_planned_ones_are_those_of_feedback(dwell_file):
+    facts = result(dwell_file("strong"), Simulation.LEFT_OUT).analysis.facts
+    many = replace(facts, whole_stretches=78, planned_stretches=2)
+    said = [{each.what: each.text for each in measurement_checks(one)}["Parts"] for one in (facts, many)]
+    assert said[0] == "1 of 1 planned parts were recorded whole"
+    assert said[1] == "78 parts were recorded whole; feedback decided how many"
 
 
 def test_levels_of_all_channels_carry_their_units(dwell_file):
