@@ -6,12 +6,14 @@ import tomllib
 import numpy as np
 import pytest
 
-from vibench.acquisition import shipped
+from vibench.acquisition import Verdict, open_bench, shipped
+from vibench.acquisition.check import bench_report
 from vibench.acquisition.rig import load_rig
 from vibench.analysis.recordings import specimen_of
 from vibench.sim import FixedDuration, Harmonic, Scene, load_specimen, shipped_specimens, solve_scene
 from vibench.sim.study import Study, open_study
 
+VIRTUAL_RIG = load_rig("virtual_rig")
 DRIVE = Harmonic(130.0, 20e-6)
 ASKED = (
     "--amplitude",
@@ -89,6 +91,25 @@ def test_fifty_random_specimens_go_every_way_with_the_same_numbers(vibench_here,
     rng = np.random.default_rng(2)
     for _ in range(50):
         every_way_agrees(vibench_here, tmp_path, random_specimen(tmp_path, rng))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_fifty_random_specimens_pass_the_bench_check_on_the_virtual_rig(tmp_path):
+    rng, refused = np.random.default_rng(3), []
+    for number in range(50):
+        path = random_specimen(tmp_path, rng)
+        own = {
+            **load_specimen(path).model_dump(),
+            "amplitude_limit_m": VIRTUAL_RIG.specimen.amplitude_limit_m,
+        }
+        specimen = VIRTUAL_RIG.specimen.model_copy(update=own)
+        with open_bench(VIRTUAL_RIG.model_copy(update={"specimen": specimen})) as bench:
+            report = bench_report(bench, tmp_path)
+        refused += [
+            (number, each.name, each.value) for each in report.findings if each.verdict is Verdict.FAIL
+        ]
+    assert refused == []
 
 
 def test_the_list_names_every_specimen_and_every_law(vibench_here, tmp_path):
