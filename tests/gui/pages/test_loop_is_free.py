@@ -213,6 +213,8 @@ def of_frame(window):
         yield Action(f"light, on {page}", lambda: context.choose_theme(LIGHT), lambda: window.is_themed)
         yield Action(f"large, on {page}", lambda: window.resize(1920, 1080))
         yield Action(f"small, on {page}", lambda: window.resize(1280, 720))
+    yield Action("other units", lambda: context.choose_units({"m": "mm", "m/s²": "g"}))
+    yield Action("the usual units", lambda: context.choose_units({}))
 
 
 def actions(window, recording, long_recording, folder):
