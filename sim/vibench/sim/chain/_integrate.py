@@ -23,8 +23,9 @@ from ._base_force import PIECE_TERMS, longest_window_s, with_pieces
 from ._cell_contact import begin_pressing
 from ._cell_flow import CURVATURE_TERMS, POWER, SIDE, fill_curvature
 from ._chain import MASSES_PER_CELL, Chain
+from ._crossing import IMPACTS, NEXT_SAMPLE, ChainRecord
 from ._observer import NOTHING, ChainObservations
-from ._run import IMPACTS, NEXT_SAMPLE, ChainRecord, advance_chain, chain_cells
+from ._run import advance_chain, chain_cells
 from ._tables import OBSERVED, PATH, ChainTables, chain_tables
 from ._windows import drive_term, fill_observed, law_of
 

@@ -18,6 +18,7 @@ from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
 from ..motion import MAX_IMPACT_RATE_HZ
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
+from ._crossing import IMPACTS
 from ._integrate import (
     check_work,
     integrate_chain,
@@ -27,7 +28,7 @@ from ._integrate import (
     state_of_phasors,
 )
 from ._observer import NOTHING
-from ._run import IMPACTS, advance_chain
+from ._run import advance_chain
 from ._tables import ChainTables, chain_tables
 
 NEARNESS = 1e-6

@@ -12,6 +12,7 @@ from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
 from ..motion import MAX_IMPACT_RATE_HZ, Response, steady_response, whole_periods
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
+from ._crossing import IMPACTS
 from ._integrate import (
     check_work,
     impacts_of,
@@ -23,7 +24,7 @@ from ._integrate import (
 )
 from ._modes import chain_impulses, chain_state_matrix
 from ._observer import NOTHING, PEAKS, PEAKS_AND_LINES
-from ._run import IMPACTS, advance_chain
+from ._run import advance_chain
 from ._tables import ACROSS, PATH, chain_tables
 
 

@@ -5,35 +5,35 @@ another's only from the window's end on. What this leaves out is bounded when th
 (`vibench.sim.chain`), so that simultaneous contacts need no common time: each is followed in its own.
 """
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
-from ..contact import DEEPEST
 from ..kernels import (
     Complex,
     Table,
     Vector,
     advance_clock,
-    copy_row,
     inlined,
     kernel,
     kernel_without_refcount,
     time_until,
 )
 from ..model import Outcome
-from ._base_force import deposit_base, place_force
-from ._cell_contact import SUMMARY_ONLY
-from ._cell_flow import CELL_SIZE, MEMORY, POWER, SIDE
-from ._cell_power import begin_power
-from ._cell_window import COUNT, CUT, cross_window
+from ._base_force import place_force
+from ._cell_flow import CELL_SIZE, POWER, SIDE
+from ._cell_window import COUNT, CUT
+from ._crossing import (
+    IMPACTS,
+    NEXT_SAMPLE,
+    REACHED_END,
+    ChainRecord,
+    cross,
+    prepare_busy,
+    sample_window,
+)
 from ._observer import (
     NOTHING,
     PEAKS_AND_LINES,
     ChainObservations,
-    may_be_larger,
-    observe_busy,
     observe_forces,
     observe_idle,
 )
@@ -44,13 +44,10 @@ from ._windows import (
     copy_terms,
     deposit,
     drive_term,
-    fill_observed,
     find_busy,
     is_bounded,
-    law_of,
     march,
     neighbours_clash,
-    place_motion,
     place_observed,
     propagate_window,
     set_ceilings,
@@ -58,27 +55,7 @@ from ._windows import (
     workspace_for,
 )
 
-REACHED_END = int(Outcome.REACHED_END)
-TOO_MANY_IMPACTS = int(Outcome.TOO_MANY_IMPACTS)
 LOST = int(Outcome.NOT_FINITE)
-
-NEXT_SAMPLE, IMPACTS = 0, 1
-"""Places of `ChainRecord.counts`."""
-
-
-class ChainRecord(NamedTuple):
-    """What a run fills on its way."""
-
-    start: float
-    """Time of sample 0 [s]."""
-    sample_rate: float
-    samples: Table
-    """Shape (n, 6 cells); n = 0 keeps none."""
-    impact_times: Vector
-    """Shape (most impacts,) [s], ascending but within a window; a run ends in the window that fills it."""
-    impact_cells: NDArray[np.int64]
-    counts: NDArray[np.int64]
-    """Samples and impacts so far."""
 
 
 @kernel
@@ -135,11 +112,11 @@ def _advance(  # noqa: C901, PLR0912 - the kinds of window and their ends are on
             count = 0
             continue
         length, count = _choose_window(workspace, cells, phasors, clock, longest, observed, tables)
-        _prepare_busy(workspace, cells, phasors, count, length, tables)
+        prepare_busy(workspace, cells, phasors, count, length, tables)
         code, impacts = CUT, record.counts[IMPACTS]
         while code == CUT:
             record.counts[IMPACTS] = impacts
-            code = _cross(
+            code = cross(
                 workspace, cells, phasors, count, length, clock, tables, tolerance, record, observations
             )
             if code == CUT:
@@ -149,7 +126,7 @@ def _advance(  # noqa: C901, PLR0912 - the kinds of window and their ends are on
         if observations.mode != NOTHING:
             _observe_rest(workspace, cells, phasors, count, length, tables, observations)
         if record.counts[NEXT_SAMPLE] < len(record.samples):
-            _sample(workspace, phasors, clock, length, tables, tolerance, record)
+            sample_window(workspace, phasors, clock, length, tables, tolerance, record)
         for k in range(count):
             deposit(workspace.turned, cells[workspace.busy[k]], workspace.busy[k], tables)
         copy_terms(phasors, workspace.turned)
@@ -179,7 +156,7 @@ def _go_quietly(
     workspace.busy_count[0] = 0
     copy_terms(workspace.start, phasors)
     if record.counts[NEXT_SAMPLE] < len(record.samples):
-        _sample(workspace, phasors, clock, longest, tables, tolerance, record)
+        sample_window(workspace, phasors, clock, longest, tables, tolerance, record)
     if observations.mode != NOTHING:
         then = workspace.then
         then[0], then[1] = clock[0], clock[1]
@@ -258,22 +235,6 @@ def _choose_window(
 
 
 @inlined
-def _prepare_busy(
-    workspace: Workspace, cells: Table, phasors: Complex, count: int, length: float, tables: ChainTables
-) -> None:
-    """Write p of busy cells as series, and their rows as the window begins."""
-    for k in range(count):
-        i = workspace.busy[k]
-        cell, series, law = cells[i], workspace.series[i], law_of(tables.laws[i])
-        fill_observed(series, phasors, i, PATH, workspace.terms, workspace.force, tables)
-        for m in range(MEMORY, CELL_SIZE):
-            cell[m] = 0.0
-        if law.kind == POWER:
-            begin_power(cell, series, length)
-        copy_row(workspace.before[i], cell)
-
-
-@inlined
 def is_quiet(workspace: Workspace, cells: Table, tables: ChainTables) -> int:
     """Say (1 or 0) whether no cell can ever touch: free phasors only shrink."""
     for i in range(len(cells)):
@@ -285,56 +246,6 @@ def is_quiet(workspace: Workspace, cells: Table, tables: ChainTables) -> int:
         ):
             return 0
     return 1
-
-
-@inlined
-def _cross(
-    workspace: Workspace,
-    cells: Table,
-    phasors: Complex,
-    count: int,
-    length: float,
-    clock: Vector,
-    tables: ChainTables,
-    tolerance: float,
-    record: ChainRecord,
-    observations: ChainObservations,
-) -> int:
-    """Take every busy cell through the window; CUT where it is to be shorter, as ``touches`` then says.
-
-    Who watches has a summary kept, and crosses again with a log where that leaves room for a larger motion.
-    """
-    worst = REACHED_END
-    for k in range(count):
-        i = workspace.busy[k]
-        cell, series, markov = cells[i], workspace.series[i], tables.markov[i, PATH]
-        log = workspace.no_log if observations.mode == NOTHING else workspace.summary
-        while True:
-            copy_row(cell, workspace.before[i])
-            workspace.touches[COUNT] = 0.0
-            if len(log) > 0:
-                log[0, DEEPEST] = observations.peaks[PATH, i]
-            code = cross_window(
-                cell, 0.0, length, series, markov, workspace.reach[PATH, i], law_of(tables.laws[i]),
-                tolerance, workspace.later, workspace.work, workspace.touches, log, tables.collision,
-                tables.collisions, tables.struck[i], workspace.power, tables.cuts,
-            )  # fmt: skip
-            if (
-                code != REACHED_END
-                or len(log) != SUMMARY_ONLY
-                or not may_be_larger(observations, i, workspace, length, log[0], tables)
-            ):
-                break
-            log = workspace.log
-        if code == CUT:
-            worst = CUT
-            break
-        if code == REACHED_END:
-            code = _record_touches(workspace.touches, i, clock, record)
-        if observations.mode != NOTHING:
-            observe_busy(observations, i, workspace, phasors, log, tables)
-        worst = max(worst, code)
-    return worst
 
 
 @kernel_without_refcount
@@ -356,56 +267,6 @@ def _observe_rest(
         busy += 1
         if observations.mode == PEAKS_AND_LINES:
             observe_forces(observations, cells[i], i, workspace.turned[len(phasors) - 1], tables.omega)
-
-
-@kernel_without_refcount
-def _record_touches(touches: Vector, place: int, clock: Vector, record: ChainRecord) -> int:
-    for k in range(1, int(touches[COUNT]) + 1):
-        impact = record.counts[IMPACTS]
-        if impact == len(record.impact_times):
-            return TOO_MANY_IMPACTS
-        record.impact_times[impact] = clock[0] + touches[k]
-        record.impact_cells[impact] = place
-        record.counts[IMPACTS] += 1
-    return REACHED_END
-
-
-@kernel_without_refcount
-def _sample(
-    workspace: Workspace,
-    phasors: Complex,
-    clock: Vector,
-    length: float,
-    tables: ChainTables,
-    tolerance: float,
-    record: ChainRecord,
-) -> None:
-    """Keep the samples that fall into a window, by a second run of the busy cells that lands on each."""
-    counts, reached, count = record.counts, 0.0, workspace.busy_count[0]
-    drive = len(phasors) - 1
-    while counts[NEXT_SAMPLE] < len(record.samples):
-        later = time_until(clock, record.start + counts[NEXT_SAMPLE] / record.sample_rate)
-        if later > length:
-            return
-        now = workspace.terms
-        for j in range(drive):
-            now[j] = phasors[j] * np.exp(tables.rates[j] * later)
-        now[drive] = drive_term(clock, later, tables)
-        deposit_base(now, workspace.force, later, tables)
-        for k in range(count):
-            i = workspace.busy[k]
-            workspace.touches[COUNT] = 0.0
-            if later > reached:
-                cross_window(
-                    workspace.before[i], reached, later, workspace.series[i], tables.markov[i, PATH],
-                    workspace.reach[PATH, i], law_of(tables.laws[i]), tolerance,
-                    workspace.later, workspace.work, workspace.touches, workspace.no_log,
-                    tables.collision, tables.collisions, tables.struck[i], workspace.power, 0,
-                )  # fmt: skip
-            deposit(now, workspace.before[i], i, tables)
-        reached = max(reached, later)
-        place_motion(record.samples[counts[NEXT_SAMPLE]], now, tables)
-        counts[NEXT_SAMPLE] += 1
 
 
 @kernel

@@ -34,6 +34,9 @@ from ._phasor_sum import (
     steps_ahead as steps_ahead,
     sum_now as sum_now,
 )
+from ._polynomials import (
+    polynomials as polynomials,
+)
 from ._row import (
     copy_row as copy_row,
 )
@@ -48,7 +51,6 @@ from ._simd import (
     fma as fma,
     largest as largest,
     magnitude as magnitude,
-    polynomials as polynomials,
     root as root,
     sixteen as sixteen,
     sixteen_of_sixteen as sixteen_of_sixteen,

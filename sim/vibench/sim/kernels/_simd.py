@@ -6,10 +6,9 @@ of their own. Every operation is IEEE's, place by place and uncontracted: the sa
 """
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, Self, cast
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -17,10 +16,10 @@ from numba.extending import intrinsic, lower_builtin, models, register_model, ty
 
 from ._arrays import Table, Vector
 
-_DOUBLE, _PLACE = ir.DoubleType(), ir.IntType(32)
-_ALIGNED = 8
+_DOUBLE, PLACE = ir.DoubleType(), ir.IntType(32)
+ALIGNED = 8
 """Bytes: what numpy promises."""
-_CHAINS = 4
+CHAINS = 4
 """Sums of rows that run beside each other, so that no addition waits for the one before."""
 
 
@@ -64,16 +63,16 @@ class _SimdVectorModel(models.PrimitiveModel):
         super().__init__(manager, simd, simd.vector)
 
 
-_EIGHT, _SIXTEEN = _SimdVectorType(8), _SimdVectorType(16)
+EIGHT, _SIXTEEN = _SimdVectorType(8), _SimdVectorType(16)
 
 
-def _spread(builder: Any, value: Any, vector: Any) -> Any:
+def spread_over(builder: Any, value: Any, vector: Any) -> Any:
     """Put a number in every lane."""
     if value.type == vector:
         return value
     nothing = ir.Constant(vector, ir.Undefined)
-    everywhere = ir.Constant(ir.VectorType(_PLACE, vector.count), [0] * vector.count)
-    return builder.shuffle_vector(builder.insert_element(nothing, value, _PLACE(0)), nothing, everywhere)
+    everywhere = ir.Constant(ir.VectorType(PLACE, vector.count), [0] * vector.count)
+    return builder.shuffle_vector(builder.insert_element(nothing, value, PLACE(0)), nothing, everywhere)
 
 
 def _begins(context: Any, builder: Any, kind: Any, array: Any, row: Any, vector: Any) -> Any:
@@ -82,10 +81,10 @@ def _begins(context: Any, builder: Any, kind: Any, array: Any, row: Any, vector:
     return builder.gep(data, [builder.mul(row, ir.Constant(row.type, vector.count))])
 
 
-def _load(builder: Any, begins: Any, row: int, vector: Any) -> Any:
+def load_row(builder: Any, begins: Any, row: int, vector: Any) -> Any:
     """Load a row from the address of the first one."""
-    begins = builder.gep(begins, [_PLACE(row * vector.count)])
-    return builder.load(builder.bitcast(begins, vector.as_pointer()), align=_ALIGNED)
+    begins = builder.gep(begins, [PLACE(row * vector.count)])
+    return builder.load(builder.bitcast(begins, vector.as_pointer()), align=ALIGNED)
 
 
 def _is_array(kind: Any) -> bool:
@@ -97,7 +96,7 @@ def _loading(simd: _SimdVectorType) -> Any:
     def load(_context: Any, array: Any, row: Any) -> Any:
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             first = _begins(context, builder, signature.args[0], given[0], given[1], simd.vector)
-            return _load(builder, first, 0, simd.vector)
+            return load_row(builder, first, 0, simd.vector)
 
         fits = _is_array(array) and isinstance(row, types.Integer)
         return (simd(array, types.intp), code) if fits else None
@@ -109,7 +108,7 @@ def _spreading(simd: _SimdVectorType) -> Any:
     @intrinsic
     def spread(_context: Any, value: Any) -> Any:
         def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-            return _spread(builder, given[0], simd.vector)
+            return spread_over(builder, given[0], simd.vector)
 
         return (simd(types.float64), code) if isinstance(value, types.Float) else None
 
@@ -122,14 +121,14 @@ def _weighing(simd: _SimdVectorType, rows: int) -> Any:
         def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
             vector = simd.vector
             top = _begins(context, builder, signature.args[0], given[0], given[1], vector)
-            weight = _numbers(context, builder, weights, given[2])
+            weight = numbers_of(context, builder, weights, given[2])
             parts = (
-                builder.fmul(_spread(builder, weight(row), vector), _load(builder, top, row, vector))
+                builder.fmul(spread_over(builder, weight(row), vector), load_row(builder, top, row, vector))
                 for row in range(rows)
             )
-            chains = [next(parts) for _ in range(_CHAINS)]
+            chains = [next(parts) for _ in range(CHAINS)]
             for row, part in enumerate(parts):
-                chains[row % _CHAINS] = builder.fadd(chains[row % _CHAINS], part)
+                chains[row % CHAINS] = builder.fadd(chains[row % CHAINS], part)
             one, two = (builder.fadd(chains[i], chains[i + 1]) for i in (0, 2))
             return builder.fadd(one, two)
 
@@ -139,24 +138,24 @@ def _weighing(simd: _SimdVectorType, rows: int) -> Any:
     return weigh
 
 
-def _numbers(context: Any, builder: Any, kind: Any, given: Any) -> Callable[[int], Any]:
+def numbers_of(context: Any, builder: Any, kind: Any, given: Any) -> Callable[[int], Any]:
     """Give what draws single numbers from lanes, or from an array."""
     if isinstance(kind, _SimdVectorType):
-        return lambda place: builder.extract_element(given, _PLACE(place))
+        return lambda place: builder.extract_element(given, PLACE(place))
     data = context.make_array(kind)(context, builder, given).data
-    return lambda place: builder.load(builder.gep(data, [_PLACE(place)]))
+    return lambda place: builder.load(builder.gep(data, [PLACE(place)]))
 
 
-eight = cast("Callable[[Table | Vector, int], SimdVector]", _loading(_EIGHT))
+eight = cast("Callable[[Table | Vector, int], SimdVector]", _loading(EIGHT))
 """A row of an array with eight columns."""
 sixteen = cast("Callable[[Table | Vector, int], SimdVector]", _loading(_SIXTEEN))
 """A row of an array with sixteen columns."""
-eights = cast("Callable[[float], SimdVector]", _spreading(_EIGHT))
+eights = cast("Callable[[float], SimdVector]", _spreading(EIGHT))
 """Eight times the same number."""
 Weigh = Callable[[Table, int, Vector | SimdVector], SimdVector]
-eight_of_eight = cast("Weigh", _weighing(_EIGHT, 8))
+eight_of_eight = cast("Weigh", _weighing(EIGHT, 8))
 """The sum of eight rows of eight numbers from one on, each times its weight."""
-eight_of_sixteen = cast("Weigh", _weighing(_EIGHT, 16))
+eight_of_sixteen = cast("Weigh", _weighing(EIGHT, 16))
 """The sum of sixteen rows of eight numbers."""
 sixteen_of_sixteen = cast("Weigh", _weighing(_SIXTEEN, 16))
 """The sum of sixteen rows of sixteen numbers."""
@@ -166,7 +165,7 @@ sixteen_of_sixteen = cast("Weigh", _weighing(_SIXTEEN, 16))
 def _store(_context: Any, array: Any, row: Any, simd: Any) -> Any:  # noqa: ARG001 - numba's names
     def code(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         begins = _begins(context, builder, signature.args[0], given[0], given[1], simd.vector)
-        builder.store(given[2], builder.bitcast(begins, simd.vector.as_pointer()), align=_ALIGNED)
+        builder.store(given[2], builder.bitcast(begins, simd.vector.as_pointer()), align=ALIGNED)
         return context.get_dummy_value()
 
     return types.none(array, types.intp, simd), code
@@ -199,12 +198,12 @@ def _by_halves(builder: Any, part: Any, join: Callable[[Any, Any], Any]) -> Any:
         nothing = ir.Constant(part.type, ir.Undefined)
         lower, upper = (
             builder.shuffle_vector(
-                part, nothing, ir.Constant(ir.VectorType(_PLACE, count), list(range(first, first + count)))
+                part, nothing, ir.Constant(ir.VectorType(PLACE, count), list(range(first, first + count)))
             )
             for first in (0, count)
         )
         part = join(lower, upper)
-    return builder.extract_element(part, _PLACE(0))
+    return builder.extract_element(part, PLACE(0))
 
 
 @intrinsic
@@ -243,8 +242,8 @@ largest = cast("Callable[[SimdVector], float]", _largest)
 def _first_outside(_context: Any, simd: Any, low: Any, high: Any) -> Any:  # noqa: ARG001 - numba's names
     def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
         vector = simd.vector
-        above = builder.fcmp_ordered(">", given[0], _spread(builder, given[1], vector))
-        below = builder.fcmp_ordered("<", given[0], _spread(builder, given[2], vector))
+        above = builder.fcmp_ordered(">", given[0], spread_over(builder, given[1], vector))
+        below = builder.fcmp_ordered("<", given[0], spread_over(builder, given[2], vector))
         outside = builder.bitcast(builder.not_(builder.and_(above, below)), ir.IntType(vector.count))
         wide = builder.zext(outside, ir.IntType(64))
         # A bit beyond the last lane stands for none.
@@ -267,7 +266,7 @@ def _below(_context: Any, one: Any, other: Any) -> Any:
     found = [each for each in (one, other) if isinstance(each, _SimdVectorType)]
 
     def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        pair = [_spread(builder, each, found[0].vector) for each in given]
+        pair = [spread_over(builder, each, found[0].vector) for each in given]
         return _mask_of(builder, builder.fcmp_ordered("<", *pair))
 
     return (types.intp(one, other), code) if found else None
@@ -285,7 +284,7 @@ def _choose(_context: Any, mask: Any, one: Any, other: Any) -> Any:  # noqa: ARG
         vector = found[0].vector
         bits = builder.trunc(given[0], ir.IntType(vector.count))
         bits = builder.bitcast(bits, ir.VectorType(ir.IntType(1), vector.count))
-        return builder.select(bits, *(_spread(builder, each, vector) for each in given[1:]))
+        return builder.select(bits, *(spread_over(builder, each, vector) for each in given[1:]))
 
     return (found[0](types.intp, one, other), code) if found else None
 
@@ -294,7 +293,7 @@ choose = cast("Callable[[int, SimdVector | float, SimdVector | float], SimdVecto
 """One where the bit of a lane is set, the other elsewhere."""
 
 
-def _fused(builder: Any, one: Any, other: Any, added: Any) -> Any:
+def fused(builder: Any, one: Any, other: Any, added: Any) -> Any:
     """Give one times other plus what is added, rounded once."""
     kind = ir.FunctionType(one.type, [one.type] * 3)
     name = f"llvm.fma.v{one.type.count}f64"
@@ -306,7 +305,7 @@ def _fma(_context: Any, one: Any, other: Any, added: Any) -> Any:
     found = [each for each in (one, other, added) if isinstance(each, _SimdVectorType)]
 
     def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        return _fused(builder, *(_spread(builder, each, found[0].vector) for each in given))
+        return fused(builder, *(spread_over(builder, each, found[0].vector) for each in given))
 
     return (found[0](one, other, added), code) if found else None
 
@@ -328,58 +327,6 @@ def _magnitude(_context: Any, simd: Any) -> Any:
 magnitude = cast("Callable[[SimdVector], SimdVector]", _magnitude)
 """Absolute values."""
 
-Polynomials = Callable[[Table, Vector, Table], None]
-Monomial = tuple[int, int]
-"""The place of an earlier monomial, and the variable that it is multiplied with."""
-
-
-def polynomials(products: Sequence[Monomial], counts: Sequence[int]) -> Polynomials:
-    """Make a kernel that evaluates polynomials of eight points at once, written out without a loop.
-
-    Parameters
-    ----------
-    products
-        Of each monomial but the first, which is 1: an earlier one times a variable.
-    counts
-        How many monomials, from the first on, each polynomial has.
-
-    Returns
-    -------
-    A kernel of the variables, shape (variables, 8), the coefficients, polynomial after polynomial, shape
-    (sum(counts),), and the values, shape (polynomials, 8), which it writes.
-
-    """
-
-    @intrinsic
-    def evaluate(_context: Any, variables: Any, coefficients: Any, values: Any) -> Any:
-        def code(context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-            at, out = (
-                context.make_array(kind)(context, builder, given[place]).data
-                for kind, place in ((variables, 0), (values, 2))
-            )
-            number = _numbers(context, builder, coefficients, given[1])
-            nothing, first = ir.Constant(_EIGHT.vector, [0.0] * 8), np.cumsum([0, *counts])
-            found = [ir.Constant(_EIGHT.vector, [1.0] * 8)]
-            sums = [[nothing] * _CHAINS for _ in counts]
-            for k in range(max(counts)):
-                if k > 0:
-                    before, variable = products[k - 1]
-                    factor = _load(builder, at, variable, _EIGHT.vector)
-                    found.append(factor if before == 0 else builder.fmul(found[before], factor))
-                for begins, count, chains in zip(first, counts, sums, strict=False):
-                    if k < count:
-                        weight = _spread(builder, number(int(begins) + k), _EIGHT.vector)
-                        chains[k % _CHAINS] = _fused(builder, weight, found[k], chains[k % _CHAINS])
-            for place, chains in enumerate(sums):
-                one, two = (builder.fadd(chains[i], chains[i + 1]) for i in (0, 2))
-                row = builder.bitcast(builder.gep(out, [_PLACE(place * 8)]), _EIGHT.vector.as_pointer())
-                builder.store(builder.fadd(one, two), row, align=_ALIGNED)
-            return context.get_dummy_value()
-
-        return types.none(variables, coefficients, values), code
-
-    return cast("Polynomials", evaluate)
-
 
 def _give_operator(function: Callable[..., object], name: str) -> None:
     """Give lanes an operator of Python."""
@@ -394,7 +341,7 @@ def _give_operator(function: Callable[..., object], name: str) -> None:
 
     def lowered(_context: Any, builder: Any, signature: Any, pair: Any) -> Any:
         vector = signature.return_type.vector
-        return getattr(builder, name)(*(_spread(builder, each, vector) for each in pair))
+        return getattr(builder, name)(*(spread_over(builder, each, vector) for each in pair))
 
     type_callable(function)(typer)
     for one, other in (
