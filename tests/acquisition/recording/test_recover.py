@@ -42,6 +42,19 @@ def test_an_abandoned_recording_is_finished_with_all_its_samples(tmp_path, aband
     assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
 
 
+@pytest.mark.parametrize("state", [each for each in RecordingState if each is not RecordingState.RECORDING])
+def test_a_program_that_died_while_it_wrote_the_state_has_not_ended_its_recording(tmp_path, abandoned, state):
+    part, counts = abandoned(tmp_path)
+    with h5py.File(part, "r+") as file:
+        file["state"][0] = state.value[:6].encode() + b"recording"[6:]
+    with open_recording(part) as recording:
+        assert recording.state is RecordingState.INTERRUPTED
+    with open_recording(recover(part)) as recording:
+        assert recording.state is RecordingState.INTERRUPTED
+        np.testing.assert_array_equal(recording.read_counts("m0_velocity"), counts[1])
+        assert [event.kind for event in recording.events] == ["interrupted"]
+
+
 def test_either_name_can_be_given(tmp_path, abandoned):
     abandoned(tmp_path)
     assert recover(tmp_path / "a.h5") == tmp_path / "a.h5"

@@ -21,7 +21,7 @@ from vibench.sim.operating_system import sync_file, sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout, _tables as tables
-from ._attributes import decoded, encoded, read_attributes, write_attributes
+from ._attributes import encoded, read_attributes, write_attributes
 from ._counts import Counts
 from ._disk_room import claim_room, extend_room, release_room
 from ._layout import COUNT_DTYPE, DEFLATE_LEVEL, RecordingState, Table
@@ -181,11 +181,11 @@ def _copy(part: Path, tmp: Path, room: int, key: SealKey | None, written: Mappin
 
 
 def _copy_file_attributes(source: h5py.File, copy: h5py.File, samples: int) -> None:
-    state = decoded(source[layout.STATE][0])
-    reason = decoded(source[layout.REASON][0])
-    if state == RecordingState.RECORDING:
-        state, reason = RecordingState.INTERRUPTED.value, INTERRUPTED_REASON
-    write_attributes(copy, {**read_attributes(source), "state": state, "reason": reason, "samples": samples})
+    state, reason = tables.ending(source)
+    if state is RecordingState.RECORDING:
+        state, reason = RecordingState.INTERRUPTED, INTERRUPTED_REASON
+    ending = {"state": state.value, "reason": reason, "samples": samples}
+    write_attributes(copy, {**read_attributes(source), **ending})
 
 
 def _write_time(
@@ -243,7 +243,7 @@ def _hashed(pieces: Iterator[Counts], digest: "hashlib._Hash") -> Iterator[Count
 
 def _rows(source: h5py.File, table: Table, samples: int) -> Columns:
     columns = tables.clipped(tables.read_columns(source, table), table, samples)
-    if table is layout.EVENTS and decoded(source[layout.STATE][0]) == RecordingState.RECORDING:
+    if table is layout.EVENTS and tables.ending(source)[0] is RecordingState.RECORDING:
         last: tuple[str | float, ...] = (samples, time.time(), INTERRUPTED_KIND, INTERRUPTED_REASON)
         return {
             column.name: np.append(columns[column.name], _cell(column.dtype, value))

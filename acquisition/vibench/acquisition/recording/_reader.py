@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import RecordingError
 from ..instruments import Identity, Overload, Samples
 from . import _layout as layout, _tables as tables
-from ._attributes import decoded, json_text, read_attributes
+from ._attributes import json_text, read_attributes
 from ._contents import channel_header, configuration_facts, file_facts
 from ._counts import Counts
 from ._disk import is_being_recorded
@@ -384,15 +384,8 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 def _growing(handle: _OpenFile) -> dict[str, object]:
     """Say how a ``.part`` stands: it says "recording" until its end, which a dead program never wrote."""
     file = handle.file
-    state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
-    if state == RecordingState.RECORDING and not is_being_recorded(handle.path):
-        state = RecordingState.INTERRUPTED.value
+    state, reason = tables.ending(file)
+    if state is RecordingState.RECORDING and not is_being_recorded(handle.path):
+        state = RecordingState.INTERRUPTED
         reason = "its program ended before it could say how the run ended"
     return {"samples": tables.first_number(file, layout.N_VALID), "state": state, "reason": reason}
-
-
-def _text(file: h5py.File, name: str) -> str:
-    dataset = file.get(name)
-    if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "S":
-        raise RecordingError(f"/{name} is no text")
-    return decoded(dataset[0])

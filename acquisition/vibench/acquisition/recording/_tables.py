@@ -15,7 +15,7 @@ from . import _layout as layout
 from ._attributes import decoded
 from ._contents import json_object
 from ._journal import Number
-from ._layout import Column, Table
+from ._layout import Column, RecordingState, Table
 
 Columns = dict[str, NDArray[Any]]
 
@@ -123,6 +123,20 @@ def first_number(group: h5py.Group, name: str) -> int:
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "i":
         raise RecordingError(f"{group.name}/{name} is no whole number")
     return int(dataset[0])
+
+
+def ending(file: h5py.File) -> tuple[RecordingState, str]:
+    """Say how a ``.part`` ended, and why; one whose program died while it wrote that is recording still."""
+    state, reason = (_text(file, name) for name in (layout.STATE, layout.REASON))
+    is_whole = state in tuple(RecordingState)
+    return RecordingState(state) if is_whole else RecordingState.RECORDING, reason
+
+
+def _text(file: h5py.File, name: str) -> str:
+    dataset = file.get(name)
+    if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "S":
+        raise RecordingError(f"/{name} is no text")
+    return decoded(dataset[0])
 
 
 def require_ranges(columns: Columns, table: Table, samples: int, roles: Sequence[str]) -> None:
