@@ -157,3 +157,15 @@ def test_more_starts_and_another_draw_can_be_asked_for():
     assert solve_ensemble(scene("hertz", 200.0, 1e-6)) is None
     with pytest.raises(ValueError, match="2 starts is not allowed: ask for 4 or more"):
         solve_ensemble(fast, starts=2)
+
+
+@pytest.mark.slow
+def test_many_starts_that_are_still_settling_do_not_make_chaos_last():
+    """Nearly undamped: each takes over 100 s, so that all together soon count more than chaos needs to."""
+    settling = Scene(
+        gong2025(1.27e-7, 27.83e-6, "power:3"), Harmonic(380.64, 9.778e-6), duration=AutomaticDuration()
+    )
+    many = solve_ensemble(settling, starts=64)
+    assert many.motions[0].period == 1
+    assert many.motions[0].share.share > 0.5
+    assert not any(each.motion is MotionKind.CHAOTIC for each in many.motions)

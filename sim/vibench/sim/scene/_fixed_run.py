@@ -70,6 +70,11 @@ class Pace:
         """Length of the section that lets every period be found."""
         return (section_needed(self.forgetting_periods) + 1) / self.frequency_hz
 
+    @property
+    def settling_s(self) -> float:
+        """What a motion takes, from wherever it was, to be seen to repeat."""
+        return self.attractor_s + self.section_s
+
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
         """Say whether the motion of these stretches, one after the other, repeats at their end."""
         return self.repeats_in(states_of(stretches))

@@ -68,7 +68,7 @@ def _horizon(scene: Scene, pace: Pace) -> Horizon:
         case FixedDuration(duration_s=longest_s, window_s=window_s):
             first_s = longest_s
         case AutomaticDuration(longest_s=longest_s, window_s=window_s):
-            first_s = pace.attractor_s + pace.section_s
+            first_s = pace.settling_s
     judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - window_s))
     last_s = max(0.0, longest_s - window_s - judging_s)
     return Horizon(min(first_s, last_s), last_s, judging_s, window_s)

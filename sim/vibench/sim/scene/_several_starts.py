@@ -147,11 +147,20 @@ class SeveralStarts:
     def escape(self) -> EscapeRate | None:
         """How often chaos died out; None where no motion wandered long enough to tell.
 
-        A motion that wanders when it should have been on its attractor is taken to be chaotic from there on.
+        A motion that wanders when it should have been on its attractor is taken to be chaotic from there on:
+        until it is known to have settled, or as long as a small change surely grows. Any other may have left
+        chaos already, as long ago as it takes to be seen to repeat.
         """
-        lives = [(each.wandered_until_s, each.period is not None) for each in self._reached]
-        lives += [(each.wandered_until_s, each.repeats is not None) for each in self._under_way]
-        chaos = [(until_s - self._pace.attractor_s, is_over) for until_s, is_over in lives]
+        known = [
+            (each.wandered_until_s, each.period is not None, each.motion is MotionKind.CHAOTIC)
+            for each in self._reached
+        ]
+        known += [(each.wandered_until_s, each.repeats is not None, False) for each in self._under_way]
+        unsure_s, attractor_s = self._pace.settling_s, self._pace.attractor_s
+        chaos = [
+            (until_s - attractor_s - (0.0 if is_over or has_grown else unsure_s), is_over)
+            for until_s, is_over, has_grown in known
+        ]
         chaotic_s = sum(max(0.0, life_s) for life_s, _ in chaos)
         if chaotic_s <= 0.0:
             return None
