@@ -67,7 +67,7 @@ class ModelForm(QWidget):
                 self._fixed[name] = get_args(plain)[0]
             else:
                 self._add(name, field)
-        UNITS.changed.connect(self._explain)
+        UNITS.on_change(self._explain)
 
     @property
     def editors(self) -> dict[str, Editor]:
@@ -339,7 +339,7 @@ class JudgedForm(QWidget, Generic[Model]):
         layout.addWidget(self.form)
         layout.addWidget(self._complaint)
         self.form.changed.connect(self._take)
-        UNITS.changed.connect(self._judge)
+        UNITS.on_change(self._judge)
         self.form.show_content({})
 
     @property

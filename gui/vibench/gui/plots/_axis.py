@@ -80,7 +80,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         self.enableAutoSIPrefix(False)
         self.setLabel(axis.text)
         self._axis = axis
-        UNITS.changed.connect(self._show_other_unit)
+        UNITS.on_change(self._show_other_unit)
         # Painted when it changes, and copied otherwise: its text is the dearest part of a frame.
         self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 

@@ -102,7 +102,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         add_actions(self)
         self.scene().sigMouseMoved.connect(self.reading.follow)
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
-        UNITS.changed.connect(self._tell_anew)
+        UNITS.on_change(self._tell_anew)
         self.retheme(theme)
 
     def with_legend(self) -> "Plot":

@@ -58,7 +58,7 @@ class ReadTable(QTableWidget):
         header.setMaximumSectionSize(_WIDEST_LETTERS * self.fontMetrics().averageCharWidth())
         self._hint = hint
         self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
-        UNITS.changed.connect(self._write)
+        UNITS.on_change(self._write)
         # A change of width comes with many steps: rows are measured once, after them.
         self._later = QTimer(self, interval=0, singleShot=True)
         self._later.timeout.connect(self._fit_rows)

@@ -5,14 +5,15 @@ the units that somebody has chosen; files and reports keep those of their own.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from math import floor, log10
-from types import MappingProxyType
+from types import MappingProxyType, MethodType
+from weakref import WeakMethod
 
-from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QLabel, QWidget
+from shiboken6 import isValid
 
 STANDARD_GRAVITY = 9.80665
 """Of g [m/s²]; ISO 80000-3."""
@@ -66,14 +67,20 @@ def fitted_unit(unit: str, value: float) -> ShownUnit:
     return ShownUnit(f"{prefix}{si}", 10.0 ** -POWERS[prefix])
 
 
-class DisplayUnits(QObject):
+class DisplayUnits:
     """What was chosen for each quantity; whatever shows a quantity listens, as it does to Qt's own font."""
 
-    changed = Signal()
-
     def __init__(self) -> None:
-        super().__init__()
         self._chosen = {si: choices[0] for si, choices in CHOICES.items()}
+        # Not a signal of Qt: this object outlives every window, and nothing of a closed one may be called.
+        self._listeners: dict[WeakMethod[Callable[[], None]], None] = {}
+
+    def on_change(self, listener: Callable[[], None]) -> None:
+        """Call a method of a widget whenever other units are chosen, as long as there is the widget."""
+        self._listeners[WeakMethod(listener, self._forget)] = None
+
+    def _forget(self, listener: WeakMethod[Callable[[], None]]) -> None:
+        self._listeners.pop(listener, None)
 
     @property
     def chosen(self) -> Mapping[str, str]:
@@ -86,7 +93,10 @@ class DisplayUnits(QObject):
         wanted = {si: name if name in CHOICES[si] else CHOICES[si][0] for si, name in names.items()}
         if wanted != self._chosen:
             self._chosen = wanted
-            self.changed.emit()
+            for each in tuple(self._listeners):
+                listener = each()
+                if isinstance(listener, MethodType) and isValid(listener.__self__):
+                    listener()
 
     def on_axis(self, unit: str) -> ShownUnit:
         """Give the unit of an axis, or of a column: one for small values and large ones."""
@@ -155,7 +165,7 @@ class SentenceLabel(QLabel):
         if rank:
             self.setProperty("rank", rank)
         self.setText(text)
-        UNITS.changed.connect(self._tell)
+        UNITS.on_change(self._tell)
 
     def setText(self, text: str) -> None:
         """Show a text as it was made: the units are seen to here."""

@@ -37,7 +37,7 @@ class CurveList(QListWidget):
         self._theme = theme
         self._curves: list[Curve] = []
         self.itemChanged.connect(lambda _item: self.changed.emit())
-        UNITS.changed.connect(self._tell_anew)
+        UNITS.on_change(self._tell_anew)
 
     @property
     def curves(self) -> tuple[Curve, ...]:

@@ -27,7 +27,7 @@ class SpectrumPlot(QWidget):
         self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
         self._curves: list[pg.PlotDataItem] = []
         self._view: LiveView | None = None
-        UNITS.changed.connect(self._draw_anew)
+        UNITS.on_change(self._draw_anew)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.plot)
