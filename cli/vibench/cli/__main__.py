@@ -181,7 +181,7 @@ COMMANDS = {
     "export": Place(
         "export",
         "export",
-        "Write a recording's samples, with units and times, as a file that other programs read.",
+        "Write a recording's samples or spectra, with units, as a file that other programs read.",
     ),
     "pack": Place(
         "pack",

@@ -50,16 +50,16 @@ def test_limits_know_the_highest_level_before_anything_moves():
     loud = plan(amplitude_vpp=10.0, frequency_hz=20.0)
     with pytest.raises(LimitExceeded):
         require_within_limits(Measurement(name="level", excitation=loud), rig)
-    highest = Dwell(frequency_hz=195, amplitude_vpp=0.9, duration_s=1)
-    used, expected = (
-        {each.what: each.use for each in require_within_limits(Measurement(name="l", excitation=one), rig)}
-        for one in (plan(), highest)
+    levels_vpp = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]
+    dwells = [Dwell(frequency_hz=195, amplitude_vpp=vpp, duration_s=1) for vpp in levels_vpp]
+    used, *each = (
+        {check.what: check.use for check in require_within_limits(Measurement(name="l", excitation=one), rig)}
+        for one in (plan(), *dwells)
     )
-    assert used.keys() == expected.keys()
-    lowest = "the lowest setting"
-    assert used.pop(lowest) == pytest.approx(expected[lowest] * 0.9 / plan().lowest_amplitude_vpp)
+    assert used.keys() == each[-1].keys()
+    # Near the resonance of m1 bound to m2 the base may move less at a higher level: all of them count.
     for what, use in used.items():
-        assert use == pytest.approx(expected[what], rel=1e-6), what
+        assert use == pytest.approx(max(level[what] for level in each), rel=1e-6), what
 
 
 @pytest.mark.parametrize(
