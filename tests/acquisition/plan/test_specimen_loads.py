@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, example, given, settings, strategies as st
 
 from vibench.acquisition import LimitExceeded
 from vibench.acquisition.plan import (
@@ -42,6 +43,19 @@ def test_a_sine_that_touches_no_stop_is_foretold_as_rig_and_specimen_answer_it(r
 def test_a_sine_that_drives_the_stops_is_foretold_within_a_half(rig, frequency_hz):
     loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
     assert loads[BaseQuantity.AMPLITUDE].peak == pytest.approx(settled_m(rig, 8.0, frequency_hz), rel=0.5)
+
+
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(frequency_hz=st.floats(150, 300), level=st.floats(0.05, 0.99))
+@example(frequency_hz=195.0, level=0.5)
+def test_no_level_on_the_way_moves_anything_more_than_was_foretold(rig, frequency_hz, level):
+    """Ramps pass every level, and the base may move less at a higher one: stops take the notch away."""
+    model = RigModel(rig)
+    loads = predicted_loads(Dwell(amplitude_vpp=8, frequency_hz=frequency_hz, duration_s=1), rig)
+    passed_v = 0.5 * 8 * level * rig.generator.terminal_factor()
+    for quantity in BaseQuantity:
+        passed = np.abs(model.under_sines(quantity, np.array([frequency_hz]), passed_v))[0]
+        assert passed <= 1.05 * loads[quantity].peak, quantity
 
 
 @pytest.mark.parametrize("kind", [MultisineNoise, StreamedNoise])

@@ -19,6 +19,8 @@ from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 HELD_SPANS = 4
 """A held waveform is followed to twice its playback rate: the images above are below 1/20 of the band
 and the table answers them ever less."""
+PASSED_LEVELS = np.arange(1, 17) / 16
+"""Shares of a tone's level that are looked at: ramps pass them, and with stops more level may move less."""
 BAND_POINTS = 2000
 """Frequencies over which the mean square of streamed noise is summed."""
 
@@ -95,7 +97,8 @@ def _sorted(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[Sam
 def _of_tones(model: RigModel, quantity: BaseQuantity, tones: list[Tone], terminal_v: float) -> Load:
     hz = np.array([tone.frequency_hz for tone in tones])
     volts = terminal_v * np.array([tone.level for tone in tones])
-    peaks = np.abs(model.under_sines(quantity, hz, volts))
+    passed = [np.abs(model.under_sines(quantity, hz, level * volts)) for level in PASSED_LEVELS]
+    peaks = np.max(passed, axis=0)
     worst = int(np.argmax(peaks))
     peak = float(peaks[worst])
     return Load(peak, peak / np.sqrt(2), f"at {tones[worst].frequency_hz:g} Hz")
