@@ -1,5 +1,6 @@
 """A branch as equations: what is played, what of the base is wrong, how the one follows from the other."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,9 @@ _RATIO = 2
 """Rows of m0 over the base, behind what is wrong of the base."""
 _NEW = 0.3
 """Part of a step that must have been gone for a point to be a new one."""
+_CHORD, _CHORD_ERRORS = 0.1, 20.0
+"""Points give a direction when they lie so many steps apart (what the tolerance moves a point by counts less
+beside that) and so many of their standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +108,7 @@ class BranchSolver:
         along = np.array([1.0, 0.0, 0.0])
         return Foreseen(self._begin, along * self._begin[0], along, 0.0)
 
-    def next(self, points: tuple[Seen, ...], length: float, way: float) -> Foreseen:
+    def next(self, points: Sequence[Seen], length: float, way: float) -> Foreseen:
         """Go on from the last point by ``length``, from the first one up (1) or down (-1) in frequency."""
         here = points[-1]
         if len(points) == 1:
@@ -112,9 +116,10 @@ class BranchSolver:
             level = -self._slope[0, 0] / self._slope[0, 1]
             moved = np.concatenate([[way, way * level], np.zeros(len(here.unknowns) - 2)])
         else:
-            chord = here.place - points[-2].place
+            behind = _behind(points)
+            chord = here.place - behind.place
             along = chord / np.linalg.norm(chord)
-            moved = (here.unknowns - points[-2].unknowns) / np.linalg.norm(chord)
+            moved = (here.unknowns - behind.unknowns) / np.linalg.norm(chord)
         return Foreseen(here.unknowns + length * moved, here.place + length * along, along, length)
 
     def setting(self, unknowns: Vector) -> LoopSetting:
@@ -188,6 +193,16 @@ def residual_of(base_m: Coefficients, level_m: float) -> Vector:
 def noise_of(base_u: Vector, ratio_u: float) -> Vector:
     """Give the standard errors of residual and ratio, from those of the base's harmonics over its level."""
     return np.concatenate([base_u[:1], np.repeat(base_u[1:], 2), [ratio_u, ratio_u]])
+
+
+def _behind(points: Sequence[Seen]) -> Seen:
+    """Give the latest point from which the chord to the last one is a direction, else the first."""
+    here = points[-1]
+    for there in reversed(points[1:-1]):
+        error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))
+        if np.linalg.norm(here.place - there.place) >= max(_CHORD, _CHORD_ERRORS * error):
+            return there
+    return points[0]
 
 
 def _outputs(seen: Seen) -> Vector:

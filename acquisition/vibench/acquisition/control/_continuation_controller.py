@@ -31,8 +31,8 @@ _SHORTEST_STEP = 1 / 64
 """Of the plan's step."""
 _GROWTH, _EASY = 1.5, 3
 """A step grows by this factor where a point took so many tries or fewer."""
-_PROBES = (-0.05, -0.05)
-"""Changes of frequency and first coefficient by which both are probed, in steps."""
+_PROBE, _PROBE_HARMONIC = -0.05, 0.02
+"""Changes by which unknowns are probed: two in steps, harmonics over the level."""
 _BELOW = 5.0
 """Steps of the first coefficient below the model's from which it is raised."""
 _ABOVE = 8.0
@@ -83,25 +83,26 @@ def _followed(
 ) -> Controller[tuple[int, BranchEnd]]:
     plan = player.plan
     way = 1.0 if plan.begin == "up" else -1.0
-    points: tuple[Seen, ...] = ()
-    number, length = 0, 1.0
+    points: list[Seen] = []
+    length, failed = 1.0, 0
     found = yield from _begun(player, solver)
     while True:
         if found is None:
             length *= 0.5
             if length < _SHORTEST_STEP or not points:
-                return number, BranchEnd.LOST
-            yield from _probed(player, solver, points[-1])
+                return len(points), BranchEnd.LOST
+            failed += 1
+            yield from _probed(player, solver, points[-1], 2 if failed == 1 else len(points[-1].unknowns))
         else:
             seen, tries = found
             setting = solver.setting(seen.unknowns)
             if points and not plan.low_hz <= setting.frequency_hz <= plan.high_hz:
-                return number, BranchEnd.RANGE
-            points = (*points[-1:], seen)
-            yield from _recorded(loop, player, setting, number, tries)
-            number += 1
-            if number == plan.most_points:
-                return number, BranchEnd.POINTS
+                return len(points), BranchEnd.RANGE
+            yield from _recorded(loop, player, setting, len(points), tries)
+            points.append(seen)
+            failed = 0
+            if len(points) == plan.most_points:
+                return len(points), BranchEnd.POINTS
             if tries <= _EASY:
                 length = min(length * _GROWTH, 1.0)
         found = yield from _corrected(player, solver, solver.next(points, length, way))
@@ -130,12 +131,16 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
     return None
 
 
-def _probed(player: BranchPlayer, solver: BranchSolver, last: Seen) -> Controller[None]:
-    """Go back to the last point, and learn anew what frequency and first coefficient do."""
+def _probed(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
+    """Go back to the last point, and learn anew what the first of the unknowns do, each alone.
+
+    Frequency and first coefficient are what usually changed. What is believed of the harmonics was learnt
+    on the way, from changes of all at once, and can leave equations that near a fold have no solution.
+    """
     here = yield from _seen(player, solver, last.unknowns)
-    for column, moved in enumerate(_PROBES):
+    for column in range(columns):
         unknowns = last.unknowns.copy()
-        unknowns[column] += moved
+        unknowns[column] += _PROBE if column < 2 else _PROBE_HARMONIC
         beside = yield from _seen(player, solver, unknowns)
         solver.probe(column, here, beside)
 
