@@ -23,7 +23,6 @@ import tempfile
 import time
 from collections import Counter
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -59,9 +58,9 @@ from vibench.sim.feedback import (
     Begin,
     LoopTiming,
     SampledPlant,
+    branch_multipliers,
     designed_law,
     impact_branch,
-    loop_multipliers,
 )
 from vibench.sim.periodic import (
     Branch,
@@ -244,37 +243,18 @@ def lost_at(rig: Rig, latency_s: float, folder: Path) -> tuple[float, str]:
     return max(hertz, default=plan.start_hz), ended or ends[0]
 
 
-def multipliers_at(rig: Rig, branch: Branch, latency_s: float) -> np.ndarray:
-    """Give the largest multiplier of the loop at each motion of the model's branch."""
-    table = amplifier_of(rig), shaker_of(rig), specimen_of(rig)
-    plant = SampledPlant(*table, LoopTiming(rig.controller.rate_hz, latency_s))
-    law, spring = designed_law(plant), spring_of(plant.specimen)
-    found = []
-    for frequency_hz, amplitude_m in zip(
-        branch.frequencies_hz, branch.response_ii[:, -1] * branch.amplitudes_m, strict=True
-    ):
-        count = round(10 * rig.controller.rate_hz / frequency_hz)
-        p = amplitude_m * np.cos(20 * np.pi * np.arange(count) / count)
-        found.append(float(loop_multipliers(plant, law, [spring.stiffness(p, p)], 10)[0]))
-    return np.array(found)
-
-
 def late(latencies_ms: list[float], draw: Path | None, folder: Path) -> None:
     """Print and draw where branches are lost, beside where the model loses them."""
     rig = load_rig(Path("virtual_rig_controller"))
     branch = model_of(rig, load_campaign("branch").measurements[0].excitation)
     fold = next(each.index for each in branch.events if each.kind.value == "fold")
-    leg = slice(0, fold + 1, max(1, fold // 40))
-    up = replace(
-        branch,
-        **{name: getattr(branch, name)[leg] for name in ("frequencies_hz", "response_ii", "amplitudes_m")},
-    )
+    leg = np.arange(0, fold + 1, max(1, fold // 40))
     # A host refuses these plans; what happens otherwise is what is measured here.
     _continuation_controller.require_held = lambda *_: None
     rows = []
     for each in sorted(latencies_ms):
         held_hz, ended = lost_at(rig, 1e-3 * each, folder)
-        model_hz, largest = model_loss(rig, up, each)
+        model_hz, largest = model_loss(rig, branch, leg, each)
         rows.append((each, held_hz))
         print(
             f"{each:g} ms: held to {held_hz:.5g} Hz ({ended}); by the model to {model_hz:.5g} Hz, "
@@ -283,18 +263,23 @@ def late(latencies_ms: list[float], draw: Path | None, folder: Path) -> None:
         )
     if draw is not None:
         fine = np.linspace(min(latencies_ms), max(latencies_ms), FINE)
-        model = np.array([(each, *model_loss(rig, up, each)) for each in fine])
-        picture(np.array(rows), model, float(up.frequencies_hz.max()), draw)
+        model = np.array([(each, *model_loss(rig, branch, leg, each)) for each in fine])
+        picture(np.array(rows), model, float(branch.frequencies_hz[leg].max()), draw)
 
 
-def model_loss(rig: Rig, up: Branch, latency_ms: float) -> tuple[float, float]:
+def model_loss(rig: Rig, branch: Branch, leg: np.ndarray, latency_ms: float) -> tuple[float, float]:
     """Give where the loop's largest multiplier passes 1, else the fold, and the largest up to the fold."""
-    multipliers = multipliers_at(rig, up, 1e-3 * latency_ms)
+    table = amplifier_of(rig), shaker_of(rig), specimen_of(rig)
+    plant = SampledPlant(*table, LoopTiming(rig.controller.rate_hz, 1e-3 * latency_ms))
+    multipliers, hertz = (
+        branch_multipliers(plant, designed_law(plant), branch, leg),
+        branch.frequencies_hz[leg],
+    )
     beyond = np.flatnonzero(multipliers > 1)
     if not beyond.size:
-        return float(up.frequencies_hz.max()), float(multipliers.max())
+        return float(hertz.max()), float(multipliers.max())
     about = slice(max(int(beyond[0]) - 1, 0), int(beyond[0]) + 1)
-    lost_hz = np.interp(1.0, multipliers[about], up.frequencies_hz[about])
+    lost_hz = np.interp(1.0, multipliers[about], hertz[about])
     return float(lost_hz), float(multipliers.max())
 
 

@@ -6,23 +6,25 @@ from functools import cache
 import numpy as np
 import pytest
 
-from vibench.sim import Harmonic, gong2025, integrate
+from vibench.sim import gong2025
 from vibench.sim.feedback import (
     Begin,
     LinearLaw,
     LoopTiming,
     SampledPlant,
+    branch_hold,
+    branch_multipliers,
     designed_law,
     impact_branch,
     loop_multipliers,
     loop_transfer,
+    motion_slopes,
 )
 from vibench.sim.model import PowerLaw
 from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
 from vibench.sim.shaker import Amplifier, LoadedShaker, Shaker
 
 RATE_HZ = 10_240.0
-PERIODS = 10
 K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
 HARDENING = replace(gong2025(), contact=PowerLaw(1e-4, ((3, 0.1 * K1 * 1e-4),)))
 LINEAR = gong2025(contact="linear")
@@ -51,26 +53,6 @@ def branch():
     return balance_branch_within(structure, spring, start, FrequencyPath((3e-6,)), 89.0, 120.0)
 
 
-@cache
-def slopes(index):
-    """Slope of the spring's force along a motion of the branch, once a sample, in the middle of a step."""
-    found = branch()
-    frequency_hz = found.frequencies_hz[index]
-    count = round(PERIODS * RATE_HZ / frequency_hz)
-    drive = Harmonic(frequency_hz, found.amplitudes_m[index])
-    motion = integrate(
-        HARDENING,
-        drive,
-        1.5 / frequency_hz,
-        initial_state=found.states[index],
-        sample_rate_hz=400 * frequency_hz,
-    )
-    p = (motion.states[:, 1] - motion.states[:, 2])[:400]
-    middle = (np.arange(count) + 0.5) * PERIODS / count
-    wave = np.interp(middle % 1.0, np.arange(401) / 400, np.append(p, p[0]))
-    return spring_of(HARDENING).stiffness(wave, wave)
-
-
 @pytest.mark.parametrize("latency_s", [0.0, 0.7 / RATE_HZ, 3.1 / RATE_HZ, 10 / RATE_HZ])
 def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
     model = plant(latency_s, LINEAR)
@@ -92,12 +74,12 @@ def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
 
 def test_under_a_table_too_heavy_to_move_the_multipliers_are_those_of_the_branch():
     found = branch()
-    unmoved = plant(mass_kg=1e7)
-    for index in range(40, len(found.frequencies_hz), 60):
-        exact = abs(found.multipliers[index, 0])
-        # The table's own multiplier is one: it stays where it is.
-        seen = loop_multipliers(unmoved, NO_LAW, [slopes(index)], PERIODS)[0]
-        assert seen == pytest.approx(max(exact, 1.0), rel=0.01)
+    points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
+    # The table's own multiplier is one: it stays where it is.
+    exact = np.maximum(np.abs(found.multipliers[points, 0]), 1.0)
+    assert exact.max() > 1.15
+    seen = branch_multipliers(plant(mass_kg=1e7), NO_LAW, found, points)
+    assert seen == pytest.approx(exact, rel=0.01)
 
 
 def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_the_model_is_wrong():
@@ -108,15 +90,25 @@ def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_th
     softer = replace(HARDENING, stiffnesses=tuple(0.9 * each for each in HARDENING.stiffnesses))
     wrong = (plant(), plant(gain=3.48), plant(gain=2.84), plant(specimen=softer))
     for index in (*unstable[[0, 70, -1]], 10, len(found.frequencies_hz) - 1):
+        slopes, periods = motion_slopes(HARDENING, found, index, RATE_HZ)
         for each in wrong:
-            assert loop_multipliers(each, law, [slopes(index)], PERIODS)[0] < 0.99
+            assert loop_multipliers(each, law, [slopes], periods)[0] < 0.99
+
+
+def test_a_late_law_loses_motions_that_need_none_and_that_is_told():
+    late = plant(2e-3)
+    hold = branch_hold(late, designed_law(late), 3e-6, 94.0, (90.0, 112.0))
+    found = branch()
+    stable = np.flatnonzero(found.frequencies_hz > 112.0)[0]
+    assert found.is_stable[stable]
+    assert hold.multiplier > 1.02
+    assert hold.at_hz == pytest.approx(112.0, abs=0.5)
 
 
 def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
-    found = branch()
-    unstable = np.flatnonzero(~found.is_stable)[[0, 70, -1]]
+    unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
     largest = [
-        max(loop_multipliers(each, designed_law(each), [slopes(index)], PERIODS)[0] for index in unstable)
+        branch_multipliers(each, designed_law(each), branch(), unstable).max()
         for each in map(plant, (1e-4, 5e-4, 1.5e-3))
     ]
     assert largest[0] < 0.95

@@ -8,10 +8,11 @@ from vibench.sim.feedback import (
     PerturbedMotion,
     designed_law,
     envelope_deviation,
+    motion_slopes,
     open_loop_multiplier,
 )
 
-from .test_feedback import PERIODS, branch, plant, slopes
+from .test_feedback import HARDENING, RATE_HZ, branch, plant
 
 HOLD, CHANGES, LEAD = 5, 20, 3
 NOISE = 3e-3, 5e-6
@@ -33,8 +34,8 @@ def modulations(rng, draws, per_period, count):
 
 def held(index, draws, rng):
     """Answers of base and m0 to changes of a volt, and to noise: shape (samples, 2, draws) each."""
-    table, wave = plant(), slopes(index)
-    law, per_period = designed_law(table), len(wave) / PERIODS
+    table, (wave, periods) = plant(), motion_slopes(HARDENING, branch(), index, RATE_HZ)
+    law, per_period = designed_law(table), len(wave) / periods
     count = round((LEAD + 2 * CHANGES + 1) * HOLD * per_period)
     volts = np.hstack([modulations(rng, draws, per_period, count), np.zeros((count, draws))])
     noise = np.dstack(

@@ -2,7 +2,9 @@ from ._branch import (
     Begin as Begin,
     BranchHold as BranchHold,
     branch_hold as branch_hold,
+    branch_multipliers as branch_multipliers,
     impact_branch as impact_branch,
+    motion_slopes as motion_slopes,
 )
 from ._law import (
     LawWeights as LawWeights,

@@ -1,16 +1,19 @@
 """How a law holds a whole branch, by the model: before anything moves."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from math import inf
 
 import numpy as np
 
-from ..model import Harmonic, Specimen
+from ..kernels import Floats
+from ..model import Harmonic, Specimen, Y, Z
 from ..periodic import (
     BalanceEnd,
     Branch,
     FrequencyPath,
+    PeriodMap,
     RestoringForce,
     ShootingEnd,
     balance,
@@ -24,16 +27,19 @@ from ._law import LinearLaw
 from ._loop import loop_multipliers
 from ._plant import SampledPlant
 
-_POINTS = 8
-"""Unstable motions of a branch that are looked at."""
-_PERIODS = 10
+_POINTS = 25
+"""Motions of a branch that are looked at, stable ones too: a late law may lose what needs none."""
+_PERIODS = range(10, 41)
+"""Of a motion that are gone through: so many that they take a whole number of samples, or nearly so."""
+_WAVE = 512
+"""Samples of a period by which the slope of the spring is known along it."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Levels, over the one that is asked for, along which motions among stops are led down to it."""
 
 
 @dataclass(frozen=True)
 class BranchHold:
-    """What a law makes of the unstable motions of a branch."""
+    """What a law makes of the motions of a branch."""
 
     multiplier: float | None
     """The largest over a period with the law acting; None where stops, or no branch, leave it unknown."""
@@ -64,7 +70,7 @@ def branch_hold(
     Parameters
     ----------
     plant, law
-        As the host knows them. The slope of a smooth spring is taken along the fundamental of p.
+        As the host knows them.
     level_m
         Amplitude of the base's displacement [m].
     start_hz, range_hz
@@ -81,18 +87,15 @@ def branch_hold(
     if branch is None:
         return BranchHold(None, start_hz, inf)
     sizes = np.abs(branch.multipliers[:, 0])
-    unstable = np.flatnonzero(sizes > 1.0)
-    if not unstable.size:
-        return BranchHold(0.0, start_hz, inf)
-    rates = np.log(sizes[unstable]) * branch.frequencies_hz[unstable]
-    fastest = int(unstable[np.argmax(rates)])
-    growth_s, at_hz = float(1 / rates.max()), float(branch.frequencies_hz[fastest])
+    rates = np.log(sizes) * branch.frequencies_hz
+    fastest = int(np.argmax(rates))
+    growth_s = float(1 / rates[fastest]) if sizes[fastest] > 1.0 else inf
     if smooth is None:
-        return BranchHold(None, at_hz, growth_s)
-    chosen = np.unique(unstable[np.linspace(0, unstable.size - 1, _POINTS).astype(int)])
-    held = [_multiplier(plant, law, smooth, branch, int(index)) for index in chosen]
+        return BranchHold(None, float(branch.frequencies_hz[fastest]), growth_s)
+    points = np.unique(np.linspace(0, sizes.size - 1, _POINTS).astype(int))
+    held = branch_multipliers(plant, law, branch, points)
     worst = int(np.argmax(held))
-    return BranchHold(held[worst], float(branch.frequencies_hz[chosen[worst]]), growth_s)
+    return BranchHold(float(held[worst]), float(branch.frequencies_hz[points[worst]]), growth_s)
 
 
 def _smooth_spring(plant: SampledPlant) -> RestoringForce | None:
@@ -130,12 +133,51 @@ def impact_branch(
     return periodic_branch_within(orbit, FrequencyPath((level_m,)), *range_hz)
 
 
-def _multiplier(
-    plant: SampledPlant, law: LinearLaw, spring: RestoringForce, branch: Branch, index: int
-) -> float:
-    """Give the largest multiplier of the loop along one motion of a branch."""
-    frequency_hz = branch.frequencies_hz[index]
-    count = round(_PERIODS * plant.timing.rate_hz / frequency_hz)
-    size = branch.response_ii[index, -1] * branch.amplitudes_m[index]
-    p = size * np.cos(2 * np.pi * _PERIODS * np.arange(count) / count)
-    return float(loop_multipliers(plant, law, [spring.stiffness(p, p)], _PERIODS)[0])
+def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, points: Iterable[int]) -> Floats:
+    """Give the largest multiplier over a period of motions of a branch, with the law acting.
+
+    Parameters
+    ----------
+    plant, law
+        Of a specimen with a smooth spring; `loop_multipliers`.
+    branch
+        Of that specimen.
+    points
+        Which of its motions.
+
+    Returns
+    -------
+    Magnitudes, shape (points,).
+
+    """
+    courses = [motion_slopes(plant.specimen, branch, point, plant.timing.rate_hz) for point in points]
+    return np.array([loop_multipliers(plant, law, [each], periods)[0] for each, periods in courses])
+
+
+def motion_slopes(specimen: Specimen, branch: Branch, point: int, rate_hz: float) -> tuple[Floats, int]:
+    """Give the slope of a smooth spring along one motion of a branch, with all its harmonics.
+
+    Parameters
+    ----------
+    specimen, branch
+        The branch is the specimen's.
+    point
+        Which of its motions.
+    rate_hz
+        Samples a second.
+
+    Returns
+    -------
+    dF/dp in the middle between samples, shape (samples,) [N/m], and over how many periods they go.
+
+    """
+    spring = spring_of(specimen)
+    drive = Harmonic(float(branch.frequencies_hz[point]), float(branch.amplitudes_m[point]))
+    samples = rate_hz / drive.frequency_hz * np.array(_PERIODS)
+    best = int(np.argmin(np.abs(samples - np.round(samples)) / samples))
+    periods, count = _PERIODS[best], round(samples[best])
+    states = PeriodMap(specimen).orbit(branch.states[point], drive, _WAVE).states
+    p = states[:_WAVE, Y] - states[:_WAVE, Z]
+    turns = (np.arange(count) + 0.5) * periods / count
+    wave = np.interp(turns, np.arange(_WAVE) / _WAVE, p, period=1.0)
+    return spring.stiffness(wave, np.zeros_like(wave)), periods
