@@ -1,0 +1,104 @@
+"""Measurements of control-based continuation that others published, beside what their authors state.
+
+    python benchmarks/published_branches.py [FOLDER --rate 5000]
+
+Reads limit cycles of an airfoil in wind, held at the University of Bristol, through an import mapping (source
+and licence: tests/analysis/exchange/flutter_rig/README.md), and prints what five periods at a time tell of
+each: frequency, amplitude of the heave (mean, least and largest), and how invasive the control was: the fundamental
+of control target less response, over that of the response. Beside them stand the authors' amplitude, measured
+over five periods before the samples were kept, and the largest heave less its mean, which their script takes
+from the samples. With a FOLDER the files as published.
+"""
+
+import argparse
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.io import loadmat
+
+from vibench.acquisition import load_toml, open_recording
+from vibench.analysis.exchange import ImportMapping, import_recording
+from vibench.analysis.tones import fitted_sine, steady_phase, tracked_orders
+
+EXCERPTS = Path(__file__).parents[1] / "tests/analysis/exchange/flutter_rig"
+NEAR_HZ, PERIODS = 2.45, 5
+ORDERS = (1.0, 2.0, 3.0)
+
+
+@dataclass(frozen=True)
+class HeldCycle:
+    """One held limit cycle, as analysed here and as stated; lengths in metres."""
+
+    name: str
+    wind_m_per_s: float
+    frequency_hz: float
+    stated_hz: float
+    heave_m: np.ndarray
+    """Of each five periods."""
+    stated_m: float
+    largest_m: float
+    invasive: float
+    """Mean fundamental of target less response, over that of the response."""
+    criterion: float
+    """What their search brings below `stated_criterion`: root of the difference of both squares [V]."""
+    stated_criterion: float
+
+
+def held_cycle(path: Path, mapping: ImportMapping, folder: Path) -> HeldCycle:
+    """Import a file and analyse the recording."""
+    stated = loadmat(path, variable_names=["amplitude", "freq_actual", "Wind_sped", "error_tol"])
+    metres_per_volt = mapping.channels[0].scale
+    with open_recording(import_recording(path, mapping, folder / f"{path.stem}.h5")) as recording:
+        rate_hz = recording.sample_rate_hz
+        heave, target = (recording.read(each) for each in ("heave", "target"))
+    frequency_hz = fitted_sine(heave, rate_hz, NEAR_HZ).frequency_hz
+    phase = steady_phase(heave.size, frequency_hz / rate_hz, 0.0)
+    interval = round(PERIODS * rate_hz / frequency_hz)
+    response, wanted = (
+        tracked_orders(each, phase, interval_samples=interval, orders=ORDERS).order(1.0)
+        for each in (heave, target)
+    )
+    sizes = np.abs(response)
+    return HeldCycle(
+        name=path.stem,
+        wind_m_per_s=stated["Wind_sped"].item(),
+        frequency_hz=frequency_hz,
+        stated_hz=stated["freq_actual"].item(),
+        heave_m=sizes,
+        stated_m=stated["amplitude"].item() * metres_per_volt,
+        largest_m=float(heave.max() - heave.mean()),
+        invasive=float(np.abs(wanted - response).mean() / sizes.mean()),
+        criterion=float(abs(sizes.mean() ** 2 - np.abs(wanted).mean() ** 2) ** 0.5 / metres_per_volt),
+        stated_criterion=stated["error_tol"].item(),
+    )
+
+
+def held_cycles(source: Path, mapping: ImportMapping) -> list[HeldCycle]:
+    """Analyse all files of a folder."""
+    with tempfile.TemporaryDirectory() as folder:
+        return [held_cycle(each, mapping, Path(folder)) for each in sorted(source.glob("CBC_*stable_*.mat"))]
+
+
+def main() -> None:
+    """Print one row of a table for each."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, nargs="?", default=EXCERPTS)
+    parser.add_argument("--rate", type=float)
+    given = parser.parse_args()
+    mapping = load_toml(EXCERPTS / "mapping.toml", ImportMapping)
+    if given.rate is not None:
+        mapping = mapping.model_copy(update={"sample_rate_hz": given.rate})
+    for each in held_cycles(given.folder, mapping):
+        heave = 1e3 * each.heave_m
+        print(
+            f"| {each.name} | {each.wind_m_per_s:.3g} | {each.frequency_hz:.4g} | {each.stated_hz:.4g} | "
+            f"{heave.mean():.2f} ({heave.min():.2f} to {heave.max():.2f}) | {1e3 * each.stated_m:.2f} | "
+            f"{1e3 * each.largest_m:.2f} | {each.invasive:.1%} | {1e3 * each.criterion:.0f} | "
+            f"{1e3 * each.stated_criterion:.0f} |"
+        )
+
+
+if __name__ == "__main__":
+    main()
