@@ -4,10 +4,10 @@
 
 Reads limit cycles of an airfoil in wind, held at the University of Bristol, through an import mapping (source
 and licence: tests/analysis/exchange/flutter_rig/README.md), and prints what five periods at a time tell of
-each: frequency, amplitude of the heave (mean, least and largest), and how invasive the control was: the fundamental
-of control target less response, over that of the response. Beside them stand the authors' amplitude, measured
-over five periods before the samples were kept, and the largest heave less its mean, which their script takes
-from the samples. With a FOLDER the files as published.
+each: frequency, amplitude of the heave (mean, least and largest), and how invasive the control was, the
+fundamental of control target less response, over that of the response. Beside them stand the authors'
+amplitude, measured over five periods before the samples were kept, and the largest heave less its mean, which
+their script takes from the samples. With a FOLDER the files as published.
 """
 
 import argparse
