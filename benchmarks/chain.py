@@ -135,7 +135,7 @@ def report_watching():
 def report_drift():
     """Energy that undamped chains without a drive gain or lose in a second, over what they have."""
     for contact in ("hertz", "power:5", "linear_gap:2e5"):
-        for cells in (1, 2, 4):
+        for cells in (1, 2, 4, 20):
             chain = chain_of(gong2025(damping_time_s=0.0, contact=contact), cells)
             found = []
             for seed in DRIFT_SEEDS:

@@ -22,7 +22,7 @@ def drifts(contact, cells, duration_s):
     return np.array(found)
 
 
-@pytest.mark.parametrize("cells", [2, 4])
+@pytest.mark.parametrize("cells", [2, 4, 20])
 def test_undamped_chains_on_hertz_s_stops_gain_energy_as_often_as_they_lose_it_and_little(cells):
     found = drifts("hertz", cells, 0.5)
     assert np.abs(found).max() < 2e-5
@@ -30,7 +30,7 @@ def test_undamped_chains_on_hertz_s_stops_gain_energy_as_often_as_they_lose_it_a
 
 
 @pytest.mark.parametrize(
-    ("contact", "bound"), [("power:5", 3e-5), ("power:3", 3e-5), ("linear_gap:2e5", 3e-5)]
+    ("contact", "bound"), [("power:5", 3e-5), ("power:3", 3e-5), ("linear_gap:2e5", 1e-6)]
 )
 def test_undamped_chains_under_other_laws_keep_their_energy(contact, bound):
     assert np.abs(drifts(contact, 3, 0.5)).max() < bound

@@ -54,9 +54,9 @@ from ._cell_flow import (
     cell_rates,
 )
 
-CARE = 0.03
+CARE = 1e-4
 """Part of the tolerance that a step may use. Errors of steps take energy and do not give it, so that they add
-up from contact to contact; those of whole collisions do not."""
+up from contact to contact; those of whole collisions do not. Here they are below what is left of those."""
 FINEST = 1e-11
 PUSHED, SO_FAR = 3, 4
 """Places of a log's first row, after those of `vibench.sim.contact`: the variation of I_1 in the window, and
