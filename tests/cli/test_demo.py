@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.signal import welch
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
@@ -61,6 +62,35 @@ def test_weak_noise_shows_the_three_linear_resonances_within_one_percent(results
 
 def test_strong_noise_shows_the_two_terminal_resonances_within_two_percent_and_no_other(results):
     assert resonances_hz(results["noise_strong"]) == pytest.approx(TERMINAL_HZ, rel=0.02)
+
+
+def test_another_program_reads_the_response_the_coherence_and_the_densities(demo, vibench_here, tmp_path):
+    pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
+    path = demo / "recordings" / "noise_weak.h5"
+    asked = ("--to", "uff", "--spectra", "--quantity", "velocity/acceleration", "--out", "frf.uff")
+    assert vibench_here("export", path, *asked, cwd=tmp_path).returncode == 0
+    _, response, coherence, *densities = pyuff.UFF(str(tmp_path / "frf.uff")).read_sets()
+    with open_recording(path) as recording:
+        measured = analyse(recording).response.frequency_response
+        samples = {each.role: recording.read(each.role) for each in recording.channels}
+        rate = round(recording.sample_rate_hz)
+    assert [response["func_type"], coherence["func_type"]] == [4, 6]
+    for each in (response, coherence):
+        np.testing.assert_allclose(each["x"], measured.frequency_hz, rtol=6e-6)
+    # v / a of the same displacements x0 / xb: the base's is divided by i times the angular frequency.
+    turned = measured.value / (2j * np.pi * measured.frequency_hz)
+    np.testing.assert_allclose(response["data"], turned, rtol=1e-10)
+    np.testing.assert_allclose(coherence["data"], measured.coherence, rtol=1e-10)
+    axes = ("ordinate", "orddenom")
+    assert [response[f"{axis}_axis_units_lab"].strip() for axis in axes] == ["m/s", "m/s2"]
+    assert [response[f"{axis}_spec_data_type"] for axis in axes] == [11, 12]
+    assert [coherence[f"{axis}_axis_units_lab"].strip() for axis in axes] == ["NONE", "NONE"]
+    assert [coherence[f"{axis}_spec_data_type"] for axis in axes] == [0, 0]
+    assert [each["ordinate_axis_lab"].strip() for each in densities] == list(samples)
+    for density, values in zip(densities, samples.values(), strict=True):
+        hz, wanted = welch(values, rate, nperseg=rate, detrend=False)
+        np.testing.assert_allclose(density["x"], hz)
+        np.testing.assert_allclose(density["data"], wanted, rtol=1e-9)
 
 
 def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own(demo):

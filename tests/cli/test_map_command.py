@@ -2,11 +2,14 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from vibench.cli.map_motions import FILE
 from vibench.sim.maps import open_map
 
+xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
+pytest.importorskip("h5netcdf", reason="pip install vibench[exchange] brings h5netcdf")
 MAP = """
 frequency_hz = { start = 80, stop = 140, points = 9 }
 amplitude_m = { start = 2e-6, stop = 2e-5, points = 7, spacing = "logarithmic" }
@@ -52,6 +55,12 @@ def test_a_map_becomes_a_file_and_a_picture_and_goes_on_where_it_was(vibench_her
     told = json.loads(found.stdout)
     assert told["is_complete"]
     assert told["computed"] == open_map(tmp_path / "a" / FILE).computed
+    with xarray.open_dataset(tmp_path / "a" / FILE, engine="h5netcdf") as labelled:
+        np.testing.assert_array_equal(
+            labelled["response_i"], open_map(tmp_path / "a" / FILE).values("response_i")
+        )
+        assert labelled["frequency"].attrs["units"] == "Hz"
+        assert labelled["response_i"].dims[-2:] == ("start", "frequency")
     assert {"map.h5", "map.png", "map.svg"} <= {path.name for path in (tmp_path / "a").iterdir()}
     again = vibench_here("map", asked, "--out", "a", cwd=tmp_path)
     assert again.returncode == 1

@@ -130,7 +130,7 @@ def test_the_bounds_hold_the_truth_as_often_as_they_say(count):
         inside_magnitude += np.count_nonzero(
             (result.magnitude_lower <= best) & (result.magnitude_upper >= best)
         )
-        inside_phase += np.count_nonzero((result.phase_lower <= 0) & (result.phase_upper >= 0))
+        inside_phase += np.count_nonzero((result.phase_lower_rad <= 0) & (result.phase_upper_rad >= 0))
         trials += result.value.size
     own_error = 4 * np.sqrt(0.95 * 0.05 / trials)
     assert inside_phase / trials == pytest.approx(0.95, abs=own_error)

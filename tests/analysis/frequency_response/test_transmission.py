@@ -108,7 +108,9 @@ def test_the_bounds_hold_the_truth_as_often_as_they_say(averages, output_noise):
         inside_magnitude += np.count_nonzero(
             (result.magnitude_lower[inner] <= 1) & (result.magnitude_upper[inner] >= 1)
         )
-        inside_phase += np.count_nonzero((result.phase_lower[inner] <= 0) & (result.phase_upper[inner] >= 0))
+        inside_phase += np.count_nonzero(
+            (result.phase_lower_rad[inner] <= 0) & (result.phase_upper_rad[inner] >= 0)
+        )
         trials += result.value[inner].size
     own_error = 3 * np.sqrt(0.95 * 0.05 / trials)
     assert inside_phase / trials == pytest.approx(0.95, abs=own_error)

@@ -33,7 +33,7 @@ def coverage(estimator, overlap, averages, repeats, seed):
         low, high = found.magnitude_lower[EVERY_THIRD], found.magnitude_upper[EVERY_THIRD]
         held_magnitude += np.count_nonzero((low <= 1) & (high >= 1))
         held_phase += np.count_nonzero(
-            (found.phase_lower[EVERY_THIRD] <= 0) & (found.phase_upper[EVERY_THIRD] >= 0)
+            (found.phase_lower_rad[EVERY_THIRD] <= 0) & (found.phase_upper_rad[EVERY_THIRD] >= 0)
         )
         trials += low.size
     return held_magnitude / trials, held_phase / trials, np.sqrt(0.95 * 0.05 / trials)

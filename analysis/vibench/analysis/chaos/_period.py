@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..signals import Reals
+from ..tables import Labelled
 
 LONGEST_PERIOD = 32
 STEADY = 2e-3
@@ -17,7 +18,7 @@ _DRIFT = 5.0
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class Points(Labelled):
     """Motion once a drive period, with what it is to be judged by; coordinates over their sizes."""
 
     value: Reals

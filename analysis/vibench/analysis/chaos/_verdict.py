@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import NotEnoughData
 from ..signals import Reals
+from ..tables import Labelled
 from ._divergence import Divergence, divergence
 from ._embedding import embedded
 from ._period import Points, is_settled, shortest_period
@@ -95,7 +96,7 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
-class MotionVerdict:
+class MotionVerdict(Labelled):
     """What a motion is, and why one may say so."""
 
     kind: MotionKind

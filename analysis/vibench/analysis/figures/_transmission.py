@@ -136,7 +136,7 @@ def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: 
     view = analysis.request.view
     measured = view.shown(analysis.response.frequency_response)
     mark_resonances(axes, at)
-    low, high = np.rad2deg(measured.phase_lower), np.rad2deg(measured.phase_upper)
+    low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
     axes.fill_between(measured.frequency_hz, low, high, color=BOUNDS, alpha=0.45, linewidth=0)
     if laid is not None:
         simulated = view.shown(laid.response.frequency_response)
@@ -241,8 +241,8 @@ def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, 
         **named(measured, "frequency_hz", "magnitude", "magnitude_lower", "magnitude_upper"),
         "magnitude_db": measured.decibel,
         "phase_rad": measured.phase_rad,
-        "phase_lower_rad": measured.phase_lower,
-        "phase_upper_rad": measured.phase_upper,
+        "phase_lower_rad": measured.phase_lower_rad,
+        "phase_upper_rad": measured.phase_upper_rad,
         "coherence": measured.coherence,
         "magnitude_h1": view.shown(analysis.response.h1).magnitude,
         "magnitude_h2": view.shown(analysis.response.h2).magnitude,

@@ -6,11 +6,12 @@ import numpy as np
 from scipy.special import digamma, polygamma
 
 from ..signals import Flags, Reals
+from ..tables import Labelled
 from ._periodic import DetectionLines, PeriodicFrequencyResponse
 
 
 @dataclass(frozen=True)
-class Distortion:
+class Distortion(Labelled):
     """Noise and nonlinear distortion of a transmission, each in parts of it; medians over the lines."""
 
     noise_share: float

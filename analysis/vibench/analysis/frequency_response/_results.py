@@ -98,12 +98,12 @@ class FrequencyResponse(Labelled):
         return magnitude_bounds(self.magnitude, self.half_width)[1]
 
     @property
-    def phase_lower(self) -> Reals:
+    def phase_lower_rad(self) -> Reals:
         """Lower bound of the phase [rad]; may pass -pi."""
         return np.asarray(self.phase_rad - phase_half_width(self.half_width))
 
     @property
-    def phase_upper(self) -> Reals:
+    def phase_upper_rad(self) -> Reals:
         """Upper bound of the phase [rad]; may pass pi."""
         return np.asarray(self.phase_rad + phase_half_width(self.half_width))
 

@@ -7,6 +7,7 @@ import numpy as np
 from vibench.sim.kernels import kernel
 
 from ..signals import Flags, Reals
+from ..tables import Labelled
 from ._filter_kernels import (
     LOWER,
     STATES,
@@ -28,7 +29,7 @@ _MOST_STEPS = 400
 
 
 @dataclass(frozen=True, eq=False)
-class Collisions:
+class Collisions(Labelled):
     """Contacts of m1 with its stops in the order of time, arrays of one value each."""
 
     samples: Reals

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import NotEnoughData
 from ..signals import Flags, Reals, Samples
+from ..tables import Labelled
 from ._filtering import MotionModel, motion_model, run_filter
 from ._latent_force import LatentMotion, latent_motion, latent_start
 from ._parameters import PRIOR_SD, Hidden, value_of, with_values
@@ -45,7 +46,7 @@ _WORST_SCATTER_OF_GAP = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class FreeImpacts:
+class FreeImpacts(Labelled):
     """Impacts told by the force that the channels need, one row each."""
 
     samples: Reals
@@ -64,7 +65,7 @@ class FreeImpacts:
 
 
 @dataclass(frozen=True, eq=False)
-class FreeMotion:
+class FreeMotion(Labelled):
     """A whole motion without a contact model."""
 
     p: Samples

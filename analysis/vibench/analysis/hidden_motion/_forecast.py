@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..signals import Reals
+from ..tables import Labelled
 from ._filter_kernels import STATES, VX, W, X, Y, Z
 from ._filtering import FilterState, MotionModel, run_filter
 from ._prepared_motion import PreparedMotion
@@ -26,7 +27,7 @@ _NOT_MEASURED = 1e30
 
 
 @dataclass(frozen=True, eq=False)
-class Forecast:
+class Forecast(Labelled):
     """p from now on, one value a sample."""
 
     first: int

@@ -10,6 +10,7 @@ from vibench.sim import UnknownSpecimenError, load_specimen
 
 from ..errors import InvalidRequest
 from ..signals import Reals, Samples
+from ..tables import Labelled
 from ._numbers import Numbers
 
 LONGEST_VIEW_S = 2.0
@@ -33,7 +34,7 @@ class HiddenViewRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class HiddenView:
+class HiddenView(Labelled):
     """What is drawn of it."""
 
     request: HiddenViewRequest

@@ -15,6 +15,7 @@ from vibench.sim import Specimen
 
 from ..recordings import BASE, RESPONSE
 from ..signals import Reals
+from ..tables import Labelled
 from ._change_watch import BLOCK_S, ChangeWatch, KnownNumber, Level
 from ._filter_kernels import STATES
 from ._filtering import LOSS_LIMIT, Filtered, FilterState, MotionModel, motion_model, run_filter
@@ -53,7 +54,7 @@ class LiveState(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class LiveMotion:
+class LiveMotion(Labelled):
     """The newest of the hidden motion."""
 
     state: LiveState

@@ -19,6 +19,7 @@ from ..model import (
 )
 from ..recordings import AbstractAnalysis, Channels, RecordingFacts
 from ..sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
+from ..tables import Labelled
 from ..uncertainty import Budget
 
 Json = dict[str, Any]
@@ -28,7 +29,7 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 
 @dataclass(frozen=True, eq=False)
-class Result(Generic[A, L]):
+class Result(Labelled, Generic[A, L]):
     """A measurement and its simulation."""
 
     analysis: A

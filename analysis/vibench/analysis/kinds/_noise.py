@@ -61,8 +61,8 @@ def _frequency_response(analysis: NoiseAnalysis) -> Json:
         "confidence": how.confidence,
         **named(found, "coherence_significance", "frequency_hz", "magnitude"),
         **named(found, "magnitude_lower", "magnitude_upper", "phase_rad"),
-        "phase_lower_rad": found.phase_lower,
-        "phase_upper_rad": found.phase_upper,
+        "phase_lower_rad": found.phase_lower_rad,
+        "phase_upper_rad": found.phase_upper_rad,
         "coherence": found.coherence,
         "is_significant": found.is_significant,
     }

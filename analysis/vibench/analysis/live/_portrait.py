@@ -6,6 +6,7 @@ import numpy as np
 from scipy import fft
 
 from ..signals import Reals
+from ..tables import Labelled
 from ._drive_tone import drive_tone, drive_turns
 from ._ring import RingWindow
 from ._sine_response import displacement_of, look_samples
@@ -20,7 +21,7 @@ MOST_POINTS = 3000
 
 
 @dataclass(frozen=True, eq=False)
-class Portrait:
+class Portrait(Labelled):
     """The orbit of the newest periods, and the motion once a drive period."""
 
     drive_hz: float

@@ -26,6 +26,7 @@ from ..signals import (
     taper,
 )
 from ..spectra import SpectralAverages
+from ..tables import Labelled
 from ._ring import Values
 
 _LEAST_SEGMENTS = 2
@@ -52,7 +53,7 @@ class SpectrumSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class LiveSpectrum:
+class LiveSpectrum(Labelled):
     """Root of the spectral density of every channel."""
 
     frequency_hz: Reals

@@ -18,11 +18,12 @@ from ..kinds import ANALYSES, AnyResult
 from ..model import AbstractOverlay, Simulation
 from ..recordings import Verdict
 from ..sine import SteppedResponse, SweepResponse
+from ..tables import Labelled
 from ._campaign_results import AnalysisFailure, result_of
 
 
 @dataclass(frozen=True, eq=False)
-class ComparedRecording:
+class ComparedRecording(Labelled):
     """What a comparison keeps of a recording; small, so that it crosses from the process that made it."""
 
     path: Path

@@ -1,5 +1,7 @@
 """Frequency response, coherence and spectral densities of a recording, for programs that read functions."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from vibench.acquisition.recording import ChannelHeader
@@ -49,10 +51,12 @@ def _responses(response: NoiseResponse, view: FrequencyResponseView) -> tuple[Un
     moved = _axis(Role.M0_VELOCITY, "m0", view.response)
     reference = _axis(Role.BASE_ACCELERATION, "base", view.base)
     note = f"estimator {found.settings.estimator.value}, {found.n_eff:.4g} averages"
-    of = (moved, reference, note)
+    # A coherence has no unit: a program that turns metres into millimetres must leave it alone.
+    bare, bare_reference = (replace(axis, quantity="", unit="NONE") for axis in (moved, reference))
+    hz, kinds = found.frequency_hz, FunctionType
     return (
-        UniversalFunction(FunctionType.FREQUENCY_RESPONSE, found.frequency_hz, found.value, *of),
-        UniversalFunction(FunctionType.COHERENCE, found.frequency_hz, found.coherence, *of),
+        UniversalFunction(kinds.FREQUENCY_RESPONSE, hz, found.value, moved, reference, note),
+        UniversalFunction(kinds.COHERENCE, hz, found.coherence, bare, bare_reference, note),
     )
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..tables import Labelled
 from ._arrays import Reals
 
 DEFAULT_BINS = 1500
@@ -11,7 +12,7 @@ DEFAULT_BINS = 1500
 
 
 @dataclass(frozen=True)
-class Envelope:
+class Envelope(Labelled):
     """Extremes of a signal in equal stretches of time; arrays of shape (bins,)."""
 
     time_s: Reals

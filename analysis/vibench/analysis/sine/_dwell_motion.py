@@ -13,6 +13,7 @@ from ..chaos import MotionVerdict, Points, begin_of_last_motion, motion_verdict,
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings import Channels, only_stretch, read_whole
 from ..signals import REACH, Quantity, Reals, converted_signal, interpolated
+from ..tables import Labelled
 from ..tones import fitted_sine
 from ._dwell import DwellResponse
 
@@ -106,7 +107,7 @@ def stroboscope(
 
 
 @dataclass(frozen=True, eq=False)
-class DwellMotion:
+class DwellMotion(Labelled):
     """A dwell once a drive period."""
 
     section: Section
