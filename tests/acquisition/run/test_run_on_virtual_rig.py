@@ -177,7 +177,7 @@ def tell(progress):
 if __name__ == "__main__":
     signal.signal(signal.SIGHUP, signal.SIG_DFL)  # whatever the test was started by
     plan = Measurement(
-        name="run", excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.1, duration_s=20000)
+        name="run", excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.1, duration_s=2000)
     )
     with open_bench(Path(sys.argv[1])) as bench:
         outcome = run_measurement(bench, plan, Path(sys.argv[2]), on_progress=tell)
