@@ -187,6 +187,24 @@ def test_a_phase_resonance_is_tracked_along_the_backbone(new_control_bench):
     assert found[-1]["frequency_hz"] > found[0]["frequency_hz"] + 0.05
 
 
+def test_a_strongly_bent_resonance_is_followed_though_each_level_moves_it_by_half_widths(new_control_bench):
+    """From 120 to 127 Hz, by up to four half-widths (0.48 Hz) a level."""
+    bench = new_control_bench(hardening=HARDENING)
+    plan = ResonanceTracking(
+        amplitude_vpp=3.0,
+        start_hz=120,
+        low_hz=110,
+        high_hz=180,
+        accelerations_m_per_s2=tuple(0.1 * 1.2**k for k in range(13)),
+        settling=SETTLING,
+        flank_pairs=1,
+    )
+    bench.carry_out(Measurement(name="bent", excitation=plan, ramp_s=0.2))
+    found = said(bench, "resonance")
+    assert all(abs(each["phase_deg"] + 90) < 6 for each in found)
+    assert found[-1]["at_hz"] > 127
+
+
 def test_without_a_level_the_plan_s_setting_is_played_from_end_to_end(new_control_bench):
     bench = new_control_bench()
     plan = SettledSine(amplitude_vpp=0.3, frequencies_hz=(140, 150), record_s=0.3, settling=SETTLING)

@@ -52,3 +52,11 @@ def test_the_sensors_phase_widens_the_uncertainty_by_the_slope():
 def test_it_stays_in_its_range():
     search = PhaseSearch(260.0, 270.0, 4.0, [PhaseError(258.0 + 4, 80.0, 0.1), PhaseError(268.0, 70.0, 0.1)])
     assert search.next_hz() == 270.0
+
+
+def test_errors_beyond_a_right_angle_tell_no_crossing():
+    tries = [PhaseError(100.0, 130.0, 1.0), PhaseError(101.0, 120.0, 1.0)]
+    found = PhaseSearch(90.0, 110.0, 1.0, tries).resonance(0.3)
+    assert found.frequency_hz == 101.0
+    assert found.uncertainty_hz == np.inf
+    assert found.half_width_hz == 0.0

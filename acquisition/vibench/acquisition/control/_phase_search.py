@@ -78,11 +78,11 @@ class PhaseSearch:
         best = nearest[0]
         frequency_hz = np.array([each.frequency_hz for each in used])
         error_deg = np.array([each.error_deg for each in used])
-        spread = float(np.var(frequency_hz))
-        if spread == 0.0:
-            return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
         # The tangent of the error is a straight line through a mode, whose phase itself bends away from it.
         error = np.degrees(np.tan(np.radians(np.clip(error_deg, -_STEEPEST_DEG, _STEEPEST_DEG))))
+        if np.ptp(frequency_hz) == 0.0 or np.ptp(error) == 0.0:
+            # All at one frequency, or all beyond a right angle: nothing tells where it is crossed.
+            return PhaseResonance(best.frequency_hz, float("inf"), 0.0)
         # A given phase moves the tangent the more, the further out it is.
         weight = np.cos(np.radians(error_deg)) ** 4
         away_hz = frequency_hz - float(weight @ frequency_hz / weight.sum())

@@ -27,12 +27,10 @@ _LOST_RAD = pi / 4
 """An error of the phase beyond which the loop is no longer on the resonance."""
 _CORRECTED = 0.5
 """Standard uncertainty of the correction for the phase that is left, as a share."""
-_LEFT = 2.0
+_LEFT = 1.5
 """How far the motion may have to go still, over the tolerance of the phase in radians."""
 _TOLD = 0.02
 """Spread of frequencies, over the half-width, from which on their errors tell another half-width."""
-_AHEAD = 0.5
-"""Part of the way from the level before that is gone ahead."""
 _LOOKS_LOCKED = 3
 """Looks in a row with phase and level where they should be, before it counts as locked."""
 _BATCHES = 8
@@ -61,11 +59,6 @@ class TrackedPlace:
     risen_hz: float = 0.0
     """From the level before."""
 
-    @property
-    def ahead_hz(self) -> float:
-        """Where the next level is begun: short of the line, as a bent resonance lies beside its fold [Hz]."""
-        return self.frequency_hz + _AHEAD * self.risen_hz
-
 
 def _followed(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace
@@ -73,7 +66,7 @@ def _followed(
     """Go to the next level under the phase-locked loop and record there; None far off the resonance."""
     controller = SettlingController(loop, plan.settling, plan.held_levels[number])
     law = PhaseLaw(plan, last.half_width_hz)
-    looks, lock = yield from _locked(controller, plan, law, last.ahead_hz)
+    looks, lock = yield from _locked(controller, plan, law, last)
     if lock is None:
         return None
     periods, half_width_hz = looks * LOOK_PERIODS, law.seen_half_width_hz
@@ -93,17 +86,18 @@ def _followed(
 
 
 def _locked(
-    controller: SettlingController, plan: ResonanceTracking, law: "PhaseLaw", start_hz: float
+    controller: SettlingController, plan: ResonanceTracking, law: "PhaseLaw", last: TrackedPlace
 ) -> Controller[tuple[int, LockResult | None]]:
     """Hold phase and level at once; gives the looks it took, and how it ended: None far off the resonance.
 
     The frequency moves by ``g (tau / L (e[k] - e[k-1]) + e[k])`` half-widths, e the error of the phase in
     radians, L the time of a look and tau that in which the mode forgets: proportion and sum, whose zero lies
     on the mode's pole, so that the error falls by the share g at every look. Contacts make the phase fall
-    more gently over the frequency: g grows as long as the error does not fall as it should.
+    more gently over the frequency: g grows as long as the error does not fall as it should. A bent resonance
+    moves as the motion grows to its new level: what it moved by at the level before is added as fast as that.
     """
     loop, error_rad = controller.loop, 0.0
-    moved(loop, start_hz, controller.level)
+    moved(loop, last.frequency_hz, controller.level)
     tolerance_rad = radians(plan.phase_tolerance_deg)
     in_a_row, looks = 0, plan.most_periods // LOOK_PERIODS
     for look in range(1, looks + 1):
@@ -116,7 +110,7 @@ def _locked(
         in_a_row = in_a_row + 1 if is_on else 0
         if in_a_row == _LOOKS_LOCKED:
             return look, LockResult.LOCKED
-        frequency_hz = law.next_hz(now.frequency_hz)
+        frequency_hz = law.next_hz(now.frequency_hz, last.risen_hz, look)
         loop.change(frequency_hz, controller.prompt_vpp(base, frequency_hz))
     return looks, None if abs(error_rad) > _LOST_RAD else LockResult.LOST
 
@@ -162,14 +156,16 @@ class PhaseLaw:
         self._motion = motion
         return error_rad, left
 
-    def next_hz(self, frequency_hz: float) -> float:
-        """Give the next frequency, within the plan's band [Hz]."""
+    def next_hz(self, frequency_hz: float, rise_hz: float, look: int) -> float:
+        """Give the next frequency, within the plan's band; the resonance should rise by so much [Hz]."""
         error_rad, before_rad = self._error_rad, self._before_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _LOOP_GAIN
         wanted = self._gain * error_rad + _LOOP_GAIN * self._forgets(frequency_hz) * (error_rad - before_rad)
         widest_hz = self._plan.widest_step_hz
-        step_hz = min(max(wanted * self._half_width_hz, -widest_hz), widest_hz)
+        kept = exp(-1.0 / self._forgets(frequency_hz))
+        wanted_hz = wanted * self._half_width_hz + rise_hz * (1.0 - kept) * kept ** (look - 1)
+        step_hz = min(max(wanted_hz, -widest_hz), widest_hz)
         return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
 
     def _forgets(self, frequency_hz: float) -> float:
