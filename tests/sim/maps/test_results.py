@@ -34,10 +34,12 @@ def test_an_adaptive_map_has_what_the_full_one_has_wherever_it_was_computed(adap
     assert low * adaptive.audit.filled <= wrong <= high * adaptive.audit.filled
 
 
-def test_the_shares_of_a_map_are_those_of_its_points(adaptive):
+def test_the_shares_of_a_map_are_those_of_its_points_and_its_audit(adaptive):
     assert sum(each.share.share for each in adaptive.motions) == pytest.approx(1.0)
+    audit, cells = adaptive.audit, adaptive.plan.grid.size
     for number, motion in enumerate(adaptive.motions):
-        assert motion.share.share == np.mean(adaptive.motion_numbers == number)
+        more = (audit.gained[number] - audit.lost[number]) / audit.audited * (audit.filled - audit.audited)
+        assert motion.share.share == pytest.approx(np.mean(adaptive.motion_numbers == number) + more / cells)
         assert motion.share.low <= motion.share.share <= motion.share.high
 
 

@@ -148,15 +148,18 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
     is_steady = is_whole[:, 0] & (motion[:, 0] == list(MotionKind).index(MotionKind.PERIODIC))
     seen = Seen(
         is_known,
-        _codes(label),
+        cell_codes(label),
         np.where(is_steady, size, math.nan),
         BASIN_JUMP if plan.is_basin else JUMP,
     )
     return plan_refinement(seen, plan.coarse, plan.seed)
 
 
-def _codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give cells a number for what the first start came to and which motions were found, (rows, columns)."""
+def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Give each cell a number for what the first start came to and which motions were found.
+
+    From shape (rows, starts, columns) to (rows, columns).
+    """
     rows, starts, columns = label.shape
     if starts == 1:
         return label[:, 0]

@@ -61,8 +61,8 @@ class RefinementPlan:
     """Coarse levels first."""
     audited: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """Cells that would have been filled in, and were computed to see."""
-    wrong: int = 0
-    """Of these, how many came to another motion than was filled in."""
+    audited_donors: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """Computed cells whose motion these had been taken to have."""
 
 
 def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
@@ -97,12 +97,15 @@ def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
 
 
 def _audited(sketch: "_Sketch", fillings: tuple[Filling, ...], seed: int) -> RefinementPlan:
-    filled = np.concatenate([np.zeros(0, dtype=np.int64), *(each.cells for each in fillings)])
+    nothing = np.zeros(0, dtype=np.int64)
+    filled = np.concatenate([nothing, *(each.cells for each in fillings)])
+    donors = np.concatenate([nothing, *(each.donors for each in fillings)])
     rng = np.random.default_rng([seed, len(filled)])
-    audited = np.sort(rng.choice(filled, min(AUDITED, int(AUDITED_SHARE * len(filled))), replace=False))
-    known = sketch.seen.is_known.reshape(-1)[audited]
-    wrong = sketch.seen.codes.reshape(-1)[audited] != sketch.codes.reshape(-1)[audited]
-    return RefinementPlan(audited[~known], 1, fillings, audited, int(np.count_nonzero(wrong[known])))
+    count = min(AUDITED, int(AUDITED_SHARE * len(filled)))
+    drawn = rng.choice(len(filled), count, replace=False)
+    drawn = drawn[np.argsort(filled[drawn])]
+    known = sketch.seen.is_known.reshape(-1)[filled[drawn]]
+    return RefinementPlan(filled[drawn][~known], 1, fillings, filled[drawn], donors[drawn])
 
 
 class _Sketch:

@@ -1,5 +1,6 @@
 """What a map has found: over its axes, computed or filled in, and which motions there are."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -8,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import Floats
-from ..scene import Count, MotionKind, Share, shares_of, wilson_share
+from ..scene import UNSURE, Count, MotionKind, Share, shares_of, wilson_share
 from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions
 from ._columns import labels_of
-from ._expansion import BASIN_JUMP, refinement_of
+from ._expansion import BASIN_JUMP, cell_codes, refinement_of
 from ._map import Map
+from ._refinement import RefinementPlan
 
 UNKNOWN = -1
 SOLID = np.array([kind is MotionKind.PERIODIC for kind in MotionKind])
@@ -43,11 +45,62 @@ class Audit:
     audited: int
     wrong: int
     """Of these, how many came to another motion than was filled in."""
+    gained: tuple[float, ...]
+    """Of these, how many came to each motion, filled in as another; of several starts, in parts."""
+    lost: tuple[float, ...]
+    """How many had been filled in as each motion and came to another."""
 
     @property
     def wrong_share(self) -> Share:
         """Share of the filled cells that is wrong; the interval holds it in 19 cases of 20."""
         return wilson_share(self.wrong, self.audited) if self.audited else Share(0.0, 0.0, 0.0)
+
+    def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
+        """Correct shares of motions in a map of so many cells by how filling in was wrong.
+
+        Where motions are mixed finely the commonest is filled in too often. What the audit gains and loses
+        each motion is what the other filled cells would, as far as their number tells.
+        """
+        if not self.audited:
+            return tuple(shares)
+        rest = (self.filled - self.audited) / cells
+        unsure = UNSURE / (2 * len(shares))
+        found = []
+        for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
+            come, gone = (wilson_share(each, self.audited, unsure) for each in (gained, lost))
+            found.append(
+                Share(
+                    share.share + rest * (come.share - gone.share),
+                    max(0.0, share.low + rest * (come.low - gone.high)),
+                    min(1.0, share.high + rest * (come.high - gone.low)),
+                )
+            )
+        return tuple(found)
+
+
+def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
+    """Say how often filling in was wrong.
+
+    Parameters
+    ----------
+    numbers
+        Of the motion that each point came to, shape (rows, starts, columns).
+    found
+        The refinement's plan, with nothing missing.
+
+    """
+    codes = cell_codes(numbers).reshape(-1)
+    starts = np.moveaxis(numbers, 1, 2).reshape(len(codes), -1)
+    here, taken = starts[found.audited], starts[found.audited_donors]
+    differs = (here != taken) & (here != UNKNOWN)
+    motions = np.arange(numbers.max(initial=UNKNOWN) + 1)[:, None, None]
+    gained, lost = (
+        tuple(((differs & (each == motions)).sum(axis=(1, 2)) / starts.shape[1]).tolist())
+        for each in (here, taken)
+    )
+    wrong = int(np.count_nonzero(codes[found.audited] != codes[found.audited_donors]))
+    filled = sum(len(each.cells) for each in found.fillings)
+    return Audit(filled, len(found.audited), wrong, gained, lost)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +122,7 @@ class MapResults(GridResults[Map]):
         """How often filling in was wrong; None of a map of which every point is computed, or not complete."""
         if not (self.plan.is_adaptive and self.is_complete):
             return None
-        found = refinement_of(self.plan, dict(self.arrays))
-        filled = sum(len(each.cells) for each in found.fillings)
-        return Audit(filled, len(found.audited), found.wrong)
+        return audit_of(self.motion_numbers, refinement_of(self.plan, dict(self.arrays)))
 
     @cached_property
     def motion_numbers(self) -> NDArray[np.int64]:
@@ -105,8 +156,7 @@ class MapResults(GridResults[Map]):
     def motions(self) -> tuple[MapMotion, ...]:
         """The motions of the whole map, by `motion_numbers`.
 
-        Shares are of all known points. Of a map of which a part is filled in the intervals are wider by the
-        most of it that may be wrong.
+        Shares are of all known points; of a map of which a part is filled in, as the audit corrects them.
         """
         return self._described(self.motion_numbers.reshape(-1), self.audit)
 
@@ -163,14 +213,15 @@ class MapResults(GridResults[Map]):
         ]
         kinds = [list(MotionKind)[int(self.arrays["motion"][place[0]])] for place in places]
         shares = shares_of([Count(len(place), is_final=True) for place in places])
-        off = 0.0 if audit is None else audit.wrong_share.high * audit.filled / total
+        if audit is not None:
+            shares = audit.corrected(shares, total // self.plan.grid.shape[-2])
         return tuple(
             MapMotion(
                 kind,
                 int(self.arrays["period"][place[0]]) if kind is MotionKind.PERIODIC else None,
                 self._median("response_i", place),
                 self._median("response_ii", place),
-                Share(share.share, max(0.0, share.low - off), min(1.0, share.high + off)),
+                share,
             )
             for place, kind, share in zip(places, kinds, shares, strict=True)
         )

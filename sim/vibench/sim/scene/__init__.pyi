@@ -25,6 +25,7 @@ from ._scene import (
     Scene as Scene,
 )
 from ._shares import (
+    UNSURE as UNSURE,
     Count as Count,
     EscapeRate as EscapeRate,
     Share as Share,

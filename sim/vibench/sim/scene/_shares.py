@@ -19,7 +19,7 @@ class Share:
     high: float
 
 
-def wilson_share(count: int, trials: int, unsure: float = UNSURE) -> Share:
+def wilson_share(count: float, trials: int, unsure: float = UNSURE) -> Share:
     """Find the share that ``count`` of ``trials`` stand for, by Wilson's interval.
 
     It holds for few trials, and for none and all of them too (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
