@@ -1,0 +1,146 @@
+"""A loop whose observer follows the contacts, beside the usual one whose observer knows none, by the model.
+
+    python benchmarks/observed_stops.py [--latency 3e-4] [--shifted 2e-7]
+
+Along the paper's motions with impacts behind their fold (base 1 um), for the rig with a controller: the
+largest multiplier over a period of table, specimen and law together. *Linear* is the usual law: its Kalman
+filter predicts without stops. *Constant* predicts with the slope of the stops along the motion under the same
+gain; *Riccati* under the gain that follows the covariance round the period, as an extended Kalman filter of
+the hidden motion does on it. With ``--shifted`` [m] both believe that p goes further by so much than it does.
+Deviations are linear: how large they may be is not told.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+
+from vibench.acquisition.rig import amplifier_of, load_rig, shaker_of, specimen_of
+from vibench.sim import Harmonic
+from vibench.sim.feedback import Begin, LawWeights, LoopTiming, SampledPlant, designed_law, impact_branch
+from vibench.sim.periodic import PeriodMap, spring_of
+
+SUBSTEPS = 40
+"""Of a sample: contacts are shorter."""
+TURNS = 12
+"""Periods in which the covariance becomes periodic."""
+OPEN = (1.1, 1.3, 1.6, 2.0, 2.5, 3.0, 4.0, 5.0)
+"""Multipliers without a law, at whose motions the loops are compared."""
+LEVEL_M, START_HZ, RANGE_HZ = 1e-6, 97.5, (95.0, 100.0)
+
+
+def struck(plant: SampledPlant, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Give what each sample of a period makes of a deviation, and what its new volt adds.
+
+    Shapes (samples, n, n) and (samples, n); ``slopes`` of the stops' force, shape (samples, SUBSTEPS).
+    """
+    into, relative = plant.spring
+    short_s = plant.timing.step_s / SUBSTEPS
+    parts = [plant._stretch(n * short_s, (n + 1) * short_s) for n in range(SUBSTEPS)]  # noqa: SLF001
+    sampled = np.eye(plant.size)
+    sampled[9:11] = np.eye(plant.size)[[1, 3]]
+    # Volts on their way move on at the end of a sample, as they do without stops.
+    shift, newest = np.eye(plant.size), np.zeros(plant.size)
+    if plant.waiting:
+        shift[11:] = np.eye(plant.size)[10 : plant.size - 1]
+        shift[11], newest[11] = 0.0, 1.0
+    moved, volts = [], []
+    for row in slopes:
+        state, volt = sampled, np.zeros(plant.size)
+        for (matrix, gain), slope in zip(parts, row * short_s, strict=True):
+            state, volt = matrix @ state, matrix @ volt + gain
+            state = state + np.outer(into, relative @ state) * slope
+            volt = volt + into * (relative @ volt) * slope
+        moved.append(shift @ state)
+        volts.append(shift @ volt + newest)
+    return np.array(moved), np.array(volts)
+
+
+def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
+    """Give the Kalman gain at each sample of a period, shape (samples, n, 2), scaled as ``moved`` is."""
+    weights, scale = LawWeights(), plant.scales
+    step, volt = plant.step[0] * scale / scale[:, None], plant.step[1] / scale
+    shown, pushed = plant.shown * scale, step @ (plant.spring[0] / scale) * plant.timing.step_s
+    unknown = np.outer(pushed, pushed) * weights.push_n**2 + np.outer(volt, volt) * weights.volt**2
+    unknown += 1e-12 * np.eye(plant.size)
+    noise = np.diag([weights.acceleration**2, weights.velocity**2])
+    covariance = solve_discrete_are(step.T, shown.T, unknown, noise)
+    gains = np.empty((len(moved), plant.size, 2))
+    for k in [*range(len(moved))] * TURNS:
+        gains[k] = np.linalg.solve(shown @ covariance @ shown.T + noise, shown @ covariance).T
+        covariance = moved[k] @ (covariance - gains[k] @ shown @ covariance) @ moved[k].T + unknown
+        covariance = 0.5 * (covariance + covariance.T)
+    return gains
+
+
+def multipliers(plant: SampledPlant, slopes: np.ndarray, believed: np.ndarray) -> list[float]:
+    """Give the largest multiplier of a period with each of the three observers."""
+    scale, law = plant.scales, designed_law(plant)
+    shown, step, volt = plant.shown * scale, plant.step[0] * scale / scale[:, None], plant.step[1] / scale
+    true, volts = struck(plant, slopes)
+    seen, seen_volts = struck(plant, believed)
+    true, seen = (each * scale / scale[:, None] for each in (true, seen))
+    volts, seen_volts = volts / scale, seen_volts / scale
+    count = len(true)
+    plain = gains_along(plant, step[None])[:1].repeat(count, axis=0)
+    # u = -feedback (estimate): the law's output for what its memory estimates, after the sample.
+    kept = np.eye(plant.size) - plain[0] @ shown
+    feedback = -np.linalg.lstsq(kept.T, law.output.T, rcond=None)[0].T
+    observers = (
+        (step[None].repeat(count, axis=0), volt[None].repeat(count, axis=0), plain),
+        (seen, seen_volts, plain),
+        (seen, seen_volts, gains_along(plant, seen)),
+    )
+    return [_largest(true, volts, observer, feedback, shown) for observer in observers]
+
+
+def _largest(
+    true: np.ndarray,
+    volts: np.ndarray,
+    observer: tuple[np.ndarray, ...],
+    feedback: np.ndarray,
+    shown: np.ndarray,
+) -> float:
+    size = true.shape[1]
+    period = np.eye(2 * size)
+    for matrix, volt, model, model_volt, gain in zip(true, volts, *observer, strict=True):
+        filtered = np.hstack([gain @ shown, np.eye(size) - gain @ shown])
+        given = -feedback @ filtered
+        plant = np.hstack([matrix, np.zeros((size, size))]) + np.outer(volt, given)
+        period = np.vstack([plant, model @ filtered + np.outer(model_volt, given)]) @ period
+    return float(np.abs(np.linalg.eigvals(period)).max())
+
+
+def main() -> None:
+    """Print a row of a table for each motion."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--latency", type=float, default=3e-4)
+    parser.add_argument("--shifted", type=float, default=0.0)
+    given = parser.parse_args()
+    rig = load_rig(Path("virtual_rig_controller"))
+    rig = rig.model_copy(update={"specimen": load_rig(Path("virtual_rig")).specimen})
+    specimen = specimen_of(rig)
+    spring = spring_of(specimen)
+    branch = impact_branch(specimen, LEVEL_M, START_HZ, RANGE_HZ, Begin.ABOVE)
+    fold = next(each.index for each in branch.events if each.kind.value == "fold")
+    sizes = np.abs(branch.multipliers[:, 0])
+    for size in OPEN:
+        point = fold + 1 + int(np.argmax(sizes[fold + 1 :] >= size))
+        hertz = float(branch.frequencies_hz[point])
+        count = round(rig.controller.rate_hz / hertz)
+        timing = LoopTiming(count * hertz, given.latency)
+        plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen, timing)
+        states = PeriodMap(specimen).orbit(
+            branch.states[point], Harmonic(hertz, LEVEL_M), 2 * count * SUBSTEPS
+        )
+        p = (states.states[:, 1] - states.states[:, 2])[1 : 2 * count * SUBSTEPS : 2].reshape(count, SUBSTEPS)
+        slopes, believed = (
+            spring.stiffness(each, np.zeros_like(each)) for each in (p, p + np.sign(p) * given.shifted)
+        )
+        found = " | ".join(f"{each:.3g}" for each in multipliers(plant, slopes, believed))
+        print(f"| {hertz:.3f} | {sizes[point]:.3g} | {found} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
