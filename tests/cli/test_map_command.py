@@ -82,7 +82,15 @@ def test_a_basin_map_tells_shares_and_kicks(vibench_here, tmp_path):
     [
         (MAP, ("--show", "beauty"), "'beauty'; there are response_i"),
         (MAP, ("--kicks", "5"), "only the start varies"),
-        (DIAGRAM.replace("120", "200"), (), "does not ascend"),
+        (
+            DIAGRAM.replace("120", "200"),
+            (),
+            "frequency_hz = {'points': 3, 'start': 200, 'stop': 130}: a",
+        ),
+        (DIAGRAM.replace("3 }", "1 }"), (), "map.toml: frequency_hz.points = 1: input should be greater"),
+        (DIAGRAM.replace("2e-5", "-2e-5"), (), "map.toml: amplitude_m = -2e-05: input should be greater"),
+        (DIAGRAM.replace('"down"', '"left"'), (), "chain.1 = 'left': input should be 'up' or 'down'"),
+        ("frequency_hz = 100", (), "map.toml: a map goes over one or two ranges"),
         (MAP + "gap = 3\n", (), "gap"),
     ],
 )
@@ -91,4 +99,5 @@ def test_what_cannot_be_mapped_is_one_sentence_and_no_folder(vibench_here, tmp_p
     assert found.returncode == 1
     assert said in " ".join(found.stderr.split())
     assert "Traceback" not in found.stderr
+    assert "valid number" not in found.stderr
     assert not (tmp_path / "a").exists()

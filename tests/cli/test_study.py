@@ -118,6 +118,13 @@ def some_kept(path):
     [
         ("window_s = 0.2", "windows_s = 0.2", "windows_s is not a known key"),
         ("duration_s = 0.5", 'models = ["herz"]', "models.0 = 'herz': contact 'herz' is not known"),
+        ("duration_s = 0.5", "specimen.masses_kg = [1, 1, -1]", "specimen.masses_kg.2 = -1: input should"),
+        ("duration_s = 0.5", "specimen.gap_m = -1", "specimen.gap_m = -1: it must be a number above 0 [m]"),
+        (
+            'starts = ["rest", "up"]',
+            'starts = ["left"]',
+            "starts.0 = 'left': input should be 'rest', 'up'",
+        ),
     ],
 )
 def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench_here, tmp_path, old, new, said):
@@ -127,6 +134,7 @@ def test_a_wrong_study_is_one_sentence_and_makes_no_file(vibench_here, tmp_path,
     assert said in result.stderr
     assert "Traceback" not in result.stderr
     assert len(result.stderr.strip().splitlines()) == 1
+    assert "; " not in result.stderr, "one fault is told once"
     assert not (tmp_path / "a.h5").exists()
 
 

@@ -1,6 +1,7 @@
 """TOML files: read and validated, or refused with file, key and what is allowed; written to be read back."""
 
 import json
+import re
 import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -124,7 +125,7 @@ def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
 
 def complaints(error: ValidationError) -> str:
     """Say in a clause each what a model did not allow; keys of one fault share theirs."""
-    details = error.errors()
+    details = _faults(error)
     missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
     unknown = _key_clause(
         details,
@@ -136,6 +137,46 @@ def complaints(error: ValidationError) -> str:
     if len(other) > MOST_CLAUSES:
         other = [*other[:MOST_CLAUSES], f"and {len(other) - MOST_CLAUSES} more"]
     return shortened("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
+
+
+def _faults(error: ValidationError) -> list[Any]:
+    """Give what is wrong, once: of a key that may hold several kinds of value, for the kind that was meant.
+
+    A value that would be derived from a key with a fault is no fault of its own, nor is a list too short
+    without an item with a fault.
+    """
+    said = error.errors()
+    meant: dict[tuple[Any, ...], dict[Any, list[Any]]] = {}
+    for each in said:
+        place = each["loc"]
+        is_short = each["type"] == "too_short"
+        within = [other for other in said if other["loc"][: len(place)] == place and other is not each]
+        if each["type"] == "default_factory_not_called" or (is_short and within):
+            continue
+        cut = next((i for i, part in enumerate(place) if _is_kind(part)), len(place))
+        meant.setdefault(place[:cut], {}).setdefault(place[cut : cut + 1], []).append(each)
+    return [each for kinds in meant.values() for each in _of_the_nearest(list(kinds.values()))]
+
+
+def _of_the_nearest(kinds: Sequence[list[Any]]) -> list[Any]:
+    """Give the faults of one kind, by the keys that a file has; a single kind is a key of the user's own."""
+    if len(kinds) == 1:
+        return kinds[0]
+    nearest = max(kinds, key=_nearness)
+    return [{**each, "loc": tuple(part for part in each["loc"] if not _is_kind(part))} for each in nearest]
+
+
+_KIND = re.compile(r"[\w-]+\[.*|constrained-\w+|float|int|str|bool|[A-Z][a-z]+([A-Z][a-z]+)*")
+"""How pydantic calls a kind of value: ``constrained-float``, ``function-after[_ascends(), Range]``."""
+
+
+def _is_kind(part: int | str) -> bool:
+    return isinstance(part, str) and _KIND.fullmatch(part) is not None
+
+
+def _nearness(faults: Sequence[Any]) -> tuple[int, bool]:
+    """Say how near a value comes to a kind: a fault within it, or in its size, is nearer than its type."""
+    return max((len(each["loc"]), not each["type"].endswith("_type")) for each in faults)
 
 
 def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) -> tuple[str, ...]:
@@ -155,8 +196,14 @@ def _key(detail: Any) -> str:
     return shortened(".".join(str(part) for part in detail["loc"]), 120) or "the whole file"
 
 
+_ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
+"""A word as Python shows it, ``<Start.UP: 'up'>``."""
+
+
 def _complaint(detail: Any) -> str:
-    reason = shortened(str(detail["msg"]).removeprefix("Value error, "))
+    reason = _ENUM_MEMBER.sub(r"\1", shortened(str(detail["msg"]).removeprefix("Value error, ")))
+    if not detail["loc"]:
+        return reason
     return f"{_key(detail)} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
 
 
