@@ -85,6 +85,34 @@ def test_two_random_specimens_go_every_way_with_the_same_numbers(vibench_here, t
         every_way_agrees(vibench_here, tmp_path, random_specimen(tmp_path, rng))
 
 
+def one_sided(folder):
+    """A file of the paper's specimen without the stop at positive p."""
+    path = folder / "one_sided.toml"
+    path.write_text('model = "gong2025"\nname = "one-sided"\ngap_m = [30e-6, inf]\n', encoding="utf-8")
+    return path
+
+
+@pytest.mark.timeout(300)
+def test_a_specimen_with_a_stop_on_one_side_goes_every_way(vibench_here, tmp_path):
+    every_way_agrees(vibench_here, tmp_path, one_sided(tmp_path))
+
+
+@pytest.mark.parametrize("command", [("specimen",), ("chain", "--cells", 1, "--specimen")])
+def test_json_of_a_stop_on_one_side_has_a_word_for_the_other(vibench_here, tmp_path, command):
+    said = vibench_here(*command, one_sided(tmp_path), "--json", cwd=tmp_path)
+    assert said.returncode == 0, said.stderr
+    document = json.loads(said.stdout)
+    described = document.get("options", {}).get("described", document)
+    assert described["gap_m"] == [30e-6, "inf"]
+
+
+def test_a_printed_specimen_with_a_stop_on_one_side_comes_back(vibench_here, tmp_path):
+    path = one_sided(tmp_path)
+    own = tmp_path / "own.toml"
+    own.write_text(vibench_here("specimen", path, "--toml", cwd=tmp_path).stdout, encoding="utf-8")
+    assert load_specimen(own).specimen() == load_specimen(path).specimen()
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 def test_fifty_random_specimens_go_every_way_with_the_same_numbers(vibench_here, tmp_path):

@@ -1,5 +1,6 @@
 """`vibench specimen`: the specimens and contact laws that there are, or what one of them amounts to."""
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -44,7 +45,8 @@ def show_specimen(
     table = described(specimen)
     facts = figures_of(table.specimen())
     if as_json:
-        print_json({**table.model_dump(mode="json", exclude_none=True), **facts})
+        gaps_m = [gap_m if math.isfinite(gap_m) else str(gap_m) for gap_m in table.specimen().gaps_m]
+        print_json({**table.model_dump(mode="json", exclude_none=True), **facts, "gaps_m": gaps_m})
     elif as_toml:
         typer.echo(toml_text(table), nl=False)
     else:

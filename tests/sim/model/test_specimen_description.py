@@ -19,6 +19,10 @@ from vibench.sim import (
     steady_response,
 )
 
+BODIES = (
+    "{ radius_m = 4e-3, sphere = { youngs_modulus_pa = 2e11, poissons_ratio = 0.7 }, "
+    "plane = { youngs_modulus_pa = 7e10, poissons_ratio = 0.3 } }"
+)
 WHOLE = """
 name = "mine"
 masses_kg = [6e-3, 2e-3, 2e-3]
@@ -120,7 +124,9 @@ def test_a_description_comes_back_from_its_own_text(tmp_path):
         (("hertz_stiffness = 4.9e9", ""), "hertz_stiffness is missing"),
         (("name =", "damping_time_s = 1e-5\nname ="), "both are given"),
         (("dampings_ns_per_m", "# "), "neither is given"),
-        (("[30e-6, inf]", "[1e-5, 2e-5, 3e-5]"), r"neither a number above 0 \[m\] nor \[lower, upper\]"),
+        (("[30e-6, inf]", "[1e-5, 2e-5, 3e-5]"), r"a number above 0 \[m\], or \[lower, upper\]"),
+        (("[30e-6, inf]", "inf"), 'give the contact "linear"'),
+        (("4.9e9", BODIES), r"sphere\.poissons_ratio: Input should be less than or equal to 0\.5"),
         (("6e-3,", "1e-320,"), "too small, or too large"),
         (("2e4,", "1e308,"), "too small, or too large"),
         (("4.9e9", "1" + 400 * "0"), "hertz_stiffness = 1000"),
@@ -141,7 +147,7 @@ def test_a_broken_file_gets_one_sentence_with_its_name(tmp_path, change, said):
     path = written(tmp_path, WHOLE.replace(*change))
     with pytest.raises(UnknownSpecimenError, match=said) as refusal:
         load_specimen(path)
-    assert "mine.toml" in str(refusal.value)
+    assert str(refusal.value).count("mine.toml") == 1
     assert "\n" not in str(refusal.value)
 
 

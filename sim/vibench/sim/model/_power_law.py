@@ -43,7 +43,7 @@ class PowerLaw:
     def __post_init__(self) -> None:
         require_positive("Reference displacement", self.reference, "m")
         if not self.terms:
-            msg = "A power law without terms is not allowed: give one exponent or more, or use NoContact."
+            msg = "A power law without terms is not allowed: give one exponent or more."
             raise ValueError(msg)
         if len(self.terms) > MOST_TERMS:
             msg = f"A power law of {len(self.terms)} terms is not allowed: at most {MOST_TERMS}."

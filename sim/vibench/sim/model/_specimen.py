@@ -52,7 +52,7 @@ class Specimen:
             msg = (
                 f"Gap {self.gap_m if self.lower_gap_m is None else self.gaps_m} m is not allowed: "
                 "it must be positive, and one side finite; "
-                "for no stops use NoContact."
+                'for no stops at all give the contact "linear".'
             )
             raise ValueError(msg)
 

@@ -24,6 +24,9 @@ from pydantic import (
     PositiveFloat,
     ValidationError,
     ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_serializer,
+    field_validator,
     model_validator,
 )
 
@@ -151,6 +154,32 @@ class SpecimenDescription(_Described):
                 return _complete({**cls._meant, **said}, folder)
             case _:
                 return said
+
+    @field_validator("gap_m", mode="wrap")
+    @classmethod
+    def _one_clearance_or_two(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
+        try:
+            return handler(said)
+        except ValidationError as error:
+            raise ValueError("it must be a number above 0 [m], or [lower, upper]") from error
+
+    @field_validator("hertz_stiffness", mode="wrap")
+    @classmethod
+    def _number_or_bodies(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
+        """Say what is wrong in the bodies, where bodies are given: pydantic complains of a number first."""
+        try:
+            return handler(said)
+        except ValidationError as error:
+            fault = max(error.errors(), key=lambda each: len(each["loc"]))
+            within = ".".join(str(part) for part in fault["loc"][1:])
+            raise ValueError(f"{within}: {fault['msg']}" if within else fault["msg"]) from error
+
+    @field_serializer("gap_m", when_used="json")
+    def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
+        """Write an infinite clearance as a word: JSON has no number for it, whatever holds the specimen."""
+        if isinstance(gap_m, float):
+            return gap_m
+        return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]
 
     @model_validator(mode="after")
     def _says_each_thing_once(self) -> Self:
@@ -326,13 +355,10 @@ def _complaint(specimen: str, error: ValidationError) -> str:
             fault = f"{key} is missing"
         case "extra_forbidden":
             fault = f"{first['loc'][-1]} is no key of a specimen; there are {', '.join(sorted(_KEYS))}"
-        case _ if key == "gap_m":
-            given = reprlib.repr(first["input"])
-            fault = f"gap_m = {given} is neither a number above 0 [m] nor [lower, upper]"
         case _ if key:
             fault = f"{key} = {reprlib.repr(first['input'])}: {said}"
         case _:
-            return said if reprlib.repr(specimen) in said else f"{specimen}: {said}"
+            return said if specimen in said else f"{specimen}: {said}"
     return f"{specimen} describes no specimen: {fault}"
 
 
