@@ -49,8 +49,9 @@ def test_the_numbers_of_a_step_are_those_of_the_matrix_exponential(level):
     scales[3:6] = tables.steps.series.fastest
     whole = expm(matrix * length) - np.eye(WIDE)
     size = np.abs(whole / scales[:, None] * scales).max()
+    # In extended precision the numbers are right to 5e-16; scipy's exponential is off by 2e-13 (1.18).
     np.testing.assert_allclose(
-        (numbers[MOVE : MOVE + WIDE].T - whole) / scales[:, None] * scales / size, 0.0, atol=1e-13
+        (numbers[MOVE : MOVE + WIDE].T - whole) / scales[:, None] * scales / size, 0.0, atol=1e-12
     )
     for i, part in enumerate(POINTS_AT):
         there = expm(matrix * (part * length))
