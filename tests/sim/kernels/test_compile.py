@@ -20,7 +20,8 @@ INNER = IMPORT + "\n@kernel\ndef inner(x):\n    return {factor} * x\n"
 def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_file(tmp_path):
     package = tmp_path / "vibench" / "sim"
     (package / "kernels").mkdir(parents=True)
-    shutil.copy(KERNELS / "_compile.py", package / "kernels" / "_compile.py")
+    for name in ("_compile.py", "_inlining.py"):
+        shutil.copy(KERNELS / name, package / "kernels" / name)
     (package / "__init__.py").write_text("")
     inner = package / "inner.py"
     (package / "outer.py").write_text(
@@ -44,7 +45,8 @@ def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_f
 def test_a_kernel_is_kept_when_a_room_changes_that_its_own_does_not_import(tmp_path):
     sim = tmp_path / "vibench" / "sim"
     (sim / "kernels").mkdir(parents=True)
-    shutil.copy(KERNELS / "_compile.py", sim / "kernels" / "_compile.py")
+    for name in ("_compile.py", "_inlining.py"):
+        shutil.copy(KERNELS / name, sim / "kernels" / name)
     (sim / "__init__.py").write_text("")
     decorated = "from ..kernels._compile import kernel\n"
     rooms = {

@@ -171,7 +171,7 @@ def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phas
     found = np.empty((len(starts) - 1, orders), np.complex128)
     length = np.diff(starts)
     for order in range(orders):
-        rotated = signal * np.exp(-2j * pi * order * turns * sample)
+        rotated: Phasors = np.asarray(signal * np.exp(-2j * pi * order * turns * sample), np.complex128)
         integral = np.concatenate([[0.0], np.cumsum(0.5 * (rotated[1:] + rotated[:-1]))])
         at_starts = _hermite(integral, rotated, low, part)
         scale = 1.0 if order == 0 else 2.0

@@ -63,7 +63,7 @@ def amplitudes_at(frequency_hz: float, signals: Reals, sample_rate_hz: float) ->
     """Complex peak amplitudes of signals, shape (channels, samples), at one frequency."""
     values = _hann(signals.shape[-1])
     turns = np.exp(-2j * np.pi * frequency_hz / sample_rate_hz * np.arange(signals.shape[-1]))
-    found: Complexes = signals @ (values * turns)
+    found: Complexes = np.asarray(signals @ (values * turns), dtype=np.complex128)
     return found * (2 / float(np.sum(values)))
 
 

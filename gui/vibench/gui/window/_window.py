@@ -236,6 +236,7 @@ class Window(QMainWindow):
         for part in (self.banner, self.strip, self.navigation, self.status_line):
             part.setStyleSheet(sheet)
         in_sight = self._stack.currentWidget()
+        assert in_sight is not None
         # Painted once, when it is done, and not after each step.
         in_sight.setUpdatesEnabled(False)
         pages = sorted(self.pages.values(), key=lambda each: each is not in_sight)

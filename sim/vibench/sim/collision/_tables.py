@@ -144,8 +144,8 @@ def collision_shapes() -> tuple[Table, Table]:
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without a press: 2.943 long, and close to half a sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943
-    for press in np.linspace(0.0, SOFTEST, SHAPES):
-        depths, duration, _ = _solved(depths, duration, float(press))
+    for softer in np.linspace(0.0, SOFTEST, SHAPES):
+        depths, duration, _ = _solved(depths, duration, float(softer))
     times = np.append(HEIGHTS, 1.0)
     for place in range(SHAPES):
         press = SOFTEST + SPACING * place

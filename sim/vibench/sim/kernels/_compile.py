@@ -11,6 +11,8 @@ from typing import Any, TypeVar, cast
 
 from numba import config, njit
 
+from ._inlining import KernelCompiler
+
 Kernel = TypeVar("Kernel", bound=Callable[..., object])
 SIM = Path(__file__).parents[1]
 
@@ -85,7 +87,13 @@ def _cache_of(kernel: Callable[..., object]) -> Iterator[None]:
         config.CACHE_DIR = chosen  # type: ignore[attr-defined]
 
 
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+_OPTIONS: dict[str, Any] = {
+    "cache": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "no_cfunc_wrapper": True,
+    "pipeline_class": KernelCompiler,
+}
 """How every kernel is compiled. Nobody calls one as a C function, so that wrapper is left out."""
 _COUNTING, _WITHOUT_REFCOUNT = ({**_OPTIONS, "_nrt": counts} for counts in (True, False))
 """With numba's memory and without. Said outright, or a kernel would take after the first that calls it."""
