@@ -241,8 +241,10 @@ def thumbnail(path: Path) -> Thumbnail | None:
     if not known.any():
         return None
     low, high = (np.asarray(each[0], dtype=np.float32) for each in (picture.low, picture.high))
-    largest = np.float32(max(np.max(np.abs(low[known])), np.max(np.abs(high[known]))))
-    return Thumbnail(low / largest, high / largest) if largest > 0 else None
+    largest = max(float(np.max(np.abs(low[known]))), float(np.max(np.abs(high[known]))))
+    if largest <= 0:
+        return None
+    return Thumbnail(*(np.asarray(each / largest, dtype=np.float32) for each in (low, high)))
 
 
 def _is_quickly_seen(recording: Recording) -> bool:
