@@ -48,6 +48,18 @@ class Edge:
         return np.array([parameter - u if u < 0.5 else math.nan]), np.array([[-1.0, 1.0]])
 
 
+class Sawtooth:
+    """u = 0 up to lambda = 0, then teeth that are too near for a step and too far for a leap to miss."""
+
+    def linearised(self, point):
+        u, parameter = point
+        turn = max(parameter, 0.0) / 3e-6
+        rises = turn % 2.0 < 1.0
+        height = 0.0 if parameter <= 0.0 else 3e-6 * (turn % 1.0 if rises else 1.0 - turn % 1.0)
+        slope = 0.0 if parameter <= 0.0 else (-1.0 if rises else 1.0)
+        return np.array([u - height]), np.array([[1.0, slope]])
+
+
 @pytest.mark.parametrize("longest", [0.01, 0.1, 0.3])
 def test_a_circle_is_followed_once_round_with_its_folds_at_plus_and_minus_one(longest):
     steps = ArcSteps(first=0.005, longest=longest, most_points=2000)
@@ -91,6 +103,13 @@ def test_equations_that_cease_to_exist_end_the_branch_with_a_reason():
     last = list(trace(Edge(), np.array([0.0, 0.0]), 1.0, (-1.0, 1.0), ArcSteps()))[-1]
     assert last.end is ArcEnd.STEP_TOO_SHORT
     assert last.point[-1] == pytest.approx(0.5, abs=1e-5)
+
+
+def test_kinks_beside_kinks_end_the_branch_soon():
+    points = list(trace(Sawtooth(), np.array([0.0, -0.1]), 1.0, (-1.0, 1.0), ArcSteps()))
+    assert points[-1].end is ArcEnd.STEP_TOO_SHORT
+    assert points[-1].point[-1] == pytest.approx(0.0, abs=1e-3)
+    assert len(points) < 300
 
 
 @pytest.mark.parametrize("direction", [-1.0, 1.0])

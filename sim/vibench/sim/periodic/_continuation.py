@@ -85,6 +85,8 @@ LONGEST_LEAP = 5.0
 LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
 """What is sought (a tangent's component, a multiplier's distance) counts as zero below this."""
+CRAWLING, MOST_CRAWLED = 10.0, 50
+"""A curve that is followed in steps below so many of the shortest, so many in a row, is at a kink."""
 NEAR_START = 0.2
 """A step that passes its start at less than this part of its length is looked at for closing."""
 SAME_POINT = 1e-6
@@ -155,11 +157,15 @@ def trace(
     along[-1] = math.copysign(1.0, toward)
     here = first = ArcPoint(start, tangent_at(curve, start, along))
     yield here
-    step = steps.first
+    step, slow, leapt_at = steps.first, 0, -math.inf
     for _ in range(steps.most_points):
         ahead, step = _advance(curve, here, step, steps)
-        if ahead is None:
-            ahead = _leap(curve, here, steps)
+        slow = slow + 1 if step < CRAWLING * steps.shortest else 0
+        if ahead is None or slow > MOST_CRAWLED:
+            # Nothing smooth lies between two kinks that are so near: what is to come is not followed.
+            is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
+            slow, leapt_at = 0, here.arc
+            ahead = None if is_stuck else _leap(curve, here, steps)
             if ahead is None:
                 yield _ended(here, ArcEnd.STEP_TOO_SHORT)
                 return
