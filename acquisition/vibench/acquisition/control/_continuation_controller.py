@@ -27,6 +27,8 @@ from ._sine_loop import SineLoop
 _MOST_TRIES = 8
 _FIRST_TRIES = 30
 """Of the first point, which the model without stops may be far from."""
+_NEAR = 0.3
+"""Part of the level by which the first motion may be wrong when its unknowns are probed each alone."""
 _SHORTEST_STEP = 1 / 64
 """Of the plan's step."""
 _GROWTH, _EASY = 1.5, 3
@@ -128,7 +130,11 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
         unknowns[1] = seen.unknowns[1]
         if not above or np.abs(seen.residual[1:]).max() <= _CALM:
             unknowns[1] -= min(max(wrong / slope, -most), most)
-    return None
+    if abs(wrong) > _NEAR:
+        return None
+    # Level and harmonics that move each other settle slowly by what changes of all of them have told.
+    yield from _probed(player, solver, seen, len(seen.unknowns))
+    return (yield from _corrected(player, solver, replace(foreseen, unknowns=seen.unknowns)))
 
 
 def _probed(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
