@@ -2,7 +2,8 @@
 
 `basin` draws starts at random from the rectangle of a basin map and counts what they come to, beside the
 shares that the map states. `map` computes a map with so many points along each axis and says what it took:
-processor time, time to the first picture, points computed, and what an estimate made before had said.
+processor time, time to the first picture, points computed, and what an estimate made before had said;
+with `--one-by-one` without lanes.
 `lanes` follows random motions in lanes and one by one, in the same run: time per impact on one core, and
 how far both lie from strict steps; some of them by heyoka too, if it is installed; then settles points of a
 map both ways, and counts those that came to another motion, and those where several starts agree.
@@ -22,10 +23,11 @@ import numpy as np
 from vibench.acquisition import load_toml
 from vibench.sim import Accuracy, Given, Harmonic, MotionKind, gong2025, settle_scene, wilson_share
 from vibench.sim.lanes import LaneRun, follow_in_lanes
-from vibench.sim.maps import Map, Range, estimate_map, map_solver, open_map, solve_map
+from vibench.sim.maps import Map, MapResults, Range, compute_map, estimate_map, map_solver, open_map
 from vibench.sim.scene import settle_scenes
 from vibench.sim.scene._followed_run import FollowedRun, Stretch
 from vibench.sim.scene._observed_window import follow_strobed
+from vibench.sim.study import ExistingStudy, executor_of, store_of
 
 STANDARD = Accuracy.STANDARD.tolerance
 SAME = 2e-3
@@ -79,7 +81,7 @@ def cost(asked: argparse.Namespace) -> int:
     said["frequency_hz"]["points"], said["amplitude_m"]["points"] = asked.columns, asked.rows
     plan = Map(specimen=plan.specimen, **said)
     # Kernels are compiled and loaded before the clock starts.
-    solver = map_solver(plan)
+    solver = settle_scene if asked.one_by_one else map_solver(plan)
     solver(plan.scene((0, 0, asked.columns // 2)))
     solver(plan.scene((asked.rows - 1, 0, asked.columns // 2)))
     before = estimate_map(plan, asked.workers)
@@ -94,13 +96,19 @@ def cost(asked: argparse.Namespace) -> int:
                 f"{time.process_time() - began_cpu_s:.1f} s of processor time"
             )
 
-    results = solve_map(plan, workers=asked.workers, observer=tell)
+    with (
+        executor_of(asked.workers, None, solver) as executor,
+        store_of(plan, None, ExistingStudy.REFUSE) as store,
+    ):
+        compute_map(plan, executor, store, tell, None)
+        results = MapResults(plan, store.arrays)
     print("\n".join((steps[0], *steps[-1:])))
     taken_s = float(np.nansum(results.arrays["taken"].astype(float)))
+    audit = results.audit
     print(
         f"{results.computed} of {plan.grid.size} points computed in {time.perf_counter() - began_s:.1f} s, "
         f"{time.process_time() - began_cpu_s:.1f} s of processor time, {taken_s:.1f} s of them the points' "
-        f"own; {results.audit}"
+        f"own; {audit.wrong} of {audit.audited} filled cells had come to another motion"
     )
     return 0
 
@@ -274,6 +282,7 @@ def main() -> int:
     points = parts.add_parser("map")
     points.add_argument("--columns", type=int, default=600)
     points.add_argument("--rows", type=int, default=400)
+    points.add_argument("--one-by-one", action="store_true", help="without lanes, as the yardstick")
     points.set_defaults(run=cost)
     compared = parts.add_parser("lanes")
     compared.add_argument("--motions", type=int, default=96)
