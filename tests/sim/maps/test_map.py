@@ -26,6 +26,7 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ({"y_m": LEVELS, "chain": ("up",)}, "y_m varies the start"),
         ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is no power of 2"),
         ({"frequency_hz": FREQUENCIES, "window_periods": 5000}, "does not fit 3000 periods"),
+        ({"frequency_hz": FREQUENCIES, "periods": 10**12}, "less than or equal to 10000000"),
         ({"frequency_hz": {"start": -5.0, "stop": 20.0, "points": 3}}, "Drive frequency -5.0 Hz"),
         ({"frequency_hz": {"start": 50.0, "stop": 20.0, "points": 3}}, "does not ascend"),
         ({"frequency_hz": FREQUENCIES, "chain": ("up", "up")}, "names a direction twice"),

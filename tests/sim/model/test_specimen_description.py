@@ -98,6 +98,12 @@ def test_a_file_says_every_number_itself(tmp_path):
     assert specimen.contact.stiffness == 1e5
 
 
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(WHOLE, encoding="utf-8-sig")
+    assert load_specimen(path) == load_specimen(written(tmp_path, WHOLE, "other.toml"))
+
+
 def test_a_file_may_start_from_another_beside_it(tmp_path):
     written(tmp_path, WHOLE, "base.toml")
     own = written(tmp_path, 'model = "base.toml"\nname = "softer"\ndamping_time_s = 1e-5\n')

@@ -123,7 +123,7 @@ class Map(GridPlan):
     """With "lyapunov" the largest exponent too, over up to 25 s at every point: tens of times the work."""
     accuracy: Accuracy = Accuracy.STANDARD
     """Of every point."""
-    periods: Annotated[int, Field(ge=100)] = 3000
+    periods: Annotated[int, Field(ge=100, le=10_000_000)] = 3000
     """Drive periods after which a motion that does not repeat is followed no longer."""
     window_periods: Annotated[int, Field(ge=10)] = 200
     """Drive periods over which a motion that does not repeat is observed."""

@@ -19,7 +19,8 @@ def toml_table(path: Path) -> dict[str, Any]:
 
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        # Editors on Windows begin a file with a byte-order mark.
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise UnreadableTomlError(
             f"{path}: cannot be read ({error.strerror}); give the path of a TOML file"
