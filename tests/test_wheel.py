@@ -131,7 +131,7 @@ def test_every_name_of_every_face_resolves_from_the_wheel(python, users_folder):
 
 def test_the_command_works_as_a_module_and_as_a_program(python, users_folder):
     assert "predict" in run(python, "-m", "vibench.cli", "--help", cwd=users_folder)
-    command = python.parent / f"vibench{python.suffix}"
+    command = python.parent / ("vibench.exe" if sys.platform == "win32" else "vibench")
     arguments = ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json")
     (point,) = json.loads(run(command, *arguments, cwd=users_folder))["points"]
     assert point["relative_i"] > 0

@@ -12,7 +12,13 @@ from threading import Event
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.engine import VIEWER_PATIENCE_S, EngineState, Supervision, announced_engines
+from vibench.acquisition.engine import (
+    VIEWER_PATIENCE_S,
+    EngineState,
+    Supervision,
+    announced_engines,
+    left_alone,
+)
 from vibench.acquisition.recording import RecordingState
 from vibench.gui.page._app_context import USUAL_PATIENCE_S
 from vibench.gui.widgets import RUN
@@ -115,6 +121,8 @@ def test_what_was_left_alone_is_shown_by_the_next_window_which_then_looks_after_
         window.look_for_left_campaign()
         qtbot.waitUntil(lambda: not window.context.background.is_busy, timeout=100_000)
         assert bridge.engine_pid is None, "it has a window that looks after it"
+    # The engine learns at its next look that its window is gone.
+    qtbot.waitUntil(lambda: left_alone() is not None, timeout=60_000)
     window.look_for_left_campaign()
     qtbot.waitUntil(lambda: bridge.state is EngineState.RUNNING, timeout=100_000)
     assert window.page is window.pages[RUN]
