@@ -28,7 +28,7 @@ kernels = (advance_under_power, rebound, hold_on_series, propagate_tangent_steps
 print(json.dumps([time.process_time() - start, {k.__name__: len(k.signatures) for k in kernels}]))
 """
 ALLOWED_S = 29.0
-"""Of one core, sampled drives included; 17 s on a machine that has nothing else to do."""
+"""Of one core, sampled drives included."""
 
 
 @pytest.mark.slow
