@@ -4,6 +4,7 @@ import json
 import re
 import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import compress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -88,7 +89,7 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
     try:
         return model.model_validate(content, context={"folder": folder})
     except ValidationError as error:
-        raise ConfigurationError(f"{origin}: {complaints(error)}") from error
+        raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
     except ArithmeticError as error:
         raise ConfigurationError(
             f"{origin}: a number is too large, or too small, to be computed with ({error}); correct it"
@@ -123,9 +124,18 @@ def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
     return f"{text[:kept]}...{text[len(text) - kept :]}"
 
 
-def complaints(error: ValidationError) -> str:
-    """Say in a clause each what a model did not allow; keys of one fault share theirs."""
-    details = _faults(error)
+def complaints(error: ValidationError, content: object) -> str:
+    """Say in a clause each what a model did not allow; keys of one fault share theirs.
+
+    Parameters
+    ----------
+    error
+        What the model said.
+    content
+        What it was given: it tells keys of the file from the model's names of kinds of value.
+
+    """
+    details = _faults(error, content)
     missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
     unknown = _key_clause(
         details,
@@ -139,44 +149,60 @@ def complaints(error: ValidationError) -> str:
     return shortened("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
 
 
-def _faults(error: ValidationError) -> list[Any]:
+Place = tuple[str | int, ...]
+
+
+def _faults(error: ValidationError, content: object) -> list[Any]:
     """Give what is wrong, once: of a key that may hold several kinds of value, for the kind that was meant.
 
     A value that would be derived from a key with a fault is no fault of its own, nor is a list too short
     without an item with a fault.
     """
     said = error.errors()
-    meant: dict[tuple[Any, ...], dict[Any, list[Any]]] = {}
+    meant: dict[Place, dict[Place, list[Any]]] = {}
     for each in said:
         place = each["loc"]
         is_short = each["type"] == "too_short"
         within = [other for other in said if other["loc"][: len(place)] == place and other is not each]
         if each["type"] == "default_factory_not_called" or (is_short and within):
             continue
-        cut = next((i for i, part in enumerate(place) if _is_kind(part)), len(place))
-        meant.setdefault(place[:cut], {}).setdefault(place[cut : cut + 1], []).append(each)
+        is_key = _of_the_file(each, content)
+        cut = is_key.index(False) if False in is_key else len(place)
+        by_keys = {**each, "loc": tuple(compress(place, is_key))}
+        meant.setdefault(place[:cut], {}).setdefault(place[cut : cut + 1], []).append((each, by_keys))
     return [each for kinds in meant.values() for each in _of_the_nearest(list(kinds.values()))]
 
 
-def _of_the_nearest(kinds: Sequence[list[Any]]) -> list[Any]:
-    """Give the faults of one kind, by the keys that a file has; a single kind is a key of the user's own."""
+def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
+    """Give the faults of one kind, by the keys of the file; a single kind is one that the file names."""
     if len(kinds) == 1:
-        return kinds[0]
-    nearest = max(kinds, key=_nearness)
-    return [{**each, "loc": tuple(part for part in each["loc"] if not _is_kind(part))} for each in nearest]
+        return (each for each, _ in kinds[0])
+    return (by_keys for _, by_keys in max(kinds, key=_nearness))
 
 
-_KIND = re.compile(r"[\w-]+\[.*|constrained-\w+|float|int|str|bool|[A-Z][a-z]+([A-Z][a-z]+)*")
-"""How pydantic calls a kind of value: ``constrained-float``, ``function-after[_ascends(), Range]``."""
+def _of_the_file(fault: Any, content: object) -> list[bool]:
+    """Say which parts of a fault's place are keys of the file; the rest are kinds of value.
+
+    pydantic names a kind after the key that may hold several: ``frequency_hz``, ``Range``, ``step``. A key
+    of the user's own may have the same name.
+    """
+    place, found = fault["loc"], []
+    for number, part in enumerate(place):
+        match content:
+            case Mapping() if part in content:
+                content = content[part]
+                found.append(True)
+            case list() | tuple() if isinstance(part, int) and part < len(content):
+                content = content[part]
+                found.append(True)
+            case _:
+                found.append(fault["type"] == "missing" and number == len(place) - 1)
+    return found
 
 
-def _is_kind(part: int | str) -> bool:
-    return isinstance(part, str) and _KIND.fullmatch(part) is not None
-
-
-def _nearness(faults: Sequence[Any]) -> tuple[int, bool]:
+def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
     """Say how near a value comes to a kind: a fault within it, or in its size, is nearer than its type."""
-    return max((len(each["loc"]), not each["type"].endswith("_type")) for each in faults)
+    return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 
 def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) -> tuple[str, ...]:

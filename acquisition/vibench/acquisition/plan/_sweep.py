@@ -240,7 +240,7 @@ def _turned(excitation: Excitation, way: Direction, name: str) -> Excitation:
     try:
         turned = excitation.turned(way)
     except ValidationError as error:
-        raise ValueError(f"{name}: {complaints(error)}") from error
+        raise ValueError(f"{name}: {complaints(error, excitation.model_dump())}") from error
     if turned is None:
         raise ValueError(
             f"{name}: direction = {way.value!r} says nothing to the excitation {excitation.kind!r} by "
@@ -271,7 +271,7 @@ def _measurement(content: Mapping[str, Any], name: str) -> Measurement:
     try:
         return Measurement.model_validate(content)
     except ValidationError as error:
-        raise ValueError(f"{name}: {complaints(error)}") from error
+        raise ValueError(f"{name}: {complaints(error, content)}") from error
 
 
 def _words(axes: Any) -> str:

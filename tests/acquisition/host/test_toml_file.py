@@ -1,0 +1,48 @@
+"""A file's faults are told by the keys of the file, whatever they are called."""
+
+import pytest
+from pydantic import PositiveFloat
+
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.host import FrozenModel, load_toml
+
+
+class Steps(FrozenModel):
+    start: PositiveFloat
+    step: PositiveFloat
+
+
+class Plan(FrozenModel):
+    values: tuple[PositiveFloat, ...] | Steps
+
+
+@pytest.mark.parametrize("key", ["Float", "Range", "float", "Masses", "str", "dict[str,Any]"])
+def test_a_key_named_as_a_kind_of_value_is_told_by_its_name(tmp_path, key):
+    for text, told in (
+        (f'values = [1.0]\n"{key}" = 1\n', f"{key} is not a known key"),
+        (f'[values]\nstart = 1.0\nstep = 1.0\n"{key}" = 1\n', f"values.{key} is not a known key"),
+    ):
+        file = tmp_path / "plan.toml"
+        file.write_text(text)
+        with pytest.raises(ConfigurationError) as refused:
+            load_toml(file, Plan)
+        assert told in str(refused.value)
+        assert str(refused.value).count("known key") == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("[values]\nstart = 1.0\n", "values.step is missing"),
+        ("values = [1.0, -2.0]\n", "values.1 = -2.0: input should be greater than 0"),
+        ("values = { start = 1.0, step = -1.0 }\n", "values.step = -1.0: input should be greater than 0"),
+        ("", "values is missing"),
+    ],
+)
+def test_the_kind_that_was_meant_gives_the_key(tmp_path, text, told):
+    file = tmp_path / "plan.toml"
+    file.write_text(text)
+    with pytest.raises(ConfigurationError) as refused:
+        load_toml(file, Plan)
+    assert str(refused.value).startswith(f"{file}: {told}")
+    assert ";" not in str(refused.value)
