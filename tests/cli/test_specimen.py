@@ -173,6 +173,22 @@ def test_a_specimen_that_there_is_not_is_one_sentence(vibench_here, tmp_path, co
     assert "gong2025" in ended.stderr
 
 
+def test_the_force_of_the_nearer_stop_is_drawn_on_its_side(vibench_here, tmp_path):
+    assert vibench_here("specimen", "asymmetric", "--forces", "drawn", cwd=tmp_path).returncode == 0
+    (table,) = (tmp_path / "drawn").glob("contact_forces_hertz*.csv")
+    text = table.read_text(encoding="utf-8")
+    p_m, pressed_n, let_go_n = np.genfromtxt(text.splitlines(), delimiter=",", names=True).view((float, 3)).T
+    is_beyond = p_m < -30e-6
+    assert is_beyond.any()
+    assert np.all(p_m < 0.0)
+    for force_n in (pressed_n, let_go_n):
+        # What pushes m1 back to the middle, and nothing before the stop is reached.
+        assert np.all(force_n[is_beyond] < 0.0)
+        assert np.all(force_n[~is_beyond] == 0.0)
+    assert "-0.0," not in text
+    assert "-0," not in text
+
+
 def test_the_forces_of_all_laws_are_drawn(vibench_here, tmp_path):
     assert vibench_here("specimen", "--forces", "drawn", cwd=tmp_path).returncode == 0
     assert (tmp_path / "drawn" / "contact_forces.png").stat().st_size > 10_000

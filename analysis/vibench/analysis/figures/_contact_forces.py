@@ -26,7 +26,7 @@ _POINTS = 801
 def contact_forces_figure(specimens: Mapping[str, Specimen]) -> DrawnFigure:
     """Draw the force that pushes m1 back, for each specimen by its label; p = y - z.
 
-    The nearer stop is shown. A law that depends on the speed is drawn pressed in and
+    The nearer stop is shown, on its side. A law that depends on the speed is drawn pressed in and
     let go at 0.1 m/s; rigid stops, which have no finite force, as a wall.
     """
     rows = -(-len(specimens) // _COLUMNS)
@@ -53,20 +53,23 @@ def contact_forces_figure(specimens: Mapping[str, Specimen]) -> DrawnFigure:
 
 
 def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
-    stop_m = min(specimen.gaps_m)
-    first_m = -stop_m if isinstance(specimen.contact, PowerLaw) else stop_m - _BEFORE_M
-    p = np.linspace(first_m, stop_m + _BEYOND_M, _POINTS)
+    below_m, above_m = specimen.gaps_m
+    nearer_m = min(below_m, above_m)
+    first_m = -nearer_m if isinstance(specimen.contact, PowerLaw) else nearer_m - _BEFORE_M
+    # From free motion into the stop, on the side where that stop is.
+    side = -1.0 if below_m < above_m else 1.0
+    stop_m, p = side * nearer_m, side * np.linspace(first_m, nearer_m + _BEYOND_M, _POINTS)
     axes.axvline(1e6 * stop_m, color=_GREY, linewidth=0.8)
     axes.set_title(label, fontsize="small")
     axes.set_xlabel("p [µm]")
     axes.set_ylabel("force [N]")
     if isinstance(specimen.contact, RigidStops):
-        axes.plot([1e6 * first_m, 1e6 * stop_m, 1e6 * stop_m], [0.0, 0.0, 1.0], color=MEASURED)
+        axes.plot([1e6 * p[0], 1e6 * stop_m, 1e6 * stop_m], [0.0, 0.0, side], color=MEASURED)
         axes.axvspan(1e6 * stop_m, 1e6 * p[-1], color=_GREY, alpha=0.3, linewidth=0)
-        axes.set_ylim(-0.1, 1.0)
+        axes.set_ylim(sorted((-0.1 * side, side)))
         axes.set_yticks([0.0])
         return []
-    pressed, let_go = (_force(specimen, p, speed) for speed in (_SPEED_M_PER_S, -_SPEED_M_PER_S))
+    pressed, let_go = (_force(specimen, p, side * each) for each in (_SPEED_M_PER_S, -_SPEED_M_PER_S))
     axes.plot(1e6 * p, pressed, color=MEASURED)
     if not np.array_equal(pressed, let_go):
         axes.plot(1e6 * p, let_go, color=SIMULATED, linestyle="--")
@@ -75,4 +78,5 @@ def _draw(axes: Axes, label: str, specimen: Specimen) -> list[Table]:
 
 
 def _force(specimen: Specimen, p: Reals, speed: float) -> Reals:
-    return np.asarray(spring_of(specimen).force(p, np.full_like(p, speed)))
+    # Adding zero makes "-0" of a table "0".
+    return np.asarray(spring_of(specimen).force(p, np.full_like(p, speed))) + 0.0
