@@ -1,6 +1,7 @@
 """A map as it is asked for: what may vary, and one sentence for what may not."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,6 +114,11 @@ def test_the_contact_energy_is_that_of_the_deepest_penetration():
     assert contact_energy_j(scene.specimen, found) == pytest.approx(energy_j, rel=5e-3)
     rigid = gong2025(contact="rigid:0.8")
     assert contact_energy_j(rigid, found) is None
+    # The largest abs(p) does not tell which of two unlike stops was reached.
+    for gap_m in ((3e-5, 6e-5), (3e-5, float("inf"))):
+        unlike = gong2025(gap_m=gap_m)
+        assert contact_energy_j(unlike, found) is None
+        assert contact_energy_j(unlike, replace(found, relative_i=1.0)) == 0.0
 
 
 def test_an_estimate_grows_with_the_work_and_shrinks_with_the_workers():

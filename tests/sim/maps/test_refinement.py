@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim.maps._refinement import AUDITED, Seen, plan_refinement
-from vibench.sim.maps._results import audit_of
-from vibench.sim.scene import Count, shares_of
+from vibench.sim.maps._results import Audit, audit_of
+from vibench.sim.scene import Count, Share, shares_of
 
 
 def disc(shape, centre, radius):
@@ -108,6 +108,17 @@ def test_the_audit_finds_what_filling_in_got_wrong():
     audit = audit_of(codes[:, None, :], plan)
     assert abs(audit.wrong - expected) < 4.0 * np.sqrt(expected) + 1.0
     assert (sum(audit.gained), sum(audit.lost)) == (audit.wrong, audit.wrong)
+
+
+def test_shares_of_a_map_that_was_filled_in_but_not_audited_are_as_wide_as_what_was_filled_in():
+    unaudited = Audit(filled=30, audited=0, wrong=0, gained=(0.0, 0.0), lost=(0.0, 0.0))
+    shares = unaudited.corrected((Share(0.9, 0.85, 0.95), Share(0.1, 0.05, 0.15)), 100)
+    assert [each.share for each in shares] == [0.9, 0.1]
+    assert [each.low for each in shares] == pytest.approx([0.55, 0.0])
+    assert [each.high for each in shares] == pytest.approx([1.0, 0.45])
+    assert (unaudited.wrong_share.low, unaudited.wrong_share.high) == (0.0, 1.0)
+    whole = Audit(filled=0, audited=0, wrong=0, gained=(), lost=())
+    assert (whole.wrong_share.low, whole.wrong_share.high) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("rare", [0.02, 0.15])

@@ -62,13 +62,18 @@ def labels_of(motion: NDArray[np.int64], period: NDArray[np.int64]) -> NDArray[n
 
 
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:
-    """Find the most energy that a stop stored [J], from the largest penetration; None where none yields."""
+    """Find the most energy that a stop stored [J], from the largest penetration; None where none yields.
+
+    Where gaps differ, the largest abs(p) does not tell which stop was reached: None beyond the nearer.
+    """
     stops = specimen.contact.stops
     if found.relative_i is None or stops.restitution is not None:
         return None
     if stops.linear_stiffness == stops.contact_stiffness == 0.0:
         return None
     depth = max(0.0, found.relative_i * found.amplitude_m - min(specimen.gaps_m))
+    if depth > 0.0 and len(set(specimen.gaps_m)) > 1:
+        return None
     return float(0.5 * stops.linear_stiffness * depth**2 + 0.4 * stops.contact_stiffness * depth**2.5)
 
 

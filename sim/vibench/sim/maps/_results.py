@@ -53,7 +53,9 @@ class Audit:
     @property
     def wrong_share(self) -> Share:
         """Share of the filled cells that is wrong; the interval holds it in 19 cases of 20."""
-        return wilson_share(self.wrong, self.audited) if self.audited else Share(0.0, 0.0, 0.0)
+        if not self.audited:
+            return Share(0.0, 0.0, 1.0 if self.filled else 0.0)
+        return wilson_share(self.wrong, self.audited)
 
     def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
         """Correct shares of motions in a map of so many cells by how filling in was wrong.
@@ -61,13 +63,17 @@ class Audit:
         Where motions are mixed finely the commonest is filled in too often. What the audit gains and loses
         each motion is what the other filled cells would, as far as their number tells.
         """
-        if not self.audited:
+        if not self.filled:
             return tuple(shares)
         rest = (self.filled - self.audited) / cells
         unsure = UNSURE / (2 * len(shares))
         found = []
         for share, gained, lost in zip(shares, self.gained, self.lost, strict=True):
-            come, gone = (wilson_share(each, self.audited, unsure) for each in (gained, lost))
+            # Nothing is known of what was filled in where none of it was audited.
+            come, gone = (
+                wilson_share(each, self.audited, unsure) if self.audited else Share(0.0, 0.0, 1.0)
+                for each in (gained, lost)
+            )
             found.append(
                 Share(
                     share.share + rest * (come.share - gone.share),
