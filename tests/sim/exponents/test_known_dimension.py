@@ -22,10 +22,11 @@ def test_the_dimension_of_uedas_attractor_is_the_published_one():
     )
     carried = abs(base_transmissibility(specimen, 0.5 / math.pi)[0, 2])
     drive = Harmonic(0.5 / math.pi, 7.5 / carried)
-    found = lyapunov_spectrum(specimen, drive, duration_s=4000.0, settle_s=400.0, interval_s=2.0 * math.pi)
+    # The plane of the first two tilts a little: their sum is off by some 2 over the duration.
+    found = lyapunov_spectrum(specimen, drive, duration_s=1e5, settle_s=400.0, interval_s=2.0 * math.pi)
     largest, second = found.exponents_per_s[:2]
     assert largest == pytest.approx(0.1034, abs=5.0 * found.standard_errors_per_s[0])
     assert largest + second == pytest.approx(-0.05, abs=1e-4)
     low, high = found.dimension_interval(0.999)
     assert low < 1.0 + 0.1034 / 0.1534 < high
-    assert high - low < 0.15
+    assert high - low < 0.03
