@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy.signal import welch
+from scipy.stats import norm
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
@@ -109,10 +110,16 @@ def test_the_linear_transmission_is_the_exact_one_within_tight_bounds_of_its_own
 
 
 def test_every_measurement_is_one_of_the_draws_of_its_twin(results):
+    """One in a hundred quantities lies outside its own limit by chance, and there are 13."""
     for name, found in results.items():
-        said = found["simulated"]
-        assert said["drive"] == "recorded amplifier voltage", name
-        assert [each["quantity"] for each in said["ensemble"] if each["agrees"] is False] == [], name
+        assert found["simulated"]["drive"] == "recorded amplifier voltage", name
+    compared = [
+        each for found in results.values() for each in found["simulated"]["ensemble"] if each["compared"]
+    ]
+    assert len(compared) == 13
+    assert sum(not each["agrees"] for each in compared) <= 1
+    limit_z = norm.ppf(1.0 - 0.5 * 0.01 / sum(each["compared"] for each in compared))
+    assert max(abs(each["largest_z"]) for each in compared) < limit_z
     assert results["sweep_moderate"]["simulated"]["escape"]["what"] == "collisions"
 
 
