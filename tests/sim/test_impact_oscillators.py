@@ -196,10 +196,13 @@ def test_the_soft_oscillator_grazes_where_its_linear_resonance_reaches_the_stop(
 @pytest.mark.parametrize(("omega", "chaotic", "largest"), [(0.802, 0.0285, 1.4552), (0.8025, 0.0242, 1.4570)])
 def test_two_attractors_live_side_by_side_just_above_grazing(omega, chaotic, largest):
     case, period = soft(omega), 2.0 * math.pi / omega
-    chaos = exponent(case, omega, 5000, 1.0)
-    allowed = 4.0 * math.hypot(chaos.standard_error_per_s, 5e-4)
-    assert chaos.verdict is ExponentVerdict.CHAOTIC
-    assert chaos.exponent_per_s == pytest.approx(chaotic, abs=allowed)
+    # On its way to chaos a start may come near the other attractor and stay there: one of sixteen does.
+    strays = [exponent(case, omega, 5000, p) for p in (1.0, 0.5, 1.2)]
+    chaos = [each for each in strays if each.verdict is ExponentVerdict.CHAOTIC]
+    assert len(chaos) >= 2
+    for each in chaos:
+        allowed = 4.0 * math.hypot(each.standard_error_per_s, 5e-4)
+        assert each.exponent_per_s == pytest.approx(chaotic, abs=allowed)
     quiet = exponent(case, omega, 2000)
     assert quiet.source is Source.MULTIPLIERS
     # A complex pair of multipliers: its size is that of the damping alone.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
+from vibench.sim.accuracy_benchmark._independent_solution import STATE_UNITS, independent_state, state_error
 from vibench.sim.scene._followed_run import FollowedRun, ObservedQuantities, Samples
 
 DRIVES = [Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6), Harmonic(311.0, 40e-6, 0.7)]
@@ -18,6 +18,18 @@ def settled(drive, gap_m, time_s=0.5):
     return run
 
 
+def growth(run, span_s, start):
+    """How much of a small change of the start is there at the end: the most of eight changes; at least 1."""
+    random, size = np.random.default_rng(1), 1e-9
+    end = integrate(run.specimen, run.drive, span_s, Accuracy.REFERENCE, start).final_state
+    most = 1.0
+    for change in random.standard_normal((8, 6)):
+        other = start + size * STATE_UNITS * change / np.abs(change).max()
+        changed = integrate(run.specimen, run.drive, span_s, Accuracy.REFERENCE, other).final_state
+        most = max(most, state_error(changed, end) / size)
+    return most
+
+
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("gap_m", GAPS, ids=["even", "uneven"])
 @pytest.mark.parametrize("drive", DRIVES, ids=str)
@@ -28,7 +40,8 @@ def test_it_is_the_independent_solution_at_every_level(drive, gap_m, level):
     truth = independent_state(run.specimen, drive, span_s, start)
     found = integrate(run.specimen, drive, span_s, level, start)
     assert found.impacts.count > 0
-    assert state_error(found.final_state, truth) < 2e-9
+    # The independent solution errs by some 1e-12, here and there, and a chaotic motion magnifies that.
+    assert state_error(found.final_state, truth) < 1e-11 * growth(run, span_s, start)
 
 
 def test_peaks_and_lines_are_those_of_close_samples_and_change_nothing():
