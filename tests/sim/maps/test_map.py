@@ -13,6 +13,8 @@ from vibench.sim.maps._columns import contact_energy_j
 from vibench.sim.scene import Method, settle_in_lanes, settle_scene, settle_scenes, solve_scene
 
 FREQUENCIES = Range(start=100.0, stop=300.0, points=5)
+GAPS = Range(start=3e-5, stop=5e-5, points=3)
+STIFFNESSES = Range(start=1e9, stop=5e9, points=3)
 LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
 
 
@@ -26,6 +28,14 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ),
         ({"y_m": LEVELS, "chain": ("up",)}, "y_m varies the start"),
         ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is no power of 2"),
+        (
+            {"frequency_hz": FREQUENCIES, "gap_m": GAPS, "model": "linear"},
+            "gap_m varies, and under the contact",
+        ),
+        (
+            {"frequency_hz": FREQUENCIES, "hertz_stiffness": STIFFNESSES, "model": "rigid:0.8"},
+            "hertz_stiffness varies, and under",
+        ),
         ({"frequency_hz": FREQUENCIES, "window_periods": 5000}, "does not fit 3000 periods"),
         ({"frequency_hz": FREQUENCIES, "periods": 10**12}, "less than or equal to 10000000"),
         ({"frequency_hz": {"start": -5.0, "stop": 20.0, "points": 3}}, "Drive frequency -5.0 Hz"),

@@ -14,7 +14,7 @@ from ..model import Accuracy, ContactWord, Harmonic, Specimen, SpecimenTable, Tr
 from ..scene import AutomaticDuration, Given, Observable, Rest, Scene
 from ..study import Column, GridPlan, Start, StudyAxis
 from ._columns import SECTION_COLUMNS, columns_with
-from ._quantities import QUANTITIES, START, Quantity
+from ._quantities import OF_SPECIMEN, QUANTITIES, START, Quantity
 
 MOST_POINTS = 4_000_000
 """A file of 1 GB, and as much memory."""
@@ -155,7 +155,25 @@ class Map(GridPlan):
             raise ValueError(f"{self.grid.size} points are asked for; a map holds at most {MOST_POINTS}")
         for corner in (0, self.grid.size - 1):
             self.scene(self.grid.place(corner))
+        for quantity in self.varied:
+            self._refuse_unless_felt(quantity)
         return self
+
+    def _refuse_unless_felt(self, quantity: Quantity) -> None:
+        """Refuse a range of what the contact law does not know: its picture would show chance, or nothing."""
+        if quantity not in OF_SPECIMEN:
+            return
+        span = self.range_of(quantity)
+        low, high = (
+            self.model_copy(update={quantity.field: value}).scene((0, 0, 0)).specimen
+            for value in (span.start, span.stop)
+        )
+        law = low.contact.kind
+        if low == high or (law == "linear" and quantity.field == "gap_m"):
+            raise ValueError(
+                f"{quantity.field} varies, and under the contact law {law!r} it changes nothing; vary "
+                "another quantity, or give another model"
+            )
 
     @property
     def varied(self) -> tuple[Quantity, ...]:
