@@ -3,6 +3,7 @@
 import pytest
 from pydantic import PositiveFloat
 
+from vibench.acquisition import load_campaign
 from vibench.acquisition.errors import ConfigurationError
 from vibench.acquisition.host import FrozenModel, load_toml
 
@@ -31,12 +32,30 @@ def test_a_key_named_as_a_kind_of_value_is_told_by_its_name(tmp_path, key):
 
 
 @pytest.mark.parametrize(
+    ("excitation", "told"),
+    [
+        ('{ kind = "dwel" }', "'kind' = 'dwel' is not known; allowed are 'multisine_noise', "),
+        ("{ amplitude_vpp = 1.0 }", "'kind' is missing"),
+        ("3", "give a table"),
+    ],
+)
+def test_an_excitation_of_no_known_kind_is_told_which_there_are(tmp_path, excitation, told):
+    file = tmp_path / "campaign.toml"
+    file.write_text(f'name = "c"\n[[measurements]]\nname = "m"\nexcitation = {excitation}\n')
+    with pytest.raises(ConfigurationError) as refused:
+        load_campaign(file)
+    assert f": {told}" in str(refused.value)
+    assert "tag" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
     ("text", "told"),
     [
         ("[values]\nstart = 1.0\n", "values.step is missing"),
         ("values = [1.0, -2.0]\n", "values.1 = -2.0: input should be greater than 0"),
         ("values = { start = 1.0, step = -1.0 }\n", "values.step = -1.0: input should be greater than 0"),
         ("", "values is missing"),
+        ("values = 3\n", "values = 3: give a list, in square brackets"),
     ],
 )
 def test_the_kind_that_was_meant_gives_the_key(tmp_path, text, told):

@@ -226,8 +226,23 @@ _ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
 """A word as Python shows it, ``<Start.UP: 'up'>``."""
 
 
+_LIST, _TABLE = "give a list, in square brackets", "give a table"
+_IN_WORDS_OF_TOML = {
+    "list_type": _LIST,
+    "tuple_type": _LIST,
+    "dict_type": _TABLE,
+    "model_type": _TABLE,
+    "model_attributes_type": _TABLE,
+    "union_tag_not_found": "{discriminator} is missing: it says what this is",
+    "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
+}
+"""What pydantic says in words of Python, by its type of fault."""
+
+
 def _complaint(detail: Any) -> str:
-    reason = _ENUM_MEMBER.sub(r"\1", shortened(str(detail["msg"]).removeprefix("Value error, ")))
+    plain = _IN_WORDS_OF_TOML.get(detail["type"])
+    said = str(detail["msg"]) if plain is None else plain.format(**detail.get("ctx", {}))
+    reason = _ENUM_MEMBER.sub(r"\1", shortened(said.removeprefix("Value error, ")))
     if not detail["loc"]:
         return reason
     return f"{_key(detail)} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
