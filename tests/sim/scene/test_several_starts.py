@@ -99,6 +99,15 @@ def test_chaos_that_dies_out_is_followed_to_the_motion_behind_it(short_chaos):
     assert 5.0 < escape.lifetime_above_s < escape.lifetime_below_s < 100.0
 
 
+def test_starts_that_are_chaotic_so_far_may_come_to_a_motion_that_was_not_found():
+    found = solve_scene(
+        scene("hertz", 242.0, 5e-6, damping_time_s=3e-5, duration=FixedDuration(36.0, 2.0))
+    ).ensemble
+    pending = sum(each.starts for each in found.motions if each.motion is MotionKind.CHAOTIC_SO_FAR)
+    assert 0 < pending < found.starts
+    assert found.unseen_share > pending / found.starts
+
+
 def test_chaos_that_lasts_has_a_least_lifetime():
     found = solve_scene(scene("hertz", 260.0, 5e-6))
     assert found.motion is MotionKind.CHAOTIC

@@ -38,9 +38,9 @@ def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -
     asked = next(group for group in groups if any(each is reached[0] for each in group))
     groups = sorted(groups, key=len, reverse=True)
     kinds = [lasting(group[0].motion, escape) for group in groups]
-    shares = shares_of(
-        [Count(len(group), kind not in PENDING) for group, kind in zip(groups, kinds, strict=True)]
-    )
+    counts = [Count(len(group), kind not in PENDING) for group, kind in zip(groups, kinds, strict=True)]
+    shares = shares_of(counts)
+    pending = sum(each.trials for each in counts if not each.is_final)
     return Ensemble(
         starts=len(reached),
         motions=tuple(
@@ -55,7 +55,7 @@ def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -
             for group, kind, share in zip(groups, kinds, shares, strict=True)
         ),
         asked=next(place for place, group in enumerate(groups) if group is asked),
-        unseen_share=wilson_share(0, len(reached)).high,
+        unseen_share=wilson_share(pending, len(reached)).high,
         escape=escape,
         scatter=_deviation([each.responses_m[0] for each in reached]),
         followed_s=several.followed_s,

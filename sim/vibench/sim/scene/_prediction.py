@@ -78,7 +78,8 @@ class Ensemble:
     asked: int
     """Which of them the start that was asked for came to."""
     unseen_share: float
-    """A motion that was not found has less than this share, in 39 cases of 40."""
+    """A motion that was not found has less than this share, in 39 cases of 40: also in the end, as starts
+    that were chaotic so far, or undecided, may come to it."""
     escape: EscapeRate | None
     """How often chaos died out; None where there was none to speak of."""
     scatter: float | None
