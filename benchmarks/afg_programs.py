@@ -1,0 +1,97 @@
+"""Other people's programs for the AFG1022 on the simulated one, unchanged: what they print, what it refused.
+
+    python benchmarks/afg_programs.py PROGRAM.py [PROGRAM.py ...]
+
+Each program, or file of tests, is a process of its own. The generator is plugged in under the USB address
+that the program names, and is the only instrument that pyvisa sees; nothing else is given or changed.
+"""
+
+import argparse
+import os
+import re
+import runpy
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+from vibench.virtual_rig.generator import AFG1022, ErrorCode, Reply
+from vibench.virtual_rig.generator._scpi_status import Status
+from vibench.virtual_rig.usb import UsbTmcInstrument, plug_in
+
+ADDRESS = re.compile(r"0x0699::0x0353::(\w+)")
+LONGEST = 70
+"""Of a message that is shown; a waveform has thousands of bytes."""
+
+
+class Noted(Status):
+    """An error queue that remembers which message each error is of."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.message = ""
+        self.refused: Counter[str] = Counter()
+
+    def report(self, code: ErrorCode) -> None:
+        """Queue an error."""
+        self.refused[f"{self.message}: {code.name}"] += 1
+        super().report(code)
+
+
+class Overheard(AFG1022):
+    """Remembers what it refused."""
+
+    def __init__(self, serial: str) -> None:
+        super().__init__(lambda: 0.0, serial=serial)
+        self.status: Noted = Noted()
+        self.messages = 0
+
+    def execute(self, message: bytes) -> Reply:
+        """Carry out one message."""
+        self.messages += 1
+        self.status.message = message[:LONGEST].decode("latin-1").strip()
+        return super().execute(message)
+
+
+def run_one(program: Path) -> None:
+    """Run one program as itself."""
+    named = ADDRESS.search(program.read_text(encoding="utf-8", errors="replace"))
+    generator = Overheard(named.group(1) if named else "C010101")
+    plug_in(UsbTmcInstrument(generator))
+    os.environ["PYVISA_LIBRARY"] = "@py"
+    os.environ["MPLBACKEND"] = "Agg"
+    sys.path.insert(0, str(program.parent))
+    try:
+        if program.stem.startswith("test_"):
+            import pytest  # noqa: PLC0415 - for files of tests alone
+
+            sys.path.insert(0, str(program.parent.parent))
+            pytest.main(
+                ["-q", "-p", "no:cacheprovider", "--tb=line", "--rootdir", str(program.parent), str(program)]
+            )
+        else:
+            runpy.run_path(str(program), run_name="__main__")
+    finally:
+        refused = dict(generator.status.refused)
+        unread = list(iter(generator.status.next_error, ErrorCode.NO_ERROR))
+        print(f"\n{generator.messages} messages; refused: {refused}; errors that nobody read: {len(unread)}")
+
+
+def main() -> None:
+    """Run each."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("programs", nargs="+", type=Path)
+    parser.add_argument("--alone", action="store_true", help=argparse.SUPPRESS)
+    asked = parser.parse_args()
+    if asked.alone:
+        run_one(asked.programs[0])
+        return
+    for program in asked.programs:
+        print(f"== {program}", flush=True)
+        subprocess.run(
+            [sys.executable, __file__, "--alone", program.absolute()], cwd=program.parent, check=False
+        )
+
+
+if __name__ == "__main__":
+    main()
