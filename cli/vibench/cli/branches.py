@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.plan import loop_time_s
+from vibench.acquisition.plan import fast_loop_time_s, loop_time_s
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import (
     Curve,
@@ -129,7 +129,9 @@ def branches(
         lowest_hz = asked.start if asked.along is Parameter.FREQUENCY else asked.frequency_hz
         if asked.resonance_band_hz is not None:
             lowest_hz = asked.resonance_band_hz[0]
-        asked = asked.model_copy(update={"loop_time_s": loop_time_s(load_rig(holdable), lowest_hz)})
+        rig = load_rig(holdable)
+        loop_s = loop_time_s(rig, lowest_hz) if rig.controller is None else fast_loop_time_s(rig.controller)
+        asked = asked.model_copy(update={"loop_time_s": loop_s})
     room_for(FILE, out)
     if not as_json:
         console.print("Looking for motions; each branch is told as it is found.")

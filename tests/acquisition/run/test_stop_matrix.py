@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event
+from time import monotonic
 
 import numpy as np
 import pytest
@@ -276,6 +277,45 @@ def test_a_folder_that_goes_away_leaves_silence_and_a_sentence(laboratory, tmp_p
     assert run.outcome.state is RunState.FAILED
     if what == "moved":  # and put back: nothing is lost
         assert recover(tmp_path / "elsewhere" / "run.h5").exists()
+
+
+def slow(rig):
+    """The same rig with a generator that takes a tenth of a second for a setting, as a laboratory's may."""
+    return rig.model_copy(update={"generator": rig.generator.model_copy(update={"settle_s": 0.1})})
+
+
+LOST_WITHIN_S, ABORTED_WITHIN_S = 1.1, 1.17
+"""By the clock, as docs/safety.md says."""
+
+
+def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tmp_path):
+    """Its ramp has a setting for each of 20 stairs: two seconds."""
+    virtual, connected = laboratory()
+    with open_bench(slow(connected), confirm_simulated, CalibrationRule.WAIVED) as bench:
+        stop, off_s = bench.generator.stop, []
+        bench.generator.stop = lambda: (stop(), off_s.append(monotonic()))
+        with Run(bench, PLAN.model_copy(update={"ramp_step_s": 0.015}), tmp_path / "run.h5") as run:
+            upto(run, RunState.RECORDING)
+            virtual.faults.overrun()
+            off_s.clear()
+            lost_s = monotonic()
+            assert ended(run) is not None
+        assert off_s[0] - lost_s < LOST_WITHIN_S
+        assert terminal_v(virtual) < SILENT_V
+
+
+def test_an_abort_of_a_slow_generator_is_over_in_time(rig, tmp_path):
+    assert rig.virtual is not None
+    on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})
+    plan = PLAN.model_copy(update={"ramp_step_s": 0.015})
+    with open_bench(slow(on_the_wall)) as bench, Run(bench, plan, tmp_path / "run.h5") as run:
+        upto(run, RunState.RECORDING)
+        run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "abort"))
+        for _ in run:
+            pass
+    with open_recording(tmp_path / "run.h5") as recording:
+        said = next(each.text for each in recording.events if each.kind == "silence")
+    assert float(said.removeprefix("abort: ").partition(" ")[0]) < ABORTED_WITHIN_S
 
 
 def test_an_abort_at_wall_pace_is_recorded_until_its_silence(rig, tmp_path):

@@ -21,13 +21,12 @@ from vibench.sim.feedback import (
 from ..errors import ConfigurationError, LimitExceeded
 from ..excitation import BranchContinuation
 from ..instruments import LoopBlock, LoopFeedback
+from ..plan import fast_loop_time_s
 from ..rig import ControllerConfig, Rig, amplifier_of, shaker_of, specimen_of
 
 Coefficients = NDArray[np.complex128]
 LARGEST_MULTIPLIER = 0.99
 """Of the loop along a branch that is allowed: a departure falls to a third in a hundred periods."""
-_SAMPLES_LATE = 1.5
-"""How late a mean over a sample is, and a volt that is held over one, in samples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +75,9 @@ class FastLoop:
 
 def fast_loop(rig: Rig) -> FastLoop:
     """Design the law of a rig's controller; raises ConfigurationError where it has none."""
-    plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), loop_timing(rig))
+    controller = controller_of(rig)
+    timing = LoopTiming(controller.rate_hz, controller.latency_s)
+    plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), timing)
     return FastLoop(rig, plant, designed_law(plant))
 
 
@@ -103,7 +104,7 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
             f"{hold.multiplier:.3g} at {hold.at_hz:.5g} Hz with {loop}, allowed is at most "
             f"{LARGEST_MULTIPLIER:g}. Nothing was played; shorten the latency, or lower the level"
         )
-    least_s = least_growth_time_s(timing.latency_s + _SAMPLES_LATE / timing.rate_hz)
+    least_s = least_growth_time_s(fast_loop_time_s(controller_of(fast.rig)))
     if hold.multiplier is None and hold.growth_s < least_s:
         raise LimitExceeded(
             f"the branch cannot be held: by the model a motion at {hold.at_hz:.5g} Hz grows by e in "
@@ -117,11 +118,11 @@ def level_at(plan: BranchContinuation, frequency_hz: float) -> float:
     return plan.base_level.acceleration_at(frequency_hz) / (2 * pi * frequency_hz) ** 2
 
 
-def loop_timing(rig: Rig) -> LoopTiming:
-    """Give rate and latency of a rig's controller; raises ConfigurationError where it has none."""
+def controller_of(rig: Rig) -> ControllerConfig:
+    """Give a rig's controller; raises ConfigurationError where it has none."""
     match rig.controller:
-        case ControllerConfig(rate_hz=rate_hz, latency_s=latency_s):
-            return LoopTiming(rate_hz, latency_s)
+        case ControllerConfig():
+            return rig.controller
         case _:
             raise ConfigurationError(
                 "a branch is followed by a real-time controller, and this bench has none. Nothing was "

@@ -73,10 +73,11 @@ from ._limits import (
 from ._loads import needed_vpp, predicted_loads
 from ._loop_time import (
     LOOK_PERIODS,
+    fast_loop_time_s,
     look_s,
     loop_time_s,
 )
-from ._measurement import InRunLimits, Measurement, OnChange, OnOverload, Point
+from ._measurement import FEWEST_STAIRS, InRunLimits, Measurement, OnChange, OnOverload, Point
 from ._measurement_preview import (
     MeasurementPreview,
     preview_measurement,
@@ -107,6 +108,7 @@ __all__ = [
     "CHECK_FREQUENCY_HZ",
     "CHECK_S",
     "EXCITATION_KINDS",
+    "FEWEST_STAIRS",
     "HUSH_S",
     "LOOK_PERIODS",
     "AbstractExcitation",
@@ -161,6 +163,7 @@ __all__ = [
     "drive_source_of",
     "duration_s",
     "excitation_text",
+    "fast_loop_time_s",
     "half_cosine",
     "known_phases",
     "lead_in_s",

@@ -19,6 +19,9 @@ LONGEST_S = 30 * 86400.0
 """Of one recording: a month [s]."""
 Fraction = Annotated[float, Field(gt=0, le=1)]
 
+FEWEST_STAIRS = 4
+"""Of a ramp: fewer would be steps."""
+
 
 class OnOverload(StrEnum):
     """What the run does when an input or the vibrometer passes 95 % of its range."""
@@ -76,11 +79,10 @@ class Measurement(FrozenModel):
 
     @model_validator(mode="after")
     def _ramp_has_stairs(self) -> Self:
-        fewest = 4
-        if self.ramp_step_s * fewest > self.ramp_s * (1 + 1e-9):
+        if self.ramp_step_s * FEWEST_STAIRS > self.ramp_s * (1 + 1e-9):
             raise ValueError(
-                f"ramp_step_s = {self.ramp_step_s:g} leaves fewer than {fewest} stairs in a ramp of "
-                f"{self.ramp_s:g} s; give at most {self.ramp_s / fewest:g}"
+                f"ramp_step_s = {self.ramp_step_s:g} leaves fewer than {FEWEST_STAIRS} stairs in a ramp of "
+                f"{self.ramp_s:g} s; give at most {self.ramp_s / FEWEST_STAIRS:g}"
             )
         return self
 

@@ -1,5 +1,6 @@
 """A function generator as a drive: one command for each change, and a ramp as a staircase of amplitudes."""
 
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
@@ -8,7 +9,7 @@ import numpy as np
 from ..errors import AcquisitionError, ConfigurationError
 from ..excitation import Play, Stream, Tone, Waveform
 from ..instruments import FunctionGenerator, Sweep
-from ..plan import DriveSource, Measurement, Phase, RunState, half_cosine, stairs
+from ..plan import FEWEST_STAIRS, DriveSource, Measurement, Phase, RunState, half_cosine, stairs
 
 QUIET = 1.25
 """Level 0 of a waveform that reaches full range, where ramps begin and end, over the generator's smallest
@@ -21,6 +22,8 @@ plays is not documented for every firmware, and the times of reading vary by som
 LITTLE = 0.98
 """A level is not lowered before the frequency changes where it is lowered by less than this."""
 MOST_CYCLES = 50_000
+_BLIND_S = 0.1
+"""Of a ramp on which no sample is counted."""
 _ROUNDING_S = 1e-9
 
 
@@ -78,6 +81,7 @@ class GeneratorDrive:
         self._level = 0.0
         self._is_on = False
         self._setting_vpp = 0.0
+        self._setting_takes_s = 0.0
 
     @property
     def can_hold(self) -> bool:
@@ -108,9 +112,9 @@ class GeneratorDrive:
                 yield phase.duration_s
             case RunState.RAMPING_UP:
                 self._begin(phase.play)
-                yield from self._ramp(phase.end_level, phase.duration_s)
+                yield from self._ramp(phase.end_level, phase.duration_s, self._stairs)
             case RunState.RAMPING_DOWN:
-                yield from self._ramp(phase.end_level, phase.duration_s)
+                yield from self._ramp(phase.end_level, phase.duration_s, self._stairs)
             case _:
                 self._begin(phase.play)
                 if phase.state is RunState.RECORDING and isinstance(phase.play, Sweep):
@@ -118,8 +122,8 @@ class GeneratorDrive:
                 yield from self._pieces(phase.duration_s)
 
     def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Ramp down from the level of now, in as many stairs as any; yields how long to read on each [s]."""
-        yield from self._ramp(0.0, ramp_s)
+        """Ramp down from the level of now, in stairs that there is time for; yields how long each is [s]."""
+        yield from self._ramp(0.0, ramp_s, self._stairs_within(ramp_s))
 
     def cut(self) -> None:
         """Turn the output off, loud as it is."""
@@ -128,8 +132,8 @@ class GeneratorDrive:
     def silence(self) -> None:
         """Ramp down as fast as the generator takes commands, then turn the output off, whatever happens.
 
-        For the ways out on which no samples can be counted. Some 20 commands of a few milliseconds
-        make a ramp that is short but no step.
+        For the ways out on which no samples can be counted. Some 20 commands of a few milliseconds make a
+        ramp that is short but no step; of a slow generator, four.
         """
         try:
             with suppress(AcquisitionError):  # a ramp that fails leaves it to stop(), which never gives up
@@ -202,11 +206,16 @@ class GeneratorDrive:
         if new.level > old.level or LITTLE * old.level <= new.level < old.level:
             self._generator.set_amplitude(self._due_vpp)
 
-    def _ramp(self, target: float, ramp_s: float) -> Iterator[float]:
+    def _ramp(self, target: float, ramp_s: float, count: int) -> Iterator[float]:
         begin = self._level
-        for stair in range(1, self._stairs + 1):
-            self._set_level(begin + (target - begin) * half_cosine(stair / self._stairs))
-            yield from self._pieces(ramp_s / self._stairs)
+        for stair in range(1, count + 1):
+            self._set_level(begin + (target - begin) * half_cosine(stair / count))
+            yield from self._pieces(ramp_s / count)
+
+    def _stairs_within(self, ramp_s: float) -> int:
+        """Count the settings that fit into a time, by how long the last took: a stop waits for no more."""
+        made = self._stairs if self._setting_takes_s == 0.0 else int(ramp_s / self._setting_takes_s)
+        return min(self._stairs, max(FEWEST_STAIRS, made))
 
     def _start(self) -> None:
         # Before the command: should it fail half-way, the output counts as on.
@@ -223,14 +232,16 @@ class GeneratorDrive:
     def _set_level(self, level: float) -> None:
         self._level = level
         self._setting_vpp = self._due_vpp
+        began_s = time.monotonic()
         self._generator.set_amplitude(self._setting_vpp)
+        self._setting_takes_s = time.monotonic() - began_s
 
     def _ramp_down_blindly(self) -> None:
         if not self.is_playing:
             return
-        top = self._level
-        for stair in range(1, self._stairs + 1):
-            self._set_level(top * half_cosine(1 - stair / self._stairs))
+        top, count = self._level, self._stairs_within(_BLIND_S)
+        for stair in range(1, count + 1):
+            self._set_level(top * half_cosine(1 - stair / count))
 
     @property
     def _due_vpp(self) -> float:
