@@ -78,8 +78,8 @@ class BranchLine(Labelled):
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
-        """All multipliers inside the unit circle, shape (n,)."""
-        return np.asarray(self.largest_multiplier < 1.0)
+        """No multiplier outside the unit circle, shape (n,)."""
+        return np.isinf(self.growth_time_s)
 
     @property
     def growth_time_s(self) -> Reals:

@@ -5,6 +5,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..periodic import NEUTRAL
+
 UPDATES_TO_HOLD = 10.0
 """A loop holds what takes this many of its updates to grow by e: it must see a departure and answer it."""
 
@@ -24,7 +26,8 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
         Drive periods of the motion.
 
     """
-    rate = np.log(np.maximum(np.asarray(multiplier, dtype=np.float64), 1.0))
+    size = np.asarray(multiplier, dtype=np.float64)
+    rate = np.where(size > 1.0 + NEUTRAL, np.log(np.maximum(size, 1.0)), 0.0)
     with np.errstate(divide="ignore"):
         return np.asarray(periods / (np.asarray(frequency_hz, dtype=np.float64) * rate))
 

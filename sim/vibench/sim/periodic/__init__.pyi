@@ -8,6 +8,7 @@ from ._balance_solver import (
     first_order_guesses as first_order_guesses,
 )
 from ._branch import (
+    NEUTRAL as NEUTRAL,
     BifurcationKind as BifurcationKind,
     Branch as Branch,
     BranchEvent as BranchEvent,

@@ -10,6 +10,10 @@ from numpy.typing import NDArray
 from ..kernels import Complex, Floats
 from ._continuation import ArcEnd
 
+NEUTRAL = 1e-9
+"""A multiplier no further outside the unit circle than this lies on it, but for rounding: as all do without
+damping, where distances neither grow nor fall."""
+
 
 class Parameter(StrEnum):
     """What changes along a branch."""
@@ -86,8 +90,8 @@ class Branch:
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:
-        """All multipliers inside the unit circle, shape (m,)."""
-        return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0)
+        """No multiplier outside the unit circle, shape (m,)."""
+        return np.asarray(np.abs(self.multipliers[:, 0]) < 1.0 + NEUTRAL)
 
     @property
     def parameters(self) -> Floats:

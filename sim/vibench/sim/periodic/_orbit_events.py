@@ -16,7 +16,7 @@ from enum import StrEnum
 import numpy as np
 
 from ..kernels import Complex, Vector
-from ._branch import BifurcationKind
+from ._branch import NEUTRAL, BifurcationKind
 
 COMPLEX_PART = 1e-6
 """A pair with less imaginary part than this is a real pair of product one: no motion is born there."""
@@ -57,9 +57,11 @@ class OrbitSigns:
 
     @property
     def torus(self) -> float:
-        """Changes sign where a complex pair passes the unit circle."""
+        """Changes sign where a complex pair passes the unit circle; one that lies on it counts as inside."""
         pairs = itertools.combinations(self.multipliers, 2)
-        return float(np.prod([a * b - 1.0 for a, b in pairs]).real)
+        beyond = np.array([a * b - 1.0 for a, b in pairs])
+        beyond[np.abs(beyond) < NEUTRAL] = -NEUTRAL
+        return float(np.prod(beyond).real)
 
     @property
     def has_pair_on_circle(self) -> bool:

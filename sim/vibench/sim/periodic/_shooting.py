@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..kernels import Complex, Floats, Table, Vector
 from ..model import Harmonic, NoContact, PowerLaw, Specimen, Y, Z, chosen
 from ..motion import Trajectory, integrate, start_motion, state_scales
-from ._branch import BifurcationKind
+from ._branch import NEUTRAL, BifurcationKind
 from ._floquet import multipliers
 from ._frequency_time import phasors_of
 from ._orbit_events import OrbitSigns, Symmetry
@@ -66,8 +66,8 @@ class PeriodicOrbit:
 
     @property
     def is_stable(self) -> bool:
-        """All multipliers inside the unit circle."""
-        return bool(abs(self.floquet_multipliers[0]) < 1.0)
+        """No multiplier outside the unit circle."""
+        return bool(abs(self.floquet_multipliers[0]) < 1.0 + NEUTRAL)
 
     @property
     def impacts(self) -> int:
