@@ -40,7 +40,7 @@ def test_a_report_lays_recordings_on_maps_over_frequency_and_amplitude_only(
     small_map, stepped_file, tmp_path
 ):
     results = analyse_files((stepped_file,), "steps", Simulation.LEFT_OUT)
-    other = solve_map(Map(model="linear", gap_m=Range(start=4e-5, stop=5e-5, points=2)))
+    other = solve_map(Map(model="linear", damping_time_s=Range(start=1e-5, stop=2e-5, points=2)))
     on_it, beside = (each.figure for each in laid_maps(results, [small_map, other]))
     assert len([line for axes in on_it.axes for line in axes.get_lines()]) > 0
     assert beside.axes

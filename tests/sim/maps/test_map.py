@@ -64,6 +64,15 @@ def test_values_of_a_range_lie_as_asked_and_between_their_edges():
         assert np.allclose(spacing, spacing[0], rtol=1e-9)
 
 
+@pytest.mark.parametrize(("points", "step"), [(15, 1), (17, 2), (40, 4), (129, 16), (600, 16)])
+def test_a_small_map_is_computed_rather_than_filled_in(points, step):
+    levels = LEVELS.model_copy(update={"points": 700})
+    plan = Map(frequency_hz=FREQUENCIES.model_copy(update={"points": points}), amplitude_m=levels)
+    assert plan.first_step == step
+    assert plan.is_adaptive == (step > 1)
+    assert plan.model_copy(update={"coarse": 32}).first_step == 32
+
+
 def test_every_quantity_reaches_the_scene():
     plan = Map(
         k1_n_per_m=Range(start=500.0, stop=900.0, points=3),

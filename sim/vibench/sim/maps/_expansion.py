@@ -77,7 +77,7 @@ class MapPoints:
         """Numbers of the points that are computed before anything is known."""
         if not self.plan.is_adaptive:
             return np.arange(self.grid.size)
-        return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.coarse)), self.grid)
+        return points_of(np.flatnonzero(lattice(cells_shape(self.grid), self.plan.first_step)), self.grid)
 
     def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
         """Ask for the next cells of the lattice, from all their starts; for everything at once if told to."""
@@ -152,7 +152,7 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
         np.where(is_steady, size, math.nan),
         BASIN_JUMP if plan.is_basin else JUMP,
     )
-    return plan_refinement(seen, plan.coarse, plan.seed)
+    return plan_refinement(seen, plan.first_step, plan.seed)
 
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:

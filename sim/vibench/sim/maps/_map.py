@@ -18,6 +18,10 @@ from ._quantities import OF_SPECIMEN, QUANTITIES, START, Quantity
 
 MOST_POINTS = 4_000_000
 """A file of 1 GB, and as much memory."""
+MOST_STEP = 16
+"""Between the first points, where a map does not say."""
+FEWEST_STEPS = 8
+"""Between the first points of an axis: a picture from fewer would be drawn, not computed."""
 STARTS = "start"
 RANDOM = "random"
 
@@ -129,8 +133,9 @@ class Map(GridPlan):
     """Drive periods over which a motion that does not repeat is observed."""
     refinement: Refinement = Refinement.ADAPTIVE
     """Which points of a map over two quantities are computed."""
-    coarse: Annotated[int, Field(ge=2, le=64)] = 16
-    """Steps between the points that are computed first; halved until it is 1."""
+    coarse: Annotated[int, Field(ge=2, le=64)] | None = None
+    """Steps between the points that are computed first, halved until it is 1; absent: 16, or as many as leave
+    eight such steps on each axis. What lies between points that agree is filled in."""
 
     @model_validator(mode="after")
     def _varies(self) -> Self:
@@ -145,7 +150,7 @@ class Map(GridPlan):
             raise ValueError(f"chain = {', '.join(self.chain)} names a direction twice; give each once")
         if self.chain and any(each in START for each in self.varied):
             raise ValueError(f"a chain takes its starts from its neighbours, and {names[0]} varies the start")
-        if self.coarse & (self.coarse - 1):
+        if self.coarse is not None and self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse = {self.coarse} is no power of 2; give 2, 4, 8, 16, 32 or 64")
         if self.window_periods >= self.periods:
             raise ValueError(
@@ -199,7 +204,17 @@ class Map(GridPlan):
     @property
     def is_adaptive(self) -> bool:
         """Whether points may be left out: of two quantities, where none waits for its neighbour."""
-        return self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
+        may_be = self.refinement is Refinement.ADAPTIVE and len(self.varied) == 2 and not self.chain
+        return may_be and self.first_step > 1
+
+    @property
+    def first_step(self) -> int:
+        """Steps between the points that are computed first; 1 where all of them are."""
+        if self.coarse is not None:
+            return self.coarse
+        fewest = min(self.range_of(each).points for each in self.varied)
+        affordable = max(1, (fewest - 1) // FEWEST_STEPS)
+        return min(MOST_STEP, 1 << (affordable.bit_length() - 1))
 
     @property
     def start_labels(self) -> tuple[str, ...]:
