@@ -26,7 +26,9 @@ def pack(
     description: Annotated[str, typer.Option("--description", help="A sentence or two.")] = "",
 ) -> None:
     """Pack a folder of recordings as a Research Object Crate, described for a repository."""
-    crate = folder.resolve().with_suffix(".zip") if out is None else out
+    here = folder.resolve()
+    # Not with_suffix: a folder may be called after a level, "0.5Vpp".
+    crate = here.with_name(f"{here.name}.zip") if out is None else out
     facts = CrateFacts(licence, tuple(author or ()), title, description)
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     with transfer_bar("pack", size) as observer:

@@ -13,6 +13,9 @@ from ._attributes import read_attributes
 LONGEST = 300
 """Letters that are shown of what is wrong: names and texts in a broken file may be of any length."""
 
+_LOCKED_OTHERWISE = "file locking flag values don't match"
+"""What HDF5 says of a file that this process has open already, with locks."""
+
 
 def open_hdf5(path: Path) -> h5py.File:
     """Open a recording for reading; it may still be growing.
@@ -29,6 +32,11 @@ def open_hdf5(path: Path) -> h5py.File:
     except hdf5_files.UnsafeHdf5 as error:
         raise RecordingError(f"{path} was not read: {str(error)[:LONGEST]}") from error
     except OSError as error:
+        if _LOCKED_OTHERWISE in str(error):
+            raise RecordingError(
+                f"{path} is open in this program already, by another library and with another locking: close "
+                "it there first. The file was not touched."
+            ) from error
         raise RecordingError(
             f"{path} is no readable HDF5 file ({error}). It was cut short, or is something else;"
             " copy it again from where it was recorded."

@@ -24,7 +24,7 @@ CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueErr
 
 
 def analyse(
-    recording: Recording | Path,
+    recording: Recording | Path | str,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     observer: ProgressObserver = UNOBSERVED,
 ) -> AbstractAnalysis[Any, Any]:
@@ -46,8 +46,8 @@ def analyse(
         With one sentence that names the file, when nothing in it is usable.
 
     """
-    if isinstance(recording, Path):
-        with open_recording(recording) as opened:
+    if isinstance(recording, Path | str):
+        with open_recording(Path(recording)) as opened:
             return analyse(opened, request, observer)
     name = recording.path.name
     observer.begin(name, "looking at every channel")

@@ -343,7 +343,7 @@ def _require_same(path: Path, kept: GridPlan, asked: GridPlan) -> None:
         raise StudyError(
             f"{path} holds another {asked.called}: "
             f"{', '.join(_difference(name, kept, asked) for name in differing)}."
-            " Nothing was changed; ask for the same {asked.called}, or choose another file."
+            f" Nothing was changed; ask for the same {asked.called}, or choose another file."
         )
 
 
