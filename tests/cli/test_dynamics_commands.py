@@ -53,6 +53,28 @@ def test_what_a_bench_can_hold_is_told_beside_branches():
     assert all(point["growth_time_s"] is None for point in found["branches"][0]["points"])
 
 
+def test_a_bench_with_a_real_time_controller_holds_what_that_one_is_quick_enough_for():
+    result = run(
+        "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
+        "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"), "--json",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    # Ten times 0.3 ms of latency and one and a half of 10,240 samples a second.
+    assert json.loads(result.stdout)["least_growth_time_s"] == pytest.approx(10.0 * (3e-4 + 1.5 / 10_240))
+
+
+@pytest.mark.parametrize("options", [("--model", "linear"), ()])
+def test_without_damping_motions_are_neither_unstable_nor_do_they_bifurcate_by_rounding(options):
+    result = run(
+        "branches", "--damping-time", 0, "--amplitude", 5e-6, "--frequency", "200:201", "--places", 2,
+        "--starts", 1, "--json", *options,
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    smooth = max(json.loads(result.stdout)["branches"], key=lambda each: len(each["points"]))
+    assert all(point["is_stable"] for point in smooth["points"])
+    assert smooth["events"] == []
+
+
 def test_exponents_are_printed_as_json_and_written(tmp_path):
     result = run(
         "spectrum", "--amplitude", 5e-6, "--frequency", 260, "--duration", 1.5, "--settle", 0.5, "--json",

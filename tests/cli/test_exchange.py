@@ -21,6 +21,16 @@ role = "m0_velocity"
 """
 
 
+def test_a_folder_that_is_called_after_a_level_gives_its_whole_name_to_its_crate(recorded, tmp_path):
+    folder = tmp_path / "lauf 0.5Vpp"
+    folder.mkdir()
+    recorded.rename(folder / "run.h5")
+    licence = "https://creativecommons.org/licenses/by/4.0/"
+    packed = CliRunner().invoke(app, ["pack", str(folder), "--license", licence])
+    assert packed.exit_code == 0, packed.output
+    assert (tmp_path / "lauf 0.5Vpp.zip").is_file()
+
+
 @pytest.fixture
 def recorded(tmp_path):
     channel = ChannelHeader("m0_velocity", "dev/ai0", "velocity", "m s-1", 0.125, range_v=5.0)

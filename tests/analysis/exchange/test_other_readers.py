@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from vibench.acquisition import open_recording
+from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.recording import ResultArray
 
 RATE_HZ = 51_200.0
@@ -113,3 +113,14 @@ def test_complex_results_are_two_real_arrays_over_one_axis(with_result):
         axis = group["transmission_real"].dims[0][0]
         np.testing.assert_allclose(value, np.exp(1j * axis[:]))
         assert axis.attrs["units"] == b"Hz"
+
+
+def test_a_recording_that_xarray_holds_open_is_not_called_cut_short(known_file):
+    xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
+    with (
+        xarray.open_dataset(known_file, engine="h5netcdf"),
+        pytest.raises(RecordingError, match="open in this program already"),
+    ):
+        open_recording(known_file)
+    with open_recording(known_file) as recording:
+        assert recording.samples > 0

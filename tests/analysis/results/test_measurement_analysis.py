@@ -28,6 +28,11 @@ def verdict(analysis, what):
     return next(each.verdict for each in analysis.checks if each.what == what)
 
 
+def test_a_recording_is_named_by_path_or_text(dwell_file):
+    path = dwell_file("weak")
+    assert analyse(str(path)).response.response_ii == analyse(path).response.response_ii
+
+
 def test_a_weak_dwell_gives_the_closed_form_in_amplitude_and_phase(dwell_file):
     found = analysed(dwell_file("weak"))
     assert isinstance(found, DwellAnalysis)

@@ -208,8 +208,9 @@ def test_another_study_is_refused_by_what_differs_and_changes_nothing(small, tmp
     make_file(path, small)
     before = path.read_bytes()
     other = Study.model_validate({**small.model_dump(), **change})
-    with pytest.raises(StudyError, match=said):
+    with pytest.raises(StudyError, match=said) as refused:
         solve_study(other, path, ExistingStudy.RESUME)
+    assert "ask for the same study, or" in str(refused.value)
     assert path.read_bytes() == before
 
 
