@@ -79,6 +79,8 @@ class TestTheJob:
             "Saved in",
             "If nobody looks",
         ]
+        # What may break, not the length of a ramp or the points of a period.
+        assert any(f"{unit} in run" in plan.lines[2] for unit in (" m", " m/s", " m/s2", " N", " A", " V"))
         assert until_state(client, EngineState.ARMED).armed.expires_in_s > 50
         assert not (tmp_path / "new").exists()
         client.start()

@@ -59,7 +59,9 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
         drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
     planned = planned_recordings(campaign, folder, request.existing)
     missing = [each for each in planned if not each.is_complete]
-    tightest, closest = max(checks, key=lambda named: named[1].use)
+    # Points of a period or the length of a ramp may be used up without harm: loads are what may break.
+    loads = [named for named in checks if named[1].load is not None]
+    tightest, closest = max(loads or checks, key=lambda named: named[1].use)
     loudest = max(point.measurement.excitation.highest_amplitude_vpp for point in points)
     kinds = ", ".join(dict.fromkeys(point.measurement.excitation.kind for point in points))
     size_mb = campaign.size_bytes(bench.digitizer.sample_rate_hz, len(bench.channels)) / 1e6

@@ -292,6 +292,7 @@ def _specimen(measurement: Measurement, rig: Rig, loads: Loads) -> Iterator[Limi
         "m",
         limit.source,
         "lower amplitude_vpp or keep away from the resonance",
+        load=BaseQuantity.AMPLITUDE,
     )
     flagged = measurement.limits.on_overload is OnOverload.FLAG
     for channel in channels_of(rig):
