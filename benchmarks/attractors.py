@@ -6,6 +6,7 @@ other starts, drawn with another seed, for as long as it takes to settle within 
 
 import argparse
 import sys
+from collections.abc import Callable
 
 import numpy as np
 from random_scenes import described, edge_scene, random_scene
@@ -50,7 +51,7 @@ def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
     if stated is None or truth is None:
         return False
     for motion in truth.motions:
-        same = [each for each in stated.motions if _is_same(each, motion)]
+        same = sorted((each for each in stated.motions if _is_same(each, motion)), key=_apart_from(motion))
         low, high = (same[0].share.low, same[0].share.high) if same else (0.0, stated.unseen_share)
         if not low <= motion.share.share <= high:
             return False
@@ -58,6 +59,11 @@ def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
         any(_is_same(each, motion) for motion in truth.motions) or each.share.low < 1.0 / truth.starts
         for each in stated.motions
     )
+
+
+def _apart_from(motion: FoundMotion) -> Callable[[FoundMotion], float]:
+    """Of several chaotic motions, that is the same whose response is nearest."""
+    return lambda each: abs((each.response_i or 0.0) - (motion.response_i or 0.0))
 
 
 def _is_same(one: FoundMotion, other: FoundMotion) -> bool:

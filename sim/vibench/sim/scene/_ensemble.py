@@ -38,7 +38,7 @@ def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -
     asked = next(group for group in groups if any(each is reached[0] for each in group))
     groups = sorted(groups, key=len, reverse=True)
     kinds = [lasting(group[0].motion, escape) for group in groups]
-    counts = [Count(len(group), kind not in PENDING) for group, kind in zip(groups, kinds, strict=True)]
+    counts = counts_of(kinds, [len(group) for group in groups])
     shares = shares_of(counts)
     pending = sum(each.trials for each in counts if not each.is_final)
     return Ensemble(
@@ -60,6 +60,19 @@ def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -
         scatter=_deviation([each.responses_m[0] for each in reached]),
         followed_s=several.followed_s,
     )
+
+
+def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
+    """Count the starts of each motion, and say which may still come to another.
+
+    Chaos that does not die out may: one chaotic motion becomes another as suddenly as a periodic one, and
+    only what becomes periodic is seen as an escape.
+    """
+    is_one_chaos = kinds.count(MotionKind.CHAOTIC) == 1
+    return [
+        Count(count, kind not in PENDING and (kind is not MotionKind.CHAOTIC or is_one_chaos))
+        for kind, count in zip(kinds, starts, strict=True)
+    ]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:

@@ -64,7 +64,7 @@ class FoundMotion:
     """How many reached it."""
     share: Share
     """Of all starts. The intervals of all motions hold together in 19 cases of 20, and also in the end:
-    starts that were chaotic so far, or undecided, may come to any of the motions."""
+    starts that were chaotic so far, undecided, or on one of several chaotic motions may come to any other."""
 
 
 @dataclass(frozen=True)
