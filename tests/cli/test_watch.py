@@ -6,17 +6,26 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from threading import Event
 
 import pytest
 
-from vibench.acquisition import open_recording
-from vibench.acquisition.engine import EngineState, Supervision, announced_engines, start_engine
+from vibench.acquisition import StopSwitch, open_recording, stop_on_signal
+from vibench.acquisition.engine import (
+    EngineState,
+    StopDelivery,
+    Supervision,
+    announced_engines,
+    start_engine,
+    stop_engine,
+)
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._announcement import announced
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
+from vibench.acquisition.stopping import Program, announced_programs
 
 ROOT = Path(__file__).resolve().parents[2]
 PAUSE, LOOK_S = Event(), 0.01
@@ -39,6 +48,10 @@ def running(tmp_path):
         while engine.client.status().samples == 0:
             PAUSE.wait(LOOK_S)
         yield engine
+
+
+def unheard(level, reason):
+    raise AssertionError((level, reason))
 
 
 def wait(engine, state):
@@ -110,13 +123,97 @@ def test_where_no_engine_runs_it_is_said():
 
 def test_what_a_killed_engine_has_left_is_swept_away(tmp_path):
     gone = EngineAddress(host="127.0.0.1", port=1, token="t")
-    with announced(gone, "killed"):
+    with announced(gone, "killed", unheard):
         assert announced_engines() == ()
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no modes")
 def test_nobody_else_can_read_the_token(tmp_path):
     state = Path(os.environ["VIBENCH_STATE_DIR"])
-    with announced(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine"):
+    with announced(EngineAddress(host="127.0.0.1", port=1, token="t"), "mine", unheard):
         (file,) = (state / "engines").iterdir()
         assert file.stat().st_mode & 0o077 == 0
+
+
+SCRIPT = """
+from pathlib import Path
+from vibench.acquisition import open_bench, run_measurement
+from vibench.acquisition.plan import Measurement
+
+dwell = {dwell!r}
+with open_bench(Path({rig!r})) as bench:
+    def progress(stand):
+        print("running", flush=True)
+    outcome = run_measurement(bench, Measurement.model_validate({{"name": "alone", "excitation": dwell}}),
+                              Path("alone.h5"), on_progress=progress)
+print(outcome.state)
+"""
+
+
+class TestWithoutAnEngine:
+    """Scripts and checks that drive a bench themselves were not to be found, while the shaker moved."""
+
+    @pytest.fixture
+    def script(self, tmp_path):
+        text = SCRIPT.format(dwell=DWELL, rig=str(ROOT / "hardware_configs" / "virtual_rig.toml"))
+        with subprocess.Popen(
+            [sys.executable, "-c", text], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+        ) as script:
+            assert script.stdout.readline() == "running\n"
+            yield script
+            script.kill()
+
+    def test_a_script_is_stopped(self, script, vibench_here, tmp_path):
+        listed = json.loads(vibench_here("watch", "--json", cwd=tmp_path).stdout)
+        assert listed["engines"] == []
+        assert [(each["pid"], each["what"]) for each in listed["programs"]] == [(script.pid, "alone")]
+        told = vibench_here("stop", "--level", "abort", "--reason", "from elsewhere", cwd=tmp_path)
+        assert told.returncode == 0, told.stderr
+        assert f"alone, process {script.pid}: has taken the stop (abort)" in told.stdout
+        said = script.communicate(timeout=60)[0]
+        assert said.splitlines()[-1].startswith("stopped")
+        with open_recording(tmp_path / "alone.h5") as recording:
+            assert recording.reason == "from elsewhere"
+        assert list((Path(os.environ["VIBENCH_STATE_DIR"]) / "engines").iterdir()) == []
+
+    def test_what_only_engines_do_is_refused(self, script, vibench_here, tmp_path):
+        held = vibench_here("stop", "--level", "hold", cwd=tmp_path)
+        assert held.returncode == 1
+        assert "is no engine and cannot be held" in held.stderr
+        watched = vibench_here("watch", cwd=tmp_path)
+        assert watched.returncode == 1
+        assert f"{script.pid} (alone) drives a bench without one" in watched.stderr
+
+    def test_a_bench_check_is_stopped(self, vibench_here, tmp_path):
+        rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text().replace('"free"', '"wall"')
+        (tmp_path / "wall.toml").write_text(rig)
+        words = [sys.executable, "-m", "vibench.cli", "bench", "check", "--bench", "wall.toml"]
+        with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as check:
+            while "bench check" not in vibench_here("watch", "--json", cwd=tmp_path).stdout:
+                assert check.poll() is None
+                PAUSE.wait(LOOK_S)
+            told = vibench_here("stop", "--level", "off", "--reason", "enough", cwd=tmp_path)
+            assert told.returncode == 0, told.stderr
+            assert "enough" in check.communicate(timeout=60)[1]
+        assert check.returncode == 1
+
+
+def test_two_switches_of_one_process_are_both_reached(tmp_path):
+    first, second = StopSwitch(), StopSwitch()
+    with stop_on_signal(first, "first"), stop_on_signal(second, "second"):
+        (program,) = announced_programs(Program)
+        assert program.what == "first"
+        assert stop_engine(program, "abort", "both") is StopDelivery.TAKEN
+    assert (first.request.reason, second.request.reason) == ("both", "both")
+    assert announced_programs(Program) == ()
+
+
+def test_a_program_stays_announced_when_its_first_part_has_ended(tmp_path):
+    with ExitStack() as first:
+        first.enter_context(stop_on_signal(StopSwitch(), "first"))
+        second = first.enter_context(ExitStack())
+        second.enter_context(stop_on_signal(StopSwitch(), "second"))
+        staying = second.pop_all()
+    with staying:
+        assert [each.what for each in announced_programs(Program)] == ["second"]
+    assert announced_programs(Program) == ()

@@ -1,6 +1,5 @@
 """`vibench bench`: what is there, and is it well."""
 
-from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +19,6 @@ from vibench.acquisition import (
     open_bench,
     stop_on_signal,
 )
-from vibench.acquisition.engine import BenchLock
 from vibench.acquisition.rig import Rig, load_rig, save_knob_sheet
 
 from .bench_new import new_bench
@@ -113,7 +111,7 @@ def new(
 
 def _now(path: Path, out: Path, knobs: Path | None) -> CheckResult:
     rig, switch = load_rig(path), StopSwitch()
-    with closing(BenchLock.of(rig)), open_bench(rig) as opened, stop_on_signal(switch):
+    with open_bench(rig) as opened, stop_on_signal(switch, "bench check"):
         if knobs is not None:
             save_knob_sheet(opened.confirmations, knobs)
         return check_bench(opened, out, switch=switch)

@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -18,7 +17,6 @@ from vibench.acquisition import (
     open_bench,
     stop_on_signal,
 )
-from vibench.acquisition.engine import BenchLock
 from vibench.acquisition.first_day import QUESTIONS, DayPage, Question, configured, first_day
 from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import Confirm, KnobSheet, Rig, load_rig
@@ -123,7 +121,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
 def _day(rig: Rig, target: Path, operator: str, given: Answers | None) -> DayPage:
     confirm: Confirm | None = None if given is None or rig.virtual is not None else given.knobs
     wired, switch = _wired_at_terminal if given is None else given.wired, StopSwitch()
-    with closing(BenchLock.of(rig)), open_bench(rig, confirm) as bench, stop_on_signal(switch):
+    with open_bench(rig, confirm) as bench, stop_on_signal(switch, "bench new"):
         return first_day(bench, target, operator, wired, switch)
 
 

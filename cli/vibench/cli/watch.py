@@ -14,23 +14,33 @@ from vibench.acquisition.engine import (
     EngineSilent,
     StopDelivery,
     announced_engines,
+    programs_without_engine,
     stop_engine,
     the_engine,
+    the_program,
 )
 
 from .engine_bars import INTERVAL_S, EngineBars
 from .output import console, print_json
 from .paths import AsJson
 
+NAME = {"pid", "what", "started_utc"}
 Pid = Annotated[
-    int | None, typer.Option("--pid", metavar="N", help="Process of the engine; the only one if absent.")
+    int | None, typer.Option("--pid", metavar="N", help="Process that is meant; the only one if absent.")
 ]
 
 
 def watch(pid: Pid = None, as_json: AsJson = False) -> None:
     """Watch what an engine carries out, from any terminal of the same user; Ctrl-C leaves it be."""
     if as_json:
-        print_json({"engines": [_facts(each) for each in announced_engines() if pid in (None, each.pid)]})
+        engines = [each for each in announced_engines() if pid in (None, each.pid)]
+        others = [each for each in programs_without_engine() if pid in (None, each.pid)]
+        print_json(
+            {
+                "engines": [_facts(each) for each in engines],
+                "programs": [each.model_dump(include=NAME) for each in others],
+            }
+        )
         return
     engine = the_engine(pid)
     console.print(
@@ -59,8 +69,8 @@ def stop(
     ] = StopLevel.RAMP,
     reason: Annotated[str, typer.Option("--reason", help="Stands in the recording.")] = "vibench stop",
 ) -> None:
-    """Stop what an engine drives, and the campaign with it; the recording is kept and says why."""
-    engine = the_engine(pid)
+    """Stop what an engine, a script or a check drives, campaign and all; the recording says why."""
+    engine = the_program(pid)
     name = f"{engine.what}, process {engine.pid}"
     match stop_engine(engine, level, reason):
         case StopDelivery.KEPT:
@@ -70,7 +80,7 @@ def stop(
                 "switch the amplifier off by hand"
             )
         case StopDelivery.TAKEN:
-            console.print(f"{name}: does not answer, and has taken the stop ({level.value}).")
+            console.print(f"{name}: has taken the stop ({level.value}) that was left for it.")
         case StopDelivery.TOLD if level is StopLevel.HOLD:
             console.print(f"{name}: told to hold; 'vibench release' lets it go on.")
         case StopDelivery.TOLD:
@@ -93,10 +103,4 @@ def _facts(engine: Announcement) -> dict[str, object]:
             status = client.status().model_dump(mode="json")
     except EngineGone as error:
         silence = str(error)
-    return {
-        "pid": engine.pid,
-        "what": engine.what,
-        "started_utc": engine.started_utc,
-        "status": status,
-        "silence": silence,
-    }
+    return {**engine.model_dump(include=NAME), "status": status, "silence": silence}

@@ -14,10 +14,17 @@ from threading import Event
 import numpy as np
 import pytest
 
-from vibench.acquisition import CheckRule, LimitExceeded, RecordingError, StopLevel, open_recording
+from vibench.acquisition import (
+    CheckRule,
+    LimitExceeded,
+    RecordingError,
+    StopLevel,
+    open_bench,
+    open_recording,
+)
+from vibench.acquisition.bench import BenchLock
 from vibench.acquisition.engine import (
     DRIVING,
-    BenchLock,
     CampaignRequest,
     EngineClient,
     EngineGone,
@@ -232,6 +239,8 @@ class TestRefusals:
                 }
             )
             mine = BenchLock.of(served)
+            with pytest.raises(InstrumentBusy, match=f"in use by process {os.getpid()}"):
+                open_bench(served)
             client = engine().client
             client.open(served)
             fault = until_state(client, EngineState.FAULT).messages[-1]

@@ -31,11 +31,12 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.engine._admission import GREETING_S, WAITING_MOST
 from vibench.acquisition.engine._announcement import Announcement
-from vibench.acquisition.engine._kept_stops import engines_folder, put_down
 from vibench.acquisition.engine._server import VIEWERS_MOST
 from vibench.acquisition.engine._state import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
+from vibench.acquisition.stopping import put_down
+from vibench.acquisition.stopping._kept_stops import engines_folder
 from vibench.sim.operating_system import process_start
 
 from .conftest import ROOT, campaign, until, until_state, until_there

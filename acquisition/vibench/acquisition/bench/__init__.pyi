@@ -8,6 +8,9 @@ from ._instrument_list import (
     list_instruments as list_instruments,
     list_rig_instruments as list_rig_instruments,
 )
+from ._lock import (
+    BenchLock as BenchLock,
+)
 from ._protocol import (
     RunBench as RunBench,
 )

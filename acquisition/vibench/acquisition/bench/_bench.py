@@ -120,7 +120,7 @@ def open_bench(
     calibration
         What a calibration that has run out does; a virtual rig's never runs out.
     power
-        What keeps a virtual rig on beyond this bench; absent, it is switched off with it.
+        What holds the rig beyond this bench; absent, it is let go with it.
 
     Raises
     ------
@@ -128,6 +128,8 @@ def open_bench(
         When the file says something that is not allowed.
     CheckFailed
         When a calibration has run out, or a knob is not confirmed.
+    InstrumentBusy
+        When another program has this bench open.
     InstrumentError
         When an instrument cannot be opened; the others are then closed again.
 

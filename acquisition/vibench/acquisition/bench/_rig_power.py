@@ -1,17 +1,18 @@
-"""The simulated instruments of a rig, kept on while benches on it are opened and closed."""
+"""The instruments of a rig, held for this process while benches on it are opened and closed."""
 
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from threading import Event as Alarm
 from types import TracebackType
 from typing import Self
 
 from ..rig import Rig
+from ._lock import BenchLock
 from ._simulated_rig import PlayedFault, SimulatedRig, simulated_rig
 
 
 class RigPower:
-    """Switches the instruments of a virtual rig on and off, in a ``with``; nothing to do for a real one.
+    """Holds the instruments of a rig, in a ``with``: a virtual one is switched on and off, a real one locked.
 
     A virtual rig lives in rig time: what happens to it, a script of faults for example, goes on while
     a bench on it is closed and opened again, because it stays the same rig.
@@ -59,6 +60,8 @@ class RigPower:
     def __enter__(self) -> Self:
         if self.rig.virtual is not None:
             self._virtual = self._closing.enter_context(simulated_rig(self.rig))
+        else:
+            self._closing.enter_context(closing(BenchLock.of(self.rig)))
         return self
 
     def __exit__(

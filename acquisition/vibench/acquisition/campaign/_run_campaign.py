@@ -103,7 +103,7 @@ def run_campaign(
         where = folder / f"{campaign.name}{STATUS_SUFFIX}"
         status = StatusLine(where, campaign.name, journal.points(), campaign.rest_s)
         notifier = Notifier(campaign.name, folder, messengers, log)
-        session.enter_context(stop_on_signal(stop))
+        session.enter_context(stop_on_signal(stop, campaign.name))
 
         def say(event: CampaignEvent) -> None:
             for listener in (log, status, notifier, on_event):

@@ -1,7 +1,9 @@
 from ._announcement import (
     Announcement as Announcement,
     announced_engines as announced_engines,
+    programs_without_engine as programs_without_engine,
     the_engine as the_engine,
+    the_program as the_program,
 )
 from ._attendant import (
     Attendant as Attendant,
@@ -25,9 +27,6 @@ from ._job_queue import (
 )
 from ._live_twin import (
     TwinSwitch as TwinSwitch,
-)
-from ._lock import (
-    BenchLock as BenchLock,
 )
 from ._request_handler import (
     RequestHandler as RequestHandler,

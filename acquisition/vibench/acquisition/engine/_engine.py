@@ -25,7 +25,6 @@ from ..rig import Confirm, Rig
 from ..stopping import StopSwitch, stop_on_signal
 from ._campaign_request import CampaignRequest
 from ._live_twin import TwinProcess, TwinSwitch
-from ._lock import BenchLock
 from ._published_state import PublishedState
 from ._state import EngineState, Supervision
 from ._status import BenchFacts, ChannelFacts, TwinStatus
@@ -63,7 +62,6 @@ class Engine:
         self.switch = StopSwitch()
         """Holds or ends what runs; a new one for every campaign."""
         self._reconnecting: ReconnectingBench | None = None
-        self._lock: BenchLock | None = None
         self._twin = TwinProcess()
 
     @property
@@ -86,7 +84,6 @@ class Engine:
     def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
         """Open the bench of a rig; ``confirm`` as `vibench.acquisition.bench.open_bench` takes it."""
         try:
-            self._lock = BenchLock.of(rig)
             self._reconnecting = ReconnectingBench(rig, confirm)
             self._reconnecting.__enter__()
         except AcquisitionError as error:
@@ -206,7 +203,6 @@ class Engine:
 
     def _release(self) -> None:
         reconnecting, self._reconnecting = self._reconnecting, None
-        lock, self._lock = self._lock, None
         try:
             if reconnecting is not None:
                 reconnecting.close()
@@ -214,8 +210,6 @@ class Engine:
             self.published.messages.fault(error)
         finally:
             self.published.bench(None)
-            if lock is not None:
-                lock.close()
             self.turn_twin(TwinSwitch.OFF)
 
 

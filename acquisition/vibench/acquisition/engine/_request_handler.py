@@ -15,7 +15,7 @@ from ..instruments import Knob
 from ..plan import LimitCheck, played_alike, require_within_limits
 from ..rig import Confirm, KnobSheet, Rig
 from ..run import drive_for
-from ..stopping import Cause, StopLevel, StopRequest, StopSwitch
+from ..stopping import INTERVAL_S, Cause, StopLevel, StopRequest, StopSwitch
 from ._campaign_request import CampaignRequest
 from ._engine import Engine
 from ._errors import EngineError
@@ -35,9 +35,6 @@ from ._status import ArmedPlan, EngineStatus, TwinStatus
 from ._verbs import Verb
 
 Answer = TypeVar("Answer")
-
-INTERVAL_S = 0.05
-"""How often deadlines are looked at [s]."""
 
 ARMED_S = 60.0
 """An armed engine disarms itself after this long [s]."""

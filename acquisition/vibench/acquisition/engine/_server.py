@@ -7,20 +7,20 @@ engine's own thread is at work.
 import json
 import secrets
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
-from threading import Event, Lock, Thread
+from threading import Lock, Thread
 from time import monotonic
 
 from pydantic import ValidationError
 
 from ..errors import AcquisitionError
+from ..stopping import Watchdog
 from ._address import EngineAddress
 from ._admission import Admission
 from ._announcement import announced
-from ._kept_stops import KeptStops
-from ._request_handler import INTERVAL_S, RequestHandler
+from ._request_handler import RequestHandler
 from ._state import ConnectionRole
 from ._verbs import DONE, REQUEST, VERBS
 from ._wire import REQUESTS, Message, receive, refused, send
@@ -133,42 +133,18 @@ def spoken(address: EngineAddress) -> str:
     return json.dumps(address.model_dump())
 
 
-class Watchdog:
-    """Lets something be done at every `INTERVAL_S`, in a thread of its own, until closed."""
-
-    def __init__(self, look: Callable[[], None], name: str) -> None:
-        self._look = look
-        self._closing = Event()
-        self._thread = Thread(target=self._run, name=name, daemon=True)
-        self._thread.start()
-
-    def close(self) -> None:
-        """Stop watching; a look that hangs, in a folder that has gone away, is left alone."""
-        self._closing.set()
-        self._thread.join(LEFT_ALONE_S)
-
-    def _run(self) -> None:
-        while not self._closing.wait(INTERVAL_S):
-            self._look()
-
-
-LEFT_ALONE_S = 1.0
-
-
 @contextmanager
 def serving(handler: RequestHandler, what: str, host: str = LOOPBACK) -> Iterator[Server]:
     """Serve a request handler at ``host``; ``what`` is shown to those who look for an engine.
 
     Raises
     ------
-    EngineError
+    AcquisitionError
         When the state folder cannot be written: nobody could stop what cannot be found.
 
     """
     with ExitStack() as inside:
         server = inside.enter_context(closing(Server(handler, host)))
         inside.enter_context(closing(Watchdog(handler.enforce_deadlines, "engine watchdog")))
-        kept = inside.enter_context(closing(KeptStops.of_this_process(handler.stop)))
-        inside.enter_context(closing(Watchdog(kept.obey, "engine kept stops")))
-        inside.enter_context(announced(server.address, what))
+        inside.enter_context(announced(server.address, what, handler.stop))
         yield server

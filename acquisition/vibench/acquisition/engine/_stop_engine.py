@@ -1,4 +1,4 @@
-"""Stopping an engine whatever state it is in: it is told, and the stop is put down for it as well."""
+"""Stopping what drives a bench, whatever its state: the stop is put down, and an engine is told as well."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -8,11 +8,10 @@ from threading import Event
 from time import monotonic
 
 from ..host import chosen
-from ..stopping import StopLevel
+from ..stopping import Program, StopLevel, put_down
 from ._announcement import Announcement
 from ._client import EngineClient
 from ._errors import EngineError, EngineGone
-from ._kept_stops import put_down
 
 PATIENCE_S = 1.0
 """How long an engine may take to answer, and then to take what was put down; both take milliseconds [s]."""
@@ -20,20 +19,20 @@ LOOK_S = 0.02
 
 
 class StopDelivery(StrEnum):
-    """How a stop has reached an engine."""
+    """How a stop has reached a program."""
 
     TOLD = "told"
     """It has answered."""
     TAKEN = "taken"
-    """It did not answer, and has taken the stop that was put down for it."""
+    """It has taken the stop that was put down for it: it is no engine, or one that did not answer."""
     KEPT = "kept"
     """It did neither: its process lives, and obeys as soon as it comes back."""
 
 
 def stop_engine(
-    engine: Announcement, level: StopLevel | str = StopLevel.RAMP, reason: str = "stopped by the operator"
+    engine: Program, level: StopLevel | str = StopLevel.RAMP, reason: str = "stopped by the operator"
 ) -> StopDelivery:
-    """Stop what an engine drives, and the campaign with it.
+    """Stop what an engine, or another program, drives, and the campaign with it.
 
     The stop is put down in the state folder before the engine is told, so that it is obeyed within a
     twentieth of a second even where no connection comes about, and later where the process stands still.
@@ -52,13 +51,24 @@ def stop_engine(
     ------
     EngineGone
         When the process has ended, or when it could neither be told nor anything be put down.
+    EngineError
+        When a hold is asked of a program that is no engine.
 
     """
     level = chosen(StopLevel, level)
     if level is StopLevel.HOLD:
+        if not isinstance(engine, Announcement):
+            raise EngineError(
+                f"process {engine.pid} ({engine.what}) is no engine and cannot be held. It goes on; stop it: "
+                "ramp, abort or off"
+            )
         _tell(engine, level, reason)
         return StopDelivery.TOLD
     path, trouble = _put_down(engine, level, reason)
+    if not isinstance(engine, Announcement):
+        if path is None:
+            raise EngineGone(f"no stop could be left in the state folder for process {engine.pid}: {trouble}")
+        return _taken_or_kept(engine, path)
     try:
         _tell(engine, level, reason)
     except EngineError as error:
@@ -73,7 +83,7 @@ def stop_engine(
     return StopDelivery.TOLD
 
 
-def _put_down(engine: Announcement, level: StopLevel, reason: str) -> tuple[Path | None, str]:
+def _put_down(engine: Program, level: StopLevel, reason: str) -> tuple[Path | None, str]:
     try:
         return put_down(engine.pid, engine.process_start, level, reason), ""
     except OSError as error:
@@ -85,7 +95,7 @@ def _tell(engine: Announcement, level: StopLevel, reason: str) -> None:
         client.stop(level, reason)
 
 
-def _taken_or_kept(engine: Announcement, path: Path) -> StopDelivery:
+def _taken_or_kept(engine: Program, path: Path) -> StopDelivery:
     if _until(lambda: not path.exists()):
         return StopDelivery.TAKEN
     if engine.is_alive:

@@ -40,7 +40,7 @@ def run_measurement(
     """
     run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
     # The signals stay caught until the run has been left: impatience must not interrupt the silencing.
-    with stop_on_signal(run.switch), run:
+    with stop_on_signal(run.switch, path.stem), run:
         for progress in run:
             on_progress(progress)
     return run.outcome

@@ -1,7 +1,8 @@
 """How a run is told to end: causes, how hard each of them stops, and the switch between threads.
 
 `StopSwitch` is set without a lock and read after every block. The first Ctrl-C asks for a ramp, the
-second insists. Knows neither runs nor instruments.
+second insists. A program that drives a bench announces itself in the state folder, where others find it and
+put down stops for it. Knows neither runs nor instruments.
 """
 
 import lazy_loader

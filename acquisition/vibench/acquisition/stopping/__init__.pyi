@@ -1,3 +1,14 @@
+from ._kept_stops import (
+    put_down as put_down,
+)
+from ._program import (
+    AnyProgram as AnyProgram,
+    Program as Program,
+    announced_programs as announced_programs,
+    facts_of_this_process as facts_of_this_process,
+    reached as reached,
+    withdraw as withdraw,
+)
 from ._stop import (
     LEVELS as LEVELS,
     Cause as Cause,
@@ -7,4 +18,8 @@ from ._stop import (
 )
 from ._stop_on_signal import (
     stop_on_signal as stop_on_signal,
+)
+from ._watchdog import (
+    INTERVAL_S as INTERVAL_S,
+    Watchdog as Watchdog,
 )

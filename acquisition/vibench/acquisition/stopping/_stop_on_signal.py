@@ -1,4 +1,4 @@
-"""Ctrl-C and a polite kill end a run softly: the first asks, the second insists."""
+"""Ctrl-C, a polite kill and `vibench stop` end a run softly: the first signal asks, the second insists."""
 
 import signal
 import threading
@@ -6,23 +6,43 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from ._stop import Cause, StopRequest, StopSwitch
+from ._program import Program, facts_of_this_process, reached
+from ._stop import Cause, StopLevel, StopRequest, StopSwitch
 
 CAUSES = {"SIGINT": Cause.KEYBOARD, "SIGTERM": Cause.TERMINATED, "SIGHUP": Cause.TERMINATED}
 """By name, since Windows has no SIGHUP."""
 
 
 @contextmanager
-def stop_on_signal(switch: StopSwitch) -> Iterator[None]:
-    """While inside, SIGINT, SIGTERM and SIGHUP (the terminal was closed) ask ``switch`` for a stop.
+def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]:
+    """While inside, a stop from outside the program is asked of ``switch``.
 
-    SIGHUP stays ignored where it was ignored before (nohup): such a run is meant to go on.
+    ``vibench stop`` finds the program and leaves its stop in the state folder, whatever thread this is;
+    ``what`` is what it is called there. SIGINT, SIGTERM and SIGHUP (the terminal was closed) are stops in
+    the main thread, the only one to which Python delivers signals. SIGHUP stays ignored where it was ignored
+    before (nohup): such a run is meant to go on.
 
     The first ramps down and ends the run as stopped: Ctrl-C as the plan ends, the others faster. A second
     raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones are
-    ignored, so that impatience cannot interrupt the silencing. Outside the main thread, where Python
-    delivers no signals, nothing is changed.
+    ignored, so that impatience cannot interrupt the silencing.
+
+    Raises
+    ------
+    AcquisitionError
+        When the state folder cannot be written: nobody could stop what cannot be found.
+
     """
+
+    def press(level: StopLevel, reason: str) -> None:
+        switch.ask(StopRequest(Cause.OPERATOR, level, reason))
+
+    program = Program.model_validate(facts_of_this_process(what))
+    with _signals(switch), reached(press, program):
+        yield
+
+
+@contextmanager
+def _signals(switch: StopSwitch) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -1,4 +1,4 @@
-"""One engine per bench: a lock that vanishes with the process that holds it, however that ends."""
+"""One program at a bench: a lock that vanishes with the process that holds it, however that ends."""
 
 import hashlib
 import os

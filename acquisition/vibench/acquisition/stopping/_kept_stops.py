@@ -1,7 +1,7 @@
-"""Stops that need no connection: a file in the state folder, which the engine looks for all the time.
+"""Stops that need no connection: a file in the state folder, which whatever drives looks for all the time.
 
 Its name says everything: which process, when that began, how hard. So it is found with a look at a name,
-by an engine that may open no more files, and it can be put down on a disk that takes no more bytes; what
+by a process that may open no more files, and it can be put down on a disk that takes no more bytes; what
 it holds is the reason, where there is room for one.
 """
 
@@ -13,14 +13,14 @@ from threading import get_ident
 
 from vibench.sim.operating_system import process_start, state_folder
 
-from ..stopping import StopLevel
+from ._stop import StopLevel
 
 LONGEST_REASON = 500
 SILENT_REASON = "a stop that was left in the state folder"
 
 
 def engines_folder() -> Path:
-    """Give the folder in which engines are announced and stops are put down; nobody else's business."""
+    """Give the folder in which programs are announced and stops are put down; nobody else's business."""
     folder = state_folder() / "engines"
     folder.mkdir(mode=0o700, exist_ok=True)
     if folder.stat().st_mode & 0o077:

@@ -1,0 +1,178 @@
+"""Programs that drive a bench say so in the state folder, and can be stopped from outside while they do."""
+
+import os
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import Lock
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from vibench.sim.operating_system import is_process, process_start
+
+from ..errors import AcquisitionError
+from ._kept_stops import KeptStops, engines_folder
+from ._stop import StopLevel
+from ._watchdog import Watchdog
+
+Press = Callable[[StopLevel, str], None]
+
+
+class Program(BaseModel):
+    """A program of this user on this computer that drives a bench, or may at any moment."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    pid: int
+    what: str
+    """What it was started for: a campaign's name, or ``"window"``."""
+    started_utc: str
+    process_start: str = ""
+    """When its process began, as the system counts: a number is given again, this pair is not."""
+    computer: str = ""
+    """A state folder may lie in a home that several computers share."""
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether its process lives, answering or not."""
+        return is_process(self.pid, self.process_start)
+
+
+AnyProgram = TypeVar("AnyProgram", bound=Program)
+
+
+def facts_of_this_process(what: str) -> dict[str, object]:
+    """Give what a program says of itself."""
+    pid = os.getpid()
+    return {
+        "pid": pid,
+        "what": what,
+        "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "process_start": process_start(pid) or "",
+        "computer": platform.node(),
+    }
+
+
+def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
+    """Every living program of this computer that says of itself what ``model`` asks, oldest first.
+
+    What is left of processes that have ended is swept away; nothing else is.
+    """
+    found = []
+    for path in sorted(engines_folder().glob("*.json")):
+        try:
+            told = model.model_validate_json(path.read_text(encoding="utf-8"))
+        except (ValidationError, OSError):  # another version's, of another kind, or ended in between
+            continue
+        if told.computer not in ("", platform.node()):
+            continue
+        if told.is_alive:
+            found.append(told)
+        else:
+            withdraw(told.pid)
+    _sweep()
+    return tuple(sorted(found, key=lambda each: each.started_utc))
+
+
+def withdraw(pid: int) -> None:
+    """Take away what a program said of itself; legal where nothing is, or can be taken away."""
+    with suppress(OSError):
+        (engines_folder() / f"{pid}.json").unlink()
+
+
+class _Reached:
+    """All of this process that a stop from outside is to reach: an engine, runs, checks.
+
+    The first of them speaks for the process until it ends, an engine for the runs in it.
+    """
+
+    def __init__(self) -> None:
+        self._inside: list[tuple[Press, Program]] = []
+        self._kept: KeptStops | None = None
+        self._watchdog: Watchdog | None = None
+        self._changing = Lock()
+
+    def enter(self, entry: tuple[Press, Program]) -> None:
+        """Let one more be reached; raises OSError when the state folder cannot be written."""
+        with self._changing:
+            if not self._inside:
+                kept = KeptStops.of_this_process(self._press)
+                try:
+                    _write(entry[1])
+                except OSError:
+                    kept.close()
+                    raise
+                self._kept, self._watchdog = kept, Watchdog(kept.obey, "kept stops")
+            self._inside.append(entry)
+
+    def leave(self, entry: tuple[Press, Program]) -> None:
+        """Let it go; with the last, nothing is looked for any more."""
+        with self._changing:
+            spoke = self._inside[0] is entry
+            self._inside = [each for each in self._inside if each is not entry]
+            if self._inside and spoke:
+                with suppress(OSError):
+                    _write(self._inside[0][1])
+            if self._inside:
+                return
+            watchdog, kept, self._watchdog, self._kept = self._watchdog, self._kept, None, None
+        if watchdog is not None and kept is not None:
+            watchdog.close()
+            kept.close()
+        withdraw(entry[1].pid)
+
+    def _press(self, level: StopLevel, reason: str) -> None:
+        for press, _ in tuple(self._inside):
+            press(level, reason)
+
+
+_REACHED = _Reached()
+
+
+@contextmanager
+def reached(press: Press, program: Program) -> Iterator[None]:
+    """While inside, be found by `announced_programs`, and let ``press`` carry out the stops put down for it.
+
+    Raises
+    ------
+    AcquisitionError
+        When the state folder cannot be written: nobody could stop what cannot be found.
+
+    """
+    entry = (press, program)
+    try:
+        _REACHED.enter(entry)
+    except OSError as error:
+        raise AcquisitionError(
+            f"{program.what} cannot be announced in the state folder ({error}), so that nobody could stop "
+            "it. Nothing was started; make room there, or name another folder with VIBENCH_STATE_DIR"
+        ) from error
+    try:
+        yield
+    finally:
+        _REACHED.leave(entry)
+
+
+def _write(program: Program) -> Path:
+    path = engines_folder() / f"{program.pid}.json"
+    coming = path.with_suffix(".coming")
+    coming.unlink(missing_ok=True)  # left by a process of the same number that was killed
+    # Nobody else may read a token, not even for the moment before the mode is set.
+    descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        file.write(program.model_dump_json())
+    return coming.replace(path)  # whole, or not there
+
+
+def _sweep() -> None:
+    """Take away what was put down for processes that have ended; names begin with the process's number."""
+    folder = engines_folder()
+    for path in folder.iterdir():
+        pid, _, rest = path.name.partition(".")
+        start = rest.partition(".")[0] if ".stop-" in rest else ""
+        is_announced = (folder / f"{pid}.json").exists()  # perhaps of another computer
+        if not is_announced and pid.isdigit() and not is_process(int(pid), start):
+            path.unlink(missing_ok=True)

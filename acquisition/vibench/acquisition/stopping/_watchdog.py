@@ -1,0 +1,27 @@
+"""Something that is looked at all the time, beside whatever else a process does."""
+
+from collections.abc import Callable
+from threading import Event, Thread
+
+INTERVAL_S = 0.05
+"""How often it is looked at [s]."""
+LEFT_ALONE_S = 1.0
+
+
+class Watchdog:
+    """Lets something be done at every `INTERVAL_S`, in a thread of its own, until closed."""
+
+    def __init__(self, look: Callable[[], None], name: str) -> None:
+        self._look = look
+        self._closing = Event()
+        self._thread = Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop watching; a look that hangs, in a folder that has gone away, is left alone."""
+        self._closing.set()
+        self._thread.join(LEFT_ALONE_S)
+
+    def _run(self) -> None:
+        while not self._closing.wait(INTERVAL_S):
+            self._look()
