@@ -11,7 +11,7 @@ from time import monotonic
 import pytest
 
 from vibench.acquisition.engine import DRIVING, VIEWER_PATIENCE_S, Attendant, EngineClient, EngineState
-from vibench.acquisition.engine._state import HUNG_FACTOR
+from vibench.acquisition.engine._state import hung_patience_s
 from vibench.sim.operating_system import process_start
 
 from .conftest import campaign, until, until_state
@@ -55,6 +55,11 @@ def attending(process):
             program.kill()
 
 
+@pytest.mark.parametrize(("granted_s", "hung_s"), [(0.5, 2.0), (2.0, 8.0), (4.0, 10.0), (10.0, 10.0)])
+def test_a_window_that_hangs_is_given_no_more_than_any_drive_may_be_granted(granted_s, hung_s):
+    assert hung_patience_s(granted_s) == hung_s
+
+
 def test_an_attendant_keeps_a_run_going_that_nobody_asks_about_and_tells_of_a_program_that_hangs(
     engine, shipped_rig, tmp_path
 ):
@@ -66,7 +71,7 @@ def test_an_attendant_keeps_a_run_going_that_nobody_asks_about_and_tells_of_a_pr
         print(file=program.stdin, flush=True)
         status = until_state(visitor, EngineState.READY)
     assert "stands still" in status.rows[0].reason
-    assert monotonic() - hung_s > HUNG_FACTOR * VIEWER_PATIENCE_S
+    assert monotonic() - hung_s > hung_patience_s(VIEWER_PATIENCE_S)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a stopped program hangs")

@@ -88,6 +88,9 @@ class TestTheJob:
         ]
         # What may break, not the length of a ramp or the points of a period.
         assert any(f"{unit} in run" in plan.lines[2] for unit in (" m", " m/s", " m/s2", " N", " A", " V"))
+        assert re.fullmatch(
+            r"If nobody looks: aborted after [\d.]+ s; after [\d.]+ s where a window hangs", plan.lines[5]
+        )
         assert until_state(client, EngineState.ARMED).armed.expires_in_s > 50
         assert not (tmp_path / "new").exists()
         client.start()

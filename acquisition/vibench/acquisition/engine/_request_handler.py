@@ -24,11 +24,11 @@ from ._live_twin import TwinSwitch
 from ._sample_buffer import SampleSlice
 from ._state import (
     DRIVING,
-    HUNG_FACTOR,
     SOUNDING,
     VIEWER_PATIENCE_S,
     EngineState,
     Supervision,
+    hung_patience_s,
     patience_s,
 )
 from ._status import ArmedPlan, EngineStatus, TwinStatus
@@ -67,6 +67,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     kept = len(planned) - len(missing)
     attendance = request.attendance or supervision
     granted_s = patience_s(request.longest_patience_s, closest.use)
+    hung_s = hung_patience_s(granted_s)
     is_attended = attendance is Supervision.ATTENDED
     return ArmedPlan(
         campaign=campaign.name,
@@ -78,7 +79,11 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
             f"How long: {length} (h:min:s), ramps and checks included",
             f"Saved in: {folder}, at most {size_mb:.0f} MB while recording",
             "If nobody looks: "
-            + (f"aborted after {granted_s:.1f} s" if is_attended else "it goes on, unattended"),
+            + (
+                f"aborted after {granted_s:.1f} s; after {hung_s:.1f} s where a window hangs"
+                if is_attended
+                else "it goes on, unattended"
+            ),
         ),
         expires_in_s=ARMED_S,
         attendance=attendance,
@@ -283,7 +288,7 @@ class RequestHandler:
         alone_s = now_s - self._last_request_s
         if alone_s > granted_s:
             self._act_alone(f"nobody has looked for {alone_s:.1f} s")
-        elif self._still_s > HUNG_FACTOR * granted_s:
+        elif self._still_s > hung_patience_s(granted_s):
             self._act_alone(f"nobody has looked for {self._still_s:.1f} s: the window stands still")
 
     @property

@@ -58,6 +58,11 @@ HUNG_FACTOR = 4.0
 """A viewer that is there and says that its window stands still is given so many times the patience."""
 
 
+def hung_patience_s(granted_s: float) -> float:
+    """How long a drive may go on while a window stands still that is granted ``granted_s`` in silence [s]."""
+    return min(HUNG_FACTOR * granted_s, LONGEST_PATIENCE_S)
+
+
 def patience_s(longest_s: float, use: float) -> float:
     """How long a drive may go on while nobody looks: the closer to a limit, the shorter [s].
 
