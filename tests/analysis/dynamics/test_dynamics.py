@@ -48,6 +48,19 @@ def line(frequency_hz, size, multiplier, events=(), periods=1):
     )  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("method", "said"),
+    [
+        (BranchMethod.SHOOTING, "No periodic motion was found; 1.0 s."),
+        (BranchMethod.BALANCE, "No harmonic balance of at most 64 harmonics was found"),
+    ],
+)
+def test_that_nothing_was_found_is_told_in_the_words_of_the_method(method, said):
+    """A balance finds none among stops that knock, where shooting finds motions; "none" alone was said."""
+    none = BranchDiagram(BranchRequest(start=100.0, stop=120.0, method=method, harmonics=64), (), 1.0)
+    assert none.cost_sentence.startswith(said)
+
+
 FOLDED = line(
     [100.0, 110.0, 120.0, 115.0, 105.0],
     [1.0, 2.0, 3.0, 2.5, 2.0],

@@ -13,7 +13,7 @@ from vibench.sim.branches import FoundBranch, growth_time_s, least_growth_time_s
 from ..comparison import Curve, CurveKind, CurveOrigin
 from ..signals import Reals
 from ..tables import Labelled, named, plain
-from ._branch_request import BranchRequest
+from ._branch_request import BranchMethod, BranchRequest
 
 
 @dataclass(frozen=True)
@@ -167,13 +167,23 @@ class BranchDiagram(Labelled):
     def cost_sentence(self) -> str:
         """Say what was found, with its error and its cost."""
         if not self.lines:
-            return f"No periodic motion was found; {self.elapsed_s:.1f} s."
+            return f"{self._none_found}; {self.elapsed_s:.1f} s."
         isolated = sum(line.is_isolated for line in self.lines)
         worst = max(float(np.max(line.error_estimate)) for line in self.lines)
         return (
             f"{len(self.lines)} branches ({isolated} isolated), {self.points} motions in "
             f"{self.elapsed_s:.1f} s; error {self.largest_error:.1g} of the fundamental of p in the "
             f"middle of the worst branch, {worst:.1g} at the worst point."
+        )
+
+    @property
+    def _none_found(self) -> str:
+        if self.request.method is BranchMethod.SHOOTING:
+            return "No periodic motion was found"
+        harmonics = self.request.balance_options.most
+        return (
+            f"No harmonic balance of at most {harmonics} harmonics was found: there is no motion of the "
+            "drive's period here, or it has more harmonics, as with impacts; the method shooting tells"
         )
 
     @property
