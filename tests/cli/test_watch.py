@@ -121,6 +121,14 @@ def test_where_no_engine_runs_it_is_said():
     assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
 
 
+def test_where_the_state_folder_cannot_be_made_it_is_said(vibench_here, tmp_path):
+    (tmp_path / "state").write_text("a file")
+    told = vibench_here("stop", cwd=tmp_path, environment={"VIBENCH_STATE_DIR": str(tmp_path / "state")})
+    assert told.returncode == 1
+    assert "what drives a bench cannot be looked for in the state folder" in told.stderr
+    assert "VIBENCH_STATE_DIR" in told.stderr
+
+
 def test_what_a_killed_engine_has_left_is_swept_away(tmp_path):
     gone = EngineAddress(host="127.0.0.1", port=1, token="t")
     with announced(gone, "killed", unheard):

@@ -60,9 +60,22 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
     """Every living program of this computer that says of itself what ``model`` asks, oldest first.
 
     What is left of processes that have ended is swept away; nothing else is.
+
+    Raises
+    ------
+    AcquisitionError
+        When there is no state folder and none can be made.
+
     """
+    try:
+        folder = engines_folder()
+    except OSError as error:
+        raise AcquisitionError(
+            f"what drives a bench cannot be looked for in the state folder ({error}); name the program's own "
+            "with VIBENCH_STATE_DIR. In an emergency switch the amplifier off by hand"
+        ) from error
     found = []
-    for path in sorted(engines_folder().glob("*.json")):
+    for path in sorted(folder.glob("*.json")):
         try:
             told = model.model_validate_json(path.read_text(encoding="utf-8"))
         except (ValidationError, OSError):  # another version's, of another kind, or ended in between
@@ -175,4 +188,5 @@ def _sweep() -> None:
         start = rest.partition(".")[0] if ".stop-" in rest else ""
         is_announced = (folder / f"{pid}.json").exists()  # perhaps of another computer
         if not is_announced and pid.isdigit() and not is_process(int(pid), start):
-            path.unlink(missing_ok=True)
+            with suppress(OSError):
+                path.unlink()
