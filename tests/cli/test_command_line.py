@@ -46,6 +46,33 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
     assert (tmp_path / "recordings" / "dwell.h5").read_bytes() == before
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
+def test_a_stop_does_not_hide_that_a_point_has_failed(tmp_path):
+    text = QUICK + QUICK.split("\n", 2)[2].replace('"dwell"\nramp', '"long"\nramp').replace(
+        "= 1.5 }", "= 900 }"
+    )
+    script = tmp_path / "faults.toml"
+    script.write_text(
+        '[[faults]]\nat_s = 0.5\nfault = "turn_amplifier_gain"\ngain_db = 20\nfor_s = 2.0\n', encoding="utf-8"
+    )
+    words = ["measure", campaign(tmp_path, text), "--out", "out", "--faults", script, "--check", "waived"]
+    words += ["--after-failure", "go_on"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "vibench.cli", *map(str, words)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=subprocess.PIPE,
+    ) as measuring:
+        while not (tmp_path / "out" / "long.h5.part").exists():
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                measuring.wait(timeout=0.05)
+            assert measuring.poll() is None
+        measuring.send_signal(signal.SIGINT)
+        measuring.communicate(timeout=100)
+    assert [path.stem for path in sorted((tmp_path / "out").glob("*.h5"))] == ["dwell", "long"]
+    assert measuring.returncode == 1
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

@@ -184,10 +184,10 @@ def measure(
     )
     with the_bench(rig, plan.name, None if knobs is None else confirm_by_sheet(knobs)) as engine:
         point_results = engine.measure(request, messengers=messengers)
-    if engine.switch.request is not None:
-        raise typer.Exit(ExitCode.STOPPED)
     if any(point_result.outcome is PointOutcome.FAILED for point_result in point_results):
         raise typer.Exit(ExitCode.FAILED)
+    if engine.switch.request is not None:
+        raise typer.Exit(ExitCode.STOPPED)
 
 
 @contextmanager
