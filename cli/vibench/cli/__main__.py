@@ -118,7 +118,7 @@ COMMANDS = {
     "stop": Place(
         "watch",
         "stop",
-        "Stop what an engine drives, and the campaign with it; the recording is kept and says why.",
+        "Stop what an engine, a script or a check drives, campaign and all; the recording says why.",
     ),
     "release": Place(
         "watch", "release", "Let a run go on that was held with vibench stop --level hold, or in the window."

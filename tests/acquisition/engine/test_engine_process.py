@@ -49,6 +49,17 @@ SILENT_V = 0.02
 """Of the recorded drive: its noise, and the last stair of a ramp."""
 
 
+def on_server(rig, virtual):
+    """Give the rig as one that is not virtual: its instruments are those of another."""
+    return rig.model_copy(
+        update={
+            "virtual": None,
+            "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
+            "generator": rig.generator.model_copy(update={"resource": virtual.socket_resource}),
+        }
+    )
+
+
 def running(client, rig, tmp_path, *names):
     client.open(rig)
     until_state(client, EngineState.READY)
@@ -229,27 +240,27 @@ class TestRefusals:
                 assert stranger.recv(1) == b""
         assert client.status().state is EngineState.CLOSED
 
+    @pytest.mark.skipif(
+        "tests.windows_here" in sys.modules, reason="the locks of this process are not those of its engines"
+    )
     def test_two_engines_cannot_open_one_bench(self, engine, shipped_rig):
-        virtual = VirtualRig(shipped_rig)
-        with virtual:
-            served = shipped_rig.model_copy(
-                update={
-                    "virtual": None,
-                    "daq": shipped_rig.daq.model_copy(update={"server": virtual.daq_address}),
-                    "generator": shipped_rig.generator.model_copy(
-                        update={"resource": virtual.socket_resource}
-                    ),
-                }
-            )
+        with VirtualRig(shipped_rig) as virtual:
+            served = on_server(shipped_rig, virtual)
             mine = BenchLock.of(served)
-            with pytest.raises(InstrumentBusy, match=f"in use by process {os.getpid()}"):
-                open_bench(served)
             client = engine().client
             client.open(served)
             fault = until_state(client, EngineState.FAULT).messages[-1]
             assert fault.kind is MessageKind.FAULT
             assert fault.code == InstrumentBusy.__name__
             assert str(os.getpid()) in fault.what
+            mine.close()
+
+    def test_two_scripts_cannot_open_one_bench(self, shipped_rig):
+        with VirtualRig(shipped_rig) as virtual:
+            served = on_server(shipped_rig, virtual)
+            mine = BenchLock.of(served)
+            with pytest.raises(InstrumentBusy, match=f"in use by process {os.getpid()}"):
+                open_bench(served)
             mine.close()
 
 

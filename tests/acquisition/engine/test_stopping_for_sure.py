@@ -2,7 +2,6 @@
 
 import json
 import os
-import resource
 import shutil
 import signal
 import socket
@@ -44,6 +43,7 @@ from .conftest import ROOT, campaign, until, until_state, until_there
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="stalls and descriptors as Linux has them")
 
 PAUSE = Event()
+resource = pytest.importorskip("resource", reason="limits of a process as POSIX has them")
 
 
 @pytest.fixture(scope="module")

@@ -186,19 +186,19 @@ if __name__ == "__main__":
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for another process")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_from_outside_ends_a_run_softly(tmp_path, number):
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_from_outside_ends_a_run_softly(tmp_path, name):
     script, path = tmp_path / "child.py", tmp_path / "run.h5"
     script.write_text(CHILD)
     with subprocess.Popen(
         [sys.executable, str(script), str(VIRTUAL), str(path)], stdout=subprocess.PIPE, text=True, cwd=ROOT
     ) as child:
         assert child.stdout.readline() == "recording\n"
-        child.send_signal(number)
+        child.send_signal(signal.Signals[name])
         out, _ = child.communicate(timeout=60)
     assert child.returncode == 0
     assert out == "stopped\n"
     with open_recording(path) as recording:
         assert recording.state is RecordingState.STOPPED
-        assert recording.reason.startswith(number.name)
+        assert recording.reason.startswith(name)
         assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 64))) < 5e-3
