@@ -19,6 +19,8 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import pytest
+
 import vibench.sim
 
 POSIX_ONLY = (
@@ -75,8 +77,9 @@ def become_windows() -> None:
             delattr(signal, name)
 
 
-def pytest_configure() -> None:
-    """Run tests so; pytest alone still asks who the user is."""
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests() -> None:
+    """Run tests so, before a conftest imports the other; pytest alone still asks who the user is."""
     import _pytest.tmpdir
 
     _pytest.tmpdir.get_user_id = lambda: None
