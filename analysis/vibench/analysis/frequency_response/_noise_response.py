@@ -1,5 +1,6 @@
 """What a noise measurement shows: the transmission from base to m0, with bounds and resonances."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from ..tones import NoiseDriveLevel, noise_drive_level
 from ._estimators import coherence, least_squares
 from ._mode import Resonance
 from ._periodic import PeriodicFrequencyResponse, PeriodicSums
-from ._repetition import period_spectra
+from ._repetition import Repetition
 from ._request import FrequencyResponseRequest
 from ._resonance import resonances
 from ._results import Estimator, FrequencyResponse, converted_frequency_response
@@ -56,11 +57,21 @@ def repeated_response(
     channels: Channels,
     noise: MultisineNoise | OddMultisine,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    *,
+    repetitions: Sequence[Repetition] = (),
 ) -> NoiseResponse:
     """Estimate the transmission of noise that repeats from everything usable in it.
 
     Raises NotEnoughData when no realisation is left, and InvalidRequest when segments are chosen: the periods
     are the segments.
+
+    Parameters
+    ----------
+    channels, noise, request
+        What was recorded, how it was driven, and what is asked.
+    repetitions
+        Of every realisation, where they were measured on the same drive before; measured if absent.
+
     """
     if request.cuts_segments:
         raise InvalidRequest(
@@ -73,19 +84,19 @@ def repeated_response(
     level = DensitySums(
         rate, segment_samples=round(rate * min(_LEVEL_SEGMENT_S, _LEAST_PERIODS / noise.repetition_hz))
     )
-    means: list[Complexes] = []
     stretches = channels.stretches(SegmentLabel.REALISATION)
-    used = 0
+    known: Sequence[Repetition | None] = repetitions or [None] * len(stretches)
+    taken = used = 0
     bad = _Unusable()
-    for stretch in stretches:
+    for stretch, repetition in zip(stretches, known, strict=True):
         data = _usable(channels, stretch, rate / noise.repetition_hz, bad)
         if data is None:
             continue
-        sums.add(*data)
+        sums.add(*data, repetition=repetition)
         level.add(data[1])
         used += data.shape[1]
-        means.append(_mean_spectra(data, rate / noise.repetition_hz))
-    if not means:
+        taken += 1
+    if not taken:
         raise NotEnoughData(
             f"none of the {noise.realisations} planned realisations of noise holds two whole periods of "
             f"{1 / noise.repetition_hz:g} s without a fault{bad.text}; measure again"
@@ -94,7 +105,7 @@ def repeated_response(
         delay_s=channels.response_delay_s, band_hz=(noise.band_start_hz, noise.band_stop_hz)
     )
     order = np.rint(periodic.frequency_response.frequency_hz / noise.repetition_hz).astype(int)
-    motion = np.stack([each[:, order] for each in means])
+    motion = sums.motion()[..., order]
 
     sensors = channels.response_gain(periodic.frequency_response.frequency_hz)
 
@@ -114,7 +125,7 @@ def repeated_response(
         base_level=noise_drive_level(level.density(), low_hz=noise.band_start_hz, high_hz=noise.band_stop_hz),
         periodic=periodic,
         used_s=used / rate,
-        left_out=len(stretches) - len(means),
+        left_out=len(stretches) - taken,
         lost_samples=bad.lost,
         overloaded_samples=bad.overloaded,
     )
@@ -151,15 +162,6 @@ def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _U
     data = channels.read(stretch.start, stretch.stop)
     valid = bad.valid(data, channels.overloaded(stretch.start, stretch.stop))
     return data if valid.all() else None
-
-
-def _mean_spectra(data: Reals, nominal_period: float) -> Complexes:
-    """Spectra of base and response averaged over the periods, shape (2, lines).
-
-    The nominal period will do for the magnitudes h1 and h2 are formed of: 20 ppm lose 2e-5 of a line.
-    """
-    periods = int(data.shape[1] / nominal_period + 1e-3)
-    return np.asarray(period_spectra(data[1:], nominal_period, periods).mean(axis=1))
 
 
 def _least_squares(

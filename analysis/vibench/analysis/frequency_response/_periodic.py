@@ -174,7 +174,9 @@ class PeriodicSums:
         self._confidence = confidence
         self._realisations: list[_Realisation] = []
 
-    def add(self, drive: Reals, base: Reals, response: Reals) -> None:
+    def add(
+        self, drive: Reals, base: Reals, response: Reals, *, repetition: Repetition | None = None
+    ) -> None:
         """Take the settled samples of one realisation, each of shape (samples,).
 
         Raises NotEnoughData for fewer than two periods.
@@ -185,12 +187,15 @@ class PeriodicSums:
             The clean reference: the recorded generator voltage.
         base, response
             What stands below and above the fraction bar.
+        repetition
+            Of this drive, where it was measured before.
 
         """
         if not drive.size == base.size == response.size:
             sizes = f"{drive.size}, {base.size} and {response.size}"
             raise InvalidRequest(f"drive, base and response hold {sizes} samples; they must be equally long")
-        repetition = measured_repetition(drive, self._sample_rate_hz / self._repetition_hz)
+        if repetition is None:
+            repetition = measured_repetition(drive, self._sample_rate_hz / self._repetition_hz)
         channels = np.stack([drive, base, response])
         spectra = period_spectra(channels, repetition.period_samples, repetition.periods)
         motion = spectra[1:]
@@ -206,6 +211,11 @@ class PeriodicSums:
                 covariance,
             )
         )
+
+    def motion(self) -> Complexes:
+        """Give the mean spectra of base and response, shape (realisations, 2, lines)."""
+        lines = min(one.drive.size for one in self._realisations)
+        return np.stack([[one.base[:lines], one.response[:lines]] for one in self._realisations])
 
     def frequency_response(
         self, *, delay_s: float = 0.0, band_hz: tuple[float, float] = EVERYTHING

@@ -1,6 +1,7 @@
 """Noise: the transmission from base to m0, its resonances, and what JSON says of them."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,9 @@ def _simulated(laid: NoiseOverlay) -> Json:
     return {"resonances": [_resonance(each) for each in laid.response.resonances]}
 
 
-def _noise(estimate: Estimate) -> AnalysisKind[Noise, NoiseAnalysis, NoiseOverlay]:
+def _noise(
+    estimate: Estimate, again: Callable[[NoiseAnalysis], Estimate]
+) -> AnalysisKind[Noise, NoiseAnalysis, NoiseOverlay]:
     def analyse(
         facts: RecordingFacts, channels: Channels, plan: Noise, request: FrequencyResponseRequest
     ) -> NoiseAnalysis:
@@ -100,7 +103,7 @@ def _noise(estimate: Estimate) -> AnalysisKind[Noise, NoiseAnalysis, NoiseOverla
         return NoiseAnalysis(facts, measurement_checks(facts), plan, response, request)
 
     def draw(analysis: NoiseAnalysis, channels: SimulatedChannels) -> Draw[NoiseResponse]:
-        response = estimate(channels, analysis.excitation, analysis.request)
+        response = again(analysis)(channels, analysis.excitation, analysis.request)
         label = SegmentLabel.NOISE if response.periodic is None else SegmentLabel.REALISATION
         return Draw(response, noise_quantities(response), (), *channels.played_impacts(label))
 
@@ -118,5 +121,13 @@ def _noise(estimate: Estimate) -> AnalysisKind[Noise, NoiseAnalysis, NoiseOverla
     )
 
 
-REPEATED_NOISE = _noise(repeated_response)
-STREAMED_NOISE = _noise(streamed_response)
+def _repeated_again(analysis: NoiseAnalysis) -> Estimate:
+    """Give the estimate for draws: their drive is the recorded one, whose periods were measured with it."""
+    found = analysis.response
+    if found.periodic is None or found.left_out:
+        return repeated_response
+    return partial(repeated_response, repetitions=found.periodic.repetitions)
+
+
+REPEATED_NOISE = _noise(repeated_response, again=_repeated_again)
+STREAMED_NOISE = _noise(streamed_response, again=lambda _: streamed_response)

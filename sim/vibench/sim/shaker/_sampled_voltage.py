@@ -11,6 +11,7 @@ from math import ceil
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
+from scipy import fft
 
 from ..model import Specimen
 from ._loaded_shaker import LoadedShaker
@@ -112,7 +113,8 @@ def follow_voltage(
     tail = np.zeros((2, 0))
     done = 0
     noise_v = noise_rms_v * np.sqrt(ratio)
-    for stop, fine in _on_steps(volts, sample_rate_hz, ratio):
+    resampling = _Resampling(sample_rate_hz, ratio)
+    for stop, fine in resampling.stretches(volts):
         means = np.empty((2, fine.size))
         for begin in range(0, fine.size, block):
             end = min(begin + block, fine.size)
@@ -125,7 +127,7 @@ def follow_voltage(
         upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
         held = stop - tail.shape[1] // ratio
         for row, gain, result in zip(tail, gains, kept, strict=True):
-            result[done:upto] = _samples_of(row, sample_rate_hz, ratio, gain)[done - held : upto - held]
+            result[done:upto] = resampling.samples(row, gain)[done - held : upto - held]
         done = upto
         tail = tail[:, max(0, (done - _MARGIN - held)) * ratio :]
     blocks_s = np.minimum(np.arange(len(impacts)) * (block * step_s), volts.size / sample_rate_hz)
@@ -138,36 +140,57 @@ def follow_voltage(
     )
 
 
-def _on_steps(volts: FloatArray, sample_rate_hz: float, ratio: int) -> Iterator[tuple[int, FloatArray]]:
-    """Yield the end of each stretch of samples, and the voltage's means over their steps."""
-    block = max(1, round(_BLOCK_S * sample_rate_hz))
-    length = ceil(_PIECE / block) * block
-    for first in range(0, volts.size, length):
-        stop = min(first + length, volts.size)
-        padded = np.zeros(stop - first + 2 * _MARGIN)
-        low, high = max(first - _MARGIN, 0), min(stop + _MARGIN, volts.size)
-        padded[low - first + _MARGIN : high - first + _MARGIN] = volts[low:high]
-        frequency_hz = _frequencies(padded.size, sample_rate_hz)
-        spectrum = np.fft.rfft(padded) * _pass_band(frequency_hz, sample_rate_hz)
-        spectrum *= np.sinc(frequency_hz / (sample_rate_hz * ratio)) * ratio
-        fine = np.fft.irfft(spectrum, padded.size * ratio)
-        yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
-
-
-def _samples_of(means: FloatArray, sample_rate_hz: float, ratio: int, gain: Gain) -> FloatArray:
-    """Give the samples behind a sensor and a converter of means over steps.
+class _Resampling:
+    """Brings samples to steps, and means over steps to samples behind a sensor and a converter.
 
     Means lie half a step behind the voltage that was brought to the steps, and are read there: both
     shifts cancel.
     """
-    count = means.size // ratio
-    padded = np.zeros((count + 2 * _MARGIN) * ratio)
-    padded[_MARGIN * ratio : (_MARGIN + count) * ratio] = means
-    kept = (count + 2 * _MARGIN) // 2 + 1
-    frequency_hz = _frequencies(count + 2 * _MARGIN, sample_rate_hz)
-    spectrum = np.fft.rfft(padded)[:kept] * _pass_band(frequency_hz, sample_rate_hz)
-    spectrum *= gain(frequency_hz) / (np.sinc(frequency_hz / (sample_rate_hz * ratio)) * ratio)
-    return np.asarray(np.fft.irfft(spectrum, count + 2 * _MARGIN)[_MARGIN : _MARGIN + count])
+
+    def __init__(self, sample_rate_hz: float, ratio: int) -> None:
+        self._sample_rate_hz = sample_rate_hz
+        self._ratio = ratio
+        # The pieces of a record are of one length, but the last.
+        self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
+
+    def stretches(self, volts: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+        """Yield the end of each stretch of samples, and the voltage's means over their steps."""
+        ratio = self._ratio
+        block = max(1, round(_BLOCK_S * self._sample_rate_hz))
+        length = ceil(_PIECE / block) * block
+        for first in range(0, volts.size, length):
+            stop = min(first + length, volts.size)
+            padded = np.zeros(_padded(stop - first))
+            low, high = max(first - _MARGIN, 0), min(stop + _MARGIN, volts.size)
+            padded[low - first + _MARGIN : high - first + _MARGIN] = volts[low:high]
+            spectrum = fft.rfft(padded) * self._weights_of(padded.size, None)
+            fine = fft.irfft(spectrum, padded.size * ratio, overwrite_x=True)
+            yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
+
+    def samples(self, means: FloatArray, gain: Gain) -> FloatArray:
+        """Give the samples behind a sensor of this gain."""
+        count = means.size // self._ratio
+        size = _padded(count)
+        padded = np.zeros(size * self._ratio)
+        padded[_MARGIN * self._ratio : (_MARGIN + count) * self._ratio] = means
+        spectrum = fft.rfft(padded)[: size // 2 + 1] * self._weights_of(size, gain)
+        return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[_MARGIN : _MARGIN + count])
+
+    def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
+        """Give what the lines of so many samples are multiplied by, to steps or from them behind a sensor."""
+        known = self._weights.get((size, gain))
+        if known is None:
+            frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
+            mean_of_step = np.sinc(frequency_hz / (self._sample_rate_hz * self._ratio)) * self._ratio
+            band = _pass_band(frequency_hz / self._sample_rate_hz)
+            known = band * mean_of_step if gain is None else band * gain(frequency_hz) / mean_of_step
+            self._weights[size, gain] = known
+        return known
+
+
+def _padded(samples: int) -> int:
+    """Give a length that a transform likes, with room for the margins."""
+    return int(fft.next_fast_len(samples + 2 * _MARGIN, real=True))
 
 
 def _coupled(values: FloatArray, cut: float) -> FloatArray:
@@ -179,11 +202,7 @@ def _coupled(values: FloatArray, cut: float) -> FloatArray:
     return np.asarray(scipy.signal.lfilter(weights, [1.0, -(1 - half_turn) / (1 + half_turn)], values))
 
 
-def _frequencies(samples: int, sample_rate_hz: float) -> FloatArray:
-    return np.asarray(np.fft.rfftfreq(samples, 1 / sample_rate_hz), dtype=np.float64)
-
-
-def _pass_band(frequency_hz: FloatArray, sample_rate_hz: float) -> FloatArray:
-    """One up to 0.45 of the sample rate, a cosine edge to nothing at half of it."""
-    edge = (frequency_hz / sample_rate_hz - _PASS_PART) / (0.5 - _PASS_PART)
+def _pass_band(cycles: FloatArray) -> FloatArray:
+    """One up to 0.45 cycles per sample, a cosine edge to nothing at half a cycle."""
+    edge = (cycles - _PASS_PART) / (0.5 - _PASS_PART)
     return np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))
