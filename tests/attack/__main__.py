@@ -2,12 +2,14 @@
 
 ::
 
-    python -m tests.attack toml --seed 7 --count 5000 --shard 1/4 --save toml_1.json
+    python -m tests.attack toml --seed 7 --count 5000 --shard 1/4 --minutes 25 --save toml_1.json
     python -m tests.attack --sum toml_*.json
 """
 
 import argparse
 import sys
+import time
+from math import inf
 from pathlib import Path
 
 from . import (
@@ -19,7 +21,7 @@ from . import (
     recordings_mutants,
     toml_files,
 )
-from .tally import Attack, Shard, Tally, saved_tally
+from .tally import Attack, Shard, Tally, save, saved_tallies
 
 TARGETS: dict[str, Attack] = {
     "toml": toml_files.attack,
@@ -37,18 +39,21 @@ def main() -> int:
     """Attack, or add up; the exit code is 1 when something was found."""
     options = _options()
     if options.sum:
-        tallies = _added_up([saved_tally(path) for path in options.sum])
+        tallies = _added_up([tally for path in options.sum for tally in saved_tallies(path)])
     else:
         part, of = (int(each) for each in options.shard.split("/"))
-        shard = Shard(options.seed, options.count, part - 1, of)
-        tallies = [TARGETS[name](shard) for name in options.target or TARGETS]
+        until_s = time.monotonic() + 60 * options.minutes
+        shard = Shard(options.seed, options.count, part - 1, of, until_s)
+        tallies = []
+        for name in options.target or TARGETS:
+            tallies.append(TARGETS[name](shard))
+            if options.save is not None:
+                save(tallies, options.save)
     for tally in tallies:
         print(tally.line())
         for finding in tally.findings:
             print(f"  seed {finding.seed}, number {finding.number}: {'; '.join(finding.faults)}")
             print("    " + finding.told.strip().replace("\n", "\n    "))
-        if options.save is not None:
-            tally.save(options.save)
     return int(any(tally.findings for tally in tallies))
 
 
@@ -67,6 +72,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument(
         "--shard", default="1/1", metavar="I/N", help="only every Nth mutant, from the Ith on"
     )
+    parser.add_argument("--minutes", type=float, default=inf, help="what is not begun by then is left out")
     parser.add_argument("--save", type=Path, metavar="FILE.json", help="what this shard has seen")
     parser.add_argument(
         "--sum", type=Path, nargs="+", metavar="FILE.json", help="add up what shards have saved"

@@ -6,10 +6,12 @@ numbers and can be made again.
 
 import json
 import random
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from math import inf
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,8 @@ class Shard:
     count: int
     part: int = 0
     of: int = 1
+    until_s: float = inf
+    """No further mutant is begun after this time of `time.monotonic`."""
 
     @property
     def numbers(self) -> range:
@@ -29,6 +33,8 @@ class Shard:
     def chances(self) -> Iterator[tuple[int, random.Random]]:
         """Give each number with the source of chance that its mutant is made from."""
         for number in self.numbers:
+            if time.monotonic() > self.until_s:
+                return
             yield number, random.Random(f"{self.seed}:{number}")
 
 
@@ -82,14 +88,18 @@ class Tally:
             f"longest {self.worst_s:.1f} s, most memory {self.worst_bytes / 1e6:.0f} MB"
         )
 
-    def save(self, path: Path) -> None:
-        """Write it for `saved_tally`."""
-        path.write_text(json.dumps(asdict(self), indent=1), encoding="utf-8")
+
+def save(tallies: Sequence[Tally], path: Path) -> None:
+    """Write what a shard has seen of each target, for `saved_tallies`."""
+    path.write_text(json.dumps([asdict(tally) for tally in tallies], indent=1), encoding="utf-8")
 
 
-def saved_tally(path: Path) -> Tally:
+def saved_tallies(path: Path) -> list[Tally]:
     """Read what a shard has written."""
-    content = json.loads(path.read_text(encoding="utf-8"))
+    return [_tally(content) for content in json.loads(path.read_text(encoding="utf-8"))]
+
+
+def _tally(content: dict[str, Any]) -> Tally:
     findings = [Finding(**{**each, "faults": tuple(each["faults"])}) for each in content.pop("findings")]
     return Tally(**content, findings=findings)
 

@@ -1,6 +1,7 @@
 """What the attacks stand on: mutants by number, shards that add up, commands judged by how they end."""
 
 import random
+import time
 from dataclasses import replace
 
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from .byte_mutants import mutated_bytes
 from .command_runner import CommandRunner
 from .limits import HANGS_S, LONGEST_COMPLAINT, LONGEST_S, MOST_BYTES, Case, Ending
-from .tally import Finding, Shard, Tally, saved_tally
+from .tally import Finding, Shard, Tally, save, saved_tallies
 from .text_mutants import mutated_toml
 from .toml_files import CAMPAIGNS, ROOT, reading
 
@@ -50,6 +51,7 @@ def test_a_mutant_depends_on_its_seed_and_number_only():
     assert sum(len(part) for part in parts) == 40
     assert len(set(whole.values())) > 30
     assert whole != mutants(Shard(8, 40))
+    assert mutants(Shard(7, 40, until_s=time.monotonic() - 1)) == {}
 
 
 def test_shards_are_added_up(tmp_path):
@@ -58,8 +60,8 @@ def test_shards_are_added_up(tmp_path):
     second.count(0, took_s=1.0, peak_bytes=7)
     second.count(1)
     second.findings.append(Finding("toml", 1, 2, ("a traceback",), "TypeError"))
-    second.save(tmp_path / "second.json")
-    first.add(saved_tally(tmp_path / "second.json"))
+    save([second], tmp_path / "second.json")
+    first.add(*saved_tallies(tmp_path / "second.json"))
     assert first == Tally("toml", 3, {"0": 2, "1": 1}, 2.0, 7, second.findings)
     with pytest.raises(ValueError, match="different targets"):
         first.add(Tally("imports"))

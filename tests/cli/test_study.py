@@ -26,11 +26,11 @@ window_s = 0.2
 """
 LONG = """
 amplitudes_m = [20e-6]
-frequencies_hz = { start = 200, stop = 205, step = 0.01 }
+frequencies_hz = { start = 200, stop = 205, step = 0.025 }
 duration_s = 0.5
 window_s = 0.2
 """
-LONG_POINTS = 501
+LONG_POINTS = 201
 LOOK_S = 0.05
 COMPILING_S = 300
 """For whoever runs the first of these tests after a change of the simulation."""
