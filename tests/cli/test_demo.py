@@ -120,7 +120,9 @@ def test_every_measurement_is_one_of_the_draws_of_its_twin(results):
     assert sum(not each["agrees"] for each in compared) <= 1
     limit_z = norm.ppf(1.0 - 0.5 * 0.01 / sum(each["compared"] for each in compared))
     assert max(abs(each["largest_z"]) for each in compared) < limit_z
-    assert results["sweep_moderate"]["simulated"]["escape"]["what"] == "collisions"
+    # Whether a sweep loses its collisions before it ends is chance, in each of its runs.
+    escape = results["sweep_moderate"]["simulated"]["escape"]
+    assert escape is None or escape["what"] == "collisions"
 
 
 def test_the_collision_region_begins_where_its_twin_has_it(results):

@@ -88,3 +88,6 @@ def test_an_end_that_all_runs_share_is_an_edge_and_no_chance():
     assert escape_rate(runs[:1], [(each,) for each in runs[1:]]) is None
     lasting = [Ending("collisions", 0.0, 90.0, ended=False)] * 17
     assert escape_rate(lasting[:1], [(each,) for each in lasting[1:]]) is None
+    # A sweep's last plateau without a contact: the collisions went on as long as there was a sweep.
+    lasting[3] = Ending("collisions", 0.0, 89.8, ended=True)
+    assert escape_rate(lasting[:1], [(each,) for each in lasting[1:]]) is None

@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 
 _ONE_EDGE_S = 2.0
-"""Ends that all lie within this are one edge, as near as an end can be told."""
+"""Runs that all stop within this share one edge, the end of the record perhaps, as near as it can be told."""
 
 
 @dataclass(frozen=True)
@@ -66,15 +66,13 @@ class EscapeRate:
 
 
 def escape_rate(measured: Sequence[Ending], draws: Sequence[Sequence[Ending]]) -> EscapeRate | None:
-    """Count ends over the measured run and its draws; None where none ended, or all at one edge."""
+    """Count ends over the measured run and its draws; None where none ended, or all stop at one edge."""
     if not measured:
         return None
     mine = measured[0]
     runs = [mine, *(one for draw in draws for one in draw[:1] if one.what == mine.what)]
     stops = np.array([each.stop_s for each in runs if each.ended])
-    if len(runs) == 1 or not stops.size:
-        return None
-    if stops.size == len(runs) and np.ptp(stops) < _ONE_EDGE_S:
+    if len(runs) == 1 or not stops.size or np.ptp([each.stop_s for each in runs]) < _ONE_EDGE_S:
         return None
     # Before the first end nothing shows that the motion could have ended there at all.
     from_s = float(stops.min())
