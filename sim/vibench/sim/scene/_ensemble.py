@@ -8,7 +8,7 @@ from scipy.special import stdtrit
 
 from ._prediction import Ensemble, FoundMotion, MotionKind
 from ._scatter import COVERED
-from ._several_starts import LASTING_S, ReachedMotion, SeveralStarts, motions_among
+from ._several_starts import LASTING_S, ReachedMotion, SeveralStarts, kind_among, motions_among
 from ._shares import Count, EscapeRate, shares_of, wilson_share
 
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
@@ -20,7 +20,9 @@ ErrorOf = Callable[[ReachedMotion], float | None]
 """Gives the relative error of the responses of a motion."""
 
 
-def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -> Ensemble:
+def ensemble_of(
+    several: SeveralStarts, amplitude_m: float, forgetting_s: float, error_of: ErrorOf
+) -> Ensemble:
     """Sort what the starts came to into motions, and count them.
 
     Parameters
@@ -29,6 +31,8 @@ def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -
         Followed as far as they are to be.
     amplitude_m
         Of the drive.
+    forgetting_s
+        Time in which the slowest mode without contact fades by e.
     error_of
         Asked once for each motion.
 
@@ -37,7 +41,7 @@ def ensemble_of(several: SeveralStarts, amplitude_m: float, error_of: ErrorOf) -
     groups = motions_among(reached)
     asked = next(group for group in groups if any(each is reached[0] for each in group))
     groups = sorted(groups, key=len, reverse=True)
-    kinds = [lasting(group[0].motion, escape) for group in groups]
+    kinds = [lasting(kind_among(group, forgetting_s), escape) for group in groups]
     counts = counts_of(kinds, [len(group) for group in groups])
     shares = shares_of(counts)
     pending = sum(each.trials for each in counts if not each.is_final)

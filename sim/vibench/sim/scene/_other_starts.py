@@ -52,7 +52,9 @@ def ensemble_beside(
     """
     several = SeveralStarts(begin, asked, pace, _horizon(scene, pace), draw or _draw(scene, asked))
     several.follow()
-    return ensemble_of(several, scene.drive.amplitude_m, error_of) if len(several.reached) > 1 else None
+    if len(several.reached) == 1:
+        return None
+    return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)
 
 
 def _draw(scene: Scene, asked: ReachedMotion) -> Draw:

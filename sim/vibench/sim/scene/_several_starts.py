@@ -17,7 +17,7 @@ from ._fixed_run import Pace
 from ._followed_run import FollowedRun, ObservedQuantities, Stretch
 from ._observed_window import ObservedWindow, follow_strobed, observe_window, window_of
 from ._prediction import MotionKind
-from ._repetition import kind_of
+from ._repetition import NEUTRAL, Growth, kind_of
 from ._scatter import WindowScatter, window_scatter
 from ._shares import EscapeRate, escape_rate
 from ._states_alone import StatesAlone
@@ -55,6 +55,8 @@ class ReachedMotion:
     """Of the largest x, where nothing repeats."""
     wandered_until_s: float
     """When it was last seen to change from period to period."""
+    growth: Growth
+    """Of a small change, as long as one was carried along: over no time, where it repeats."""
 
 
 def pushes(specimen: Specimen, frequency_hz: float, count: int, seed: int) -> Floats:
@@ -115,6 +117,7 @@ class Draw:
     """Nominal cost of all of them."""
 
 
+NOT_CARRIED = Growth(np.empty(0), 0.0)
 MORE_S = 1.0
 """Starts that are followed on are followed for longer than they need, by this together."""
 
@@ -241,13 +244,13 @@ class SeveralStarts:
             begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
             one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
             window = window_of(begins, [one])
-            return reached_motion(run, kind, period, window, None, other.wandered_until_s)
+            return reached_motion(run, kind, period, window, None, other.wandered_until_s, NOT_CARRIED)
         until_s = other.wandered_until_s
         growth = other.growth_over(self._horizon.judging_s)
         window = observe_window(run, self._horizon.window_s)
         scatter = window_scatter([block.peak_x_m for block in window.blocks], len(window.blocks))
         kind = kind_of(None, growth, self._pace.forgetting_s)
-        return reached_motion(run, kind, None, window, scatter, until_s)
+        return reached_motion(run, kind, None, window, scatter, until_s, growth)
 
 
 def reached_motion(
@@ -257,9 +260,10 @@ def reached_motion(
     window: ObservedWindow,
     scatter: WindowScatter | None,
     wandered_until_s: float,
+    growth: Growth,
 ) -> ReachedMotion:
     """Describe what a run came to by the window at its end."""
-    return ReachedMotion(run, motion, period, window.responses_m, scatter, wandered_until_s)
+    return ReachedMotion(run, motion, period, window.responses_m, scatter, wandered_until_s, growth)
 
 
 def _as_many(wanted: int, budget_s: float, each_s: float) -> int:
@@ -274,11 +278,11 @@ APART = 2.0
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
-"""A motion is named by the start that shows it best, in this order; without a period, by most starts."""
+"""A motion is shown by the start that shows it best, in this order."""
 
 
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
-    """Sort what starts came to into motions."""
+    """Sort what starts came to into motions, each with the start first that shows it best."""
     groups: list[list[ReachedMotion]] = []
     for each in sorted(reached, key=_clearness):
         same = next((group for group in groups if is_same(group[0], each)), None)
@@ -286,16 +290,24 @@ def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]
             groups.append([each])
         else:
             same.append(each)
-    return [_named_by_most(group) for group in groups]
+    return groups
 
 
-def _named_by_most(group: list[ReachedMotion]) -> list[ReachedMotion]:
-    """Put a start first that shows the kind of motion which most starts show, of those that show one."""
+def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKind:
+    """Name the kind of a motion that several starts came to.
+
+    Chaos that is weak, or comes in bursts, leaves most starts calm for as long as they are watched: where a
+    small change has surely grown from one of them, the growth from all together tells.
+    """
     kinds = [each.motion for each in group if each.motion in CLEAREST]
+    if group[0].period is None and any(each.growth.is_certain for each in group):
+        grown = sum(each.growth.total for each in group)
+        times = sum(each.growth.duration_s for each in group) / forgetting_s
+        is_chaos = MotionKind.CHAOTIC in kinds and grown > NEUTRAL * times
+        return MotionKind.CHAOTIC if is_chaos else MotionKind.UNDECIDED
     if group[0].period is not None or not kinds:
-        return group
-    named = max(CLEAREST, key=kinds.count)
-    return sorted(group, key=lambda each: each.motion is not named)
+        return group[0].motion
+    return max(CLEAREST, key=kinds.count)
 
 
 def _clearness(one: ReachedMotion) -> int:

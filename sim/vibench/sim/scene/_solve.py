@@ -10,7 +10,7 @@ from ..exponents import LyapunovEstimate, Precision, lyapunov_exponent
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
 from ._ensemble import ErrorOf, lasting
-from ._fixed_run import Pace, SceneRun, pace_of, run_for
+from ._fixed_run import Pace, SceneRun, growth_of, pace_of, run_for
 from ._followed_run import FollowedRun
 from ._line_spectrum import spectrum_of
 from ._linear_motion import LinearMotion, linear_motion
@@ -288,7 +288,8 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
 def _asked(run: FollowedRun, seen: SceneRun, drawn: WindowScatter | None) -> ReachedMotion:
     """Describe what the start that was asked for came to."""
     period = None if seen.repeats is None else seen.repeats.period
-    return reached_motion(run, seen.motion, period, seen.window, drawn, seen.wandered_until_s)
+    growth = growth_of(seen.path)
+    return reached_motion(run, seen.motion, period, seen.window, drawn, seen.wandered_until_s, growth)
 
 
 def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pace: Pace) -> ErrorOf:
