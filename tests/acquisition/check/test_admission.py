@@ -107,11 +107,22 @@ def test_a_check_made_now_arms_and_stands_in_the_recording(real, tmp_path):
 def test_a_check_made_now_that_fails_does_not_arm_and_is_kept(real, tmp_path):
     bench, virtual = real
     virtual.faults.turn_amplifier_gain(20.0)
-    with pytest.raises(CheckFailed, match=r"did not pass its check.*amplifier gain is 20 "):
+    with pytest.raises(
+        CheckFailed, match=r"did not pass its check.*amplifier gain is 20 .*The output is off; "
+    ):
         require_fresh(bench, tmp_path, CheckRule.NOW)
     assert last_check(bench.rig.name).verdict is Verdict.FAIL
     with pytest.raises(CheckFailed, match="did not pass"):
         require_fresh(bench, tmp_path)
+
+
+def test_a_check_that_finds_the_drive_playing_on_does_not_say_that_it_is_off(real, tmp_path):
+    bench, virtual = real
+    virtual.faults.stick_output()
+    with pytest.raises(
+        CheckFailed, match=r"drive left after stop.*THE OUTPUT MAY STILL BE ON: switch the amp"
+    ):
+        require_fresh(bench, tmp_path, CheckRule.NOW)
 
 
 def test_a_waived_check_arms_and_the_recording_says_that_there_was_none(real, tmp_path):

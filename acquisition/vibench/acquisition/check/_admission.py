@@ -34,7 +34,7 @@ from ..errors import CheckFailed, RecordingError
 from ..rig import Rig
 from ..stopping import StopSwitch
 from ._bench_report import bench_report
-from ._loop import LASTING, Lasting
+from ._loop import DRIVE_LEFT, LASTING, Lasting
 from ._rule import CheckRule
 
 FOLDER = "bench_checks"
@@ -250,10 +250,18 @@ def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
 def _passed(result: CheckResult) -> CheckResult:
     if result.verdict is Verdict.FAIL:
         raise CheckFailed(
-            f"the bench {result.rig!r} did not pass its check: {_failures(result)}. The output is off; "
+            f"the bench {result.rig!r} did not pass its check: {_failures(result)}. {_output_after(result)} "
             "put right what 'vibench bench check' advises, and check again"
         )
     return result
+
+
+def _output_after(result: CheckResult) -> str:
+    """Say whether the output is off, as far as the check has measured it."""
+    left = next((each for each in result.findings if each.name == DRIVE_LEFT), None)
+    if left is None or left.verdict is Verdict.FAIL:
+        return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand,"
+    return "The output is off;"
 
 
 def _failures(result: CheckResult) -> str:

@@ -100,6 +100,7 @@ AMPLIFIER_GAIN = "amplifier gain"
 DRIVE_CLOCK = "drive's clock"
 DRIVE_OVER_SETTING = "drive over setting"
 BASE_ACCELERATION = "base acceleration"
+DRIVE_LEFT = "drive left after stop"
 
 
 def hears_name(role: Role) -> str:
@@ -206,7 +207,7 @@ class LoopCheck:
         left = fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz).amplitude / self._terminal_v
         advice = "the output says off and plays on: switch the amplifier off, and have what plays repaired"
         return judged(
-            "drive left after stop",
+            DRIVE_LEFT,
             left,
             "",
             f"{LEFT_OVER.well:.0%} or less",
