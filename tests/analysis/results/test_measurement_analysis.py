@@ -1,14 +1,17 @@
 """Recordings of a known specimen: each excitation gives the closed form, and what is missing is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.rig import load_rig
 from vibench.analysis import NotEnoughData, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.frequency_response import NoiseAnalysis
-from vibench.analysis.recordings import Verdict
+from vibench.analysis.recordings import Verdict, measurement_checks
 from vibench.analysis.sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
 from vibench.sim import base_transmissibility, gong2025
 
@@ -128,6 +131,24 @@ def test_a_faultless_recording_passes_its_checks(dwell_file):
     found = analysed(dwell_file("weak"))
     assert {each.verdict for each in found.checks} <= {Verdict.PASSED, Verdict.NOTE}
     assert verdict(found, "Calibration") is Verdict.PASSED
+
+
+@pytest.mark.parametrize(
+    ("share", "told"), [(1.0, Verdict.PASSED), (0.6, Verdict.WARNING), (1.1, Verdict.NOTE)]
+)
+def test_a_drive_that_is_not_as_loud_as_its_plan_is_told(dwell_file, share, told):
+    generator = load_rig("virtual_rig").generator.model_dump(mode="json")
+    facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
+    setting_v = facts.measurement.excitation.amplitude_vpp / 2
+    levels = tuple(
+        replace(each, peak=share * setting_v) if each.header.role == "drive_voltage" else each
+        for each in facts.channels
+    )
+    (found,) = [each for each in measurement_checks(replace(facts, channels=levels)) if "level" in each.what]
+    assert found.verdict is told
+    stopped = replace(facts, channels=levels, state=RecordingState.STOPPED)
+    (found,) = [each for each in measurement_checks(stopped) if "level" in each.what]
+    assert found.verdict is not Verdict.WARNING
 
 
 def test_a_channels_level_is_its_largest_magnitude_and_its_root_mean_square(dwell_file, dwell_motions):

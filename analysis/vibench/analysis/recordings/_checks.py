@@ -4,9 +4,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import date
 from enum import StrEnum
+from math import cos, pi
 from typing import Generic, TypeVar
 
+from vibench.acquisition.plan import EXCITATION_KINDS, StreamedNoise
 from vibench.acquisition.recording import RecordingState, SealState
+from vibench.acquisition.rig import GeneratorConfig
 
 from ..tables import Labelled
 from ._channels import DRIVE
@@ -37,6 +40,8 @@ _LEAST_SHARE_OF_RANGE = 1e-3
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
 """Overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
+_SHORTFALL = 0.15
+"""Of its peak below the setting: as much as a bench check refuses."""
 
 
 P = TypeVar("P")
@@ -115,9 +120,32 @@ def _lost(facts: RecordingFacts) -> Check:
 def _drive(facts: RecordingFacts) -> Iterator[Check]:
     setting_v = facts.measurement.excitation.highest_amplitude_vpp / 2
     reached_v = facts.level(DRIVE).peak
-    is_high = reached_v > setting_v * (1 + _LEVEL_TOLERANCE)
     text = f"peak {reached_v:.4g} V recorded for a setting of {2 * setting_v:g} V peak to peak"
+    if reached_v < _least_peak_v(facts):
+        text += "; the drive was quieter than its plan: levels are those recorded, not those planned"
+        yield Check("Drive level", Verdict.WARNING, text)
+        return
+    is_high = reached_v > setting_v * (1 + _LEVEL_TOLERANCE)
     yield Check("Drive level", Verdict.NOTE if is_high else Verdict.PASSED, text)
+
+
+def _least_peak_v(facts: RecordingFacts) -> float:
+    """Give the lowest peak of the drive of a plan that was carried out; nothing, where it is not known.
+
+    Feedback is quieter than its setting allows, the peak of streamed noise is a draw, and a few samples a
+    period need not meet the peak of a sine.
+    """
+    excitation = facts.measurement.excitation
+    is_open_ended = EXCITATION_KINDS[excitation.kind].is_feedback or isinstance(excitation, StreamedNoise)
+    if facts.state is not RecordingState.COMPLETE or is_open_ended:
+        return 0.0
+    if (stated := facts.bench.get("generator")) is None:
+        return 0.0
+    terminal_v = (
+        excitation.highest_amplitude_vpp / 2 * GeneratorConfig.model_validate(stated).terminal_factor()
+    )
+    missed = cos(pi * min(0.5, excitation.band_hz[1] / facts.sample_rate_hz))
+    return terminal_v * (1 - _SHORTFALL) * missed
 
 
 def _late(facts: RecordingFacts) -> Iterator[Check]:
