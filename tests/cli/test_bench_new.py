@@ -1,5 +1,7 @@
 """`vibench bench new`: the configuration that it writes, the page that it keeps, and what it refuses."""
 
+import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -35,7 +37,7 @@ def new(*arguments):
     return CliRunner().invoke(app, ["bench", "new", *map(str, arguments)])
 
 
-def test_a_bench_is_made_checked_and_written_down(tmp_path):
+def test_a_bench_is_made_checked_and_written_down(tmp_path, monkeypatch):
     (tmp_path / "answers.toml").write_text(ANSWERS)
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert done.exit_code == 0, done.output
@@ -47,6 +49,9 @@ def test_a_bench_is_made_checked_and_written_down(tmp_path):
     for part in ("TEKTRONIX,AFG1022", "the first 5 mVpp: ok", "two per cent of the amplitude limit: ok"):
         assert part in page
     assert page.count(": by eye") == len(rig.daq.channels)
+    (told,) = re.findall("^    vibench (.*)", page, re.MULTILINE)
+    monkeypatch.chdir(tmp_path)
+    assert CliRunner().invoke(app, [*shlex.split(told), "--estimate"]).exit_code == 0
     again = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert again.exit_code == 1
     assert "is there already" in str(again.exception)

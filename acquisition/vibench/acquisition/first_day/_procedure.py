@@ -105,4 +105,5 @@ def _next_steps(rig: Rig, checked: CheckResult, config: Path) -> Iterator[str]:
         yield "\nDo not energise: mend what FAILs, and check again with `vibench bench check`."
         return
     yield f"\nThe bench may be armed for {rig.check_valid_h:g} h. Record a first sweep with"
-    yield f"\n    vibench measure campaigns/first_day.toml --bench {config} --out recordings"
+    bench = f'"{config}"' if " " in str(config) else config
+    yield f"\n    vibench measure first_day --bench {bench} --out recordings"
