@@ -32,12 +32,12 @@ with open_recording(path) as recording:
 """
 
 
-def run(*arguments, path=None):
+def run(*arguments, path=None, folder=ROOT):
     """Run a program of this interpreter; a folder of packages may be put in front of its path."""
     kept = os.environ if path is None else {**os.environ, "PYTHONPATH": str(path)}
     return subprocess.run(
         [sys.executable, *map(str, arguments)],
-        cwd=ROOT,
+        cwd=folder,
         env=kept,
         capture_output=True,
         text=True,
@@ -45,11 +45,12 @@ def run(*arguments, path=None):
     )
 
 
-def contract(name, *options, path=None):
+def contract(name, *options, path=None, folder=ROOT):
     return run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),
         *("--pyargs", "vibench.acquisition.contract", "--instrument", name, *options),
         path=path,
+        folder=folder,
     )
 
 
@@ -87,6 +88,14 @@ def test_a_package_that_cannot_be_imported_says_so(tmp_path, monkeypatch):
         plug_in(PlugInKind.GENERATOR, "broken")
 
 
+def test_a_module_that_raises_when_it_is_imported_is_told_in_a_sentence(tmp_path, monkeypatch):
+    (tmp_path / "raises_at_once.py").write_text('raise RuntimeError("the firmware is too old")')
+    offer(tmp_path, monkeypatch, "broken", "raises_at_once:Driver")
+    said = r"raises_at_once:Driver, which cannot be loaded \(RuntimeError: the firmware is too old\)"
+    with pytest.raises(ConfigurationError, match=said):
+        plug_in(PlugInKind.GENERATOR, "broken")
+
+
 def test_two_packages_with_one_name_are_told_apart_by_nobody(tmp_path, monkeypatch):
     offer(tmp_path, monkeypatch, "afg1022x", "somebody:Else")
     with pytest.raises(ConfigurationError, match=r"offered more than once \(somebody:Else, vibench"):
@@ -121,8 +130,9 @@ def test_a_stranger_s_instruments_measure_without_an_edit_of_ours(installed, tmp
 
 
 @pytest.mark.parametrize("name", ["plain_scpi", "charge_amplifier"])
-def test_a_stranger_s_instruments_keep_the_contract(installed, name):
-    done = contract(name, "--bench", BENCH, path=installed)
+def test_a_stranger_s_instruments_keep_the_contract(installed, tmp_path, name):
+    """Wherever it is asked for: outside of our folder pytest knows none of our settings."""
+    done = contract(name, f"--bench={BENCH}", path=installed, folder=tmp_path)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout
 
@@ -133,7 +143,7 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
         '"OUTP1:STAT OFF"', '"*WAI"'
     )
     (tmp_path / "example_instruments.py").write_text(broken)
-    done = contract("plain_scpi", "--bench", BENCH, path=os.pathsep.join((str(tmp_path), str(installed))))
+    done = contract("plain_scpi", f"--bench={BENCH}", path=os.pathsep.join((str(tmp_path), str(installed))))
     assert done.returncode == 1
     for promise in ("test_a_waveform_is_played_point_by_point", "test_stop_is_silence_at_any_time"):
         assert promise in done.stdout

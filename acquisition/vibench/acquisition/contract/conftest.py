@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ..bench import Bench, open_bench
-from ..errors import ConfigurationError
-from ..host import all_shipped
-from ..instruments import PlugInKind, Samples, plug_in_names
-from ..rig import CalibrationRule, Rig, Role, load_rig, sensor_name
+from vibench.acquisition.bench import Bench, open_bench
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.host import all_shipped
+from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
+from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor_name
 
 LEVEL = 0.02
 """Of the bench's amplitude limit: what is played."""

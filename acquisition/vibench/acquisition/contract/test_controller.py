@@ -5,9 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from ..bench import Bench
-from ..errors import AcquisitionError
-from ..instruments import (
+from vibench.acquisition.bench import Bench
+from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v
+from vibench.acquisition.errors import AcquisitionError
+from vibench.acquisition.instruments import (
     LoopBlock,
     LoopFeedback,
     LoopProgram,
@@ -16,8 +17,7 @@ from ..instruments import (
     RealTimeController,
     Samples,
 )
-from ..rig import Role
-from .conftest import LEVEL, heard_v, line_v
+from vibench.acquisition.rig import Role
 
 KIND = PlugInKind.CONTROLLER
 TONE_HZ = 160.0

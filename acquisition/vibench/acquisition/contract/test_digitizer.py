@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from ..bench import Bench
-from ..errors import AcquisitionError
-from ..instruments import PlugInKind
+from vibench.acquisition.bench import Bench
+from vibench.acquisition.errors import AcquisitionError
+from vibench.acquisition.instruments import PlugInKind
 
 KIND = PlugInKind.DIGITIZER
 BLOCK = 256

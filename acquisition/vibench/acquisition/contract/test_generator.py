@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from ..bench import Bench
-from ..errors import AcquisitionError, LimitExceeded
-from ..instruments import Knob, PlugInKind, Sweep
-from ..rig import Rig, generator_driver
-from .conftest import LEVEL, heard_v, line_v
+from vibench.acquisition.bench import Bench
+from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v
+from vibench.acquisition.errors import AcquisitionError, LimitExceeded
+from vibench.acquisition.instruments import Knob, PlugInKind, Sweep
+from vibench.acquisition.rig import Rig, generator_driver
 
 KIND = PlugInKind.GENERATOR
 TONE_HZ = 160.0

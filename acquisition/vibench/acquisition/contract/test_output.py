@@ -6,10 +6,10 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 
-from ..bench import Bench
-from ..errors import AcquisitionError, InstrumentError, LimitExceeded
-from ..instruments import AnalogOutput, IdleOutput, PlugInKind, Samples
-from .conftest import LEVEL, heard_v, line_v
+from vibench.acquisition.bench import Bench
+from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v
+from vibench.acquisition.errors import AcquisitionError, InstrumentError, LimitExceeded
+from vibench.acquisition.instruments import AnalogOutput, IdleOutput, PlugInKind, Samples
 
 KIND = PlugInKind.OUTPUT
 TONE_HZ = 160.0

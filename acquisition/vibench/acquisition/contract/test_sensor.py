@@ -2,8 +2,8 @@
 
 from math import isfinite
 
-from ..instruments import PlugInKind
-from ..rig import Rig, channels_of
+from vibench.acquisition.instruments import PlugInKind
+from vibench.acquisition.rig import Rig, channels_of
 
 KIND = PlugInKind.SENSOR
 

@@ -84,10 +84,10 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
     (row,) = found.values()
     try:
         return row.load()
-    except (ImportError, AttributeError, OSError) as error:
+    except Exception as error:  # a stranger's module may raise whatever it likes
         raise ConfigurationError(
-            f"{name!r} of {kind.value} is {row.value}, which cannot be loaded ({error}); install what its "
-            "package needs, or correct its entry point"
+            f"{name!r} of {kind.value} is {row.value}, which cannot be loaded "
+            f"({type(error).__name__}: {error}); install what its package needs, or correct its entry point"
         ) from error
 
 
