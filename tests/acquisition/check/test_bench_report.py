@@ -1,5 +1,6 @@
 """The check of the bench: a healthy one passes, every fault is found by name, and the output ends silent."""
 
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from vibench.acquisition import BenchReport, InstrumentLost, StopSwitch, Verdict
 from vibench.acquisition.bench import Bounds
 from vibench.acquisition.check._bench_report import bench_report
 from vibench.acquisition.check._loop import clock_ratio, fit_sine
-from vibench.acquisition.errors import CheckStopped
+from vibench.acquisition.errors import CheckStopped, InstrumentError
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping import Cause, StopRequest
 from vibench.virtual_rig.generator import Panel, Quirks
@@ -112,6 +113,20 @@ def test_a_check_can_be_stopped_while_it_sounds_and_leaves_silence(bench_of, rig
         switch = PressedOnceItSounds(virtual.generator)
         with pytest.raises(CheckStopped, match=r"was stopped: SIGTERM\. The output is off"):
             bench_report(bench, tmp_path, switch)
+        assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
+
+
+def test_a_converter_that_hands_over_nothing_ends_the_check_in_silence(bench_of, rig, tmp_path, monkeypatch):
+    with bench_of(rig) as (bench, virtual):
+        read, blocks = type(bench.digitizer).read, iter(range(100))
+
+        def empty_from_the_third_on(digitizer, samples):
+            block = read(digitizer, samples)
+            return replace(block, volts=block.volts[:, :0]) if next(blocks) > 2 else block
+
+        monkeypatch.setattr(type(bench.digitizer), "read", empty_from_the_third_on)
+        with pytest.raises(InstrumentError, match=r"a block of shape \(4, 0\) where \d+ samples"):
+            bench_report(bench, tmp_path)
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, judged
 from ..errors import CheckStopped
 from ..excitation import Dwell, Tone
-from ..instruments import AnalogOutput, IdleOutput, Samples
+from ..instruments import AnalogOutput, IdleOutput, Samples, read_block
 from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState, check_amplitude_vpp
 from ..rig import Channel, calibrations
 from ..run import BLOCK_S, Drive, drive_for
@@ -119,7 +119,7 @@ class _BlockReader:
                 raise CheckStopped(
                     f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
                 )
-            blocks.append(digitizer.read(min(longest, left)).volts)
+            blocks.append(read_block(digitizer, min(longest, left)).volts)
             left -= blocks[-1].shape[1]
         return blocks
 

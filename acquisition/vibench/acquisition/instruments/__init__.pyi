@@ -24,6 +24,9 @@ from ._protocols import (
     Spacing as Spacing,
     Sweep as Sweep,
 )
+from ._reading import (
+    read_block as read_block,
+)
 from ._values import (
     Block as Block,
     FoundDevice as FoundDevice,

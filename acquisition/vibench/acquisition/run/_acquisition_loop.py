@@ -8,7 +8,7 @@ from typing import Protocol
 
 from ..errors import LimitExceeded
 from ..excitation import Segment
-from ..instruments import Block, Digitizer
+from ..instruments import Block, Digitizer, read_block
 from ..recording import EventKind, RecordingState
 
 BLOCK_S = 0.1
@@ -93,7 +93,7 @@ class AcquisitionLoop:
         return self._next(round(duration_s * self._digitizer.sample_rate_hz))
 
     def _next(self, samples: int) -> Block:
-        block = self._digitizer.read(samples)
+        block = read_block(self._digitizer, samples)
         self._sink.append(block)
         self._samples = block.first_sample + block.volts.shape[1]
         return block
