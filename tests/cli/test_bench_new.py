@@ -2,11 +2,13 @@
 
 import re
 import shlex
+import signal
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from vibench.acquisition import CheckStopped, StopSwitch, stop_on_signal
 from vibench.acquisition.bench import InstrumentList
 from vibench.acquisition.errors import ConfigurationError
 from vibench.acquisition.first_day import QUESTIONS, configured
@@ -14,6 +16,7 @@ from vibench.acquisition.first_day._template import value_in, with_answer
 from vibench.acquisition.instruments import FoundDevice
 from vibench.acquisition.rig import load_rig
 from vibench.cli.__main__ import app
+from vibench.cli.bench_new import _wired_at_terminal
 from vibench.sim import UnreadableTomlError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -78,6 +81,15 @@ def test_answers_that_cannot_be_read_or_have_no_place_are_told_in_a_sentence(tmp
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
     assert isinstance(done.exception, (ConfigurationError, UnreadableTomlError))  # told in a sentence by main
     assert not list(tmp_path.glob("mine*"))
+
+
+def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
+    """The handler of a check would only ask it to stop, and the question would go on waiting."""
+    monkeypatch.setattr("typer.confirm", lambda _: signal.raise_signal(signal.SIGINT))
+    switch = StopSwitch()
+    with stop_on_signal(switch), pytest.raises(CheckStopped, match="before anything played"):
+        _wired_at_terminal("the T-piece")
+    assert switch.request is None
 
 
 def test_a_place_that_is_no_folder_is_told_before_anything_is_asked(tmp_path):

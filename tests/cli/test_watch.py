@@ -203,7 +203,7 @@ class TestWithoutAnEngine:
             told = vibench_here("stop", "--level", "off", "--reason", "enough", cwd=tmp_path)
             assert told.returncode == 0, told.stderr
             assert "enough" in check.communicate(timeout=60)[1]
-        assert check.returncode == 1
+        assert check.returncode == 3
 
 
 def test_two_switches_of_one_process_are_both_reached(tmp_path):

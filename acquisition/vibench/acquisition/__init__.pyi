@@ -20,6 +20,7 @@ from .check import (
 from .errors import (
     AcquisitionError as AcquisitionError,
     CheckFailed as CheckFailed,
+    CheckStopped as CheckStopped,
     ConfigurationError as ConfigurationError,
     InstrumentError as InstrumentError,
     InstrumentLost as InstrumentLost,

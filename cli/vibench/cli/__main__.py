@@ -18,7 +18,7 @@ import typer
 from rich.console import Console
 from typer.core import TyperCommand, TyperGroup
 
-from vibench.acquisition import AcquisitionError, shortened
+from vibench.acquisition import AcquisitionError, CheckStopped, shortened
 from vibench.analysis import AnalysisError
 from vibench.sim import UnreadableTomlError
 from vibench.sim.study import StudyError
@@ -291,6 +291,9 @@ def main() -> None:
     """Run the command line. An error that a user can mend is one sentence and a non-zero exit."""
     try:
         app()
+    except CheckStopped as error:
+        complain(error)
+        sys.exit(ExitCode.STOPPED)
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)

@@ -1,5 +1,6 @@
 """`vibench bench new`: from nothing to a bench that is checked, with a page that says so."""
 
+import signal
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import typer
 
 from vibench.acquisition import (
     CheckFailed,
+    CheckStopped,
     ConfigurationError,
     StopSwitch,
     list_rig_instruments,
@@ -92,7 +94,17 @@ def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) ->
 
 
 def _wired_at_terminal(pair: str) -> str:
-    return "plugged in, by eye" if typer.confirm(f"Plug {pair}. Done?") else ""
+    """Ask whether a wire is plugged in; nothing plays meanwhile, and Ctrl-C ends the program at once."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        return "plugged in, by eye" if typer.confirm(f"Plug {pair}. Done?") else ""
+    except (KeyboardInterrupt, typer.Abort) as stop:
+        raise CheckStopped(
+            "the first day was stopped at its wires, before anything played; the configuration is written: "
+            "go on with `vibench bench check`"
+        ) from stop
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
