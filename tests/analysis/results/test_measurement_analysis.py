@@ -151,6 +151,25 @@ def test_a_drive_that_is_not_as_loud_as_its_plan_is_told(dwell_file, share, told
     assert found.verdict is not Verdict.WARNING
 
 
+@pytest.mark.parametrize("generator", [{"name": "of another version"}, "AFG1022", None])
+def test_a_generator_that_this_version_does_not_know_has_no_least_level(dwell_file, generator):
+    facts = replace(analysed(dwell_file("weak")).facts, bench={"generator": generator})
+    (found,) = [each for each in measurement_checks(facts) if "level" in each.what]
+    assert found.verdict is Verdict.PASSED
+
+
+def test_a_calibration_after_the_measurement_is_not_called_old(dwell_file):
+    facts = analysed(dwell_file("weak")).facts
+    channels = tuple(
+        replace(each, header=replace(each.header, calibration_date="2098-02-10")) for each in facts.channels
+    )
+    (found,) = [each for each in measurement_checks(replace(facts, channels=channels)) if "Cal" in each.what]
+    assert found.verdict is Verdict.WARNING
+    assert "after the measurement" in found.text
+    assert "2098-02-10" in found.text
+    assert "days" not in found.text
+
+
 def test_a_channels_level_is_its_largest_magnitude_and_its_root_mean_square(dwell_file, dwell_motions):
     found = analysed(dwell_file("weak"))
     velocity = dwell_motions["weak"][1]

@@ -7,6 +7,8 @@ from enum import StrEnum
 from math import cos, pi
 from typing import Generic, TypeVar
 
+from pydantic import ValidationError
+
 from vibench.acquisition.plan import EXCITATION_KINDS, StreamedNoise
 from vibench.acquisition.recording import RecordingState, SealState
 from vibench.acquisition.rig import GeneratorConfig
@@ -139,11 +141,11 @@ def _least_peak_v(facts: RecordingFacts) -> float:
     is_open_ended = EXCITATION_KINDS[excitation.kind].is_feedback or isinstance(excitation, StreamedNoise)
     if facts.state is not RecordingState.COMPLETE or is_open_ended:
         return 0.0
-    if (stated := facts.bench.get("generator")) is None:
+    try:
+        generator = GeneratorConfig.model_validate(facts.bench.get("generator"))
+    except ValidationError:  # imported, or written by another version
         return 0.0
-    terminal_v = (
-        excitation.highest_amplitude_vpp / 2 * GeneratorConfig.model_validate(stated).terminal_factor()
-    )
+    terminal_v = excitation.highest_amplitude_vpp / 2 * generator.terminal_factor()
     missed = cos(pi * min(0.5, excitation.band_hz[1] / facts.sample_rate_hz))
     return terminal_v * (1 - _SHORTFALL) * missed
 
@@ -175,7 +177,11 @@ def _calibrations(facts: RecordingFacts) -> Check:
     if not dated or not valid_days:
         return Check("Calibration", Verdict.NOTE, "the recording names no calibration dates")
     ages = {each.role: (measured - date.fromisoformat(each.calibration_date)).days for each in dated}
-    stale = [f"{role} ({days} days)" for role, days in ages.items() if not 0 <= days <= valid_days]
+    later = [f"{each.role} ({each.calibration_date})" for each in dated if ages[each.role] < 0]
+    if later:
+        text = f"dated after the measurement, on {measured}: {', '.join(later)}; look at the certificates"
+        return Check("Calibration", Verdict.WARNING, text)
+    stale = [f"{role} ({days} days)" for role, days in ages.items() if days > valid_days]
     if stale:
         text = f"run out on the day of the measurement: {', '.join(stale)}; {valid_days} days are allowed"
         return Check("Calibration", Verdict.WARNING, text)
