@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 
 from vibench.sim import MotionKind
-from vibench.sim.scene._ensemble import counts_of
+from vibench.sim.scene._ensemble import _error, counts_of
 from vibench.sim.scene._repetition import Growth
 from vibench.sim.scene._scatter import WindowScatter
-from vibench.sim.scene._several_starts import ReachedMotion, is_same, kind_among, motions_among
+from vibench.sim.scene._several_starts import (
+    ReachedMotion,
+    is_same,
+    kind_among,
+    motions_among,
+)
 
 RESPONSES = np.array([4.0, 3.0, 9.0, 8.0])
 PERIODIC, TORUS, CHAOS, OPEN = (
@@ -92,3 +97,10 @@ def test_one_of_several_chaotic_motions_may_become_another(kinds, final):
     counts = counts_of(kinds, range(1, len(kinds) + 1))
     assert tuple(each.is_final for each in counts) == final
     assert [each.trials for each in counts] == list(range(1, len(kinds) + 1))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_two_starts_of_one_motion_are_as_uncertain_as_the_worse_of_them(order):
+    calm, burst = reached(TORUS, None, 1.0, 0.001), reached(CHAOS, None, 1.0, 0.02)
+    errors = {id(calm): 1e-6, id(burst): 0.04}
+    assert _error([calm, burst][::order], lambda each: errors[id(each)]) == 0.04

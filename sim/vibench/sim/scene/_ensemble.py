@@ -98,8 +98,12 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
     """Give what one more draw of a motion may differ by from the mean of these, in 19 cases of 20."""
-    if group[0].period is not None or len(group) < FEWEST_DRAWS:
+    if group[0].period is not None:
         return error_of(group[0])
+    if len(group) < FEWEST_DRAWS:
+        # A calm start of chaos in bursts knows nothing of the bursts.
+        known = [each for each in map(error_of, group) if each is not None]
+        return max(known, default=None)
     widened = math.sqrt(1.0 + 1.0 / len(group)) * float(stdtrit(len(group) - 1, COVERED))
     return widened * (_deviation([each.responses_m[0] for each in group]) or 0.0)
 
