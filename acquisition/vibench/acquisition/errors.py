@@ -34,6 +34,10 @@ class InstrumentBusy(InstrumentError):
     """Another program, or a task that was never closed, holds the instrument."""
 
 
+class BrokenPromise(InstrumentError):
+    """A plug-in raised an error of its own kind, or gave something else than its protocol says."""
+
+
 class SettingRefused(InstrumentError):
     """A setting read back differs from what was sent: the instrument silently took another value."""
 

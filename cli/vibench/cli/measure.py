@@ -1,7 +1,7 @@
 """`vibench measure`: carry out a campaign, one recording a measurement."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import timedelta
 from enum import StrEnum
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import vibench.analysis
-from vibench.acquisition import CheckRule, ConfigurationError, load_campaign, load_toml
+from vibench.acquisition import AcquisitionError, CheckRule, ConfigurationError, load_campaign, load_toml
 from vibench.acquisition.campaign import (
     AfterFailure,
     CampaignEstimate,
@@ -195,7 +195,14 @@ def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[E
     """Open a bench in this process, with bars on the terminal and a server for `vibench watch` and `stop`."""
     engine = Engine(Supervision.UNATTENDED)
     handler = RequestHandler(engine, JobQueue(engine))
-    with closing(engine):
+    try:
         engine.open(rig, confirm)
         with serving(handler, what), Watching(handler.status):
             yield engine
+    except BaseException as error:
+        try:
+            engine.close()
+        except AcquisitionError as failure:
+            error.add_note(f"While leaving the bench: {failure}")
+        raise
+    engine.close()

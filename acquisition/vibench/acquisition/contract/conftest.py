@@ -1,13 +1,14 @@
 """The instrument under test and its bench, from the command line."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from vibench.acquisition.bench import Bench, open_bench
-from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.errors import AcquisitionError, BrokenPromise, ConfigurationError
 from vibench.acquisition.host import all_shipped
 from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
 from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor_name
@@ -63,6 +64,14 @@ def bench(rig: Rig) -> Iterator[Bench]:
     """Open the bench anew for every test; who runs this has looked at its knobs."""
     with open_bench(rig, calibration=CalibrationRule.WAIVED) as opened:
         yield opened
+
+
+@contextmanager
+def refused() -> Iterator[None]:
+    """Demand a refusal in the words of an instrument, and not whatever its code happens to raise."""
+    with pytest.raises(AcquisitionError) as told:
+        yield
+    assert not isinstance(told.value, BrokenPromise), str(told.value)
 
 
 def heard_v(bench: Bench, duration_s: float) -> Samples:

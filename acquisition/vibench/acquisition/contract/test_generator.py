@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.bench import Bench
-from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v
-from vibench.acquisition.errors import AcquisitionError, LimitExceeded
+from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v, refused
+from vibench.acquisition.errors import LimitExceeded
 from vibench.acquisition.instruments import Knob, PlugInKind, Sweep
 from vibench.acquisition.rig import Rig, generator_driver
 
@@ -46,6 +46,7 @@ def test_it_says_who_it_is_and_what_must_be_confirmed(bench: Bench) -> None:
     identity = bench.generator.identity
     assert identity.model
     assert identity.reply
+    assert identity == bench.generator.identity
     assert all(isinstance(each, Knob) for each in bench.generator.unconfirmed)
     can = generator_driver(bench.rig.generator).describe(bench.rig.generator)
     lowest, highest = bench.generator.amplitude_range_vpp
@@ -181,5 +182,5 @@ def test_close_is_silence_and_may_be_repeated(bench: Bench) -> None:
     bench.generator.stop()
     bench.digitizer.start()
     assert is_quiet(bench)
-    with pytest.raises(AcquisitionError):
+    with refused():
         bench.generator.load_sine(TONE_HZ, level)

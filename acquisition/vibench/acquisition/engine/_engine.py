@@ -95,9 +95,14 @@ class Engine:
         self.published.enter(EngineState.READY)
 
     def close(self) -> None:
-        """Silence the bench and close it. Legal at any time."""
-        self._release()
+        """Silence the bench and close it. Legal at any time.
+
+        Raises AcquisitionError, once it is shown, when an instrument fails at that.
+        """
+        failure = self._release()
         self.published.enter(EngineState.CLOSED)
+        if failure is not None:
+            raise failure
 
     def check(self, folder: Path) -> None:
         """Check the bench with a small sine, and keep what was found."""
@@ -201,13 +206,16 @@ class Engine:
             self._release()
         self.published.enter(state)
 
-    def _release(self) -> None:
+    def _release(self) -> AcquisitionError | None:
         reconnecting, self._reconnecting = self._reconnecting, None
         try:
             if reconnecting is not None:
                 reconnecting.close()
         except AcquisitionError as error:
             self.published.messages.fault(error)
+            return error
+        else:
+            return None
         finally:
             self.published.bench(None)
             self.turn_twin(TwinSwitch.OFF)

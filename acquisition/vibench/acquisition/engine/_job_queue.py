@@ -1,6 +1,7 @@
 """What is asked of an engine, done one after the other by the engine's own thread."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from queue import SimpleQueue
 
 from ..errors import AcquisitionError
@@ -33,7 +34,8 @@ class JobQueue:
             while (job := self._jobs.get()) is not None:
                 self._do(job)
         finally:
-            self._engine.close()
+            with suppress(AcquisitionError):  # the engine has shown it
+                self._engine.close()
 
     def _do(self, job: Job) -> None:
         try:

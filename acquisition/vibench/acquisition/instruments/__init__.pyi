@@ -9,6 +9,9 @@ from ._fast_loop import (
     LoopRequest as LoopRequest,
     LoopState as LoopState,
 )
+from ._guarded import (
+    driver_of as driver_of,
+)
 from ._plug_in import (
     PlugInKind as PlugInKind,
     plug_in as plug_in,

@@ -1,5 +1,7 @@
 """What is asked of every converter's block, whoever wrote its driver."""
 
+import numpy as np
+
 from ..errors import InstrumentError
 from ._protocols import Digitizer
 from ._values import Block
@@ -18,13 +20,20 @@ def read_block(digitizer: Digitizer, samples: int) -> Block:
     Raises
     ------
     InstrumentError
-        When the block holds none, or what `Digitizer.read` raises.
+        When the block holds none, of other channels, or no finite volts; or what `Digitizer.read` raises.
 
     """
     block = digitizer.read(samples)
-    if block.volts.ndim != 2 or block.volts.shape[1] == 0:
+    rows = len(digitizer.roles)
+    if block.volts.ndim != 2 or block.volts.shape[0] != rows or block.volts.shape[1] == 0:
         raise InstrumentError(
             f"the converter handed over a block of shape {block.volts.shape} where {samples} samples of "
-            "every channel were asked for; its driver must wait until they are there, or raise InstrumentLost"
+            f"{rows} channels were asked for; its driver must wait until they are there, or raise "
+            "InstrumentLost"
+        )
+    if not np.isfinite(block.volts).all():
+        raise InstrumentError(
+            f"the converter handed over samples that are no numbers, from sample {block.first_sample} on; "
+            "its driver must hand over volts, or raise DataLost"
         )
     return block

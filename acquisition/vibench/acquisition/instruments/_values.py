@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 from datetime import date
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
 
 from ..host import FrozenModel
 
@@ -69,6 +71,12 @@ class Block:
     overloads: tuple[Overload, ...] = ()
 
 
+def _not_zero(units: float) -> float:
+    if units == 0:
+        raise ValueError("a sensor that gives no volts measures nothing")
+    return units
+
+
 @dataclass(frozen=True)
 class SensorFacts:
     """How a sensor turns its quantity into volts."""
@@ -77,11 +85,11 @@ class SensorFacts:
     """``"voltage"``, ``"acceleration"`` or ``"velocity"``: what the role of its channel records."""
     unit: str
     """UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
-    units_per_volt: float
-    full_scale_v: float
+    units_per_volt: Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
+    full_scale_v: Annotated[float, Field(gt=0)]
     """Largest output, peak [V]; infinite for a wire."""
     name: str
     serial: str = ""
-    delay_s: float = 0.0
+    delay_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     """How much later its volts are than the quantity [s]."""
     calibrated: date | None = None

@@ -9,7 +9,7 @@ from ..instruments import (
     GeneratorDescription,
     PlugInKind,
     RealTimeController,
-    plug_in,
+    driver_of,
 )
 from ._configuration import ControllerConfig, GeneratorConfig, Rig
 from ._output import OutputConfig
@@ -64,19 +64,19 @@ class ControllerDriver(Protocol):
 
 def controller_driver(config: ControllerConfig) -> ControllerDriver:
     """Find the driver of a real-time controller; raises ConfigurationError where none is installed."""
-    return cast("ControllerDriver", plug_in(PlugInKind.CONTROLLER, config.driver))
+    return cast("ControllerDriver", driver_of(PlugInKind.CONTROLLER, config.driver, ControllerDriver))
 
 
 def generator_driver(config: GeneratorConfig) -> GeneratorDriver:
     """Find the driver of a generator; raises ConfigurationError where none is installed."""
-    return cast("GeneratorDriver", plug_in(PlugInKind.GENERATOR, config.driver))
+    return cast("GeneratorDriver", driver_of(PlugInKind.GENERATOR, config.driver, GeneratorDriver))
 
 
 def digitizer_driver(rig: Rig) -> DigitizerDriver:
     """Find the driver of a converter; raises ConfigurationError where none is installed."""
-    return cast("DigitizerDriver", plug_in(PlugInKind.DIGITIZER, rig.daq.driver))
+    return cast("DigitizerDriver", driver_of(PlugInKind.DIGITIZER, rig.daq.driver, DigitizerDriver))
 
 
 def output_driver(rig: Rig) -> OutputDriver:
     """Find the driver of an analogue output; raises ConfigurationError where none is installed."""
-    return cast("OutputDriver", plug_in(PlugInKind.OUTPUT, rig.daq.driver))
+    return cast("OutputDriver", driver_of(PlugInKind.OUTPUT, rig.daq.driver, OutputDriver))

@@ -1,14 +1,20 @@
 """What is in front of an input: a wire, an accelerometer, a vibrometer, or the sensor of a plug-in."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Protocol, cast
 
 from ..errors import ConfigurationError
-from ..instruments import PlugInKind, SensorFacts, plug_in
+from ..instruments import PlugInKind, SensorFacts, driver_of
 from ._configuration import ChannelConfig, Rig, Role
 
-Sensor = Callable[[Rig, ChannelConfig], SensorFacts]
-"""What an entry point of ``vibench.sensors`` is: it tells the facts, and may ask its instrument for them."""
+
+class Sensor(Protocol):
+    """What an entry point of ``vibench.sensors`` is: it tells the facts, and may ask its instrument."""
+
+    def __call__(self, rig: Rig, config: ChannelConfig, /) -> SensorFacts:
+        """Give the facts of the sensor in front of an input."""
+
 
 _USUAL: Mapping[Role, str] = MappingProxyType(
     {
@@ -36,11 +42,11 @@ def sensor_name(config: ChannelConfig) -> str:
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
     """Give the facts of the sensor in front of an input.
 
-    Raises ConfigurationError when no package offers it, or it measures something else than the role records.
+    Raises ConfigurationError when no package offers it, or it measures something else than the role records;
+    BrokenPromise when it is somebody else's, and fails or tells what no sensor can be.
     """
     name = sensor_name(config)
-    sensor: Sensor = plug_in(PlugInKind.SENSOR, name)
-    facts = sensor(rig, config)
+    facts = cast("Sensor", driver_of(PlugInKind.SENSOR, name, Sensor))(rig, config)
     if (facts.quantity, facts.unit) != _RECORDED[config.role]:
         quantity, unit = _RECORDED[config.role]
         raise ConfigurationError(

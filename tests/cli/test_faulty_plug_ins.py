@@ -1,0 +1,210 @@
+"""A stranger's instrument that raises, or gives something else: a sentence, nothing lost, and silence."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import AcquisitionError, open_bench, run_measurement
+from vibench.acquisition.check import check_bench
+from vibench.acquisition.drivers import AFG1022_MODEL, DaqmxDigitizer
+from vibench.acquisition.errors import BrokenPromise
+from vibench.acquisition.instruments import Block, SensorFacts
+from vibench.acquisition.plan import Dwell, Measurement
+from vibench.acquisition.recording import RecordingState, open_recording
+from vibench.acquisition.rig import load_rig
+
+ROOT = Path(__file__).resolve().parents[2]
+GROUPS = {"generator": "vibench.generators", "digitizer": "vibench.digitizers", "sensor": "vibench.sensors"}
+DWELL = Measurement(
+    name="dwell",
+    ramp_s=0.5,
+    excitation=Dwell(amplitude_vpp=0.5, frequency_hz=160, settle_s=0.1, duration_s=0.2),
+)
+PLAN = """
+name = "one_dwell"
+[[measurements]]
+name = "dwell"
+ramp_s = 0.5
+[measurements.excitation]
+kind = "dwell"
+amplitude_vpp = 0.5
+frequency_hz = 160
+settle_s = 0.1
+duration_s = 0.2
+"""
+
+
+class Odd:
+    """Somebody's class around one of ours: does as it does, except for one member."""
+
+    def __init__(self, inside, faulty, does):
+        self._inside, self._faulty, self._does = inside, faulty, does
+
+    def __getattr__(self, member):
+        found = getattr(self._inside, member)
+        if member != self._faulty:
+            return found
+        return (lambda *given: self._does(found, *given)) if callable(found) else self._does(lambda: found)
+
+
+class OddDriver(Odd):
+    """Opens an odd instrument; an instrument of ours is handed to our driver as it is."""
+
+    def open(self, *given):
+        if self._faulty == "open":
+            return self._does(self._inside.open, *given)
+        return Odd(self._inside.open(*given), self._faulty, self._does)
+
+
+def raises(_found, *_given):
+    raise ZeroDivisionError("firmware 1.02")
+
+
+def gives_none(found, *given):
+    found(*given)
+
+
+def does_then_raises(found, *given):
+    found(*given)
+    raise KeyError("session")
+
+
+def not_a_number(found, *given):
+    block = found(*given)
+    volts = block.volts.copy()
+    volts[0, -1] = np.nan
+    return Block(block.first_sample, volts, block.overloads)
+
+
+def fewer_rows(found, *given):
+    block = found(*given)
+    return Block(block.first_sample, block.volts[1:], block.overloads)
+
+
+class Drivers:
+    """What the entry points of the stranger's package name; a test puts the drivers here."""
+
+    generator, digitizer, sensor = AFG1022_MODEL, DaqmxDigitizer, None
+
+
+@pytest.fixture
+def stranger(tmp_path, monkeypatch):
+    """Install a package that offers a generator, a digitizer and a sensor; give a rig that names them."""
+    metadata = tmp_path / "odd-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: odd\nVersion: 1.0\n")
+    rows = [f"[{group}]\nodd = {__name__}:Drivers.{kind}\n" for kind, group in GROUPS.items()]
+    (metadata / "entry_points.txt").write_text("\n".join(rows))
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def bench(kind, driver):
+        monkeypatch.setattr(Drivers, kind, driver)
+        text = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text()
+        if kind == "sensor":
+            text = text.replace('role = "base_acceleration"', 'role = "base_acceleration"\nsensor = "odd"')
+        else:
+            table = {"generator": "[generator]", "digitizer": "[daq]"}[kind]
+            text = text.replace(f"\n{table}\n", f'\n{table}\ndriver = "odd"\n')
+        assert 'odd"' in text
+        path = tmp_path / "bench.toml"
+        path.write_text(text)
+        return path
+
+    return bench
+
+
+@pytest.fixture
+def told(vibench_here, tmp_path):
+    """Measure on a bench through the command line; an exception that it lets out ends the test."""
+    (tmp_path / "plan.toml").write_text(PLAN)
+
+    def run(bench):
+        done = vibench_here("measure", "plan.toml", "--bench", bench, "--out", "out", cwd=tmp_path)
+        return done.returncode, " ".join((done.stdout + done.stderr).split())
+
+    return run
+
+
+GENERATOR = ("describe", "open", "identity", "unconfirmed", "amplitude_range_vpp", "load_sine", "start")
+DIGITIZER = ("open", "identity", "sample_rate_hz", "roles", "volts_per_count", "start", "read", "stop")
+
+
+@pytest.mark.parametrize("does", [raises, gives_none])
+@pytest.mark.parametrize(
+    ("kind", "member"),
+    [*(("generator", each) for each in GENERATOR), *(("digitizer", each) for each in DIGITIZER)],
+)
+def test_what_a_stranger_s_instrument_breaks_is_told_in_a_sentence(stranger, kind, member, does, told):
+    inside = AFG1022_MODEL if kind == "generator" else DaqmxDigitizer
+    path = stranger(kind, OddDriver(inside, member, does))
+    code, said = told(path)
+    if does is gives_none and member in {"load_sine", "start", "stop"}:
+        assert code == 0, said  # they promise nothing
+        return
+    assert code != 0
+    assert f"'odd' of {GROUPS[kind]} broke its promise in {member}:" in said or member == "open", said
+    assert f"'odd' of {GROUPS[kind]} broke its promise in" in said
+    assert ("ZeroDivisionError: firmware 1.02" in said) is (does is raises)
+
+
+@pytest.mark.parametrize(("does", "words"), [(not_a_number, "no numbers"), (fewer_rows, "of shape")])
+def test_samples_that_are_none_end_check_and_run_with_a_sentence(stranger, does, words, tmp_path):
+    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", does))
+    with open_bench(path) as bench:
+        with pytest.raises(AcquisitionError, match=words):
+            check_bench(bench, tmp_path)
+        with pytest.raises(AcquisitionError, match=words):
+            run_measurement(bench, DWELL, tmp_path / "dwell.h5")
+
+
+def test_a_failure_while_playing_ends_silent_and_the_recording_says_why(stranger, tmp_path):
+    left = [15]
+
+    def fails_later(found, *given):
+        left[0] -= 1
+        return found(*given) if left[0] > 0 else raises(found)
+
+    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", fails_later))
+    with pytest.raises(BrokenPromise), open_bench(path) as bench:
+        run_measurement(bench, DWELL, tmp_path / "dwell.h5")
+    with open_recording(tmp_path / "dwell.h5") as recording:
+        assert recording.state is RecordingState.FAILED
+        assert "ZeroDivisionError: firmware 1.02" in recording.reason
+        assert recording.samples > 0
+
+
+@pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
+def test_a_close_that_fails_after_a_complete_recording_says_that_it_is_complete(stranger, kind, inside, told):
+    path = stranger(kind, OddDriver(inside, "close", does_then_raises))
+    code, said = told(path)
+    assert "recorded out/dwell.h5 (the plan was carried out)" in said
+    assert "broke its promise in close: KeyError: 'session'" in said
+    assert code == 1
+
+
+@pytest.mark.parametrize(
+    ("facts", "words"),
+    [
+        ({"units_per_volt": "10 mV/g"}, "SensorFacts.units_per_volt"),
+        ({"units_per_volt": 0.0}, "a sensor that gives no volts measures nothing"),
+        ({"units_per_volt": float("nan")}, "SensorFacts.units_per_volt"),
+        ({"full_scale_v": 0.0}, "SensorFacts.full_scale_v"),
+        (None, "None as SensorFacts"),
+    ],
+)
+def test_a_sensor_that_tells_what_no_sensor_can_be_is_refused(stranger, facts, words):
+    usual = {"units_per_volt": 100.0, "full_scale_v": 5.0, "name": "odd"}
+
+    def sensor(_rig, _config):
+        return None if facts is None else SensorFacts("acceleration", "m s-2", **(usual | facts))
+
+    path = stranger("sensor", sensor)
+    with pytest.raises(BrokenPromise, match=words), open_bench(path):
+        pass
+
+
+def test_a_sensor_that_raises_is_told_by_name(stranger):
+    path = stranger("sensor", raises)
+    with pytest.raises(BrokenPromise, match=r"'odd' of vibench\.sensors broke its promise when it was asked"):
+        load_rig(path) and open_bench(path)
