@@ -87,8 +87,8 @@ def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
     """The handler of a check would only ask it to stop, and the question would go on waiting."""
     monkeypatch.setattr("typer.confirm", lambda _: signal.raise_signal(signal.SIGINT))
     switch = StopSwitch()
-    with stop_on_signal(switch), pytest.raises(CheckStopped, match="before anything played"):
-        _wired_at_terminal("the T-piece")
+    with stop_on_signal(switch), pytest.raises(CheckStopped, match=r"before anything played.*--bench mine"):
+        _wired_at_terminal(Path("mine.toml"), "the T-piece")
     assert switch.request is None
 
 
@@ -141,6 +141,54 @@ def test_a_value_that_a_bench_cannot_have_is_refused_and_nothing_is_written(tmp_
     with pytest.raises(ConfigurationError, match=r"generator\.settle_s"):
         configured(LAB, tmp_path / "lab.toml", seen(), ask, "note")
     assert not list(tmp_path.iterdir())
+
+
+def asked_of_a_person(tmp_path, given):
+    """Answer each question by its list of answers, one after the other, then as it is; hear what is wrong."""
+    wrong = []
+    rig = configured(
+        LAB,
+        tmp_path / "lab.toml",
+        seen(),
+        lambda question, _choices, _held: given[question.key].pop(0) if given.get(question.key) else "",
+        "note",
+        refuse=lambda error: wrong.append(str(error)),
+    )
+    return rig, wrong
+
+
+def test_a_person_is_asked_again_at_once_after_a_wrong_answer(tmp_path):
+    rig, wrong = asked_of_a_person(
+        tmp_path, {"amplifier.gain_db": ["ten", "700", "12"], "generator.settle_s": ["-1", "0.2"]}
+    )
+    assert (rig.amplifier.gain_db, rig.generator.settle_s) == (12.0, 0.2)
+    assert len(wrong) == 3
+    for words in ("'ten' is no number", "gain_db = 700", "settle_s = -1"):
+        assert any(words in each for each in wrong)
+    assert load_rig(tmp_path / "lab.toml") == rig
+
+
+def test_answers_that_do_not_agree_are_asked_anew_and_the_first_ones_kept(tmp_path):
+    place = "daq.channels.{}.physical".format
+    rig, wrong = asked_of_a_person(
+        tmp_path,
+        {place("m0_velocity"): ["ai1", "ai3"], place("amplifier_voltage"): ["ai1"], "name": ["my bench"]},
+    )
+    assert rig.name == "my bench"
+    assert {each.role: each.physical for each in rig.daq.channels}["m0_velocity"] == "ai3"
+    assert len(wrong) == 1
+    assert ".draft" not in wrong[0]
+
+
+def test_a_broken_package_of_somebody_s_does_not_end_the_first_day(tmp_path, monkeypatch):
+    metadata = tmp_path / "somebody-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: somebody\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text("[vibench.generators]\nbroken = no_such_module:Driver\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    only = seen("USB0::2391::11271::MY5::0::INSTR")
+    rig = configured(LAB, tmp_path / "lab.toml", only, lambda *_: "", "note")
+    assert rig.generator.driver == "keysight33500b"
 
 
 @pytest.mark.parametrize("question", QUESTIONS, ids=lambda each: each.key)

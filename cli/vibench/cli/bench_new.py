@@ -5,6 +5,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,7 @@ class Answers:
     @property
     def operator(self) -> str:
         """Who answers."""
-        return self.given.get(_OPERATOR, "nobody named")
+        return self.given.get(_OPERATOR, "").strip() or "nobody named"
 
 
 def _flat(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
@@ -93,7 +94,11 @@ def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) ->
     return answer
 
 
-def _wired_at_terminal(pair: str) -> str:
+def _asked_again(error: ConfigurationError) -> None:
+    console.print(f"! {error}", markup=False, soft_wrap=True)
+
+
+def _wired_at_terminal(target: Path, pair: str) -> str:
     """Ask whether a wire is plugged in; nothing plays meanwhile, and Ctrl-C ends the program at once."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
@@ -101,7 +106,7 @@ def _wired_at_terminal(pair: str) -> str:
     except (KeyboardInterrupt, typer.Abort) as stop:
         raise CheckStopped(
             "the first day was stopped at its wires, before anything played; the configuration is written: "
-            "go on with `vibench bench check`"
+            f"go on with `vibench bench check --bench {target}`"
         ) from stop
     finally:
         signal.signal(signal.SIGINT, before)
@@ -119,8 +124,10 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
         console.print(f"! {remark}", markup=False)
     operator = str(typer.prompt("Who sets up this bench?")) if given is None else given.operator
     note = f"{operator}, {datetime.now(UTC).astimezone().date()}"
-    ask, questions = (_asked_at_terminal, QUESTIONS) if given is None else (given.ask, given.questions)
-    rig = configured(template, target, seen, ask, note, questions)
+    if given is None:
+        rig = configured(template, target, seen, _asked_at_terminal, note, refuse=_asked_again)
+    else:
+        rig = configured(template, target, seen, given.ask, note, given.questions)
     console.print(f"\nwritten: {target}\n", markup=False)
     page = _day(rig, target, operator, given)
     kept = _free(target.with_suffix(".first_day.md"))
@@ -132,7 +139,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
 
 def _day(rig: Rig, target: Path, operator: str, given: Answers | None) -> DayPage:
     confirm: Confirm | None = None if given is None or rig.virtual is not None else given.knobs
-    wired, switch = _wired_at_terminal if given is None else given.wired, StopSwitch()
+    wired, switch = partial(_wired_at_terminal, target) if given is None else given.wired, StopSwitch()
     with open_bench(rig, confirm) as bench, stop_on_signal(switch, "bench new"):
         return first_day(bench, target, operator, wired, switch)
 

@@ -1,19 +1,31 @@
 """A configuration from a template and answers: asked one by one, looked up where the computer can see."""
 
 import re
+import tomllib
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from ..bench import InstrumentList
-from ..errors import ConfigurationError
-from ..host import load_toml, schema_line, shipped_folder
+from ..errors import AcquisitionError, ConfigurationError
+from ..host import complaints, from_toml, schema_line, shipped_folder
 from ..instruments import PlugInKind, plug_in_names
 from ..rig import GeneratorConfig, Rig, generator_driver, load_rig
 from ._questions import QUESTIONS, Found, Question
-from ._template import value_in, with_answer
+from ._template import place_of, value_in, with_answer
 
 Ask = Callable[[Question, Sequence[str], str], str]
 """Asks a question, with what was found for it and what the template holds; empty: as it is."""
+Refuse = Callable[[ConfigurationError], None]
+
+
+def refuse_at_once(error: ConfigurationError) -> None:
+    """Raise what is wrong: nobody is there who could be asked again."""
+    raise error
+
+
 _SCHEMA = re.compile(r"^#:schema .*\n")
 _USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECASE)
 
@@ -36,6 +48,7 @@ def configured(
     ask: Ask,
     note: str,
     questions: Sequence[Question] = QUESTIONS,
+    refuse: Refuse = refuse_at_once,
 ) -> Rig:
     """Ask everything, write the configuration, and read it back.
 
@@ -53,11 +66,13 @@ def configured(
         Who answers, and when; it stands behind each answer.
     questions
         What to ask, where it is more than usual.
+    refuse
+        Hears what is wrong with an answer, or with all together; when it returns, they are asked again.
 
     Raises
     ------
     ConfigurationError
-        When ``target`` is there, or an answer is not allowed; nothing is written then.
+        When ``target`` is there, or ``refuse`` raises it; nothing is written then.
 
     """
     if target.exists():
@@ -66,28 +81,52 @@ def configured(
         raise ConfigurationError(f"{target.absolute().parent} is no folder; make it, or give another place")
     text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is that of the template
     for question in questions:
-        choices = found_choices(question, seen)
-        held = value_in(text, question.key).strip('"')
-        if len(choices) == 1:
-            held = choices[0]
-            text = with_answer(text, question.key, held, "the only one seen")
-        answer = ask(question, choices, held)
-        if answer:
-            text = with_answer(text, question.key, answer, note)
-    text = _with_driver(_with_product(text, seen, note), note)
-    text = schema_line(load_rig(template), shipped_folder("schemas")) + text
+        if len(choices := found_choices(question, seen)) == 1:
+            text = with_answer(text, question.key, choices[0], "the only one seen")
+    while True:
+        for question in questions:
+            text = _answered(text, question, found_choices(question, seen), ask, note, refuse)
+        text = _with_driver(_with_product(text, seen, note), note)
+        try:
+            from_toml(tomllib.loads(text), Rig, target)
+            break
+        except ConfigurationError as error:
+            refuse(error)
+    _write(target, schema_line(load_rig(template), shipped_folder("schemas")) + text)
+    return load_rig(target)
+
+
+def _answered(
+    text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
+) -> str:
+    """Ask until the answer is of its kind and within its bounds; how answers agree is seen at the end."""
+    while answer := ask(question, choices, value_in(text, question.key).strip('"')):
+        try:
+            changed = with_answer(text, question.key, answer, note)
+            _require_within_bounds(changed, question.key)
+        except ConfigurationError as error:
+            refuse(error)
+        else:
+            return changed
+    return text
+
+
+def _require_within_bounds(text: str, key: str) -> None:
+    content = tomllib.loads(text)
+    try:
+        Rig.model_validate(content)
+    except ValidationError as error:
+        if wrong := complaints(error, content, place_of(content, key)):
+            raise ConfigurationError(wrong) from error
+
+
+def _write(target: Path, text: str) -> None:
     draft = target.with_name(target.name + ".draft")
     try:
         draft.write_text(text, encoding="utf-8")
+        draft.rename(target)
     except OSError as error:
         raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error
-    try:
-        load_toml(draft, Rig)
-    except ConfigurationError:
-        draft.unlink()
-        raise
-    draft.rename(target)
-    return load_rig(target)
 
 
 def _with_product(text: str, seen: InstrumentList, note: str) -> str:
@@ -117,6 +156,7 @@ def _driver_of(resource: str) -> str | None:
     ids = int(found.group(1), 0), int(found.group(2), 0)
     for name in plug_in_names(PlugInKind.GENERATOR):
         config = GeneratorConfig(driver=name, resource=resource, connected_ohm=1e6, amplitude_limit_vpp=1.0)
-        if ids in generator_driver(config).describe(config).usb_ids:
-            return name
+        with suppress(AcquisitionError):  # a broken package of somebody's is no answer
+            if ids in generator_driver(config).describe(config).usb_ids:
+                return name
     return None

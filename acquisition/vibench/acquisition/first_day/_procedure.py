@@ -71,7 +71,7 @@ def _head(bench: Bench, config: Path, operator: str) -> Iterator[str]:
     for part, identity in bench.identities.items():
         yield f"- {part}: {identity.reply}"
     for one in calibrations(bench.rig, datetime.now(UTC).astimezone().date()):
-        yield f"- {one}{'' if one.is_valid else ': RUN OUT'}"
+        yield f"- {one}{'' if one.is_valid else f': {one.advice}'}"
     yield f"\n## Confirmed by hand ({sheet.operator})\n"
     for knob in sheet.knobs:
         yield f"- {knob.instrument}, {knob.setting}: {knob.value}"

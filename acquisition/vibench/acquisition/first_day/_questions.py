@@ -35,6 +35,10 @@ QUESTIONS = (
     Question("daq.channels.amplifier_voltage.physical", "Which input reads the amplifier's output?"),
     Question("daq.channels.amplifier_voltage.attenuation", "Divider in front of it?"),
     Question("daq.channels.base_acceleration.physical", "Which input reads the accelerometer on the base?"),
+    Question(
+        "daq.channels.base_acceleration.iepe_current_a",
+        "Current that this input feeds the accelerometer [A]? 0 for a supply of its own",
+    ),
     Question("daq.channels.m0_velocity.physical", "Which input reads the vibrometer?"),
     Question("amplifier.serial", "Serial number of the amplifier?"),
     Question("amplifier.gain_db", "Gain at its knob [dB]?"),

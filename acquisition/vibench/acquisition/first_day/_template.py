@@ -3,6 +3,7 @@
 import json
 import re
 import tomllib
+from collections.abc import Mapping
 from datetime import date
 from typing import Any
 
@@ -35,6 +36,24 @@ def with_answer(text: str, key: str, answer: str, note: str) -> str:
         raise ConfigurationError(f"the template has no place for {key}; leave it out of the answers")
     header = text.index("\n", begin) + 1
     return f"{text[:header]}{name} = {_guessed(answer)}  # {note}\n{text[header:]}"
+
+
+def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
+    """Give the way to a key through what was read of a configuration.
+
+    Parameters
+    ----------
+    content
+        As TOML was read.
+    key
+        As a question names it; an input by the role of its channel.
+
+    """
+    if not key.startswith(_CHANNEL):
+        return tuple(key.split("."))
+    role, _, name = key.removeprefix(_CHANNEL).partition(".")
+    roles = [channel.get("role") for channel in content["daq"]["channels"]]
+    return ("daq", "channels", roles.index(role), name)
 
 
 def _guessed(answer: str) -> str:

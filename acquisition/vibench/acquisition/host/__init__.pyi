@@ -32,6 +32,7 @@ from ._shipped import (
 from ._toml_file import (
     FrozenModel as FrozenModel,
     complaints as complaints,
+    from_toml as from_toml,
     load_toml as load_toml,
     save_toml as save_toml,
     shortened as shortened,

@@ -41,6 +41,11 @@ def load_toml(path: Path, model: type[Model]) -> Model:
         content = toml_table(path)
     except UnreadableTomlError as error:
         raise ConfigurationError(str(error)) from error
+    return from_toml(content, model, path)
+
+
+def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
+    """Read what stands, or will stand, in a TOML file as ``model``; see `load_toml`."""
     content = migrated(content, model.__name__, str(path))
     return validated(content, model, str(path), path.absolute().parent)
 
@@ -124,7 +129,10 @@ def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
     return f"{text[:kept]}...{text[len(text) - kept :]}"
 
 
-def complaints(error: ValidationError, content: object) -> str:
+Place = tuple[str | int, ...]
+
+
+def complaints(error: ValidationError, content: object, within: Place = ()) -> str:
     """Say in a clause each what a model did not allow; keys of one fault share theirs.
 
     Parameters
@@ -133,9 +141,11 @@ def complaints(error: ValidationError, content: object) -> str:
         What the model said.
     content
         What it was given: it tells keys of the file from the model's names of kinds of value.
+    within
+        Where to look; nothing is said of the rest.
 
     """
-    details = _faults(error, content)
+    details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
     missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
     unknown = _key_clause(
         details,
@@ -147,9 +157,6 @@ def complaints(error: ValidationError, content: object) -> str:
     if len(other) > MOST_CLAUSES:
         other = [*other[:MOST_CLAUSES], f"and {len(other) - MOST_CLAUSES} more"]
     return shortened("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
-
-
-Place = tuple[str | int, ...]
 
 
 def _faults(error: ValidationError, content: object) -> list[Any]:

@@ -28,12 +28,25 @@ class Calibration:
     valid_days: int
 
     @property
+    def is_to_come(self) -> bool:
+        """Whether its date is a slip of the pen."""
+        return self.age_days < 0
+
+    @property
     def is_valid(self) -> bool:
-        """Whether it holds today; a date to come is a slip of the pen and does not."""
+        """Whether it holds today; a date to come does not."""
         return 0 <= self.age_days <= self.valid_days
 
+    @property
+    def advice(self) -> str:
+        """What to do about one that does not hold."""
+        if self.is_to_come:
+            return "the date is still to come: enter the one on the certificate in the configuration"
+        return "have it calibrated, and enter the date in the configuration"
+
     def __str__(self) -> str:
-        return f"{self.what} was calibrated on {self.calibrated}, {self.age_days} days ago"
+        when = "a day that is still to come" if self.is_to_come else f"{self.age_days} days ago"
+        return f"{self.what} was calibrated on {self.calibrated}, {when}"
 
 
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
@@ -81,5 +94,5 @@ def check_calibrations(rig: Rig, today: date) -> None:
     if stale:
         raise CheckFailed(
             f"{'; '.join(stale)}; {rig.calibration_valid_days} days are allowed (calibration_valid_days). "
-            "Nothing was opened; have it calibrated and enter the date, or waive the rule for this run"
+            "Nothing was opened; have it calibrated, enter the date on its certificate, or waive the rule"
         )
