@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
+from vibench.acquisition.check import check_bench, require_fresh
 from vibench.acquisition.errors import InstrumentLost
 from vibench.acquisition.plan import Dwell, Measurement
 from vibench.acquisition.rig import CalibrationRule
+from vibench.analysis import analyse
+from vibench.analysis.recordings import Verdict
 
 PLAN = Measurement(
     name="dwell",
-    excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.3, duration_s=0.5),
+    excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.3, duration_s=1.0),
     ramp_s=0.3,
     ramp_step_s=0.03,
 )
@@ -76,3 +79,20 @@ def test_the_end_of_the_recording_is_told(playing, original):
 def test_a_bench_that_does_not_fit_the_recording_is_refused(playing, daq, said):
     with pytest.raises(ConfigurationError, match=said):
         open_bench(playing(**daq), calibration=CalibrationRule.WAIVED)
+
+
+def test_a_recording_at_another_frequency_than_the_plan_is_found_out(playing, tmp_path):
+    other = PLAN.model_copy(update={"excitation": PLAN.excitation.model_copy(update={"frequency_hz": 255.0})})
+    with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
+        again = run_measurement(bench, other, tmp_path / "again.h5").path
+    with open_recording(again) as recording:
+        told = {each.what: each for each in analyse(recording).checks}["Drive frequency"]
+    assert told.verdict is Verdict.WARNING
+    assert "at 260.0" in told.text
+
+
+def test_a_recording_is_not_checked_as_a_bench_and_needs_no_waiver(playing, tmp_path):
+    with open_bench(playing(), calibration=CalibrationRule.WAIVED) as bench:
+        with pytest.raises(ConfigurationError, match="a recording is played back"):
+            check_bench(bench, tmp_path)
+        assert require_fresh(bench, tmp_path) is None

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, judged
-from ..errors import CheckStopped
+from ..errors import CheckStopped, ConfigurationError
 from ..excitation import Dwell, Tone
 from ..instruments import AnalogOutput, IdleOutput, Samples, read_block
 from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState, check_amplitude_vpp
@@ -40,8 +40,8 @@ def bench_report(
 
     Reads all channels in silence, while a small sine plays at 160 Hz for some seconds, and in silence again.
 
-    Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails; what is merely wrong
-    is a finding.
+    Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails, ConfigurationError
+    on a recording that is played back; what is merely wrong is a finding.
 
     Parameters
     ----------
@@ -55,6 +55,11 @@ def bench_report(
         Of the sine; absent, two per cent of the amplitude limit, or less, so that no stop is touched [V].
 
     """
+    if bench.rig.plays_back:
+        raise ConfigurationError(
+            f"on the bench {bench.rig.name!r} a recording is played back: there is nothing to check. Measure "
+            "with the plan that it was made with"
+        )
     findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
     if amplitude_vpp is None:
         amplitude_vpp = check_amplitude_vpp(CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp, bench.rig)
@@ -151,7 +156,7 @@ def _calibrated(bench: Bench) -> list[Finding]:
             verdict=Verdict.OK if one.is_valid else Verdict.WARN,
             number=one.age_days,
             unit="d",
-            advice="" if one.is_valid else "have it calibrated, and enter the date in the configuration",
+            advice="" if one.is_valid else one.advice,
         )
         for one in calibrations(bench.rig, today)
     ]

@@ -324,6 +324,11 @@ class Rig(FrozenModel):
         )
 
     @property
+    def plays_back(self) -> bool:
+        """Whether a recording takes the place of the instruments."""
+        return self.daq.driver == "file"
+
+    @property
     def knobs(self) -> tuple[Knob, ...]:
         """Everything that is set by hand."""
         amplifier, vibrometer = self.amplifier, self.vibrometer

@@ -1,5 +1,7 @@
 """Dwells: both responses, the lines of the spectrum, how the motion repeats, and what JSON says of them."""
 
+import numpy as np
+
 from vibench.acquisition.recording import SegmentLabel
 
 from ..chaos import MotionVerdict
@@ -24,6 +26,7 @@ from ..sine import (
     TerminalLevel,
     bound_frequencies_hz,
     dwell_motion,
+    frequency_check,
     irregular_motion,
     measured_dwell,
     settled_envelope,
@@ -39,9 +42,10 @@ def _analyse(
 ) -> DwellAnalysis:
     towards_hz = bound_frequencies_hz(facts)
     found = measured_dwell(channels, plan, towards_hz)
+    frequency = frequency_check(np.array([found.drive.frequency_hz]), np.array([plan.frequency_hz]))
     return DwellAnalysis(
         facts=facts,
-        checks=measurement_checks(facts),
+        checks=(*measurement_checks(facts), frequency),
         excitation=plan,
         response=found,
         displacement=settled_envelope(found),

@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 
+import numpy as np
+
 from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison import stepped_traces
@@ -11,7 +13,14 @@ from ..errors import UnusableData
 from ..frequency_response import FrequencyResponseRequest
 from ..model import Draw, Quantity, SimulatedChannels, SteppedSineOverlay, stepped_overlay, stepped_quantities
 from ..recordings import Channels, RecordingFacts, Stretch, measurement_checks
-from ..sine import SteppedResponse, SteppedSineAnalysis, Steps, level_summary, stepped_response
+from ..sine import (
+    SteppedResponse,
+    SteppedSineAnalysis,
+    Steps,
+    frequency_check,
+    level_summary,
+    stepped_response,
+)
 from ..tables import named
 from ..uncertainty import stepped_budgets
 from ._analysis_kind import AnalysisKind, Json
@@ -48,7 +57,11 @@ def _stepped(
         facts: RecordingFacts, channels: Channels, plan: Steps, _: FrequencyResponseRequest
     ) -> SteppedSineAnalysis:
         response = stepped_response(channels, plan, label, setting_vpp)
-        return SteppedSineAnalysis(facts, measurement_checks(facts), plan, response)
+        planned_hz = np.array(
+            [each.numbers["frequency_hz"] for each in channels.stretches(label)], dtype=float
+        )
+        checks = (*measurement_checks(facts), frequency_check(response.frequency_hz, planned_hz))
+        return SteppedSineAnalysis(facts, checks, plan, response)
 
     def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:
         response = stepped_response(channels, analysis.excitation, label, setting_vpp)

@@ -4,6 +4,9 @@ from ._collision_region import (
     Edge as Edge,
     collisions as collisions,
 )
+from ._drive_frequency import (
+    frequency_check as frequency_check,
+)
 from ._dwell import (
     DwellResponse as DwellResponse,
     dwell_response as dwell_response,
