@@ -69,7 +69,8 @@ def test_a_heavy_specimen_near_its_resonance_is_no_fault(
     report = checked(heavy, tmp_path)
     assert failed(report) == set()
     assert report["base acceleration"].verdict is Verdict.OK
-    assert report["sign of base_acceleration"].verdict is Verdict.OK
+    for role in ("base_acceleration", "m0_velocity"):
+        assert report[f"sign of {role}"].verdict is Verdict.OK
 
 
 @pytest.mark.parametrize(
@@ -92,6 +93,14 @@ def test_a_fault_is_found_by_name_with_advice(checked, rig, tmp_path, fault, nam
     assert name in failed(report)
     assert advice in report[name].advice
     assert report.verdict is Verdict.FAIL
+
+
+def test_a_vibrometer_whose_sign_is_reversed_is_warned_of(checked, rig, tmp_path):
+    assert checked(rig, tmp_path)["sign of m0_velocity"].verdict is Verdict.OK
+    report = checked(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))
+    assert report["sign of m0_velocity"].verdict is Verdict.WARN
+    assert "vibrometer" in report["sign of m0_velocity"].advice
+    assert failed(report) == set()
 
 
 class PressedOnceItSounds(StopSwitch):

@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, auto
-from math import hypot, log10, pi, sqrt
+from math import hypot, inf, log10, pi, sqrt
 
 import numpy as np
 
 from ..bench import Bench, Bounds, Finding, Verdict, judged
 from ..instruments import Samples
-from ..plan import CHECK_FREQUENCY_HZ, base_under_check, nearest_expected
+from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
 from ..rig import BaseQuantity, ComplexArray, RigModel, Role
 
 _PPM = 1e6
@@ -93,6 +93,8 @@ DETECTED = 10.0
 WRONG_LOAD = 2.0
 PHASE_DEG = Bounds(45.0, 90.0)
 """Of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
+M0_PHASE_DEG = Bounds(90.0, inf)
+"""The same of m0: a specimen is known less well than a shaker, so that nothing FAILs."""
 LEFT_OVER = Bounds(0.02, 0.05)
 """Share of the drive that may be left when the output is off."""
 
@@ -140,7 +142,8 @@ class LoopCheck:
         self._amplifier_modelled = np.atleast_1d(
             RigModel(bench.rig).transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ)
         )
-        self._base_modelled = base_under_check(bench.rig, self._terminal_v)
+        self._base_modelled = expected_under_check(bench.rig, self._terminal_v)
+        self._m0_modelled = expected_under_check(bench.rig, self._terminal_v, BaseQuantity.M0_VELOCITY)
 
     def findings(self) -> list[Finding]:
         """Answer what can be answered with the channels that there are."""
@@ -156,6 +159,8 @@ class LoopCheck:
             found.append(self._base())
         if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.BASE_ACCELERATION):
             found.append(self._sign(Role.BASE_ACCELERATION, self._base_modelled))
+        if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.M0_VELOCITY):
+            found.append(self._sign(Role.M0_VELOCITY, self._m0_modelled, M0_PHASE_DEG))
         return found
 
     def _detects(self, role: Role) -> bool:
@@ -242,16 +247,20 @@ class LoopCheck:
         advice = "check the accelerometer's sensitivity, fixture, specimen, the amplifier's power and gain"
         return judged(BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
 
-    def _sign(self, role: Role, modelled: ComplexArray) -> Finding:
+    def _sign(self, role: Role, modelled: ComplexArray, bounds: Bounds = PHASE_DEG) -> Finding:
         """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""
         turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
         each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
         off_deg = each_deg[np.argmin(np.abs(each_deg))]
         advice = {
             Role.BASE_ACCELERATION: "turn the accelerometer round, or swap the wires of coil or amplifier",
+            Role.M0_VELOCITY: (
+                "if the base's sign is right, the vibrometer's is reversed (its direction, or the side "
+                "that the laser sees), or the specimen is not the one described"
+            ),
         }.get(role, "swap the two wires of this input, or see whether the amplifier inverts")
-        expected = f"0 deg within {PHASE_DEG.well:g} deg"
-        verdict = PHASE_DEG.verdict(abs(off_deg))
+        expected = f"0 deg within {bounds.well:g} deg"
+        verdict = bounds.verdict(abs(off_deg))
         return judged(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)
 
 

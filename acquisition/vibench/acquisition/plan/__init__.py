@@ -52,9 +52,9 @@ from ._axis import (
 from ._base_motion import BaseMotion, base_motion
 from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign, played_alike
 from ._check_level import (
-    base_under_check,
     check_amplitude_vpp,
     check_phases,
+    expected_under_check,
     nearest_expected,
     run_check_vpp,
 )
@@ -157,12 +157,12 @@ __all__ = [
     "StreamedNoise",
     "SweepAxis",
     "base_motion",
-    "base_under_check",
     "check_amplitude_vpp",
     "check_phases",
     "drive_source_of",
     "duration_s",
     "excitation_text",
+    "expected_under_check",
     "fast_loop_time_s",
     "half_cosine",
     "known_phases",

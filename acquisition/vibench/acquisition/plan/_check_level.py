@@ -61,8 +61,10 @@ def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phas
     )
 
 
-def base_under_check(rig: Rig, terminal_v: float) -> ComplexArray:
-    """Give the base's acceleration [m/s2] that a check may find, as phasors over the voltage's phase.
+def expected_under_check(
+    rig: Rig, terminal_v: float, quantity: BaseQuantity = BaseQuantity.ACCELERATION
+) -> ComplexArray:
+    """Give what a check may find of a quantity, as phasors over the voltage's phase; shape (n,).
 
     One for each of some specimens whose resonances lie up to 3 % elsewhere; where p comes near a stop all the
     same, also with m1 held to m2.
@@ -71,14 +73,16 @@ def base_under_check(rig: Rig, terminal_v: float) -> ComplexArray:
     ----------
     terminal_v
         Peak at the generator's terminal [V].
+    quantity
+        Of base or specimen.
 
     """
     model = RigModel(rig)
-    free = terminal_v * model.transfer(BaseQuantity.ACCELERATION, _KNOWN_HZ)
+    free = terminal_v * model.transfer(quantity, _KNOWN_HZ)
     p_m = terminal_v * np.abs(model.transfer(BaseQuantity.P, _KNOWN_HZ))
     if np.max(p_m) < 2 * TOUCH_SHARE * model.gap_m:
         return free
-    return np.concatenate([free, terminal_v * model.stuck_transfer(BaseQuantity.ACCELERATION, _KNOWN_HZ)])
+    return np.concatenate([free, terminal_v * model.stuck_transfer(quantity, _KNOWN_HZ)])
 
 
 def nearest_expected(measured: float, expected: ComplexArray) -> float:
@@ -89,7 +93,7 @@ def nearest_expected(measured: float, expected: ComplexArray) -> float:
     measured
         Amplitude of the base [m/s2].
     expected
-        As `base_under_check` gives it, shape (n,) [m/s2].
+        As `expected_under_check` gives it, shape (n,) [m/s2].
 
     """
     sizes = np.abs(expected)

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import CheckFailed
 from ..instruments import Samples
-from ..plan import CHECK_FREQUENCY_HZ, base_under_check, nearest_expected
+from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
 from ..rig import Channel, Rig, Role
 
 DRIVE_TOLERANCE = 0.15
@@ -78,7 +78,7 @@ def judged(
         return sine_amplitude(volts[row], CHECK_FREQUENCY_HZ, sample_rate_hz) * channels[row].units_per_volt
 
     moved = measured(during, base)
-    expected = nearest_expected(moved, base_under_check(rig, terminal_v))
+    expected = nearest_expected(moved, expected_under_check(rig, terminal_v))
     figures = CheckFigures(measured(during, drive), terminal_v, moved, expected)
     _require_quiet("the drive voltage", measured(quiet, drive), figures.expected_drive_v, "V")
     _require_quiet("the base acceleration", measured(quiet, base), figures.expected_base_m_per_s2, "m/s2")
