@@ -100,7 +100,7 @@ def _answered(
     text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
 ) -> str:
     """Ask until the answer is of its kind and within its bounds; how answers agree is seen at the end."""
-    while answer := ask(question, choices, value_in(text, question.key).strip('"')):
+    while answer := ask(question, choices, _held(text, question.key)):
         try:
             changed = with_answer(text, question.key, answer, note)
             _require_within_bounds(changed, question.key)
@@ -109,6 +109,16 @@ def _answered(
         else:
             return changed
     return text
+
+
+def _held(text: str, key: str) -> str:
+    """Show what the template holds; of a number with its source, the number."""
+    written = value_in(text, key)
+    match tomllib.loads(f"held = {written}")["held"] if written else None:
+        case {"value": number}:
+            return str(number)
+        case _:
+            return written.strip('"')
 
 
 def _require_within_bounds(text: str, key: str) -> None:
