@@ -1,5 +1,6 @@
 """Where state is kept on each system, and how to have it elsewhere."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -29,6 +30,8 @@ def test_each_system_keeps_state_where_it_keeps_such_things(
 ):
     if platform == "win32":
         monkeypatch.setattr(_state_folder, "usual_state_folder", windows().usual_state_folder)
+    elif not hasattr(os, "fork"):
+        pytest.skip("Windows has not the functions of the other systems")
     monkeypatch.setattr(sys, "platform", platform)
     for each in ("VIBENCH_STATE_DIR", "XDG_STATE_HOME", "LOCALAPPDATA"):
         monkeypatch.delenv(each, raising=False)
