@@ -48,3 +48,11 @@ def test_chaos_that_nothing_escapes_has_a_least_lifetime_and_no_greatest():
     assert found.lifetime_above_s == pytest.approx(300.0 / np.log(20.0))
     assert found.lifetime_below_s == np.inf
     assert (found.rate_per_s, found.low_per_s) == (0.0, 0.0)
+
+
+def test_of_several_outcomes_that_are_not_final_each_may_take_the_others():
+    one, other = shares_of([Count(4, is_final=False), Count(4, is_final=False)])
+    assert (one.low, one.high) == (other.low, other.high) == (0.0, 1.0)
+    settled, *open_ones = shares_of([Count(8, is_final=True), *2 * [Count(4, is_final=False)]])
+    assert settled.high == 1.0
+    assert [each.high for each in open_ones] == 2 * [wilson_share(8, 16, 0.05 / 3).high]

@@ -67,10 +67,9 @@ def shares_of(counts: Sequence[Count]) -> tuple[Share, ...]:
     found = []
     for each in counts:
         now = wilson_share(each.trials, trials, unsure)
-        if each.is_final:
-            found.append(replace(now, high=wilson_share(each.trials + pending, trials, unsure).high))
-        else:
-            found.append(replace(now, low=0.0))
+        highest = each.trials + pending if each.is_final else pending
+        high = wilson_share(highest, trials, unsure).high
+        found.append(replace(now, low=now.low if each.is_final else 0.0, high=high))
     return tuple(found)
 
 
