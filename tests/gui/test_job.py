@@ -308,6 +308,9 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 20_000, timeout=PATIENCE_MS)
     assert (page.time_histories.plots[0].getPlotItem().listDataItems()[0].getData()[0] == frozen).all()
     page.watch_card.freeze.setChecked(False)
+    now = page.time_histories.plots[0].getPlotItem().listDataItems()[0].getData()[0]
+    assert now.shape != frozen.shape or (now != frozen).any(), "what was frozen is old at once"
+    assert all(each.is_true for each in page.shown)
     page.watch_card.mark.setText("tapped the table")
     page.watch_card.wish_mark()
     qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)

@@ -206,6 +206,8 @@ class RunPage(Page):
         self.arm_card.cancel_wanted.connect(self._actions.disarm)
         self.arm_card.hold_wanted.connect(self._actions.hold_or_resume)
         self.watch_card.mark_wanted.connect(self._mark)
+        # Until the next tick the picture of a run that has ended meanwhile would pass for that of this one.
+        self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_wanted.connect(self._turn_twin)
         self.look_button.clicked.connect(self._look)
         self.context.recording_made.connect(self._recorded)
