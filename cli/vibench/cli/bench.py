@@ -66,18 +66,23 @@ def check(
     last: Annotated[
         bool, typer.Option("--last", help="Show what the last check found; touch nothing.")
     ] = False,
+    new_reference: Annotated[
+        bool,
+        typer.Option("--new-reference", help="Compare with no earlier check: what has changed was meant."),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Check the bench with a small sine: identities, noise, gains, signs, clocks, disk, and what has changed.
 
     The result is kept: a real bench is armed only on a check that passed lately. Exit code 1 if it fails.
     """
-    if last and knobs is not None:
+    if last and (knobs is not None or new_reference):
         raise ConfigurationError(
-            "--last touches nothing, and --knobs keeps what is confirmed at a check. Nothing was done; leave "
-            "one of them out"
+            "--last touches nothing, and --knobs and --new-reference are of a check. Nothing was done; leave "
+            "--last out, or the other"
         )
-    result = _last(load_rig(bench_path(bench))) if last else _now(bench_path(bench), out, knobs)
+    path = bench_path(bench)
+    result = _last(load_rig(path)) if last else _now(path, out, knobs, new_reference=new_reference)
     if as_json:
         print_json(result.model_dump(mode="json"))
     else:
@@ -109,12 +114,12 @@ def new(
         raise typer.Exit(ExitCode.FAILED)
 
 
-def _now(path: Path, out: Path, knobs: Path | None) -> CheckResult:
+def _now(path: Path, out: Path, knobs: Path | None, *, new_reference: bool) -> CheckResult:
     rig, switch = load_rig(path), StopSwitch()
     with open_bench(rig) as opened, stop_on_signal(switch, "bench check"):
         if knobs is not None:
             save_knob_sheet(opened.confirmations, knobs)
-        return check_bench(opened, out, switch=switch)
+        return check_bench(opened, out, switch=switch, new_reference=new_reference)
 
 
 def _last(rig: Rig) -> CheckResult:

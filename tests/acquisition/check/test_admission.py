@@ -168,7 +168,27 @@ class TestKeeping:
         last, apart = kept_result(rig, 2.0), kept_result(other)
         assert last_check(rig.name) == last
         assert last_check(other.name) == apart
-        assert len(list(state_folder.rglob("*"))) == 1 + 2
+        assert len(list(state_folder.rglob("*"))) == 1 + 2 * 2, "the last, and the last that passed"
+
+    def test_a_check_is_compared_with_the_last_that_passed_until_the_change_is_meant(self, real, tmp_path):
+        """A fault that is still there was no fault the second time, and a repaired bench failed."""
+        bench, _ = real
+        healthy = check_bench(bench, tmp_path)
+        was_louder = tuple(
+            each.model_copy(update={"number": 2 * each.number})
+            if each.name.startswith("m0_velocity h")
+            else each
+            for each in healthy.findings
+        )
+        keep(healthy.model_copy(update={"findings": was_louder}))
+        name = "m0_velocity hears the sine since last time"
+        for _ in range(2):
+            found = check_bench(bench, tmp_path)
+            assert found.report[name].verdict is Verdict.FAIL
+            assert "--new-reference" in found.report[name].advice
+        meant = check_bench(bench, tmp_path, new_reference=True)
+        assert meant.verdict is not Verdict.FAIL
+        assert check_bench(bench, tmp_path).report[name].verdict is Verdict.OK
 
     @pytest.mark.parametrize("content", ["", "{", '{"rig": 3}', "\x00\xff"])
     def test_a_damaged_file_counts_as_no_check(self, rig, state_folder, content):

@@ -41,11 +41,14 @@ FOLDER = "bench_checks"
 _HASH_DIGITS = 8
 
 
-def archive_path(rig_name: str) -> Path:
-    """Name the file of a rig: its name as far as files allow it, and a hash of the whole of it."""
+def archive_path(rig_name: str, *, passed: bool = False) -> Path:
+    """Name the file of a rig's last check: its name as far as files allow it, and a hash of the whole of it.
+
+    ``passed``: of the last that did not fail.
+    """
     plain = re.sub(r"[^A-Za-z0-9]+", "_", rig_name).strip("_")[:48]
     digest = hashlib.sha256(rig_name.encode()).hexdigest()[:_HASH_DIGITS]
-    return state_folder() / FOLDER / f"{plain}-{digest}.json"
+    return state_folder() / FOLDER / f"{plain}-{digest}{'.passed' if passed else ''}.json"
 
 
 def last_check(rig_name: str) -> CheckResult | None:
@@ -57,8 +60,20 @@ def last_check(rig_name: str) -> CheckResult | None:
         As the hardware configuration says it.
 
     """
+    return _read(archive_path(rig_name))
+
+
+def last_passed(rig: Rig) -> CheckResult | None:
+    """Give the last check of a rig, as it is configured now, that did not fail; None when there is none."""
+    for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
+        if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
+            return each
+    return None
+
+
+def _read(path: Path) -> CheckResult | None:
     try:
-        return CheckResult.model_validate_json(archive_path(rig_name).read_text(encoding="utf-8"))
+        return CheckResult.model_validate_json(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, ValidationError):
         return None
 
@@ -68,8 +83,14 @@ def keep(result: CheckResult) -> Path:
 
     Raises RecordingError when the state folder cannot be written.
     """
+    if result.verdict is not Verdict.FAIL:
+        _write(result, passed=True)
+    return _write(result, passed=False)
+
+
+def _write(result: CheckResult, *, passed: bool) -> Path:
     try:
-        path = archive_path(result.rig)
+        path = archive_path(result.rig, passed=passed)
         path.parent.mkdir(parents=True, exist_ok=True)
         descriptor, name = tempfile.mkstemp(prefix=path.name, suffix=".tmp", dir=path.parent)
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
@@ -89,7 +110,8 @@ CLOCK_PPM = Bounds(20.0, inf)
 """Of the ratio of two clocks: oscillators age by some ppm a year."""
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
-    "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying amplifier"
+    "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying "
+    "amplifier; if you have changed something that does not stand there, check once with --new-reference"
 )
 
 
@@ -142,9 +164,14 @@ def utc_now() -> datetime:
 
 
 def check_bench(
-    bench: Bench, folder: Path, clock: Clock = utc_now, switch: StopSwitch | None = None
+    bench: Bench,
+    folder: Path,
+    clock: Clock = utc_now,
+    switch: StopSwitch | None = None,
+    *,
+    new_reference: bool = False,
 ) -> CheckResult:
-    """Check a bench, compare with the last time, and keep the result for later; see `bench_report`.
+    """Check a bench, compare with the last time that it passed, and keep the result; see `bench_report`.
 
     Parameters
     ----------
@@ -156,11 +183,13 @@ def check_bench(
         What time it is.
     switch
         Ends the check from another thread.
+    new_reference
+        Compare with nothing: what has changed since was meant.
 
     """
     report, at = bench_report(bench, folder, switch), clock()
-    last = last_check(bench.rig.name)
-    if last is not None and last.rig_digest == rig_digest(bench.rig):
+    last = None if new_reference else last_passed(bench.rig)
+    if last is not None:
         report = BenchReport(findings=(*report.findings, *drift(report, last, at)))
     result = CheckResult.of(bench.rig, report, at)
     keep(result)
@@ -218,8 +247,8 @@ def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) 
             return _passed(check_bench(bench, folder, clock, switch))
         case BenchKind.REAL:
             raise CheckFailed(
-                f"{complaint}. Nothing was played; check it with 'vibench bench check' or --check now, or go "
-                "on without with --check waived"
+                f"{complaint}. Nothing was played; check it with 'vibench bench check --bench FILE', or "
+                "--check now, or go on without with --check waived"
             )
 
 
