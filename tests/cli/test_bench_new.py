@@ -6,6 +6,7 @@ import signal
 from pathlib import Path
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from vibench.acquisition import CheckStopped, StopSwitch, stop_on_signal
@@ -16,7 +17,7 @@ from vibench.acquisition.first_day._template import value_in, with_answer
 from vibench.acquisition.instruments import FoundDevice
 from vibench.acquisition.rig import load_rig
 from vibench.cli.__main__ import app
-from vibench.cli.bench_new import _wired_at_terminal
+from vibench.cli.bench_new import _configured_at_terminal, _wired_at_terminal
 from vibench.sim import UnreadableTomlError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -74,6 +75,33 @@ def test_wires_that_nobody_confirms_end_the_day_before_anything_plays(tmp_path):
     assert again.exit_code == 0, again.output
 
 
+@pytest.mark.parametrize("wired", ["false", '"no"', '" No "', '""'])
+def test_a_wire_that_is_not_plugged_in_ends_the_day(tmp_path, wired):
+    (tmp_path / "answers.toml").write_text(f"wired = {wired}")
+    done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
+    assert done.exit_code == 1
+    assert "Nothing has played" in str(done.exception)
+
+
+def test_a_file_beside_the_target_is_left_alone(tmp_path):
+    (tmp_path / "lab.toml.draft").write_text("mine")
+    configured(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
+    assert (tmp_path / "lab.toml.draft").read_text() == "mine"
+
+
+@pytest.mark.parametrize(("answer", "gain_db"), [(".5", 0.5), ("010", 10.0), ("1e1", 10.0), ("-3", -3.0)])
+def test_a_number_as_people_write_it_is_one(tmp_path, answer, gain_db):
+    rig, wrong = asked_of_a_person(tmp_path, {"amplifier.gain_db": [answer]})
+    assert (rig.amplifier.gain_db, wrong) == (gain_db, [])
+
+
+@pytest.mark.parametrize("name", ["B\udce9nch", "a\x7fb", "two\nlines"])
+def test_a_letter_that_cannot_be_written_is_asked_again(tmp_path, name):
+    rig, wrong = asked_of_a_person(tmp_path, {"name": [name, "Bénch"]})
+    assert rig.name == "Bénch"
+    assert "cannot be shown" in wrong[0]
+
+
 @pytest.mark.parametrize("content", [None, b"\xff\xfe", b"operator = ", b"nonsense.key = 3"])
 def test_answers_that_cannot_be_read_or_have_no_place_are_told_in_a_sentence(tmp_path, content):
     if content is not None:
@@ -90,6 +118,16 @@ def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
     with stop_on_signal(switch), pytest.raises(CheckStopped, match=r"before anything played.*--bench mine"):
         _wired_at_terminal(Path("mine.toml"), "the T-piece")
     assert switch.request is None
+
+
+def test_ctrl_c_at_a_question_is_a_stop_and_nothing_is_written(tmp_path, monkeypatch):
+    def stopped(*_given, **_named):
+        raise typer.Abort
+
+    monkeypatch.setattr("typer.prompt", stopped)
+    with pytest.raises(CheckStopped, match="nothing is written"):
+        _configured_at_terminal(LAB, tmp_path / "lab.toml", seen(), "note")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_place_that_is_no_folder_is_told_before_anything_is_asked(tmp_path):

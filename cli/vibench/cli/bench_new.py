@@ -15,6 +15,7 @@ from vibench.acquisition import (
     CheckFailed,
     CheckStopped,
     ConfigurationError,
+    InstrumentList,
     StopSwitch,
     list_rig_instruments,
     open_bench,
@@ -28,6 +29,8 @@ from vibench.sim import toml_table
 from .output import console
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
+_NOT_YET = {"", "no", "n", "not yet", "false", "0"}
+"""Answers to whether a wire is plugged in, false among them, that say that it is not."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +60,9 @@ class Answers:
 
     def wired(self, pair: str) -> str:
         """Say whether a pair of ends is plugged in."""
-        console.print(f"Plug {pair}: {self.given.get(_WIRED, '')}", markup=False, soft_wrap=True)
-        return self.given.get(_WIRED, "")
+        answer = self.given.get(_WIRED, "")
+        console.print(f"Plug {pair}: {answer}", markup=False, soft_wrap=True)
+        return "" if answer.strip().casefold() in _NOT_YET else answer
 
     def knobs(self, knobs: tuple[Knob, ...]) -> KnobSheet:
         """Confirm every setting made by hand, or none."""
@@ -72,7 +76,12 @@ class Answers:
     @property
     def operator(self) -> str:
         """Who answers."""
-        return self.given.get(_OPERATOR, "").strip() or "nobody named"
+        return _name_in_a_comment(self.given.get(_OPERATOR, ""))
+
+
+def _name_in_a_comment(answer: str) -> str:
+    """Leave out what would end a line of the configuration, or cannot be written at all."""
+    return "".join(letter for letter in answer if letter.isprintable()).strip() or "nobody named"
 
 
 def _flat(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
@@ -92,6 +101,13 @@ def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) ->
     if answer.isdigit() and 1 <= int(answer) <= len(choices):
         return choices[int(answer) - 1]
     return answer
+
+
+def _configured_at_terminal(template: Path, target: Path, seen: InstrumentList, note: str) -> Rig:
+    try:
+        return configured(template, target, seen, _asked_at_terminal, note, refuse=_asked_again)
+    except typer.Abort as stop:
+        raise CheckStopped("the first day was stopped at its questions; nothing is written") from stop
 
 
 def _asked_again(error: ConfigurationError) -> None:
@@ -122,10 +138,13 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     seen = list_rig_instruments(load_rig(template))
     for remark in seen.remarks:
         console.print(f"! {remark}", markup=False)
-    operator = str(typer.prompt("Who sets up this bench?")) if given is None else given.operator
+    if given is None:
+        operator = _name_in_a_comment(str(typer.prompt("Who sets up this bench?")))
+    else:
+        operator = given.operator
     note = f"{operator}, {datetime.now(UTC).astimezone().date()}"
     if given is None:
-        rig = configured(template, target, seen, _asked_at_terminal, note, refuse=_asked_again)
+        rig = _configured_at_terminal(template, target, seen, note)
     else:
         rig = configured(template, target, seen, given.ask, note, given.questions)
     console.print(f"\nwritten: {target}\n", markup=False)

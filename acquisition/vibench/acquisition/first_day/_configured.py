@@ -102,6 +102,7 @@ def _answered(
     """Ask until the answer is of its kind and within its bounds; how answers agree is seen at the end."""
     while answer := ask(question, choices, _held(text, question.key)):
         try:
+            _require_text(answer, question.key)
             changed = with_answer(text, question.key, answer, note)
             _require_within_bounds(changed, question.key)
         except ConfigurationError as error:
@@ -109,6 +110,11 @@ def _answered(
         else:
             return changed
     return text
+
+
+def _require_text(answer: str, key: str) -> None:
+    if not answer.isprintable():
+        raise ConfigurationError(f"{key}: {answer!a} has a letter that cannot be shown; leave it out")
 
 
 def _held(text: str, key: str) -> str:
@@ -131,10 +137,9 @@ def _require_within_bounds(text: str, key: str) -> None:
 
 
 def _write(target: Path, text: str) -> None:
-    draft = target.with_name(target.name + ".draft")
     try:
-        draft.write_text(text, encoding="utf-8")
-        draft.rename(target)
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
     except OSError as error:
         raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error
 

@@ -101,9 +101,10 @@ def _chapter(title: str, report: BenchReport) -> Iterator[str]:
 
 
 def _next_steps(rig: Rig, checked: CheckResult, config: Path) -> Iterator[str]:
+    bench = f'"{config}"' if " " in str(config) else config
     if checked.verdict is Verdict.FAIL:
-        yield "\nDo not energise: mend what FAILs, and check again with `vibench bench check`."
+        yield "\nDo not energise: mend what FAILs, and check again with"
+        yield f"\n    vibench bench check --bench {bench}"
         return
     yield f"\nThe bench may be armed for {rig.check_valid_h:g} h. Record a first sweep with"
-    bench = f'"{config}"' if " " in str(config) else config
     yield f"\n    vibench measure first_day --bench {bench} --out recordings"

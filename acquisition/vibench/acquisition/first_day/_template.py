@@ -59,10 +59,19 @@ def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
 def _guessed(answer: str) -> str:
     """Write an answer to what the template says nothing of: a number where it reads as one."""
     try:
-        float(answer)
+        return _as_toml(answer)
     except ValueError:
         return json.dumps(answer, ensure_ascii=False)
-    return answer
+
+
+def _as_toml(number: str) -> str:
+    """Write a number as TOML does, which has no .5 and no 010; raises ValueError where it is none."""
+    value = float(number)
+    try:
+        tomllib.loads(f"number = {number}")
+    except tomllib.TOMLDecodeError:
+        return repr(value)
+    return number
 
 
 def _place(text: str, key: str) -> re.Match[str] | None:
@@ -112,7 +121,6 @@ def _literal(held: str, answer: str, key: str, note: str) -> str:
 
 def _number(answer: str, key: str) -> str:
     try:
-        float(answer)
+        return _as_toml(answer)
     except ValueError as error:
         raise ConfigurationError(f"{key}: {answer!r} is no number; give one, such as 0.1 or 2e-3") from error
-    return answer
