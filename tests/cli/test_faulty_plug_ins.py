@@ -1,5 +1,8 @@
 """A stranger's instrument that raises, or gives something else: a sentence, nothing lost, and silence."""
 
+import re
+import sys
+from collections import deque
 from pathlib import Path
 
 import numpy as np
@@ -7,8 +10,8 @@ import pytest
 
 from vibench.acquisition import AcquisitionError, open_bench, run_measurement
 from vibench.acquisition.check import check_bench
-from vibench.acquisition.drivers import AFG1022_MODEL, DaqmxDigitizer
-from vibench.acquisition.errors import BrokenPromise
+from vibench.acquisition.drivers import AFG1022_MODEL, DaqmxDigitizer, FilePlayer
+from vibench.acquisition.errors import BrokenPromise, DataLost
 from vibench.acquisition.instruments import Block, SensorFacts
 from vibench.acquisition.plan import Dwell, Measurement
 from vibench.acquisition.recording import RecordingState, open_recording
@@ -119,8 +122,8 @@ def told(vibench_here, tmp_path):
     """Measure on a bench through the command line; an exception that it lets out ends the test."""
     (tmp_path / "plan.toml").write_text(PLAN)
 
-    def run(bench):
-        done = vibench_here("measure", "plan.toml", "--bench", bench, "--out", "out", cwd=tmp_path)
+    def run(bench, *more):
+        done = vibench_here("measure", "plan.toml", "--bench", bench, "--out", "out", *more, cwd=tmp_path)
         return done.returncode, " ".join((done.stdout + done.stderr).split())
 
     return run
@@ -158,6 +161,54 @@ def test_samples_that_are_none_end_check_and_run_with_a_sentence(stranger, does,
             run_measurement(bench, DWELL, tmp_path / "dwell.h5")
 
 
+def test_samples_that_are_left_out_are_told_with_the_recording_and_not_played_back(stranger, told, tmp_path):
+    left = [20]
+
+    def skips(found, *given):
+        left[0] -= 1
+        if left[0] == 0:
+            found(*given)
+        return found(*given)
+
+    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", skips))
+    code, said = told(path, "--check", "waived")
+    assert code == 0, said
+    assert re.search(r"the plan was carried out; the converter lost \d+ samples", said)
+    rig = load_rig("virtual_rig")
+    played = rig.daq.model_copy(
+        update={"driver": "file", "options": {"recording": str(tmp_path / "out" / "dwell.h5")}}
+    )
+    player = FilePlayer.open(rig.model_copy(update={"daq": played}))
+    player.start()
+    with pytest.raises(DataLost, match="with a hole cannot be played back"):
+        deque(iter(lambda: player.read(5120), None), maxlen=0)
+
+
+def test_a_check_finds_a_converter_that_leaves_samples_out(stranger, tmp_path):
+    def skips(found, *given):
+        found(*given)
+        return found(*given)
+
+    path = stranger("digitizer", OddDriver(DaqmxDigitizer, "read", skips))
+    with open_bench(path) as bench, pytest.raises(DataLost, match="where 0 was due: it loses samples"):
+        check_bench(bench, tmp_path)
+
+
+def test_a_stop_that_fails_says_that_the_output_may_be_on(stranger, tmp_path):
+    path = stranger("generator", OddDriver(AFG1022_MODEL, "stop", raises))
+    with pytest.raises(BrokenPromise, match="THE OUTPUT MAY STILL BE ON"), open_bench(path) as bench:
+        check_bench(bench, tmp_path)
+
+
+def test_a_driver_that_ends_the_program_is_told_too(stranger, told):
+    def ends(_found, *_given):
+        sys.exit(0)
+
+    code, said = told(stranger("generator", OddDriver(AFG1022_MODEL, "open", ends)))
+    assert code == 1
+    assert "broke its promise in open: SystemExit: 0" in said
+
+
 def test_a_failure_while_playing_ends_silent_and_the_recording_says_why(stranger, tmp_path):
     left = [15]
 
@@ -190,6 +241,10 @@ def test_a_close_that_fails_after_a_complete_recording_says_that_it_is_complete(
         ({"units_per_volt": 0.0}, "a sensor that gives no volts measures nothing"),
         ({"units_per_volt": float("nan")}, "SensorFacts.units_per_volt"),
         ({"full_scale_v": 0.0}, "SensorFacts.full_scale_v"),
+        ({"full_scale_v": -1.0}, "SensorFacts.full_scale_v"),
+        ({"delay_s": -5.0}, "SensorFacts.delay_s"),
+        ({"serial": 4711}, "4711 as SensorFacts.serial"),
+        ({"calibrated": "last year"}, "SensorFacts.calibrated"),
         (None, "None as SensorFacts"),
     ],
 )

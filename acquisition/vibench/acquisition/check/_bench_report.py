@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, judged
-from ..errors import CheckStopped, ConfigurationError
+from ..errors import CheckStopped, ConfigurationError, DataLost
 from ..excitation import Dwell, Tone
 from ..instruments import AnalogOutput, IdleOutput, Samples, read_block
 from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState, check_amplitude_vpp
@@ -40,8 +40,9 @@ def bench_report(
 
     Reads all channels in silence, while a small sine plays at 160 Hz for some seconds, and in silence again.
 
-    Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails, ConfigurationError
-    on a recording that is played back; what is merely wrong is a finding.
+    Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails, DataLost when the
+    converter leaves samples out, ConfigurationError on a recording that is played back; what is merely wrong
+    is a finding.
 
     Parameters
     ----------
@@ -85,11 +86,12 @@ class _BlockReader:
     def __init__(self, bench: Bench, switch: StopSwitch) -> None:
         self._bench = bench
         self._switch = switch
+        self._due = 0
 
     def in_silence(self) -> Samples:
         """Read all channels while nothing plays, after couplings have settled."""
         digitizer = self._bench.digitizer
-        digitizer.start()
+        self._begin()
         try:
             self._read_for(_SETTLE_S)
             return np.concatenate(self._read_for(_READ_S), axis=1)
@@ -103,7 +105,7 @@ class _BlockReader:
         measuring = Phase(RunState.CHECKING, tone, _READ_S)
         try:
             drive.arm((settling, measuring))
-            self._bench.digitizer.start()
+            self._begin()
             for wait_s in drive.perform(settling):
                 self._read_for(wait_s)
             blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
@@ -113,6 +115,10 @@ class _BlockReader:
                 drive.silence()
             finally:
                 self._bench.digitizer.stop()
+
+    def _begin(self) -> None:
+        self._bench.digitizer.start()
+        self._due = 0
 
     def _read_for(self, duration_s: float) -> list[Samples]:
         digitizer = self._bench.digitizer
@@ -124,8 +130,15 @@ class _BlockReader:
                 raise CheckStopped(
                     f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
                 )
-            blocks.append(read_block(digitizer, min(longest, left)).volts)
-            left -= blocks[-1].shape[1]
+            block = read_block(digitizer, min(longest, left))
+            if block.first_sample != self._due:
+                raise DataLost(
+                    f"the converter handed over sample {block.first_sample} where {self._due} was due: it "
+                    "loses samples while nothing else is asked of it. Look for what keeps the bus busy"
+                )
+            self._due += block.volts.shape[1]
+            blocks.append(block.volts)
+            left -= block.volts.shape[1]
         return blocks
 
 

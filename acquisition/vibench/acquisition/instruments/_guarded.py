@@ -4,8 +4,8 @@ Our own drivers are not guarded: what they raise beyond their promises is a mist
 is what mends it.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import is_dataclass
+from collections.abc import Callable
+from dataclasses import is_dataclass, replace
 from functools import cache
 from typing import Any, cast, get_type_hints
 
@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from ..errors import AcquisitionError, BrokenPromise
 from ._plug_in import OURS, PlugInKind, plug_in
+from ._protocols import Digitizer
 
 
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
@@ -36,6 +37,13 @@ def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:
     found = plug_in(kind, name)
     is_ours = any(row.group == kind and row.name == name for row in OURS)
     return found if is_ours else Guarded(found, promise, f"{name!r} of {kind.value}")
+
+
+_SILENCING = {"stop", "close", "silence"}
+_ADVICE = (
+    "Have its package mended and run its contract tests (docs/instruments.md), or name another driver in the "
+    "hardware configuration"
+)
 
 
 class Guarded:
@@ -74,7 +82,7 @@ class Guarded:
             return attempt()
         except AcquisitionError:
             raise
-        except Exception as error:  # a stranger's code may raise whatever it likes
+        except (Exception, SystemExit) as error:  # a stranger's code may raise whatever it likes
             raise self._broken(member, f"{type(error).__name__}: {error}") from error
 
     def _as_promised(self, member: str, hint: Any, found: Any) -> Any:
@@ -82,35 +90,37 @@ class Guarded:
             return None
         if getattr(hint, "_is_protocol", False):
             return Guarded(found, hint, self._name)
-        for fault in _faults(hint, found):
-            raise self._broken(member, f"it gave {fault}")
-        return found
+        try:
+            return _taken(hint, found)
+        except (TypeError, ValueError) as error:
+            raise self._broken(member, f"it gave {error}") from error
 
     def _broken(self, member: str, what: str) -> BrokenPromise:
         asked = "when it was asked" if member == "__call__" else f"in {member}"
-        return BrokenPromise(
-            f"the plug-in {self._name} broke its promise {asked}: {what}. Have its package mended, and run "
-            "its contract tests (docs/instruments.md); or name another driver in the hardware configuration"
-        )
+        is_source = member in _SILENCING and self._promise is not Digitizer
+        alarm = " THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand." if is_source else ""
+        return BrokenPromise(f"the plug-in {self._name} broke its promise {asked}: {what}.{alarm} {_ADVICE}")
 
 
-def _faults(hint: Any, value: object) -> Iterator[str]:
-    """Hold a value to its type, a data class of ours field by field."""
+def _taken(hint: Any, value: Any) -> Any:
+    """Take a value as its type, a data class of ours field by field; raises TypeError or ValueError."""
     name = getattr(hint, "__name__", str(hint))
     if not is_dataclass(hint):
-        yield from _part_faults(name, hint, value)
-    elif isinstance(value, cast("type", hint)):
-        for field, each in _hints(cast("type", hint)).items():
-            yield from _part_faults(f"{name}.{field}", each, getattr(value, field))
-    else:
-        yield f"{value!r:.80} as {name}"
+        return _taken_part(name, hint, value)
+    if not isinstance(value, cast("type", hint)):
+        raise TypeError(f"{value!r:.80} as {name}")
+    taken = {
+        at: _taken_part(f"{name}.{at}", each, getattr(value, at))
+        for at, each in _hints(cast("type", hint)).items()
+    }
+    return replace(cast("Any", value), **taken)
 
 
-def _part_faults(name: str, hint: Any, value: object) -> Iterator[str]:
+def _taken_part(name: str, hint: Any, value: object) -> Any:
     try:
-        _adapter(hint).validate_python(value)
+        return _adapter(hint).validate_python(value)
     except ValidationError as error:
-        yield f"{value!r:.80} as {name} ({error.errors()[0]['msg']})"
+        raise ValueError(f"{value!r:.80} as {name} ({error.errors()[0]['msg']})") from error
 
 
 @cache
@@ -126,10 +136,13 @@ def _hints(annotated: Any) -> dict[str, Any]:
     return get_type_hints(annotated, include_extras=True)
 
 
+_PLAIN = ConfigDict(arbitrary_types_allowed=True, allow_inf_nan=False)
+
+
 @cache
 def _adapter(hint: Any) -> TypeAdapter[Any]:
     has_own = isinstance(hint, type) and issubclass(hint, BaseModel)
-    return TypeAdapter(hint, config=None if has_own else ConfigDict(arbitrary_types_allowed=True))
+    return TypeAdapter(hint, config=None if has_own else _PLAIN)
 
 
 def _bare(given: Any) -> Any:

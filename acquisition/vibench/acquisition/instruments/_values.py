@@ -85,11 +85,11 @@ class SensorFacts:
     """``"voltage"``, ``"acceleration"`` or ``"velocity"``: what the role of its channel records."""
     unit: str
     """UDUNITS text: ``"V"``, ``"m s-2"``, ``"m s-1"``."""
-    units_per_volt: Annotated[float, Field(allow_inf_nan=False), AfterValidator(_not_zero)]
-    full_scale_v: Annotated[float, Field(gt=0)]
+    units_per_volt: Annotated[float, AfterValidator(_not_zero)]
+    full_scale_v: Annotated[float, Field(gt=0, allow_inf_nan=True)]
     """Largest output, peak [V]; infinite for a wire."""
     name: str
     serial: str = ""
-    delay_s: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    delay_s: Annotated[float, Field(ge=0)] = 0.0
     """How much later its volts are than the quantity [s]."""
     calibrated: date | None = None

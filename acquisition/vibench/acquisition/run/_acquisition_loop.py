@@ -42,6 +42,7 @@ class AcquisitionLoop:
         self._sink = sink
         self._segment: Segment | None = None
         self._samples = 0
+        self._lost = 0
         self._due_s = 0.0
 
     @property
@@ -53,6 +54,11 @@ class AcquisitionLoop:
     def samples(self) -> int:
         """Samples recorded so far."""
         return self._samples
+
+    @property
+    def lost_samples(self) -> int:
+        """Samples that the converter did not hand over; they are marked in the recording."""
+        return self._lost
 
     @property
     def elapsed_s(self) -> float:
@@ -95,6 +101,7 @@ class AcquisitionLoop:
     def _next(self, samples: int) -> Block:
         block = read_block(self._digitizer, samples)
         self._sink.append(block)
+        self._lost += block.first_sample - self._samples
         self._samples = block.first_sample + block.volts.shape[1]
         return block
 

@@ -52,9 +52,10 @@ class Ending:
         self.reason = "the run ended without saying why"
         self._cause: Cause | None = None
 
-    def is_finished(self) -> None:
-        """Note that the plan was carried out."""
-        self.state, self.reason = RunState.FINISHED, "the plan was carried out"
+    def is_finished(self, lost_samples: int) -> None:
+        """Note that the plan was carried out, and what the converter has lost meanwhile."""
+        lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
+        self.state, self.reason = RunState.FINISHED, f"the plan was carried out{lost}"
 
     def is_stopped(self, reason: str, cause: Cause) -> None:
         """Note that somebody ended it."""

@@ -216,7 +216,7 @@ class Run(ClosedOnLeaving):
         """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
         try:
             yield from self._played(runner)
-            self._ending.is_finished()
+            self._ending.is_finished(runner.loop.lost_samples)
         except Stopped as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
             yield from self._ramped_down_early(runner, stop.request.level)
