@@ -199,7 +199,9 @@ class TestLeaving:
 
 class TestCalibration:
     def test_a_calibration_that_has_run_out_keeps_the_bench_closed(self, laboratory):
-        with pytest.raises(CheckFailed, match=r"Polytec PSV-500 was calibrated on 2001-01-01.*730 days"):
+        with pytest.raises(
+            CheckFailed, match=r"Polytec PSV-500 DV-04 was calibrated on 2001-01-01.*730 days"
+        ):
             open_bench(aged(laboratory, "2001-01-01"), confirm_simulated)
 
     def test_it_may_be_waived(self, laboratory):
@@ -219,6 +221,19 @@ class TestCalibration:
             check_calibrations(rig, today)
         for what in ("PSV-500", "IEPE", *(channel.physical for channel in rig.daq.channels)):
             assert what in str(caught.value)
+
+    def test_the_sensor_in_front_of_an_input_is_looked_at_and_not_another(self, rig):
+        left = tuple(each for each in rig.daq.channels if each.role.value != "base_acceleration")
+        bare = rig.model_copy(update={"daq": rig.daq.model_copy(update={"channels": left})})
+        named = [each.what for each in calibrations(bare, rig.vibrometer.calibrated)]
+        assert not any("IEPE" in each for each in named)
+        assert any("PSV-500" in each for each in named)
+
+    def test_a_recording_that_is_played_back_has_no_sensor_whose_calibration_could_run_out(self, laboratory):
+        old = aged(laboratory, "2001-01-01")
+        played = old.model_copy(update={"daq": old.daq.model_copy(update={"driver": "file"})})
+        with pytest.raises(ConfigurationError, match="none is named"):
+            open_bench(played, confirm_simulated)
 
 
 class TestKnobs:

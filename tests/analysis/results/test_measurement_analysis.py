@@ -12,7 +12,7 @@ from vibench.analysis import NotEnoughData, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.frequency_response import NoiseAnalysis
 from vibench.analysis.recordings import Verdict, measurement_checks
-from vibench.analysis.sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis
+from vibench.analysis.sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis, frequency_check
 from vibench.sim import base_transmissibility, gong2025
 
 RATE = 6400.0
@@ -131,6 +131,15 @@ def test_a_faultless_recording_passes_its_checks(dwell_file):
     found = analysed(dwell_file("weak"))
     assert {each.verdict for each in found.checks} <= {Verdict.PASSED, Verdict.NOTE}
     assert verdict(found, "Calibration") is Verdict.PASSED
+    assert verdict(found, "Drive frequency") is Verdict.PASSED
+
+
+def test_a_drive_at_another_frequency_than_the_plan_is_told():
+    planned_hz = np.array([100.0, 200.0, 300.0])
+    assert frequency_check(np.array([100.005, 299.99]), planned_hz).verdict is Verdict.PASSED
+    told = frequency_check(np.array([100.0, 260.0]), planned_hz)
+    assert told.verdict is Verdict.WARNING
+    assert "at 260 Hz, which the plan does not have; nearest is 300 Hz" in told.text
 
 
 @pytest.mark.parametrize(

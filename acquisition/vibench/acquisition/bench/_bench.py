@@ -135,7 +135,8 @@ def open_bench(
 
     """
     rig = config if isinstance(config, Rig) else load_rig(config)
-    if rig.virtual is None and chosen(CalibrationRule, calibration) is CalibrationRule.ENFORCED:
+    has_sensors = rig.virtual is None and not rig.plays_back
+    if has_sensors and chosen(CalibrationRule, calibration) is CalibrationRule.ENFORCED:
         check_calibrations(rig, datetime.now(UTC).astimezone().date())
     closing = ExitStack()
     try:

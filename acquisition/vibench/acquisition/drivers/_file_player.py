@@ -5,12 +5,13 @@ from typing import Self
 
 import numpy as np
 
-from ..errors import ConfigurationError, InstrumentError, InstrumentLost
+from ..errors import ConfigurationError, DataLost, InstrumentError, InstrumentLost
 from ..instruments import Block, Identity, Overload
 from ..recording import Recording, open_recording
 from ..rig import Channel, Rig, channels_of
 
 _SAME_RATE = 1e-9
+_SAME_SCALE = 1e-6
 
 
 class FilePlayer:
@@ -29,7 +30,7 @@ class FilePlayer:
 
     @classmethod
     def open(cls, rig: Rig) -> Self:
-        """Open the recording; raises ConfigurationError where channels or rate are not the rig's."""
+        """Open the recording; raises ConfigurationError where channels, scales or rate are not the rig's."""
         path = rig.daq.options.get("recording")
         if not isinstance(path, str):
             raise ConfigurationError(
@@ -39,6 +40,7 @@ class FilePlayer:
         recording = open_recording(Path(path))
         channels = channels_of(rig)
         missing = [each.role.value for each in channels if each.role.value not in recording.roles]
+        scales = {each.role.value: each.units_per_volt for each in channels if not missing}
         rate_hz, asked_hz = recording.sample_rate_hz, rig.daq.sample_rate_hz
         if missing or abs(rate_hz - asked_hz) > _SAME_RATE * rate_hz:
             recording.close()
@@ -47,6 +49,15 @@ class FilePlayer:
                 f"configuration asks for {', '.join(each.role.value for each in channels)} at "
                 f"{asked_hz:.12g}. Make them agree"
             )
+        for role, units_per_volt in scales.items():
+            made_with = recording.channel(role).physical_per_volt
+            if abs(made_with - units_per_volt) > _SAME_SCALE * abs(made_with):
+                recording.close()
+                raise ConfigurationError(
+                    f"{path} was recorded with {made_with:.6g} units of {role} per volt, and sensor and "
+                    f"attenuation of the configuration give {units_per_volt:.6g}; copy the file of the bench "
+                    "that it was made on"
+                )
         return cls(recording, channels)
 
     @property
@@ -81,7 +92,10 @@ class FilePlayer:
         self._is_running, self._next_sample = True, 0
 
     def read(self, samples: int) -> Block:
-        """Hand over the next samples; raises InstrumentLost where the recording has no more."""
+        """Hand over the next samples.
+
+        Raises InstrumentLost where the recording has no more, DataLost where it has lost them itself.
+        """
         if not self._is_running or samples < 1:
             raise InstrumentError(f"{samples} samples were asked of a recording that does not play; start it")
         first, last = self._next_sample, self._next_sample + samples
@@ -92,6 +106,12 @@ class FilePlayer:
                 f"{last} was asked for; play it back under the plan that it was made with"
             )
         volts = np.stack([self._volts(role, first, last) for role in self.roles])
+        if np.isnan(volts).any():
+            self._is_running = False
+            raise DataLost(
+                f"{self._recording.path.name} has lost samples between {first} and {last}; a recording with "
+                "a hole cannot be played back"
+            )
         self._next_sample = last
         told = tuple(
             Overload(each.channel, max(each.first_sample, first), min(each.last_sample, last - 1))

@@ -23,6 +23,7 @@ from ..rig import (
 from ._drive_source import DriveSource, drive_source_of, lowest_setting_vpp
 from ._loads import Loads, needed_vpp, predicted_loads
 from ._measurement import Measurement, OnOverload
+from ._played_back import require_own_plan
 
 RAMP_PERIODS = 3.0
 """A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""
@@ -107,8 +108,11 @@ def require_within_limits(measurement: Measurement, rig: Rig) -> tuple[LimitChec
     ------
     LimitExceeded
         Naming every violation with value, limit, source and remedy. Nothing was moved.
+    ConfigurationError
+        When a recording is played back that was made with another plan.
 
     """
+    require_own_plan(measurement, rig)
     checks = limit_checks(measurement, rig)
     violations = [check.complaint() for check in checks if check.forbids]
     if violations:

@@ -50,7 +50,7 @@ class Calibration:
 
 
 def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
-    """Every calibration of a rig: its sensors', and each input's.
+    """Every calibration of a rig: that of each sensor which tells one, and each input's.
 
     Parameters
     ----------
@@ -60,17 +60,14 @@ def calibrations(rig: Rig, today: date) -> tuple[Calibration, ...]:
         Their ages are counted to it.
 
     """
-    dates = [
-        (rig.vibrometer.model, rig.vibrometer.calibrated),
-        (rig.accelerometer.model, rig.accelerometer.calibrated),
-        *(
-            (f"{channel.physical} of {rig.daq.product}", channel.converter_calibrated)
-            for channel in channels_of(rig)
-        ),
-    ]
+    channels = channels_of(rig)
+    sensors = {channel.sensor: channel.sensor_calibrated for channel in channels if channel.sensor_calibrated}
+    inputs = {
+        f"{channel.physical} of {rig.daq.product}": channel.converter_calibrated for channel in channels
+    }
     return tuple(
         Calibration(what, calibrated, (today - calibrated).days, rig.calibration_valid_days)
-        for what, calibrated in dates
+        for what, calibrated in (*sensors.items(), *inputs.items())
     )
 
 
