@@ -6,7 +6,8 @@ runs a command of vibench so, and
 
     pytest -p tests.windows_here -o timeout_method=thread tests/acquisition/recording
 
-the tests of a room. Left of the true system are its libraries (numba, HDF5, Qt) and Python's own.
+the tests of a room. Left of the true system are its libraries (numba, HDF5, Qt) and Python's own, and the
+programs that a test starts: their locks are of another kind, and neither sees the other's (`sees_locks`).
 """
 
 import errno
@@ -62,6 +63,13 @@ def windows() -> ModuleType:
     module.process_start = lambda pid: "1" if Path(f"/proc/{pid}").exists() else None
     module.lower_priority = lambda by: None
     return module
+
+
+sees_locks = pytest.mark.skipif(
+    "sys.platform != 'win32' and not hasattr(os, 'fork')",
+    reason="programs that are started here lock as the true system does",
+)
+"""On tests that look for the locks of programs which they start."""
 
 
 def become_windows() -> None:

@@ -12,6 +12,7 @@ from threading import Event
 
 import pytest
 
+from tests.windows_here import sees_locks
 from vibench.acquisition import StopSwitch, open_recording, stop_on_signal
 from vibench.acquisition.engine import (
     EngineState,
@@ -72,6 +73,7 @@ def vibench(*arguments):
     )
 
 
+@sees_locks
 def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench_here, tmp_path):
     seen = json.loads(vibench("watch", "--json").stdout)["engines"]
     assert [each["pid"] for each in seen] == [running.pid]
@@ -158,6 +160,7 @@ print(outcome.state)
 """
 
 
+@sees_locks
 class TestWithoutAnEngine:
     """Scripts and checks that drive a bench themselves were not to be found, while the shaker moved."""
 

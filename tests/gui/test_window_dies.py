@@ -11,6 +11,7 @@ from threading import Event
 
 import pytest
 
+from tests.windows_here import sees_locks
 from vibench.acquisition import open_recording
 from vibench.acquisition.engine import (
     VIEWER_PATIENCE_S,
@@ -114,6 +115,7 @@ def silent_after_s(window, number, folder):
     return silent_s - signalled_s
 
 
+@sees_locks
 @pytest.mark.timeout(300)
 def test_what_was_left_alone_is_shown_by_the_next_window_which_then_looks_after_it(window, qtbot, tmp_path):
     bridge, left = window.context.bridge, tmp_path / "left"
