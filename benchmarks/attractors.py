@@ -74,9 +74,11 @@ def _is_undecided(motion: FoundMotion) -> bool:
 
 
 def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
+    is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME
+    if is_near and (_is_undecided(one) or _is_undecided(other)):
+        return True
     if one.motion in PENDING or other.motion in PENDING:
         return one.motion in PENDING and other.motion in PENDING
-    is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME
     return one.period == other.period and is_near
 
 
