@@ -185,7 +185,7 @@ class TestKeeping:
         for _ in range(2):
             found = check_bench(bench, tmp_path)
             assert found.report[name].verdict is Verdict.FAIL
-            assert "--new-reference" in found.report[name].advice
+            assert "as a new reference" in found.report[name].advice
         meant = check_bench(bench, tmp_path, new_reference=True)
         assert meant.verdict is not Verdict.FAIL
         assert check_bench(bench, tmp_path).report[name].verdict is Verdict.OK

@@ -88,6 +88,10 @@ class TestTheJob:
         client.check(tmp_path)
         checked = until_state(client, EngineState.READY)
         assert checked.check.verdict == "ok"
+        for is_new in (False, True):
+            client.check(tmp_path, new_reference=is_new)
+            compared = [each.name for each in until_state(client, EngineState.READY).check.findings]
+            assert any("since last time" in name for name in compared) is not is_new
         plan = client.arm(campaign("run", duration_s=3.0), tmp_path / "new")
         assert [line.partition(":")[0] for line in plan.lines] == [
             "What",

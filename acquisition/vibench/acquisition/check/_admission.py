@@ -111,7 +111,8 @@ CLOCK_PPM = Bounds(20.0, inf)
 _DECIBELS, _PPM = "dB", "ppm"
 _ADVICE = (
     "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying "
-    "amplifier; if you have changed something that does not stand there, check once with --new-reference"
+    "amplifier; if you have changed something that does not stand there, check it once as a new reference "
+    "(menu Test, or vibench bench check --new-reference)"
 )
 
 

@@ -104,10 +104,10 @@ class Engine:
         if failure is not None:
             raise failure
 
-    def check(self, folder: Path) -> None:
-        """Check the bench with a small sine, and keep what was found."""
+    def check(self, folder: Path, *, new_reference: bool = False) -> None:
+        """Check the bench with a small sine, and keep what was found; see `check_bench`."""
         try:
-            result = check_bench(self.bench, folder, switch=self.switch)
+            result = check_bench(self.bench, folder, switch=self.switch, new_reference=new_reference)
         except CheckStopped as stopped:
             self._check_ended(stopped)
             return

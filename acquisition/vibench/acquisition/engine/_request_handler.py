@@ -192,12 +192,12 @@ class RequestHandler:
         self._is_closing = True
         self._jobs.put(self._close)
 
-    def check(self, folder: Path = Path()) -> None:
+    def check(self, folder: Path = Path(), *, new_reference: bool = False) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
         self._engine.switch = StopSwitch()
         self._attendance, self._patience_s = self._engine.supervision, VIEWER_PATIENCE_S
         self._engine.published.enter(EngineState.CHECKING)
-        self._jobs.put(lambda: self._engine.check(folder))
+        self._jobs.put(lambda: self._engine.check(folder, new_reference=new_reference))
 
     def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
         """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be."""

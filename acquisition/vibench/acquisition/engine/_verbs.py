@@ -168,8 +168,11 @@ class EngineVerbs:
         """Close the bench."""
 
     @verb("check", DONE, EngineState.READY)
-    def check(self, folder: AbsolutePath = Path()) -> None:
-        """Check the bench with a small sine; ``folder`` is where recordings will go."""
+    def check(self, folder: AbsolutePath = Path(), *, new_reference: bool = False) -> None:
+        """Check the bench with a small sine; ``folder`` is where recordings will go.
+
+        ``new_reference``: compare with no earlier check, since what has changed was meant.
+        """
 
     @verb("arm", PLAN, EngineState.READY, EngineState.ARMED, work_s=ARMING_S)
     def arm_request(self, campaign_request: AbsoluteRequest) -> ArmedPlan:

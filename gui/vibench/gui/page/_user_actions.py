@@ -24,13 +24,13 @@ class UserActions(QObject):
         super().__init__(parent)
         self._context = context
 
-    def check(self) -> None:
-        """Check the bench."""
+    def check(self, *, new_reference: bool = False) -> None:
+        """Check the bench; as a new reference, where what has changed was meant."""
         if not self._may("check the bench", EngineState.READY):
             return
         folder = self._context.folder
         folder.mkdir(parents=True, exist_ok=True)
-        self._context.bridge.order(EngineClient.check, folder)
+        self._context.bridge.order(EngineClient.check, folder, new_reference=new_reference)
 
     def arm_test(self) -> None:
         """Arm the test of the Test page, under a name that is free."""

@@ -119,6 +119,7 @@ def menu_actions(
         MenuAction("Edit", "&Undo", target.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
         MenuAction("Edit", "&Redo", target.redo, "Ctrl+Shift+Z", "make it again"),
         MenuAction("&Test", "&Check the bench", actions.check, "F6"),
+        MenuAction("&Test", "Check as a new &reference", partial(actions.check, new_reference=True)),
         MenuAction("&Test", "&Arm the test", actions.arm_test, "Ctrl+Return", "arm"),
         MenuAction("&Test", "S&tart", actions.start, "F5", "start what is armed"),
         MenuAction("&Test", "&Hold or go on", actions.hold_or_resume),
