@@ -50,6 +50,30 @@ def noise(seed, rate=20_000.0, duration_s=0.03):
     return Sampled(np.interp(time_s, np.arange(len(coarse)) * rate / 1000.0, coarse), rate)
 
 
+@settings(max_examples=60, deadline=None)
+@given(
+    contact=laws,
+    place=places,
+    gap_m=st.floats(41e-6, 60e-6),
+    is_upper=st.booleans(),
+    drive=st.sampled_from([Harmonic(40.0, 2e-3), Harmonic(170.0, 50e-6), Harmonic(430.0, 1e-4)]),
+)
+def test_a_stop_that_nothing_reaches_may_as_well_be_none(contact, place, gap_m, is_upper, drive):
+    """Without a stop above, the one below was passed through while p moved upwards."""
+    far, none = ((gap, gap_m) if is_upper else (gap_m, gap) for gap in (1.0, math.inf))
+    start = np.array([*place, 0.0, 0.0, 0.0])
+    ends = []
+    for lower, upper in (far, none):
+        specimen = replace(paper(contact), gap_m=upper, lower_gap_m=lower)
+        run = integrate(specimen, drive, 0.05, Accuracy.REFERENCE, start, sample_rate_hz=1e5)
+        ends.append((run.impacts.count, *run.final_state))
+        if contact.startswith("rigid"):
+            p = run.states[:, 1] - run.states[:, 2]
+            assert max(p.max() - upper, -p.min() - lower) < 1e-15
+    assert ends[0][0] == ends[1][0]
+    assert np.all(np.abs(np.subtract(*ends))[1:] < LIMITS)
+
+
 @settings(max_examples=20, deadline=None)
 @given(contact=laws, place=places, speed=speeds, seed=st.integers(0, 1000))
 def test_a_mirrored_sampled_drive_and_start_give_the_mirrored_motion_to_the_bit(contact, place, speed, seed):

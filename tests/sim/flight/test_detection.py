@@ -35,6 +35,21 @@ def test_a_peak_beyond_the_stop_is_found_at_its_first_crossing(over, at, bend, s
 
 
 @settings(deadline=None)
+@given(share=st.floats(0.1, 0.9), back=st.floats(0.05, 0.4), slack=st.floats(1.0, 30.0))
+def test_a_stop_on_one_side_alone_is_found_after_p_was_away_from_it(share, back, slack):
+    """While p moves towards the side that has no stop, the other one is watched all the same."""
+    at, bend = share * back, GAP / (back * LENGTH) ** 2
+    series = parabola(-0.5 * GAP, at * LENGTH, bend)  # up from the lower stop's side, and down to -GAP
+    bound = slack * bend
+    below = first_contact(series, LENGTH, GAP, np.inf, bound, GAP)
+    above = first_contact(-series, LENGTH, np.inf, GAP, bound, GAP)
+    far = first_contact(series, LENGTH, GAP, 1.0, bound, GAP)
+    assert below == above
+    assert abs(below - (at + back) * LENGTH) < 1e-9 * LENGTH
+    assert abs(below - far) < 1e-9 * LENGTH
+
+
+@settings(deadline=None)
 @given(
     under=st.floats(1e-15, 1e-6),
     at=st.floats(0.0, LENGTH),

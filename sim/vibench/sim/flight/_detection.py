@@ -68,6 +68,8 @@ def derivative_bound(series: Vector, length: float, derivative: int) -> float:
 @kernel_without_refcount
 def _earliest(gap: float, approach: float, bound: float) -> float:
     """Earliest time [s] at which a gap can close when it closes now at ``approach`` [m/s]."""
+    if gap == math.inf:  # or the formula divides infinite by infinite
+        return math.inf
     root = math.sqrt(approach * approach + 2.0 * bound * gap)
     if approach > 0.0:
         return 2.0 * gap / (approach + root)
