@@ -1,4 +1,5 @@
 import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -63,3 +64,33 @@ def test_a_specimen_that_cannot_be_says_which_number_is_wrong(field, value, sent
 def test_an_unknown_contact_names_the_known_ones():
     with pytest.raises(ValueError, match="'rubber' is not known: give one of hertz, linear"):
         gong2025(contact="rubber")
+
+
+def test_dampers_that_couple_the_modes_have_the_ratios_of_the_poles():
+    specimen = replace(
+        gong2025(),
+        masses=(5e-3, 2e-3, 3e-3),
+        stiffnesses=(20_000.0, 900.0, 12_000.0),
+        dampings=(0.1, 2.0, 0.0),
+    )
+    system = np.block(
+        [
+            [np.zeros((3, 3)), np.eye(3)],
+            [
+                -np.linalg.solve(specimen.mass_matrix, each)
+                for each in (specimen.stiffness_matrix, specimen.damping_matrix)
+            ],
+        ]
+    )
+    poles = np.linalg.eigvals(system)
+    poles = sorted(poles[poles.imag > 0], key=abs)
+    np.testing.assert_allclose(specimen.damping_ratios, [-each.real / abs(each) for each in poles], rtol=1e-9)
+    np.testing.assert_allclose(specimen.damping_ratios, [0.71605, 0.16889, 0.03498], atol=1e-5)
+
+
+def test_ratios_of_modes_that_hardly_couple_are_those_of_modes_that_do_not():
+    """The poles of an overdamped mode are real: two of them, whose product is the square of its frequency."""
+    for damping_time_s in (2e-5, 1e-2):
+        alone = gong2025(damping_time_s=damping_time_s)
+        coupled = replace(alone, dampings=tuple(np.array(alone.dampings) * (1.0, 1.0 + 1e-7, 1.0)))
+        np.testing.assert_allclose(coupled.damping_ratios, alone.damping_ratios, rtol=1e-6)

@@ -89,15 +89,34 @@ class Specimen:
 
     @property
     def damping_ratios(self) -> NDArray[np.float64]:
-        """Damping ratio of each undamped mode, shape (3,): modal c over its critical value.
+        """Damping ratio of each mode without contact, in the order of its frequency, shape (3,).
 
-        Exact when the c_i are proportional to the k_i; otherwise the off-diagonal modal damping
-        is left out, as is usual. Above 1 the mode does not oscillate.
+        ``-Re(s) / abs(s)`` of its pair of poles. Above 1 the mode does not oscillate.
         """
         root = np.sqrt(np.asarray(self.masses))
         values, vectors = np.linalg.eigh(self.stiffness_matrix / np.outer(root, root))
         damping = vectors.T @ (self.damping_matrix / np.outer(root, root)) @ vectors
-        return np.asarray(np.diag(damping) / (2.0 * np.sqrt(values)), dtype=np.float64)
+        own = np.diag(damping)
+        if np.all(np.abs(damping - np.diag(own)) <= _ROUNDING * np.max(own)):
+            return np.asarray(own / (2.0 * np.sqrt(values)), dtype=np.float64)
+        return _ratios_of_coupled_modes(np.diag(values), damping)
+
+
+_ROUNDING = 1e-12
+
+
+def _ratios_of_coupled_modes(stiffness: Matrix, damping: Matrix) -> NDArray[np.float64]:
+    """Give the damping ratios of modes that the dampers couple; both matrices over the masses."""
+    count = len(stiffness)
+    system = np.block([[np.zeros((count, count)), np.eye(count)], [-stiffness, -damping]])
+    poles = np.linalg.eigvals(system)
+    still = np.sort(np.abs(poles[poles.imag == 0.0]))
+    # Of modes that do not oscillate the slowest pole belongs to the fastest: their product is the square of
+    # the mode's frequency, and their sum the damping.
+    pairs = list(zip(still[: still.size // 2], still[: still.size // 2 - 1 : -1], strict=True))
+    found = [(math.sqrt(slow * fast), 0.5 * (slow + fast) / math.sqrt(slow * fast)) for slow, fast in pairs]
+    found += [(abs(pole), -pole.real / abs(pole)) for pole in poles if pole.imag > 0.0]
+    return np.array([ratio for _, ratio in sorted(found)])
 
 
 JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
