@@ -6,6 +6,7 @@ import sys
 import time
 import traceback
 from collections import Counter, deque
+from contextlib import suppress
 from random import Random
 
 from PySide6.QtCore import (
@@ -336,7 +337,8 @@ class Robot:
         if pid is not None:
             os.kill(pid, signal.SIGSTOP)
             self.live(self.random.choice((300, 1500)))
-            os.kill(pid, signal.SIGCONT)
+            with suppress(ProcessLookupError):  # its attendant may have ended it meanwhile
+                os.kill(pid, signal.SIGCONT)
 
     # What every page must still do
 
