@@ -51,7 +51,7 @@ def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
     if stated is None or truth is None:
         return False
     for motion in truth.motions:
-        same = sorted((each for each in stated.motions if _is_same(each, motion)), key=_unlike(motion))
+        same = sorted((each for each in stated.motions if _is_same(each, motion)), key=_apart_from(motion))
         low, high = (same[0].share.low, same[0].share.high) if same else (0.0, stated.unseen_share)
         if not low <= motion.share.share <= high:
             return False
@@ -61,24 +61,15 @@ def _is_covered(answered: ScenePrediction, truth: Ensemble | None) -> bool:
     )
 
 
-def _unlike(motion: FoundMotion) -> Callable[[FoundMotion], tuple[bool, float]]:
-    """Of several motions that are not periodic, the same is called so and responds most alike."""
-    return lambda each: (
-        _is_undecided(each) is not _is_undecided(motion),
-        abs((each.response_i or 0.0) - (motion.response_i or 0.0)),
-    )
-
-
-def _is_undecided(motion: FoundMotion) -> bool:
-    return motion.motion is MotionKind.UNDECIDED
+def _apart_from(motion: FoundMotion) -> Callable[[FoundMotion], float]:
+    """Of several chaotic motions, that is the same whose response is nearest."""
+    return lambda each: abs((each.response_i or 0.0) - (motion.response_i or 0.0))
 
 
 def _is_same(one: FoundMotion, other: FoundMotion) -> bool:
-    is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME
-    if is_near and (_is_undecided(one) or _is_undecided(other)):
-        return True
     if one.motion in PENDING or other.motion in PENDING:
         return one.motion in PENDING and other.motion in PENDING
+    is_near = abs((one.response_i or 0.0) / (other.response_i or 1.0) - 1.0) < SAME
     return one.period == other.period and is_near
 
 
