@@ -1,5 +1,6 @@
 """`vibench bench new`: the configuration that it writes, the page that it keeps, and what it refuses."""
 
+import errno
 import re
 import shlex
 import signal
@@ -15,9 +16,9 @@ from vibench.acquisition.errors import ConfigurationError
 from vibench.acquisition.first_day import QUESTIONS, configured
 from vibench.acquisition.first_day._template import value_in, with_answer
 from vibench.acquisition.instruments import FoundDevice
-from vibench.acquisition.rig import load_rig
+from vibench.acquisition.rig import confirm_at_terminal, load_rig
 from vibench.cli.__main__ import app
-from vibench.cli.bench_new import _configured_at_terminal, _wired_at_terminal
+from vibench.cli.bench_new import _configured_at_terminal, _operator_at_terminal, _wired_at_terminal
 from vibench.sim import UnreadableTomlError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -115,8 +116,11 @@ def test_ctrl_c_at_a_wire_ends_the_day_at_once(monkeypatch):
     """The handler of a check would only ask it to stop, and the question would go on waiting."""
     monkeypatch.setattr("typer.confirm", lambda _: signal.raise_signal(signal.SIGINT))
     switch = StopSwitch()
-    with stop_on_signal(switch), pytest.raises(CheckStopped, match=r"before anything played.*--bench mine"):
-        _wired_at_terminal(Path("mine.toml"), "the T-piece")
+    with (
+        stop_on_signal(switch),
+        pytest.raises(CheckStopped, match=r'before anything played.*--bench "my own'),
+    ):
+        _wired_at_terminal(Path("my own.toml"), "the T-piece")
     assert switch.request is None
 
 
@@ -127,6 +131,41 @@ def test_ctrl_c_at_a_question_is_a_stop_and_nothing_is_written(tmp_path, monkeyp
     monkeypatch.setattr("typer.prompt", stopped)
     with pytest.raises(CheckStopped, match="nothing is written"):
         _configured_at_terminal(LAB, tmp_path / "lab.toml", seen(), "note")
+    with pytest.raises(CheckStopped, match="nothing is written"):
+        _operator_at_terminal()
+    assert not list(tmp_path.iterdir())
+
+
+def test_ctrl_c_at_a_knob_is_a_stop_before_anything_is_energised(monkeypatch):
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True)
+    monkeypatch.setattr("builtins.input", lambda _: signal.raise_signal(signal.SIGINT))
+    with pytest.raises(CheckStopped, match="nothing was energised"):
+        confirm_at_terminal(())
+
+
+def test_a_number_that_nothing_can_be_computed_with_is_asked_again(tmp_path):
+    rig, wrong = asked_of_a_person(tmp_path, {"amplifier.gain_db": ["1e300", "3"]})
+    assert rig.amplifier.gain_db == 3.0
+    assert "amplifier.gain_db" in wrong[0]
+
+
+def test_a_configuration_that_is_written_in_part_is_taken_away(tmp_path, monkeypatch):
+    """A full disk; begin again would find the name taken."""
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    real = Path.open
+
+    def opened(self, *given, **named):
+        file = real(self, *given, **named)
+        if "x" in given:
+            monkeypatch.setattr(file, "write", full)
+        return file
+
+    monkeypatch.setattr(Path, "open", opened)
+    with pytest.raises(ConfigurationError, match="No space left"):
+        configured(LAB, tmp_path / "lab.toml", seen(), lambda *_: "", "note")
     assert not list(tmp_path.iterdir())
 
 

@@ -2,7 +2,8 @@
 
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -21,7 +22,7 @@ from vibench.acquisition import (
     open_bench,
     stop_on_signal,
 )
-from vibench.acquisition.first_day import QUESTIONS, DayPage, Question, configured, first_day
+from vibench.acquisition.first_day import QUESTIONS, DayPage, Question, configured, first_day, in_a_command
 from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import Confirm, KnobSheet, Rig, load_rig
 from vibench.sim import toml_table
@@ -103,11 +104,22 @@ def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) ->
     return answer
 
 
-def _configured_at_terminal(template: Path, target: Path, seen: InstrumentList, note: str) -> Rig:
+@contextmanager
+def _stopped_by_hand() -> Iterator[None]:
     try:
-        return configured(template, target, seen, _asked_at_terminal, note, refuse=_asked_again)
+        yield
     except typer.Abort as stop:
         raise CheckStopped("the first day was stopped at its questions; nothing is written") from stop
+
+
+@_stopped_by_hand()
+def _operator_at_terminal() -> str:
+    return _name_in_a_comment(str(typer.prompt("Who sets up this bench?")))
+
+
+@_stopped_by_hand()
+def _configured_at_terminal(template: Path, target: Path, seen: InstrumentList, note: str) -> Rig:
+    return configured(template, target, seen, _asked_at_terminal, note, refuse=_asked_again)
 
 
 def _asked_again(error: ConfigurationError) -> None:
@@ -122,7 +134,7 @@ def _wired_at_terminal(target: Path, pair: str) -> str:
     except (KeyboardInterrupt, typer.Abort) as stop:
         raise CheckStopped(
             "the first day was stopped at its wires, before anything played; the configuration is written: "
-            f"go on with `vibench bench check --bench {target}`"
+            f"go on with `vibench bench check --bench {in_a_command(target)}`"
         ) from stop
     finally:
         signal.signal(signal.SIGINT, before)
@@ -138,10 +150,7 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     seen = list_rig_instruments(load_rig(template))
     for remark in seen.remarks:
         console.print(f"! {remark}", markup=False)
-    if given is None:
-        operator = _name_in_a_comment(str(typer.prompt("Who sets up this bench?")))
-    else:
-        operator = given.operator
+    operator = _operator_at_terminal() if given is None else given.operator
     note = f"{operator}, {datetime.now(UTC).astimezone().date()}"
     if given is None:
         rig = _configured_at_terminal(template, target, seen, note)

@@ -7,6 +7,7 @@ from ._procedure import (
     FIRST_VPP as FIRST_VPP,
     DayPage as DayPage,
     first_day as first_day,
+    in_a_command as in_a_command,
 )
 from ._questions import (
     QUESTIONS as QUESTIONS,

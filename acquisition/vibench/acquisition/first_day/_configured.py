@@ -134,12 +134,21 @@ def _require_within_bounds(text: str, key: str) -> None:
     except ValidationError as error:
         if wrong := complaints(error, content, place_of(content, key)):
             raise ConfigurationError(wrong) from error
+    except ArithmeticError as error:
+        raise ConfigurationError(
+            f"{key}: the number is too large, or too small, to be computed with; give another"
+        ) from error
 
 
 def _write(target: Path, text: str) -> None:
     try:
-        with target.open("x", encoding="utf-8") as file:
-            file.write(text)
+        file = target.open("x", encoding="utf-8")
+        try:
+            with file:
+                file.write(text)
+        except OSError:
+            target.unlink()
+            raise
     except OSError as error:
         raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error
 

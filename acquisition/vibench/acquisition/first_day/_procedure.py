@@ -49,7 +49,7 @@ def first_day(
 
     """
     folder = config.absolute().parent
-    again = f"begin again with --from {config} and the name of a new one"
+    again = f"begin again with --from {in_a_command(config)} and the name of a new one"
     pages = [*_head(bench, config, operator), *_wires(bench.rig, confirmed, again)]
     first = bench_report(bench, folder, switch, FIRST_VPP)
     pages += _chapter(f"Noise floor, and the first {1e3 * FIRST_VPP:g} mVpp", first)
@@ -60,6 +60,11 @@ def first_day(
     pages += _chapter("The bench check, at two per cent of the amplitude limit", checked.report)
     pages += list(_next_steps(bench.rig, checked, config))
     return DayPage("\n".join(pages) + "\n", checked.verdict)
+
+
+def in_a_command(path: Path) -> str:
+    """Write a path as any shell takes it."""
+    return f'"{path}"' if " " in str(path) else str(path)
 
 
 def _head(bench: Bench, config: Path, operator: str) -> Iterator[str]:
@@ -101,7 +106,7 @@ def _chapter(title: str, report: BenchReport) -> Iterator[str]:
 
 
 def _next_steps(rig: Rig, checked: CheckResult, config: Path) -> Iterator[str]:
-    bench = f'"{config}"' if " " in str(config) else config
+    bench = in_a_command(config)
     if checked.verdict is Verdict.FAIL:
         yield "\nDo not energise: mend what FAILs, and check again with"
         yield f"\n    vibench bench check --bench {bench}"

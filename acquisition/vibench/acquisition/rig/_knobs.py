@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydantic import AwareDatetime, Field
 
-from ..errors import CheckFailed, ConfigurationError
+from ..errors import CheckFailed, CheckStopped, ConfigurationError
 from ..host import FrozenModel, load_toml
 from ..instruments import Knob
 
@@ -60,7 +60,7 @@ def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
 
 
 def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
-    """Ask whoever sits at the terminal; raises CheckFailed when nobody does.
+    """Ask whoever sits at the terminal; raises CheckFailed when nobody does, CheckStopped at a Ctrl-C.
 
     An unattended program uses `confirm_by_sheet`.
     """
@@ -71,8 +71,11 @@ def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
             "this terminal and nothing was energised; confirm them at one (vibench bench check --knobs "
             "SHEET.toml keeps the answers, and vibench measure --knobs SHEET.toml takes them for 36 hours)"
         )
-    operator = input("Who confirms the settings made by hand? ") or "at the terminal"
-    return confirm_by_asking(input, operator)(knobs)
+    try:
+        operator = input("Who confirms the settings made by hand? ") or "at the terminal"
+        return confirm_by_asking(input, operator)(knobs)
+    except (KeyboardInterrupt, EOFError) as stop:
+        raise CheckStopped("stopped at the settings made by hand; nothing was energised") from stop
 
 
 def confirm_by_sheet(path: Path, valid: timedelta = SHEET_VALID) -> Confirm:
