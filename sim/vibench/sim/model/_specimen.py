@@ -99,17 +99,15 @@ class Specimen:
         own = np.diag(damping)
         if np.all(np.abs(damping - np.diag(own)) <= _ROUNDING * np.max(own)):
             return np.asarray(own / (2.0 * np.sqrt(values)), dtype=np.float64)
-        return _ratios_of_coupled_modes(np.diag(values), damping)
+        return _ratios_of_coupled_modes(np.diag(np.sqrt(values)), damping)
 
 
 _ROUNDING = 1e-12
 
 
-def _ratios_of_coupled_modes(stiffness: Matrix, damping: Matrix) -> NDArray[np.float64]:
-    """Give the damping ratios of modes that the dampers couple; both matrices over the masses."""
-    count = len(stiffness)
-    system = np.block([[np.zeros((count, count)), np.eye(count)], [-stiffness, -damping]])
-    poles = np.linalg.eigvals(system)
+def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64]:
+    """Give the ratios of modes that the dampers couple: own frequencies [rad/s], modal damping [1/s]."""
+    poles = np.linalg.eigvals(np.block([[np.zeros_like(own), own], [-own, -damping]]))
     still = np.sort(np.abs(poles[poles.imag == 0.0]))
     # Of modes that do not oscillate the slowest pole belongs to the fastest: their product is the square of
     # the mode's frequency, and their sum the damping.
