@@ -95,3 +95,23 @@ def test_lines_of_two_windows_differ_by_no_more_than_is_said_in_19_cases_of_20()
         apart = abs(abs(another.mean()) / abs(one.mean()) - 1.0)
         inside += apart <= draws_apart(blocks, 10)[1]
     assert inside / 1000 > 0.93
+
+
+@pytest.mark.parametrize(
+    ("contact", "amplitude_m", "frequency_hz", "duration_s"),
+    [("rigid:1", 10e-6, 100.0, 0.4), ("linear_gap", 10e-6, 100.0, 0.35), ("rigid:0.5", 20e-6, 240.0, 0.4)],
+)
+def test_roundings_that_grow_are_in_the_error_of_a_law_that_is_flown_exactly(
+    contact, amplitude_m, frequency_hz, duration_s
+):
+    """All lengths times a number: the same scene. Exact laws, compared with themselves, said 1e-11."""
+    found = []
+    for scale in (1.0, 1.1, 1.3, 0.7, 0.9):
+        drive = Harmonic(frequency_hz, scale * amplitude_m)
+        specimen = gong2025(contact=contact, gap_m=scale * 45e-6)
+        length = FixedDuration(duration_s, 0.5 * duration_s)
+        answer = solve_scene(Scene(specimen, drive, duration=length, budget_s=0.0))
+        found.append((answer.response_i, answer.response_i * answer.response_i_error))
+    for one, one_error in found:
+        for other, other_error in found:
+            assert abs(one - other) <= one_error + other_error

@@ -33,6 +33,11 @@ SAFETY = 2.0
 """Error that is stated over the error that was measured."""
 ROUNDING = 1e-11
 """Relative error of an exact answer."""
+ROUNDED = 3e-14
+"""How far away a compared run starts, over the drive's amplitude: some times what roundings come to over a
+run, since the difference that it makes is one draw of many."""
+_SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
+"""y and z alike: stops may leave p no room."""
 SLOWEST_RATIO = 0.9
 """A difference that shrinks less than this from one look to the next is taken to shrink by this."""
 FIRST_LOOK = 16
@@ -156,8 +161,13 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
 
 
 def _strict_answer(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> Floats | None:
-    """Responses of the same window by a stricter run from the start; None where it came another way."""
+    """Responses of the same window by a stricter run from the start; None where it came another way.
+
+    Its start is a rounding away, or laws that are flown exactly would be compared with themselves, and a
+    motion in which roundings grow would pass for exact.
+    """
     loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
+    strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * _SIDES * _places_and_speeds(scene))
     begin_s, frequency = seen.window.begins.time_s, begin.drive.frequency_hz
     while strict.time_s < begin_s:
         until_s = min(begin_s, max(2.0 * strict.time_s, FIRST_LOOK / frequency))
@@ -174,8 +184,13 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
     """Whether two runs are at the same place, as far as the stops can tell."""
     if not one.outcome is other.outcome is Outcome.REACHED_END:
         return False
-    apart = np.abs(one.state - other.state) / np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
+    apart = np.abs(one.state - other.state) / _places_and_speeds(scene)
     return bool(np.max(apart) < PARTED * min(scene.specimen.gaps_m))
+
+
+def _places_and_speeds(scene: Scene) -> Floats:
+    """Give one, and the angular frequency of the drive: what differences of a state are measured by."""
+    return np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
 
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:
