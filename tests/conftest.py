@@ -138,8 +138,18 @@ All others are quick.
 """
 
 
+ON_PURPOSE = ("slow", "hardware", "attack")
+"""Marks of what runs where it is asked for by -m, and otherwise never."""
+THOROUGH = "thorough"
+"""The mark of what is left out of a run of everything; whoever names a file or folder gets it."""
+
+
 def pytest_configure(config: pytest.Config) -> None:
-    """Let files be handed out in the order below, not by their number of tests."""
+    """Choose what runs where no -m does, and let files be handed out in the order above."""
+    if not config.option.markexpr:
+        names_a_path = config.args_source is config.ArgsSource.ARGS
+        left_out = ON_PURPOSE if names_a_path else (THOROUGH, *ON_PURPOSE)
+        config.option.markexpr = " and ".join(f"not {mark}" for mark in left_out)
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 
@@ -151,5 +161,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: place.get(item.nodeid.partition("::")[0], len(place)))
     for item in items:
         is_long = item.nodeid.partition("::")[0] in place
-        if not is_long and not any(item.get_closest_marker(name) for name in ("slow", "hardware", "attack")):
+        if not is_long and not any(item.get_closest_marker(name) for name in (THOROUGH, *ON_PURPOSE)):
             item.add_marker("quick")

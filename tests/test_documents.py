@@ -127,6 +127,7 @@ def test_the_measurement_in_the_readme_runs(tmp_path, monkeypatch, capsys):
     assert "Resonance" in capsys.readouterr().out
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("face", FACES_WITH_AN_EXAMPLE)
 def test_the_example_of_a_face_says_what_happens(face):
     result = doctest.testmod(importlib.import_module(face))

@@ -34,6 +34,7 @@ def test_at_260_hz_the_specimen_strikes_its_stops_at_5_micrometres_but_not_at_1(
     assert int(re.search(r"(\d+) impacts", strong)[1]) > 0
 
 
+@pytest.mark.thorough
 def test_branches_break_their_symmetry_and_the_exponents_add_up():
     lines = lines_of("branches_and_exponents.py")
     assert sum(line.startswith("period 1, mirrored") for line in lines) == 1

@@ -136,6 +136,7 @@ def test_a_room_says_what_it_is_for_and_every_name_on_its_face_is_there(room):
         getattr(face, name)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("face", FOR_PEOPLE)
 def test_the_example_of_a_face_runs(face):
     result = doctest.testmod(importlib.import_module(face))
@@ -151,6 +152,7 @@ def loaded_by(program):
     ).stdout.split()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("program", "heavy"),
     [

@@ -82,6 +82,7 @@ def test_a_bench_is_held_and_a_recording_marked(here):
     assert said[1:] == ["True b'\\x00\\x00abc\\x00\\x00\\x00'", "False"]
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)
 def test_a_campaign_is_measured_verified_and_analysed(here):
     rig = str(ROOT / "hardware_configs" / "virtual_rig.toml")

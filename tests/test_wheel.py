@@ -115,6 +115,7 @@ def test_every_source_file_is_in_the_wheel_under_the_name_by_which_it_is_importe
     assert names == tracked
 
 
+@pytest.mark.thorough
 def test_a_script_beside_files_of_our_folders_names_imports_ours(python, users_folder):
     script = users_folder / "script.py"
     script.write_text(f"{FACES}\nimport vibench.sim\nprint(vibench.sim.__file__)\n")
@@ -122,6 +123,7 @@ def test_a_script_beside_files_of_our_folders_names_imports_ours(python, users_f
     assert imported.is_relative_to(python.parent.parent)
 
 
+@pytest.mark.thorough
 def test_every_name_of_every_face_resolves_from_the_wheel(python, users_folder):
     printed = run(
         python, "-c", EVERY_NAME.format(portions=PORTIONS), cwd=users_folder, QT_QPA_PLATFORM="offscreen"
@@ -129,6 +131,7 @@ def test_every_name_of_every_face_resolves_from_the_wheel(python, users_folder):
     assert printed == "every name resolves\n"
 
 
+@pytest.mark.thorough
 def test_the_command_works_as_a_module_and_as_a_program(python, users_folder):
     assert "predict" in run(python, "-m", "vibench.cli", "--help", cwd=users_folder)
     command = python.parent / ("vibench.exe" if sys.platform == "win32" else "vibench")

@@ -25,6 +25,7 @@ def runner():
         yield one
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("path", [*found("campaign"), *found("study")], ids=lambda path: path.stem)
 def test_a_broken_toml_file_is_refused_in_a_sentence_that_names_it(runner, path):
     ending = runner.run(toml_files.reading(path.parent.name, path.read_bytes()))

@@ -74,6 +74,7 @@ def test_mutants_of_nothing_are_mutants_too():
         assert isinstance(mutated_toml("", chance, ("a = 1",)), bytes)
 
 
+@pytest.mark.thorough
 def test_a_command_runs_in_a_process_of_its_own():
     with CommandRunner() as runner:
         good = runner.run(reading("campaign", (ROOT / "campaigns" / "paper.toml").read_bytes()))

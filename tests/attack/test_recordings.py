@@ -41,6 +41,7 @@ def test_a_flip_that_changed_numbers_unnoticed_would_be_found():
     assert recordings_flips.faults("5678", "5678", 0.1, 1) == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "count",
     [20, pytest.param(300, marks=pytest.mark.attack), pytest.param(10_000, marks=pytest.mark.slow)],

@@ -95,6 +95,7 @@ def test_a_growing_recording_is_analysed_as_far_as_it_is_written(vibench_here, n
         writer.finish(RecordingState.STOPPED, "enough")
 
 
+@pytest.mark.thorough
 def test_a_bad_recording_in_a_folder_is_one_sentence_and_the_others_are_analysed(vibench, good, tmp_path):
     folder = tmp_path / "night[red]"
     folder.mkdir()

@@ -24,6 +24,7 @@ def shaken(tmp_path_factory):
     return module.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
 
 
+@pytest.mark.thorough
 def test_the_hidden_motion_is_told_in_numbers_figures_and_the_report(vibench_here, shaken, tmp_path):
     done = vibench_here("analyse", shaken.path, "--hidden", "--no-simulate", "--out", "told", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -42,6 +42,7 @@ def new(*arguments):
     return CliRunner().invoke(app, ["bench", "new", *map(str, arguments)])
 
 
+@pytest.mark.thorough
 def test_a_bench_is_made_checked_and_written_down(tmp_path, monkeypatch):
     (tmp_path / "answers.toml").write_text(ANSWERS)
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
@@ -62,6 +63,7 @@ def test_a_bench_is_made_checked_and_written_down(tmp_path, monkeypatch):
     assert "is there already" in str(again.exception)
 
 
+@pytest.mark.thorough
 def test_wires_that_nobody_confirms_end_the_day_before_anything_plays(tmp_path):
     (tmp_path / "answers.toml").write_text('operator = "A. Student"')
     done = new(tmp_path / "mine.toml", "--from", VIRTUAL, "--answers", tmp_path / "answers.toml")
@@ -76,6 +78,7 @@ def test_wires_that_nobody_confirms_end_the_day_before_anything_plays(tmp_path):
     assert again.exit_code == 0, again.output
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("wired", ["false", '"no"', '" No "', '""'])
 def test_a_wire_that_is_not_plugged_in_ends_the_day(tmp_path, wired):
     (tmp_path / "answers.toml").write_text(f"wired = {wired}")

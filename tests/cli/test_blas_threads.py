@@ -14,6 +14,7 @@ print(os.environ["OPENBLAS_NUM_THREADS"], order.index("vibench.cli.blas_threads"
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("chosen", "told"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "2"}, "2")])
 def test_one_thread_unless_the_user_says_otherwise(chosen, told):
     environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}

@@ -3,6 +3,8 @@
 import json
 import sys
 
+import pytest
+
 from vibench.acquisition import open_recording
 from vibench.acquisition.campaign import CampaignEstimate
 from vibench.cli.measure import estimate_text
@@ -21,6 +23,7 @@ def test_an_estimate_is_one_json_document_and_makes_nothing(vibench_here, tmp_pa
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.thorough
 def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     keep = f"{sys.executable} -c \"import sys; open('told.json', 'w').write(sys.stdin.read())\""
@@ -38,6 +41,7 @@ def test_a_campaign_is_catalogued_and_its_end_is_told(vibench, tmp_path):
     assert {entry["verdict"] for entry in entries} == {"good"}
 
 
+@pytest.mark.thorough
 def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     knobs, campaign = tmp_path / "knobs.toml", ("measure", plan, "--bench", bench, "--knobs", "knobs.toml")
@@ -55,6 +59,7 @@ def test_settings_confirmed_at_a_check_hold_for_a_campaign_and_no_others_do(vibe
     assert not list(tmp_path.glob("elsewhere/*.h5*"))
 
 
+@pytest.mark.thorough
 def test_a_file_that_is_no_sheet_is_not_replaced_by_one(vibench, tmp_path):
     plan, bench = short_points(tmp_path, 2), slow_rig(tmp_path)
     before = plan.read_text()

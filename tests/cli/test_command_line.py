@@ -30,6 +30,7 @@ def campaign(folder, text=QUICK):
     return path
 
 
+@pytest.mark.thorough
 def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vibench, tmp_path):
     plan = campaign(tmp_path)
     first = vibench("measure", plan, "--out", "recordings", cwd=tmp_path)
@@ -46,6 +47,7 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
     assert (tmp_path / "recordings" / "dwell.h5").read_bytes() == before
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
 def test_a_stop_does_not_hide_that_a_point_has_failed(tmp_path):
     text = QUICK + QUICK.split("\n", 2)[2].replace('"dwell"\nramp', '"long"\nramp').replace(
@@ -107,6 +109,7 @@ def test_a_bench_without_its_instruments_is_one_sentence(vibench_here, tmp_path)
     assert "NI-DAQmx" in result.stderr
 
 
+@pytest.mark.thorough
 def test_a_bench_check_says_what_it_found_as_one_json_document(vibench, tmp_path):
     result = vibench("bench", "check", "--json", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
@@ -123,6 +126,7 @@ def test_the_instruments_of_the_virtual_rig_are_listed_by_name(vibench_here, tmp
     assert any(device.startswith("cDAQ1Mod1: NI 9234") for device in found["daq"])
 
 
+@pytest.mark.thorough
 def test_a_recording_that_was_cut_off_is_recovered(vibench, tmp_path):
     plan = campaign(tmp_path, QUICK.replace("duration_s = 1.5", "duration_s = 3000"))
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

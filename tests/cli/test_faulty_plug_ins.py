@@ -133,6 +133,7 @@ GENERATOR = ("describe", "open", "identity", "unconfirmed", "amplitude_range_vpp
 DIGITIZER = ("open", "identity", "sample_rate_hz", "roles", "volts_per_count", "start", "read", "stop")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("does", [raises, gives_none])
 @pytest.mark.parametrize(
     ("kind", "member"),
@@ -225,6 +226,7 @@ def test_a_failure_while_playing_ends_silent_and_the_recording_says_why(stranger
         assert recording.samples > 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "inside"), [("generator", AFG1022_MODEL), ("digitizer", DaqmxDigitizer)])
 def test_a_close_that_fails_after_a_complete_recording_says_that_it_is_complete(stranger, kind, inside, told):
     path = stranger(kind, OddDriver(inside, "close", does_then_raises))
@@ -234,6 +236,7 @@ def test_a_close_that_fails_after_a_complete_recording_says_that_it_is_complete(
     assert code == 1
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("facts", "words"),
     [

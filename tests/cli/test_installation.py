@@ -100,6 +100,7 @@ def test_a_shell_completes_commands_and_their_options(vibench, tmp_path, words, 
     assert completed in told.stdout.split()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("library", "arguments", "extra"),
     [

@@ -12,6 +12,7 @@ from .conftest import ENVIRONMENT
 from .killed_campaign import amplitudes, branches, command, done, killed, short_points, slow_rig
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("points", "kills"),
     [pytest.param(16, 2, id="16"), pytest.param(200, 10, id="200", marks=pytest.mark.slow)],
@@ -41,6 +42,7 @@ def test_a_campaign_that_is_killed_and_resumed_makes_every_point_once(tmp_path, 
     assert found == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.thorough
 def test_a_point_with_two_motions_is_measured_on_the_same_branch_after_a_kill(tmp_path):
     plan, bench, out = branches(tmp_path), slow_rig(tmp_path), tmp_path / "out"
     reached = killed(command(plan, bench, out), out, 4, random.Random(1))

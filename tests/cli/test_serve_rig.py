@@ -85,6 +85,7 @@ def hints(served):
     return ["\n".join(line[2:] for line in block.splitlines() if line.startswith("  ")) for block in blocks]
 
 
+@pytest.mark.thorough
 def test_the_hints_work_when_they_are_pasted(served):
     converter, usb, stream = hints(served)
     pasted = {}

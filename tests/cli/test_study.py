@@ -58,6 +58,7 @@ def test_an_estimate_counts_points_and_work_and_makes_no_file(vibench_here, tmp_
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(COMPILING_S)
 def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vibench, tmp_path):
     asked = plan(tmp_path)
@@ -78,6 +79,7 @@ def test_a_study_is_predicted_into_a_file_and_a_second_run_overwrites_nothing(vi
     assert (tmp_path / "a.h5").read_bytes() == before
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(COMPILING_S)
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process there")
 def test_ctrl_c_keeps_what_is_computed_and_resume_goes_on(vibench, tmp_path):

@@ -75,6 +75,7 @@ def recorded(tmp_path):
         return [(each.kind, each.text) for each in recording.events], recording.gaps
 
 
+@pytest.mark.thorough
 def test_p_is_told_while_it_is_measured_and_a_change_ends_a_run_whose_plan_says_so(running, tmp_path):
     client = running(campaign(STOPPING))
     told = until(client, is_tracked).twin
@@ -97,6 +98,7 @@ def test_p_is_told_while_it_is_measured_and_a_change_ends_a_run_whose_plan_says_
     assert gaps == ()
 
 
+@pytest.mark.thorough
 def test_a_twin_that_is_killed_is_told_and_disturbs_nothing(running, tmp_path):
     client = running(campaign({}), twin=TwinSwitch.ON)
     pid = until(client, lambda status: status.twin is not None and status.twin.pid > 0).twin.pid

@@ -73,6 +73,7 @@ def vibench(*arguments):
     )
 
 
+@pytest.mark.thorough
 @sees_locks
 def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench_here, tmp_path):
     seen = json.loads(vibench("watch", "--json").stdout)["engines"]
@@ -89,6 +90,7 @@ def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench
         assert recording.reason == "smoke in the laboratory"
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
 def test_a_stop_of_an_engine_that_stands_still_is_kept_and_said_so(running, tmp_path):
     os.kill(running.pid, signal.SIGSTOP)
@@ -106,6 +108,7 @@ def test_a_stop_of_an_engine_that_stands_still_is_kept_and_said_so(running, tmp_
         assert recording.reason == "while it stood still"
 
 
+@pytest.mark.thorough
 def test_watching_shows_the_run_and_its_end(running):
     arguments = [sys.executable, "-m", "vibench.cli", "watch"]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
@@ -174,6 +177,7 @@ class TestWithoutAnEngine:
             yield script
             script.kill()
 
+    @pytest.mark.thorough
     def test_a_script_is_stopped(self, script, vibench_here, tmp_path):
         listed = json.loads(vibench_here("watch", "--json", cwd=tmp_path).stdout)
         assert listed["engines"] == []

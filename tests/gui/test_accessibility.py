@@ -140,6 +140,7 @@ def test_every_field_has_an_edge_that_is_seen(window, qapp, qtbot, contrast, the
     assert looked_at > 20
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("theme", [LIGHT, DARK], ids=lambda theme: theme.name)
 @pytest.mark.parametrize(
     "size", [(1024, 700), (1280, 720), (2560, 1440)], ids=lambda size: f"{size[0]}x{size[1]}"
@@ -156,6 +157,7 @@ def test_no_text_is_cut_off(window, qapp, qtbot, theme, size):
         assert list(scrolled_sideways(window.page)) == [], name
 
 
+@pytest.mark.thorough
 def test_no_text_is_cut_off_at_twice_the_scale():
     """On a fine screen, as Qt scales it for a whole process."""
     this = f"{Path(__file__)}::test_no_text_is_cut_off"

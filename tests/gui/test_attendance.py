@@ -16,6 +16,7 @@ PATIENCE_MS = 100_000
 pytestmark = pytest.mark.timeout(300)
 
 
+@pytest.mark.thorough
 def test_a_window_that_is_busy_for_a_second_stops_nothing_and_a_campaign_is_left_alone(window, qtbot):
     bridge, seen = window.context.bridge, []
 
@@ -57,6 +58,7 @@ def test_a_window_that_is_busy_for_a_second_stops_nothing_and_a_campaign_is_left
     window.user_actions.disarm()
 
 
+@pytest.mark.thorough
 def test_nothing_of_an_engine_that_was_killed_is_taken_for_the_next_one(window, qtbot):
     """Its orders were waited for, and its last picture was continued by the next engine's first run."""
     bridge, rig = window.context.bridge, load_rig(shipped("hardware_configs/virtual_rig.toml"))

@@ -51,6 +51,7 @@ def measuring_window(folder, attendance, state, patience_s=USUAL_PATIENCE_S):
         window.stdout.close()
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither signal")
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 @pytest.mark.timeout(300)
@@ -59,6 +60,7 @@ def test_a_window_that_dies_or_freezes_leaves_silence(tmp_path, number):
         assert silent_after_s(window, number, tmp_path) < SILENT_WITHIN_S[number.name]
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a stopped window is given four times as long")
 @pytest.mark.parametrize(
     ("number", "attended_s"),
@@ -115,6 +117,7 @@ def silent_after_s(window, number, folder):
     return silent_s - signalled_s
 
 
+@pytest.mark.thorough
 @sees_locks
 @pytest.mark.timeout(300)
 def test_what_was_left_alone_is_shown_by_the_next_window_which_then_looks_after_it(window, qtbot, tmp_path):

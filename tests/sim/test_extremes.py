@@ -79,6 +79,7 @@ def motion(specimen, drive, duration_s):
     return run
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("contact", LAWS)
 @pytest.mark.parametrize(
     ("drive", "duration_s"),
@@ -129,6 +130,7 @@ def test_the_smallest_gaps_agree_with_the_equations_as_written(contact, gap_m):
     assert distance(ours.final_state, as_written(specimen, DRIVE, 0.003, 2e-6)) < 1e-6
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("contact", [*SPRINGY, *POWERS])
 @pytest.mark.parametrize("drive", [Harmonic(130.0, 1e-2), Harmonic(50e3, 1e-2)])
 def test_violent_drives_agree_with_the_equations_as_written(contact, drive):

@@ -90,6 +90,7 @@ def outcomes(point_results):
     return {each.name: (each.outcome, each.path.name) for each in point_results}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_a_damaged_point_is_named_kept_and_made_again_beside_it(bench, folder, damage):
     damage(folder)
@@ -126,6 +127,7 @@ def test_what_a_resume_would_make_is_known_before_it_plays(folder, damage):
     assert [each.is_complete for each in planned] == [True, False, True]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_verifying_finds_every_damage(folder, damage):
     assert {each.verdict for each in verify_recordings(folder)} == {"intact"}

@@ -31,6 +31,7 @@ def script():
     return compile(text, "docs/campaigns.md", "exec")
 
 
+@pytest.mark.thorough
 def test_it_refines_the_step_around_the_jump_and_can_be_run_again(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")

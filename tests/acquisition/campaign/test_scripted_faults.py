@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from vibench.acquisition import open_recording, run_campaign
 from vibench.acquisition.campaign import AfterFailure, PointOutcome, ReconnectingBench
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, Retryable, RetryPolicy
@@ -17,6 +19,7 @@ SCRIPT = [
 ]
 
 
+@pytest.mark.thorough
 def test_every_point_of_a_rehearsed_campaign_is_recorded_past_cable_overrun_server_and_knob(rig, tmp_path):
     lines = [
         ["[[faults]]", *(f"{key} = {json.dumps(value)}" for key, value in each.items())] for each in SCRIPT

@@ -73,6 +73,7 @@ def test_a_heavy_specimen_near_its_resonance_is_no_fault(
         assert report[f"sign of {role}"].verdict is Verdict.OK
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("fault", "name", "advice"),
     [

@@ -123,12 +123,14 @@ def offer(folder, monkeypatch, name, target):
     assert name in plug_in_names(PlugInKind.GENERATOR)
 
 
+@pytest.mark.thorough
 def test_a_stranger_s_instruments_measure_without_an_edit_of_ours(installed, tmp_path):
     done = run("-c", MEASURES, BENCH, tmp_path / "dwell.h5", path=installed)
     assert done.returncode == 0, done.stderr
     assert done.stdout.split(maxsplit=2) == ["complete", "AFG1022", "base acceleration (charge amplifier)\n"]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["plain_scpi", "charge_amplifier"])
 def test_a_stranger_s_instruments_keep_the_contract(installed, tmp_path, name):
     """Wherever it is asked for: outside of our folder pytest knows none of our settings."""
@@ -137,6 +139,7 @@ def test_a_stranger_s_instruments_keep_the_contract(installed, tmp_path, name):
     assert "passed" in done.stdout
 
 
+@pytest.mark.thorough
 def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
     broken = (installed / "example_instruments.py").read_text()
     broken = broken.replace("self._stretch = peak", "self._stretch = 1.0").replace(

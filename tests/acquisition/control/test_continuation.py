@@ -162,6 +162,7 @@ def model_of(rig):
     return branch, [each for each in branch.events if each.kind.value == "fold"]
 
 
+@pytest.mark.thorough
 def test_a_branch_is_begun_from_rest_and_its_base_is_a_sine_of_the_level(rig, tmp_path):
     hard = hardening(rig)
     points, notes = followed(hard, continuation(start_hz=92, most_points=2), tmp_path / "begun.h5")
@@ -175,6 +176,7 @@ def test_a_branch_is_begun_from_rest_and_its_base_is_a_sine_of_the_level(rig, tm
         assert each.m0_m == pytest.approx(m0, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_small_changes_tell_a_points_stability_and_leave_it_where_it_was(rig, tmp_path):
     hard = hardening(rig)
     path = tmp_path / "perturbed.h5"

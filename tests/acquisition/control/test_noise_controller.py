@@ -62,6 +62,7 @@ def random_spectrum(seed):
     return corners(*zip(places, 0.004 * 10 ** random.uniform(0, 0.8, 4), strict=True))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("spectrum", [corners((40, 0.01)), random_spectrum(3), random_spectrum(8)])
 def test_the_base_has_the_spectrum_that_was_asked_for(recorded, spectrum):
     with recorded(noise(spectrum=spectrum)) as recording:

@@ -63,6 +63,7 @@ def simulated_period(frequency_hz, amplitude_m, longest=8):
     return 0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequency_hz", "amplitude_m", "period"),
     [(260.0, 1e-6, 1), (74.0, 30e-6, 2), (70.0, 40e-6, 3), (260.0, 5e-6, 0)],
@@ -131,6 +132,7 @@ BELOW = (250.0, 257.0)
 ABOVE = (277.0, 281.0, 285.0, 290.0, 295.0, 300.0, 310.0, 320.0, 330.0, 340.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequencies_hz", "direction", "between_hz"),
     [(BELOW, Direction.UP, (250.0, 260.0)), (ABOVE, Direction.DOWN, (272.0, 285.0))],
@@ -157,6 +159,7 @@ def test_a_sweep_jumps_where_its_linear_branch_first_touches_the_stops(
     assert low_hz - 0.2 <= grazing_hz(*between_hz, 3e-6) <= high_hz + 0.2
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("start_hz", "span_hz", "step_hz", "acceleration", "paper_hz", "of"),
     [
@@ -193,6 +196,7 @@ def test_linear_modes_are_tracked_to_their_phase_resonance(
     assert round(found["mode_hz"]) == paper_hz
 
 
+@pytest.mark.thorough
 def test_a_resonance_is_followed_among_impacts_as_far_as_the_model_has_a_steady_motion(carried_out):
     plan = ResonanceTracking(
         amplitude_vpp=1.0,

@@ -101,6 +101,7 @@ def opened(card_rig, audio):
         bench.close()
 
 
+@pytest.mark.thorough
 def test_the_bench_passes_its_check(opened, tmp_path):
     report = bench_report(opened(), tmp_path)
     assert [each.name for each in report.findings if each.verdict is Verdict.FAIL] == []
@@ -108,6 +109,7 @@ def test_the_bench_passes_its_check(opened, tmp_path):
     assert report["amplifier gain"].number == pytest.approx(10.0, abs=0.1)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "excitation",
     [

@@ -60,6 +60,7 @@ def test_a_window_that_hangs_is_given_no_more_than_any_drive_may_be_granted(gran
     assert hung_patience_s(granted_s) == hung_s
 
 
+@pytest.mark.thorough
 def test_an_attendant_keeps_a_run_going_that_nobody_asks_about_and_tells_of_a_program_that_hangs(
     engine, shipped_rig, tmp_path
 ):
@@ -74,6 +75,7 @@ def test_an_attendant_keeps_a_run_going_that_nobody_asks_about_and_tells_of_a_pr
     assert monotonic() - hung_s > hung_patience_s(VIEWER_PATIENCE_S)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere a stopped program hangs")
 def test_an_attendant_is_silent_for_a_stopped_program(engine, shipped_rig, tmp_path):
     process = engine()
@@ -84,6 +86,7 @@ def test_an_attendant_is_silent_for_a_stopped_program(engine, shipped_rig, tmp_p
     assert "stands still" not in status.rows[0].reason
 
 
+@pytest.mark.thorough
 def test_an_attendant_ends_with_a_program_that_is_killed(engine, shipped_rig, tmp_path):
     process = engine()
     with attending(process) as (program, pid), running(process, shipped_rig, tmp_path) as visitor:
@@ -98,6 +101,7 @@ def test_an_attendant_ends_with_a_program_that_is_killed(engine, shipped_rig, tm
     assert process_start(pid) is None
 
 
+@pytest.mark.thorough
 def test_an_attendant_that_was_killed_is_replaced(engine):
     attendant, clock = Attendant(engine().address), Event()
     first = attendant.pid

@@ -79,6 +79,7 @@ def kept(path, reason):
 
 
 class TestTheJob:
+    @pytest.mark.thorough
     def test_a_bench_is_opened_checked_armed_run_and_closed(self, client, shipped_rig, tmp_path):
         assert client.status().state is EngineState.CLOSED
         client.open(shipped_rig)
@@ -323,6 +324,7 @@ class TestNobodyLooks:
         assert client.status().state in DRIVING
         until(client, lambda status: status.samples > samples + 50_000)
 
+    @pytest.mark.thorough
     def test_a_campaign_that_is_left_alone_goes_on_when_its_window_is_gone(
         self, engine, shipped_rig, tmp_path
     ):
@@ -354,6 +356,7 @@ class TestNobodyLooks:
             os.kill(shared_engine.pid, signal.SIGCONT)
         until(client, lambda status: status.samples > before + 100_000)
 
+    @pytest.mark.thorough
     def test_a_frozen_viewer_does_not_hold_the_engine_up(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
@@ -365,6 +368,7 @@ class TestNobodyLooks:
             before = client.status().samples
             until(client, lambda status: status.samples > before + 500_000)
 
+    @pytest.mark.thorough
     def test_an_unattended_run_goes_on_alone(self, engine, shipped_rig, tmp_path):
         process = engine(Supervision.UNATTENDED)
         client = process.client
@@ -387,6 +391,7 @@ class TestNobodyLooks:
         with EngineClient.attach(shared_engine.address) as visitor:
             until_state(visitor, EngineState.READY)
 
+    @pytest.mark.thorough
     @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGKILL")
     @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
     def test_a_viewer_killed_or_frozen_leaves_silence_and_a_recording(self, shipped_rig, tmp_path, number):
@@ -412,6 +417,7 @@ class TestNobodyLooks:
 
 
 class TestItsEnd:
+    @pytest.mark.thorough
     def test_an_unattended_engine_that_was_never_used_ends_when_it_is_forgotten(self):
         arguments = ["--attendance", "unattended", "--forgotten-s", "1"]
         with subprocess.Popen(
@@ -425,6 +431,7 @@ class TestItsEnd:
                 until(viewer, lambda status: time.monotonic() > asked_until_s)
             assert engine.wait(20) == 0
 
+    @pytest.mark.thorough
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
     def test_a_signal_ramps_down_and_ends_the_process(self, shipped_rig, tmp_path, number):
         with start_engine() as process:
@@ -440,6 +447,7 @@ class TestItsEnd:
         assert not process.is_alive
         kept(tmp_path / "run.h5", "was told to end")
 
+    @pytest.mark.thorough
     def test_a_client_of_an_engine_that_was_killed_is_told_so(self, engine, shipped_rig, tmp_path):
         process = engine()
         running(process.client, shipped_rig, tmp_path)

@@ -128,6 +128,7 @@ def ended_by(tmp_path, reason):
 
 
 class TestAStallDoesNotMakeAnEngineUnstoppable:
+    @pytest.mark.thorough
     def test_a_stop_during_it_is_kept_and_obeyed_when_the_engine_comes_back(self, running, tmp_path):
         with stalled(running):
             told = the_engine(None)

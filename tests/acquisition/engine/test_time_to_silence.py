@@ -19,6 +19,7 @@ def measured(*options):
     )
 
 
+@pytest.mark.thorough
 def test_two_cells_of_the_table_are_silent_within_their_bounds():
     told = measured("--cells", "0.007", "--seed", "7")
     assert told.returncode == 0, told.stdout + told.stderr

@@ -73,6 +73,7 @@ def handed_over(places, trace):
     return max(ends, default=0)
 
 
+@pytest.mark.thorough
 def test_a_crash_after_any_write_opens_and_loses_at_most_one_block(tmp_path, traced):
     places, empty, trace, truth = traced
     crashed = tmp_path / "crashed.h5.part"
@@ -130,6 +131,7 @@ def sectors_of(write):
     return [(begin, data[begin - offset : end - offset]) for begin, end in pairwise(edges)]
 
 
+@pytest.mark.thorough
 def test_any_part_of_the_unsynced_writes_may_survive_a_power_cut(tmp_path, traced):
     places, empty, trace, truth = traced
     cut_file = CutFile(tmp_path / "cut.h5.part", empty)

@@ -205,6 +205,7 @@ def in_phase(left, phase):
     return sum(number for (each, _), number in left.items() if each == phase)
 
 
+@pytest.mark.thorough
 @forks
 def test_recordings_killed_in_every_phase_open_and_miss_at_most_the_last_second(tmp_path):
     left = killed_at(tmp_path, {"recording": 2, "committing": 3, "finalising": 3}, seed=1)

@@ -134,6 +134,7 @@ CHANGES = (
 )  # fmt: skip
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("depth", SealDepth)
 def test_every_change_beside_the_samples_shows_at_a_quick_look(recorded, change, depth):

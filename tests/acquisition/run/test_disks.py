@@ -75,6 +75,7 @@ DISKS = {
 }
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", DISKS)
 def test_whatever_the_disk_does_there_is_silence_a_sentence_and_a_recording(laboratory, tmp_path, name):
     virtual, connected = laboratory()

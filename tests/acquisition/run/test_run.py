@@ -504,6 +504,7 @@ class TestStopLevels:
         assert bench.recorder.ending == (RecordingState.STOPPED, "enough")
         assert_ended_without_a_jump(bench)
 
+    @pytest.mark.thorough
     def test_nobody_holds_longer_than_the_recording_has_room(self, bench, tmp_path):
         run = run_of(bench, tmp_path)
         upto(run, RunState.RECORDING)

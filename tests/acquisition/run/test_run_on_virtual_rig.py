@@ -109,6 +109,7 @@ def test_a_sweep_arrives_with_the_cycles_of_the_ideal_one(virtual_bench, tmp_pat
     assert np.max(np.abs(drive)) == pytest.approx(0.75 * TERMINAL, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_the_quick_campaign_is_recorded_without_an_overload(virtual_bench, tmp_path):
     items = run_campaign(virtual_bench, load_campaign(ROOT / "campaigns" / "quick.toml"), tmp_path)
     assert [item.outcome for item in items] == [PointOutcome.RECORDED] * 15
@@ -185,6 +186,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGINT for another process")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 def test_a_signal_from_outside_ends_a_run_softly(tmp_path, name):

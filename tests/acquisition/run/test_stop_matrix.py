@@ -235,12 +235,14 @@ def check_recording(path, run, stop, error, disk):
                 assert type(error).__name__ in recording.reason or str(error)[:40] in recording.reason
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("stop", STOPS)
 def test_every_stop_in_every_state_leaves_silence_and_a_reason(laboratory, tmp_path, state, stop):
     carried_out(laboratory, tmp_path, state, STOPS[stop], "none")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("state", STATES)
 @pytest.mark.parametrize("fault", [name for name in FAULTS if name != "none"])
 def test_every_fault_in_every_state_leaves_silence_and_a_reason(laboratory, tmp_path, state, fault):
@@ -260,6 +262,7 @@ def test_the_stated_time_of_an_abort_is_that_of_the_shipped_rig(rig):
     assert shortest_ramp_s(rig) + BLOCK_S < ABORT_S
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("state", [RunState.RAMPING_UP, RunState.RECORDING, RunState.RAMPING_DOWN])
 @pytest.mark.parametrize("what", ["removed", "moved"])
 def test_a_folder_that_goes_away_leaves_silence_and_a_sentence(laboratory, tmp_path, state, what):
@@ -288,6 +291,7 @@ LOST_WITHIN_S, ABORTED_WITHIN_S = 1.1, 1.17
 """By the clock, as docs/safety.md says."""
 
 
+@pytest.mark.thorough
 def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tmp_path):
     """Its ramp has a setting for each of 20 stairs: two seconds."""
     virtual, connected = laboratory()
@@ -304,6 +308,7 @@ def test_a_slow_generator_is_silent_in_time_when_samples_are_lost(laboratory, tm
         assert terminal_v(virtual) < SILENT_V
 
 
+@pytest.mark.thorough
 def test_an_abort_of_a_slow_generator_is_over_in_time(rig, tmp_path):
     assert rig.virtual is not None
     on_the_wall = rig.model_copy(update={"virtual": rig.virtual.model_copy(update={"pace": "wall"})})

@@ -90,6 +90,7 @@ def played(streamed):
     return TERMINAL * preview * envelope
 
 
+@pytest.mark.thorough
 def test_what_is_recorded_is_what_the_plan_previews_to_the_converters_noise(streamed):
     expected = played(streamed)
     begin = streamed.segments["ramp_up"].start

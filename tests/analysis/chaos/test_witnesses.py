@@ -96,6 +96,7 @@ def test_henon_with_noise_is_more_than_linear_noise_and_an_autoregression_is_not
     assert not surrogate_test(autoregression(rng, 2000)).rejects_linear_noise
 
 
+@pytest.mark.thorough
 def test_linear_noise_is_rejected_no_more_often_than_the_test_says():
     rejected = sum(
         surrogate_test(autoregression(np.random.default_rng(seed), 400), seed=seed).rejects_linear_noise

@@ -118,6 +118,7 @@ def test_the_ends_of_a_range_are_points_where_the_step_fits():
     assert SpectrumRequest(start=5.0, stop=5.0, step=1.0).values == (5.0,)
 
 
+@pytest.mark.thorough
 def test_a_file_holds_everything_and_nothing_is_overwritten(computed, tmp_path):
     path = write_diagram(computed, tmp_path / "b.h5")
     again = read_diagram(path)
@@ -265,6 +266,7 @@ def test_a_lossy_contact_has_no_check_by_the_dampers_and_says_so():
     json.dumps(found.to_dict(), allow_nan=False)
 
 
+@pytest.mark.thorough
 def test_a_balance_says_how_far_its_harmonics_reach():
     options = {"model": "power:5", "start": 60.0, "stop": 80.0, "places": 2, "starts": 0}
     first = diagram_of(BranchRequest(method=BranchMethod.FIRST_ORDER, **options))

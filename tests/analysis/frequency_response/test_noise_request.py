@@ -37,6 +37,7 @@ def test_streamed_noise_gives_the_exact_ratio_by_every_estimator(streamed_file):
     assert found.frequency_response.settings.estimator is Estimator.DRIVE
 
 
+@pytest.mark.thorough
 def test_a_noisy_vibrometer_biases_h2_and_not_the_estimate_referenced_to_the_drive(
     streamed_file, streamed_noise
 ):
@@ -56,6 +57,7 @@ def test_the_resolution_asked_for_is_the_noise_bandwidth_of_a_line(streamed_file
     assert found.settings.window == window.value
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("averages", [4.0, 25.0])
 def test_the_averages_asked_for_are_reached_and_hardly_passed(streamed_file, averages):
     found = response(streamed_file(), averages=averages).frequency_response

@@ -63,6 +63,7 @@ def poles():
     return sorted((abs(each) / (2 * np.pi), -each.real / abs(each)) for each in values if each.imag > 0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("estimator", ["frequency_response", "h1", "h2"])
 def test_the_bounds_of_weak_noise_hold_the_closed_form_at_95_of_100_lines(responses, estimator):
     found = getattr(responses[WEAK_VPP], estimator)

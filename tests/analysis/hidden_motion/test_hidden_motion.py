@@ -49,6 +49,7 @@ def impacts_scored(motion, recorded, found, true):
     return paired(told_at[(told_at > low - 5) & (told_at < high + 5)], inner, PAIRED_S * rate), inner.size
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("kind", "level_vpp", "largest_rms_m"),
     [(260.0, 1.5, 0.1e-6), ("sweep", 1.5, 0.1e-6), ("noise", 10.0, 0.2e-6)],

@@ -65,6 +65,7 @@ def test_a_forecast_errs_as_it_says(dwell):
     assert typical[-1] > 2e-6  # of this draw; another library's last digits make another draw
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("kind", "level_vpp"), [(258.0, 1.6), ("noise", 8.0)])
 def test_gaps_wider_by_a_micrometre_are_noticed_within_a_second_and_found(live_world, dwell, kind, level_vpp):
     running = live_world(kind, level_vpp, 7.0, seed=72, known=dwell[0].twin.known)

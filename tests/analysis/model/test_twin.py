@@ -53,6 +53,7 @@ def chaotic(recordings):
     return laid(recordings / "dwell.h5")
 
 
+@pytest.mark.thorough
 def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
     run = chaotic.laid.run
     assert (run.driven, run.draws) == (Driven.AMPLIFIER, 16)

@@ -40,6 +40,7 @@ def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(colli
     assert updated.to_dict()["suspects"][0]["assumption"] == "gaps"
 
 
+@pytest.mark.thorough
 def test_a_motion_that_the_described_masses_do_not_explain_tells_no_gap(collided):
     """Motion tells m1 and the springs by their ratio to m0 and m2, which must be right."""
     m0, m1, m2 = TRUE.masses

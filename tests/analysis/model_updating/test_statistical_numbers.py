@@ -39,6 +39,7 @@ def holds(number, true):
     return number.low - beyond < true < number.high + beyond
 
 
+@pytest.mark.thorough
 def test_the_mean_gap_and_m1_are_told_and_what_is_flat_is_not_determined(buried):
     with open_recording(buried.path) as recording:
         found, _ = statistical_numbers(recording, gong2025(), STRETCH_S, 260.0, rounds=FEW)

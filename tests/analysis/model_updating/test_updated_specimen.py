@@ -113,6 +113,7 @@ def test_the_intervals_are_useful(updated):
     assert relative[Parameter.GAP] < 0.15
 
 
+@pytest.mark.thorough
 def test_the_fitted_specimen_lies_on_the_measurement_where_the_nominal_one_does_not(recorded, updated):
     paths = recorded[:2]
     nominal = analyse_files(paths, "nominal")

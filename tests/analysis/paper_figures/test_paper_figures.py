@@ -38,6 +38,7 @@ def numbers(table, heading):
     return np.array([float(cell) for cell in table.column(heading)])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "number", [1, 2, 3, 5, 7, *(pytest.param(n, marks=pytest.mark.slow) for n in (6, 8, 9, 11))]
 )

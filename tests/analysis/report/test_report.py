@@ -69,6 +69,7 @@ def page(written):
     return Page(written.read_text(encoding="utf-8"))
 
 
+@pytest.mark.thorough
 def test_a_report_needs_no_other_file_and_no_network(page):
     assert page.open == []
     assert page.sources

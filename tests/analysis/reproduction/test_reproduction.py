@@ -47,6 +47,7 @@ def test_the_linear_claims_follow_from_the_specimen_and_need_no_study():
     assert not found(claims("linear-resonances")[0], none, overdamped).is_met
 
 
+@pytest.mark.thorough
 def test_short_runs_already_show_what_collisions_do(evidence):
     case = Case(AS_CHOSEN, SHORT)
     assert [each.key for each in claims(*HERTZ_KEYS) if not found(each, evidence, case).is_met] == []

@@ -35,6 +35,7 @@ def found(amplitude_m, start_hz, stop_hz, spoil=lambda velocity, rng: velocity):
     return collisions(result), impacts_hz
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("amplitude_m", "start_hz", "stop_hz"),
     [(5e-6, 225.0, 385.0), (2e-6, 225.0, 385.0), (5e-6, 385.0, 225.0)],

@@ -80,6 +80,7 @@ def hardening():
     return specimen, amplitude_m, found
 
 
+@pytest.mark.thorough
 def test_a_hardening_specimen_jumps_down_where_its_branch_folds_and_later_than_it_jumps_up(hardening):
     specimen, amplitude_m, (up, down) = hardening
     parts, options = (structure_of(specimen), spring_of(specimen)), BalanceOptions(fewest=1, most=1)

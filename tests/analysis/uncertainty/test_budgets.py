@@ -79,6 +79,7 @@ def seen(samples, weak, rng, *, base=1.0, response=1.0, clock=0.0):
     )
 
 
+@pytest.mark.thorough
 def test_a_budget_is_what_propagation_of_distributions_gives(samples, weak):
     """JCGM 101:2008: all inputs drawn from their distributions, through the whole analysis."""
     rng = np.random.default_rng(12)

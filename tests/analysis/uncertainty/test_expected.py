@@ -22,6 +22,7 @@ NOISE = MultisineNoise(
 )
 
 
+@pytest.mark.thorough
 def test_noise_is_known_as_well_as_was_said_before(tmp_path):
     plan = Measurement(name="weak", excitation=NOISE, ramp_s=0.3)
     expected = expected_uncertainty(plan, RIG)

@@ -80,6 +80,7 @@ def type_into(widget, text):
     (widget if isinstance(widget, QAbstractSpinBox) else line).editingFinished.emit()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", FORMS)
 def test_a_bad_value_is_answered_with_the_name_and_the_unit_of_its_field(qtbot, name):
     form = FORMS[name]()

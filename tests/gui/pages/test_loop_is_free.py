@@ -229,6 +229,7 @@ def actions(window, recording, long_recording, folder):
     yield from of_frame(window)
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)  # all that can be done: a minute idle, two with cold kernels beside other work
 @pytest.mark.usefixtures("_without_leftovers")
 def test_nothing_that_is_done_on_a_page_keeps_the_loop_over_the_bound(

@@ -1,5 +1,6 @@
 """A message says what happened, what was done and what to do, and stays until it is read."""
 
+import pytest
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
@@ -60,6 +61,7 @@ def test_every_message_gives_way_to_what_was_wanted_and_stays_in_details(qtbot):
     assert len(strip.notices) == 3
 
 
+@pytest.mark.thorough
 def test_a_message_moves_nothing_that_can_be_clicked(window, qapp):
     """A page that moved down put "Check bench" where "Find instruments" had been."""
 

@@ -51,6 +51,7 @@ def test_what_is_dropped_comes_up_on_its_page_and_is_listed_as_recent(window, tm
     assert window.page is window.pages[FILES]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "content"),
     [("a.txt", b"x"), ("a.toml", b"\xff"), ("b.toml", b"a = 1"), ("c.toml", b"["), ("gone.toml", None)],
@@ -65,6 +66,7 @@ def test_what_cannot_be_opened_is_told_and_nothing_changes(window, tmp_path, nam
     assert window.context.recent_files == ()
 
 
+@pytest.mark.thorough
 def test_what_is_no_recording_is_told_by_the_page_that_would_show_it(window, qtbot, tmp_path):
     (tmp_path / "broken.h5").write_bytes(b"no file of that kind")
     dropped(window, tmp_path / "broken.h5")
@@ -125,6 +127,7 @@ def test_settings_are_one_form_and_are_kept(window, qapp, tmp_path):
     assert "at most 10 s" in dialog.form.complaint
 
 
+@pytest.mark.thorough
 def test_help_is_offline_and_says_what_is_installed(window, qtbot):
     qtbot.keyClick(window, Qt.Key.Key_F1)
     keys = next(each for each in window.findChildren(QLabel) if "<table>" in each.text())

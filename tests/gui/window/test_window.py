@@ -21,6 +21,7 @@ def test_the_pages_lie_in_the_order_of_the_job(window):
     assert names[:3] == ["Rig", "Test", "Run"]
 
 
+@pytest.mark.thorough
 def test_theme_page_and_test_are_there_again_and_nothing_is_armed(window, qapp, own_state, tmp_path):
     window.context.choose_theme(DARK)
     window.show_page(TEST)
@@ -43,6 +44,7 @@ def test_the_banner_and_stop_are_in_sight_on_every_page(window, qapp):
         assert window.banner.isVisible(), name
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("order", ["arm_test", "start", "check"])
 def test_an_order_without_a_bench_is_answered_with_what_to_do(window, order):
     getattr(window.user_actions, order)()

@@ -41,6 +41,7 @@ def test_the_phase_resonance_of_a_duffing_oscillator_runs_along_the_exact_backbo
         assert 2 * math.pi * branch.frequencies_hz[k] == pytest.approx(backbone, rel=1e-4)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("amplitude", [1e-6, 5e-6, 50e-6])
 def test_every_point_of_a_first_order_branch_solves_the_papers_equation_five(amplitude):
     specimen = gong2025(contact="power:5")
@@ -71,6 +72,7 @@ def _passes(branch, frequency, size):
     return False
 
 
+@pytest.mark.thorough
 def test_with_many_harmonics_a_balance_follows_the_exact_branch():
     specimen, path = gong2025(contact="power:5"), FrequencyPath((5e-6,))
     options = BalanceOptions(HarmonicSet.ODD, fewest=15, most=127, tolerance=1e-6)

@@ -22,11 +22,13 @@ def folds(specimen, path, low, high):
     return [each for each in found.branch.events if each.kind is BifurcationKind.FOLD]
 
 
+@pytest.mark.thorough
 def test_over_frequency_the_hardening_specimen_folds_at_98_296_and_116_296_hz():
     found = folds(hardening(), FrequencyPath((3e-6,)), 95.0, 125.0)
     assert sorted(each.frequency_hz for each in found) == pytest.approx([98.296, 116.296], abs=2e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("frequency", "lower_um", "upper_um"),
     [(103.0, 1.80, 9.35), (106.0, 2.10, 14.1), (112.0, 2.63, 24.5), (285.0, 9.32, 17.3)],

@@ -132,6 +132,7 @@ def test_between_linear_stops_a_branch_is_the_piecewise_exact_solution():
     assert checked > 5
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("contact", "amplitude", "low", "high"),
     [("hertz", 5e-6, 88.0, 112.0), ("linear_gap", 20e-6, 125.0, 160.0), ("power:5", 5e-6, 60.0, 100.0)],
@@ -152,6 +153,7 @@ def test_a_run_from_near_a_stable_point_settles_on_it(contact, amplitude, low, h
         assert run.relative_i == pytest.approx(branch.response_i[k, 3], rel=2e-5)
 
 
+@pytest.mark.thorough
 def test_every_point_comes_back_within_its_error_whatever_its_stability(near_the_first_resonance):
     specimen = gong2025()
     for found in near_the_first_resonance:

@@ -22,6 +22,7 @@ def drifts(contact, cells, duration_s):
     return np.array(found)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("cells", [2, 4, 20])
 def test_undamped_chains_on_hertz_s_stops_gain_energy_as_often_as_they_lose_it_and_little(cells):
     found = drifts("hertz", cells, 0.5)

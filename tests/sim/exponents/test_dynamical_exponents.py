@@ -92,6 +92,7 @@ def forced(parameters, readings, tolerance=1e-8):
     )
 
 
+@pytest.mark.thorough
 def test_lorenz_has_the_exponents_of_the_literature():
     found = lorenz(6000)
     assert found.is_long_enough

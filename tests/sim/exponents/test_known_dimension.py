@@ -10,6 +10,7 @@ HEAVY, FAST = 1e4, 20.0
 """m0 and m2 over m1, and their frequency over the drive's: they follow the base, and m1 moves on m2 alone."""
 
 
+@pytest.mark.thorough
 def test_the_dimension_of_uedas_attractor_is_the_published_one():
     # x'' + 0.05 x' + x^3 = 7.5 sin t: exponents 0.1034, 0, -0.1534 (Sprott, Chaos and Time-Series Analysis).
     heavy = HEAVY * FAST**2

@@ -12,6 +12,7 @@ from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
 CHAOS = Harmonic(260.0, 5e-6)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "hunt_crossley:0.5", "rigid:0.8", "power:5"])
 def test_interval_by_interval_two_motions_part_as_the_tangent_grows(contact):
     specimen = gong2025(contact=contact)

@@ -42,6 +42,7 @@ def test_a_kernel_is_recompiled_when_a_kernel_that_it_calls_changes_in_another_f
     assert answers == [2.0, 3.0]
 
 
+@pytest.mark.thorough
 def test_a_kernel_is_kept_when_a_room_changes_that_its_own_does_not_import(tmp_path):
     sim = tmp_path / "vibench" / "sim"
     (sim / "kernels").mkdir(parents=True)

@@ -121,6 +121,7 @@ def test_shares_of_a_map_that_was_filled_in_but_not_audited_are_as_wide_as_what_
     assert (whole.wrong_share.low, whole.wrong_share.high) == (0.0, 0.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("rare", [0.02, 0.15])
 def test_shares_hold_though_what_is_rare_among_others_is_filled_in_too_seldom(rare):
     held, middles = 0, []

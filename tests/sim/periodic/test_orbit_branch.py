@@ -82,6 +82,7 @@ def test_a_branch_that_leaves_the_stops_does_so_at_the_grazing_of_the_linear_res
     assert branch.response_ii[0] == pytest.approx(np.abs(linear), rel=1e-8)
 
 
+@pytest.mark.thorough
 def test_an_isolated_branch_closes_though_another_lies_beside_its_fold():
     """At 94.188 Hz, where it turns back, the motion of one period lies beside it along the same tangent."""
     start = [9.918125e-07, -1.045327e-05, -2.993997e-06, 7.055605e-03, 2.760657e-02, 1.403336e-02]

@@ -35,6 +35,7 @@ def test_between_the_stops_it_is_the_quadrature_of_the_linear_motion(of, band_hz
     assert branch.response_ii[:, 0] == pytest.approx(abs(answer), rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_along_a_hardening_mode_every_motion_repeats_and_is_a_quarter_of_a_period_behind():
     specimen = hardening()
     branch = phase_resonance_branch(specimen, (92.0, 97.0), (4e-7, 5e-6))

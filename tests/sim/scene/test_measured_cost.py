@@ -20,6 +20,7 @@ def ledger(tmp_path, monkeypatch):
     return new
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("contact", "duration", "observe"),

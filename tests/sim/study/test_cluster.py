@@ -95,6 +95,7 @@ def truth(longer):
     return solve_study(longer)
 
 
+@pytest.mark.thorough
 def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(
     cluster, longer, truth, tmp_path, require_equal
 ):

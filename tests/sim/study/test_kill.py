@@ -85,6 +85,7 @@ def check_killed_study(folder, truth, require_equal, kills, luck):
     require_equal(results, truth)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("seed", range(QUICK))
 def test_a_killed_study_goes_on_and_ends_like_one_that_was_never_interrupted(
     tmp_path, truth, require_equal, seed

@@ -66,6 +66,7 @@ def truth(small):
     return solve_study(small, workers=1)
 
 
+@pytest.mark.thorough
 @settings(deadline=None, max_examples=25)
 @given(st.integers(0, 2**32), st.integers(1, 9))
 def test_no_order_of_answers_and_no_lost_worker_changes_an_answer(small, truth, require_equal, seed, slots):

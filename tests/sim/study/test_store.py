@@ -293,6 +293,7 @@ def images_after_power_cuts(empty, log, luck):
             loose.append(entry)
 
 
+@pytest.mark.thorough
 def test_whatever_moment_the_power_goes_a_point_that_counts_has_all_its_cells(small, tmp_path):
 
     path, image_path = tmp_path / "a.h5", tmp_path / "image.h5"

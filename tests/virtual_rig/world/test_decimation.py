@@ -28,6 +28,7 @@ def converted(ratio, delay_steps, cycles_per_sample, count=300):
     return samples, np.sin(2 * np.pi * cycles_per_step * steps)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize("delay_steps", [EARLIEST_STEPS, 0.0, 0.37, 5.5])
 @pytest.mark.parametrize("cycles_per_sample", [0.003, 0.1, 0.3, 0.4])

@@ -121,6 +121,7 @@ def test_curves_follow_the_theme(laid):
     assert laid.plots.magnitudes.backgroundBrush().color().name() == DARK.base
 
 
+@pytest.mark.thorough
 def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record_noise, tmp_path, waited):
     """The road of the page: two recordings, their curves, a picture with a known point, a report."""
     paths = (record_noise(tmp_path, "twice", 2.0), record_noise(tmp_path, "thrice", 3.0))

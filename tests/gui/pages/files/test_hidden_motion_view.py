@@ -46,6 +46,7 @@ def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shak
     pictures.close()
 
 
+@pytest.mark.thorough
 def test_another_specimen_is_chosen_and_its_numbers_are_found(
     shared_context, shaken, waited, tmp_path, monkeypatch
 ):

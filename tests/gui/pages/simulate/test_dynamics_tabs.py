@@ -50,6 +50,7 @@ def asked(view, request):
     view.begin()
 
 
+@pytest.mark.thorough
 def test_branches_are_found_drawn_and_told_with_error_and_cost(page, waited):
     view = page.branches
     asked(view, BranchRequest(start=60.0, stop=62.0, places=2, starts=0))
@@ -115,6 +116,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
     assert not view._compare.isEnabled()
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(300)  # The first run compiles the kernels of chains.
 def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waited):
     view = page.chain
