@@ -207,3 +207,5 @@ def test_people_read_units_and_a_law_in_words(vibench_here, tmp_path):
     assert "stiffnesses [N/m]: 23741" in said
     assert "dampings [N s/m]:" in said
     assert "contact law: hertz, stiffness 4.89108e+09" in said
+    nameless = random_specimen(tmp_path, np.random.default_rng(1))
+    assert vibench_here("specimen", nameless, cwd=tmp_path).stdout.splitlines()[0] == "random"

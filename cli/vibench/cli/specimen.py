@@ -50,7 +50,7 @@ def show_specimen(
     elif as_toml:
         typer.echo(toml_text(table), nl=False)
     else:
-        console.print(f"{table.name}: {table.about}", markup=False)
+        console.print(": ".join(filter(None, (table.name, table.about))), markup=False)
         for name, value in facts.items():
             console.print(f"  {_heading(name)}: {_shown(value)}", markup=False)
 
