@@ -232,3 +232,22 @@ def test_a_scene_that_would_take_too_many_steps_ends_in_a_sentence_and_has_no_ot
 
 def test_rest_is_named_in_the_answer():
     assert solve_scene(scene_of("linear", 50.0, 1e-6, start=Rest())).start == "rest"
+
+
+@pytest.mark.parametrize(
+    ("contact", "damping_time_s", "frequency_hz", "periods"),
+    [("linear", 1e-6, 400.0, 3000), ("linear", 2e-6, 600.0, 3000), ("hertz", 2e-5, 380.0, 300)],
+)
+def test_a_motion_that_still_fades_is_undecided(contact, damping_time_s, frequency_hz, periods):
+    """Neither repeating nor growing, it was called quasi-periodic, with a response half too large."""
+    specimen = gong2025(contact=contact, damping_time_s=damping_time_s)
+    length = AutomaticDuration(window_s=200 / frequency_hz, longest_s=periods / frequency_hz)
+    answer = solve_scene(Scene(specimen, Harmonic(frequency_hz, 1e-6), duration=length, budget_s=0.0))
+    assert answer.motion is MotionKind.UNDECIDED
+
+
+def test_a_motion_of_undamped_modes_and_the_drive_is_quasi_periodic():
+    specimen = gong2025(contact="linear", damping_time_s=0.0)
+    length = AutomaticDuration(window_s=0.5, longest_s=10.0)
+    answer = solve_scene(Scene(specimen, Harmonic(400.0, 1e-6), duration=length, budget_s=0.0))
+    assert answer.motion is MotionKind.QUASI_PERIODIC

@@ -50,7 +50,9 @@ class Pace:
 
     frequency_hz: float
     forgetting_s: float
-    """Time in which the slowest mode without contact fades by e."""
+    """Time in which the slowest mode without contact fades by e, or as slowly as is waited for."""
+    fading_s: float
+    """The same where it is longer than can be waited for; of undamped modes, what is waited for."""
     sharpness: Sharpness
     nearly: Sharpness
     """That of the least accurate level."""
@@ -98,9 +100,9 @@ def pace_of(
 ) -> Pace:
     """Choose the pace for a specimen whose slowest mode has ``slowest_rate`` [1/s], zero or negative."""
     slowest_s = longest_s / FEWEST_TIMES
-    forgetting_s = min(slowest_s, -1.0 / slowest_rate) if slowest_rate < 0.0 else slowest_s
+    fading_s = -1.0 / slowest_rate if slowest_rate < 0.0 else slowest_s
     own, nearly = (_sharpness(specimen.contact, each) for each in (accuracy, Accuracy.QUICK))
-    return Pace(frequency_hz, forgetting_s, own, nearly)
+    return Pace(frequency_hz, min(slowest_s, fading_s), fading_s, own, nearly)
 
 
 def _sharpness(contact: ContactLaw, accuracy: Accuracy) -> Sharpness:
@@ -173,7 +175,7 @@ def judged(
         window=window,
         blocks=(*blocks_of(before), *window.blocks),
         was_settled=False,
-        motion=MotionKind.UNDECIDED if is_lost else kind_of(repeats, growth, pace.forgetting_s),
+        motion=MotionKind.UNDECIDED if is_lost else kind_of(repeats, growth, pace.fading_s),
         repeats=None if is_lost else repeats,
         settled_s=None,
         ended=run.outcome.text if is_lost else ended,

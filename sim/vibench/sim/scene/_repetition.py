@@ -146,11 +146,11 @@ def section_needed(forgetting_periods: float) -> int:
     return 2 * (int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN))) + MOST_PERIODS) + MOST_PERIODS
 
 
-def kind_of(repeats: Repetition | None, growth: Growth, forgetting_s: float) -> MotionKind:
-    """Judge a motion; one that may still be settling is undecided."""
+def kind_of(repeats: Repetition | None, growth: Growth, fading_s: float) -> MotionKind:
+    """Judge a motion; one that may still be settling, within eight times ``fading_s``, is undecided."""
     if repeats is not None:
         return MotionKind.PERIODIC
-    times = growth.duration_s / forgetting_s
+    times = growth.duration_s / fading_s
     per_time = growth.total / times if times > 0.0 else 0.0
     earlier, later = growth.halves
     if growth.is_certain and per_time > NEUTRAL and min(earlier, later) > 0.25 * growth.total:

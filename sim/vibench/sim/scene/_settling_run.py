@@ -68,7 +68,7 @@ def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Settling:
         repeats = pace.repeats([*early, *late])
         if repeats is not None:
             return _observe_period(run, repeats, [*early, *late], pace)
-        kind = kind_of(None, growth_of(late), pace.forgetting_s)
+        kind = kind_of(None, growth_of(late), pace.fading_s)
         if kind is MotionKind.CHAOTIC and len(late) >= in_window and patience.alone_s > 0.0:
             return (yield from _followed_on(run, [*early, *late], len(late), patience, pace))
         if len(late) >= WINDOWS * in_window and kind is not MotionKind.UNDECIDED:

@@ -249,7 +249,7 @@ class SeveralStarts:
         growth = other.growth_over(self._horizon.judging_s)
         window = observe_window(run, self._horizon.window_s)
         scatter = window_scatter([block.peak_x_m for block in window.blocks], len(window.blocks))
-        kind = kind_of(None, growth, self._pace.forgetting_s)
+        kind = kind_of(None, growth, self._pace.fading_s)
         return reached_motion(run, kind, None, window, scatter, until_s, growth)
 
 
