@@ -153,6 +153,7 @@ def document(results: MapResults, stability: tuple[KickStability, ...], file: Pa
             {
                 "motion": str(each.motion),
                 "period": each.period,
+                "has_impacts": each.has_impacts,
                 "response_i": each.response_i,
                 "response_ii": each.response_ii,
                 "share": each.share.share,

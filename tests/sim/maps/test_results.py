@@ -107,3 +107,18 @@ def test_noise_has_no_exponent():
     labels = np.random.default_rng(3).integers(0, 2, (200, 200))
     assert uncertainty_exponent(labels) is None
     assert uncertainty_exponent(np.zeros((64, 64), dtype=np.int64)) is None
+
+
+def test_where_impacts_begin_is_refined_and_what_is_filled_in_wrong_is_in_the_audit():
+    """Soft stops are touched without a jump of the response, which alone was looked at."""
+    soft = {
+        "hertz_stiffness": 1e6,
+        "frequency_hz": Range(start=60, stop=80, points=33),
+        "amplitude_m": Range(start=1e-5, stop=6e-5, points=33),
+        "periods": 400,
+    }
+    adaptive, full = solve_map(Map(**soft)), solve_map(Map(**soft, refinement="full"))
+    is_filled = adaptive.state == PointState.FILLED
+    differs = (adaptive.values("impact_rate") == 0.0) != (full.values("impact_rate") == 0.0)
+    assert differs[is_filled].mean() <= adaptive.audit.wrong_share.high
+    assert {each.has_impacts for each in adaptive.motions if each.period == 1} == {True, False}

@@ -50,7 +50,7 @@ def motion_classes(results: MapResults, start: int = 0) -> Reals:
     found = np.full(motion.shape, np.nan)
     is_periodic = motion == kinds.index(MotionKind.PERIODIC)
     found[is_periodic] = np.minimum(period[is_periodic], 5.0)
-    found[is_periodic & (impacts == 0.0)] = 0.0
+    found[is_periodic & (period == 1.0) & (impacts == 0.0)] = 0.0
     found[motion == kinds.index(MotionKind.QUASI_PERIODIC)] = 6.0
     found[np.isin(motion, [kinds.index(MotionKind.CHAOTIC), kinds.index(MotionKind.CHAOTIC_SO_FAR)])] = 7.0
     found[motion == kinds.index(MotionKind.UNDECIDED)] = 8.0
@@ -60,6 +60,7 @@ def motion_classes(results: MapResults, start: int = 0) -> Reals:
 def motion_words(motion: MapMotion) -> str:
     """Name a motion and its share."""
     kind = f"period {motion.period}" if motion.period is not None else str(motion.motion)
+    kind = kind if motion.has_impacts else "no impacts"
     share = motion.share
     return (
         f"{kind}, Response I {motion.response_i:.3g}: {share.share:.2%} ({share.low:.2%} to {share.high:.2%})"

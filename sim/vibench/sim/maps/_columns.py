@@ -1,13 +1,14 @@
 """The columns of a map's file: fewer than a study's, because a map has many points and no errors of each."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Specimen
-from ..scene import ScenePrediction
+from ..scene import MotionKind, ScenePrediction
 from ..study import COLUMNS, MESSAGE, Cell, Column
 
 KEPT = (
@@ -56,9 +57,19 @@ LONGER = 64
 """Than the longest period that is looked for."""
 
 
-def labels_of(motion: NDArray[np.int64], period: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give the same number to motions of one kind and period."""
-    return motion * LONGER + period
+_PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
+
+
+def without_impacts(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """Say which points came to the motion that nothing but the drive tells from rest."""
+    is_first = (arrays["motion"] == _PERIODIC) & (arrays["period"] == 1)
+    return np.asarray(is_first & (arrays["impact_rate"] == 0.0))
+
+
+def labels_of(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+    """Give the same number to motions of one kind and period; a motion without impacts has its own."""
+    motion, period = (arrays[name].astype(np.int64) for name in ("motion", "period"))
+    return np.where(without_impacts(arrays), _PERIODIC * LONGER, motion * LONGER + period)
 
 
 def contact_energy_j(specimen: Specimen, found: ScenePrediction) -> float | None:

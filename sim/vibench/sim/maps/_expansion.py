@@ -139,11 +139,9 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
     shape = plan.grid.shape
     state = np.asarray(arrays["state"]).reshape(shape)
     is_known = np.all((state != PointState.MISSING) & (state != PointState.FILLED), axis=1)
-    motion, period = (
-        np.asarray(arrays[name], dtype=np.int64).reshape(shape) for name in ("motion", "period")
-    )
+    motion = np.asarray(arrays["motion"]).reshape(shape)
     is_whole = state == PointState.DONE
-    label = np.where(is_whole, labels_of(motion, period), NOTHING)
+    label = np.where(is_whole, labels_of(arrays).reshape(shape), NOTHING)
     size = np.log(np.maximum(np.asarray(arrays["response_i"], dtype=np.float64).reshape(shape)[:, 0], 1e-300))
     is_steady = is_whole[:, 0] & (motion[:, 0] == list(MotionKind).index(MotionKind.PERIODIC))
     seen = Seen(

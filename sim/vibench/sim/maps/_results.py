@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..kernels import Floats
 from ..scene import UNSURE, Count, MotionKind, Share, shares_of, wilson_share
 from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions
-from ._columns import labels_of
+from ._columns import labels_of, without_impacts
 from ._expansion import BASIN_JUMP, cell_codes, refinement_of
 from ._map import Map
 from ._refinement import RefinementPlan
@@ -28,6 +28,7 @@ class MapMotion:
     motion: MotionKind
     period: int | None
     """Of a periodic motion, in drive periods."""
+    has_impacts: bool
     response_i: float
     """Largest abs(x) over the drive amplitude; the median over its points."""
     response_ii: float
@@ -134,9 +135,9 @@ class MapResults(GridResults[Map]):
     def motion_numbers(self) -> NDArray[np.int64]:
         """Number of the motion that each point came to, over all axes; -1 where it is not known.
 
-        Points have the same number if they are of one kind and period. Where only the start varies the
-        responses of periodic motions are told apart too, so that each number is one attractor; the
-        commonest is 0.
+        Points have the same number if they are of one kind and period; motions without impacts have theirs.
+        Where only the start varies the responses of periodic motions are told apart too, so that each number
+        is one attractor; the commonest is 0.
         """
         state = self.state.reshape(-1)
         is_known = np.flatnonzero((state == PointState.DONE) | (state == PointState.FILLED))
@@ -198,9 +199,8 @@ class MapResults(GridResults[Map]):
     @cached_property
     def _labels(self) -> NDArray[np.int64]:
         state = self.state.reshape(-1)
-        motion, period = (self.arrays[name].astype(np.int64) for name in ("motion", "period"))
         is_known = (state == PointState.DONE) | (state == PointState.FILLED)
-        return np.where(is_known, labels_of(motion, period), UNKNOWN)
+        return np.where(is_known, labels_of(self.arrays), UNKNOWN)
 
     @cached_property
     def _sizes(self) -> Floats:
@@ -218,6 +218,7 @@ class MapResults(GridResults[Map]):
             np.flatnonzero(numbers == number) for number in range(int(numbers.max(initial=UNKNOWN)) + 1)
         ]
         kinds = [list(MotionKind)[int(self.arrays["motion"][place[0]])] for place in places]
+        is_free = without_impacts(self.arrays)
         shares = shares_of([Count(len(place), is_final=True) for place in places])
         if audit is not None:
             shares = audit.corrected(shares, total // self.plan.grid.shape[-2])
@@ -225,6 +226,7 @@ class MapResults(GridResults[Map]):
             MapMotion(
                 kind,
                 int(self.arrays["period"][place[0]]) if kind is MotionKind.PERIODIC else None,
+                not is_free[place[0]],
                 self._median("response_i", place),
                 self._median("response_ii", place),
                 share,
