@@ -33,6 +33,7 @@ def test_a_broken_toml_file_is_refused_in_a_sentence_that_names_it(runner, path)
     assert ending.err.startswith("error: broken.toml: ")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("path", found("imports"), ids=lambda path: path.stem)
 def test_a_broken_file_of_another_program_is_refused_in_a_sentence_that_names_it(runner, path):
     case = imported_files.reading(path.suffix, path.read_bytes(), *imported_files.MAKING)

@@ -140,8 +140,11 @@ def test_ctrl_c_at_a_question_is_a_stop_and_nothing_is_written(tmp_path, monkeyp
 
 
 def test_ctrl_c_at_a_knob_is_a_stop_before_anything_is_energised(monkeypatch):
+    def stopped(_question):
+        raise KeyboardInterrupt
+
     monkeypatch.setattr("sys.stdin.isatty", lambda: True)
-    monkeypatch.setattr("builtins.input", lambda _: signal.raise_signal(signal.SIGINT))
+    monkeypatch.setattr("builtins.input", stopped)
     with pytest.raises(CheckStopped, match="nothing was energised"):
         confirm_at_terminal(())
 

@@ -25,7 +25,7 @@ NAMES = (
     "dwell_strong",
 )
 
-pytestmark = pytest.mark.timeout(400)
+pytestmark = [pytest.mark.thorough, pytest.mark.timeout(400)]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,6 @@ def resonances_hz(result):
     return [found["frequency_hz"] for found in result["measured"]["resonances"]]
 
 
-@pytest.mark.thorough
 def test_every_measurement_is_a_complete_recording_without_overload(demo, results):
     assert set(results) == set(NAMES)
     for name in NAMES:
@@ -66,7 +65,6 @@ def test_strong_noise_shows_the_two_terminal_resonances_within_two_percent_and_n
     assert resonances_hz(results["noise_strong"]) == pytest.approx(TERMINAL_HZ, rel=0.02)
 
 
-@pytest.mark.thorough
 def test_another_program_reads_the_response_the_coherence_and_the_densities(demo, vibench_here, tmp_path):
     pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
     path = demo / "recordings" / "noise_weak.h5"

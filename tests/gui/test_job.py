@@ -25,7 +25,7 @@ STOPPED_S = 5.0
 """From the key to a finished recording; when the drive is silent is measured where the stops are."""
 PATIENCE_MS = 100_000
 """The first bench that is opened may have to compile the simulation."""
-pytestmark = pytest.mark.timeout(300)
+pytestmark = [pytest.mark.thorough, pytest.mark.timeout(300)]
 
 
 def dwell(name, duration_s):
@@ -93,7 +93,6 @@ def space_freezes_the_picture_and_opens_nothing(qtbot, bench):
     assert not card.freeze.isChecked()
 
 
-@pytest.mark.thorough
 def test_a_newcomer_measures_with_five_keys(bench, qtbot):
     """Alt+O opens, Ctrl+Return arms, F5 starts, the run ends by itself: three keys, and two to look."""
     keys = []
@@ -148,7 +147,6 @@ def type_into_dialog(qtbot, text):
     return timer
 
 
-@pytest.mark.thorough
 def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
     """A second measurement is made, looked at, compared with the first one, and exported."""
     key = partial(press, qtbot, bench)
@@ -265,7 +263,6 @@ def in_a_menu(bench):
     return menu
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("place", [on_the_banner, on_a_plot, in_a_field, in_a_modal_dialog, in_a_menu])
 def test_esc_brings_the_drive_to_zero_wherever_the_focus_is(bench, qtbot, place):
     start_dwell(bench, qtbot, place.__name__)

@@ -217,6 +217,7 @@ def test_a_bench_without_a_controller_says_so(rig, tmp_path):
         run_measurement(bench, measurement(continuation()), tmp_path / "none.h5")
 
 
+@pytest.mark.thorough
 def test_a_latency_at_which_the_loop_fails_is_refused_with_the_number_before_anything_plays(rig, tmp_path):
     with open_bench(hardening(rig, latency_s=1.5e-3)) as bench:
         with pytest.raises(LimitExceeded, match=r"largest multiplier is 1\.\d+ at .* with 1.5 ms of latency"):

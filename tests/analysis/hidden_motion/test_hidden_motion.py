@@ -71,6 +71,7 @@ def test_tracked_p_and_its_impacts_are_those_of_the_world(world_recording, kind,
     assert np.mean(z < 1.96) > 0.93
 
 
+@pytest.mark.thorough
 def test_ten_times_the_noise_is_still_followed(world_recording):
     recorded = world_recording(260.0, 1.5, seed=42, noise=10.0, duration_s=2.4)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)

@@ -61,6 +61,7 @@ def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
     assert all(each.compared == 1 and each.agrees for each in chaotic.laid.ensemble)
 
 
+@pytest.mark.thorough
 def test_under_the_base_motion_the_same_dwell_is_told_as_one_run_without_a_place(recordings, chaotic):
     base = laid(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).laid
     assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)

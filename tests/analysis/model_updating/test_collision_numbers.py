@@ -22,6 +22,7 @@ def collided(world, tmp_path_factory):
     return analyse_files([recorded.path], "unequal", Simulation.LEFT_OUT)
 
 
+@pytest.mark.thorough
 def test_unequal_gaps_are_found_and_contradict_a_description_of_equal_ones(collided):
     updated = update_model(collided)
     lower, upper = updated.collisions.gaps

@@ -78,6 +78,7 @@ def test_a_rig_that_the_voltage_would_shake_otherwise_is_refused_before_much_is_
         statistical_numbers(recording, gong2025(), STRETCH_S, 260.0)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("specimen", "stretch_s", "why"),
     [

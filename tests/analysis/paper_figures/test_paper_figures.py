@@ -96,6 +96,7 @@ def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solved
     assert share["damped"] < share["damped_7um"]
 
 
+@pytest.mark.thorough
 def test_figure_7_has_the_papers_rates_at_the_weakest_level(solved):
     caption = drawn(solved, 7).caption
     assert "log10 of the response [mm]" in caption

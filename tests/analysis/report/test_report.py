@@ -77,6 +77,7 @@ def test_a_report_needs_no_other_file_and_no_network(page):
     assert all(each.startswith("#") for each in page.links)
 
 
+@pytest.mark.thorough
 def test_a_report_holds_the_results_numbers(page, campaign):
     for found in campaign.noise[0].analysis.response.resonances:
         assert plus_minus(found.frequency_hz, 2 * found.sd_frequency_hz) in page.text

@@ -180,6 +180,7 @@ def test_an_isolated_branch_of_period_three_is_found_from_random_states(near_the
     assert np.abs((once - isolated.branch.states[k]) / state_scales(gong2025(), drive)).max() > 1e-3
 
 
+@pytest.mark.thorough
 def test_where_a_symmetry_breaks_the_other_branch_begins_and_ends(near_the_first_resonance):
     mirrored = near_the_first_resonance[0]
     assert (mirrored.periods, mirrored.shape) == (1, OrbitShape.MIRRORED)

@@ -116,6 +116,7 @@ def test_one_cell_settles_on_the_periodic_motion_of_the_specimen(accuracy):
         np.testing.assert_allclose(ours.impacts.times_s, theirs.impacts.times_s, atol=1e-11)
 
 
+@pytest.mark.thorough
 def test_two_cells_move_as_an_independent_integrator_restarted_at_every_touch_says():
     chain = chain_of(gong2025(), 2)
     theirs = independent(chain, HARD, 0.008, lively(2))

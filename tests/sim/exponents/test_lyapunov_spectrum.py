@@ -24,6 +24,7 @@ def shrinking(specimen):
     return -float(np.trace(np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix)))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("drive", [CHAOS, LARGE, Harmonic(130.0, 20e-6), Harmonic(260.0, 1e-6)])
 @pytest.mark.parametrize("contact", ["hertz", "linear_gap", "power:5", "power:47", "linear", "rigid:1"])
 def test_the_exponents_add_up_to_what_the_dampers_take(contact, drive):

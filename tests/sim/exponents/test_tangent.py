@@ -40,6 +40,7 @@ def by_differences(specimen, step, accuracy=Accuracy.REFERENCE):
     return np.array(columns).T
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("gap_m", GAPS)
 @pytest.mark.parametrize("contact", [*ELASTIC, "hunt_crossley:0.5", "rigid:0.8"])
 def test_differences_of_runs_approach_the_tangent_with_the_square_of_their_step(contact, gap_m):

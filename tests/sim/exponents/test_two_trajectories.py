@@ -26,6 +26,7 @@ def test_interval_by_interval_two_motions_part_as_the_tangent_grows(contact):
     assert np.ptp(run.rates[:14, 0]) > 20.0
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("contact", ["hertz", "power:5"])
 def test_on_average_both_give_the_same_exponent_within_their_errors(contact):
     specimen = gong2025(contact=contact)

@@ -148,6 +148,7 @@ def test_recordings_are_analysed_elsewhere_laid_over_and_written(working, record
     assert "twice, transmission, measured" in (tmp_path / "out.csv").read_text().splitlines()[0]
 
 
+@pytest.mark.thorough
 def test_what_cannot_be_analysed_or_written_says_so_and_spoils_nothing(working, tmp_path, waited):
     notices = []
     working.context.noticed.connect(notices.append)

@@ -25,6 +25,7 @@ def shaken(tmp_path_factory):
     return module.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=61, duration_s=2.4)
 
 
+@pytest.mark.thorough
 def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shaken, waited):
     pictures = Pictures(DARK, shared_context.background)
     pictures.resize(900, 600)
