@@ -49,10 +49,16 @@ class Estimate:
 
     tracked: TrackedSpecimen
     wanted: tuple[Hidden, ...]
-    values: Reals
-    """Shape (parameters,), SI."""
+    begun_at: Reals
+    """Where the search began, shape (parameters,), SI."""
+    prior_sd: Reals
+    """How far from there they were looked for, shape (parameters,)."""
+    moved: Reals
+    """How far from there they are, in prior standard deviations, shape (parameters,)."""
     covariance: Reals
-    """As the filter claims it, shape (parameters, parameters)."""
+    """As the filter claims it, in prior standard deviations, shape (parameters, parameters)."""
+    wandered: float
+    """Variance that was added to each parameter on the way, in the same units."""
     followed_s: float
     innovation_level: float
     """Mean squared normalised innovation of the last part, at the channels' own noise; 1 for a good model."""
@@ -123,8 +129,11 @@ class _Search:
         return Estimate(
             self._current(),
             self._wanted,
-            self._values,
-            self._covariance * np.outer(self._prior_sd, self._prior_sd),
+            self._nominal,
+            self._prior_sd,
+            (self._values - self._nominal) / self._prior_sd,
+            self._covariance,
+            _WANDER**2 * self._followed / block,
             self._followed / rate,
             self._level,
         )

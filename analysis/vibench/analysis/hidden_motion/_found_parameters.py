@@ -6,7 +6,7 @@ by tracking.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
@@ -52,7 +52,14 @@ _LEAST_SD = {
 }
 _FREE_S = 1.0
 _TOLD = 0.5
-"""Posterior over prior standard deviation above which the data say nothing that was not assumed."""
+"""Standard deviation over that of a description above which the data say nothing that was not assumed."""
+_WIDE = 3.0
+"""Prior standard deviations of a description that are put in the place of a narrow prior."""
+_FAR = 3.0
+"""Standard deviation over the narrow prior's above which a parameter was hardly looked for."""
+_SETTLED = 1.0
+"""Narrow priors that a value may lie from where the filter looked for it."""
+_ROUNDS = 3
 _CONFIDENCE = 0.95
 _Z = 1.96
 _CLOCK_SD = {Hidden.K0: 5e-5, Hidden.K2: 5e-5, Hidden.M1: 5e-5}
@@ -141,17 +148,63 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     """Find the parameters that collisions tell."""
     if described.steepness == 0.0:
         return _nothing(described, "the specimen is described without stops")
+    if _can_be_tracked(described, motion):
+        refined = _refined(described, motion, described, _NEAR)
+        if isinstance(refined, FoundSpecimen):
+            return refined
     stretches = _stretches(motion)
-    searched = not _can_be_tracked(described, motion)
-    start, near = (
-        (described, _NEAR) if not searched else _search(described, motion, [a for a, _ in stretches])
-    )
+    start, near = _search(described, motion, [first for first, _ in stretches])
     if isinstance(near, str):
         return _nothing(described, near, searched=True)
-    if searched:
-        first_look = estimate(start, motion, near, *stretches[len(stretches) // 2])
-        if isinstance(first_look, Estimate):
-            start = first_look.tracked
+    first_look = estimate(start, motion, near, *stretches[len(stretches) // 2])
+    if isinstance(first_look, Estimate):
+        start = first_look.tracked
+    found = _refined(described, motion, start, near)
+    return (
+        replace(found, searched=True)
+        if isinstance(found, FoundSpecimen)
+        else _nothing(start, found, searched=True)
+    )
+
+
+def _refined(
+    described: TrackedSpecimen, motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
+) -> FoundSpecimen | str:
+    """Find parameters near a start, and again from where they are told to be while that is elsewhere."""
+    wanted = tuple(near)
+    for _ in range(_ROUNDS):
+        good = _restarts(motion, start, near)
+        if isinstance(good, str):
+            return good
+        independent = max(1.0, min(len(good), motion.samples / (_STRETCH_S * motion.sample_rate_hz)))
+        found = combined(good, described, independent)
+        narrow = np.array([near[each] * value_of(start, each) for each in wanted])
+        is_told = (found.sd < _TOLD * found.assumed) & (found.sd < _FAR * narrow)
+        is_beyond = is_told & (found.beyond > _SETTLED * narrow)
+        start = with_values(
+            start, {each: float(found.values[n]) for n, each in enumerate(wanted) if is_told[n]}
+        )
+        if not np.any(is_beyond):
+            break
+    parameters = tuple(
+        _judged(
+            what,
+            found.values[n],
+            found.half[n],
+            value_of(described, what),
+            is_told=bool(is_told[n] and not is_beyond[n]),
+        )
+        for n, what in enumerate(wanted)
+    )
+    told = {each.what: each.value for each in parameters if each.is_determined}
+    return FoundSpecimen(with_values(start, told), parameters, len(good), searched=False)
+
+
+def _restarts(
+    motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
+) -> list[Estimate] | str:
+    """Search several parts of a motion from different beginnings; a sentence where too few held."""
+    stretches = _stretches(motion)
     enough_s = 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
     good: list[Estimate] = []
     refused = ""
@@ -164,42 +217,81 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
                 break
             refused = answer if isinstance(answer, str) else refused
     if 2 * len(good) <= len(stretches) and len(stretches) > 1:
-        held = f"only {len(good)} of {len(stretches)} restarts over parts of the motion held their track"
-        return _nothing(start, refused or held, searched=searched)
+        return (
+            refused
+            or f"only {len(good)} of {len(stretches)} restarts over parts of the motion held their track"
+        )
     if not good:
-        why = refused or "the track was lost again and again while the parameters were looked for"
-        return _nothing(start, why, searched=searched)
-    independent = max(1.0, min(len(good), motion.samples / (_STRETCH_S * motion.sample_rate_hz)))
-    values, half = combined(good, independent)
-    prior = np.array([near[each] * value_of(start, each) for each in good[0].wanted])
-    parameters = tuple(
-        _judged(what, values[n], half[n], value_of(described, what), half[n] / _Z / prior[n])
-        for n, what in enumerate(good[0].wanted)
-    )
-    told = {each.what: each.value for each in parameters if each.is_determined}
-    return FoundSpecimen(with_values(start, told), parameters, len(good), searched)
+        return refused or "the track was lost again and again while the parameters were looked for"
+    return good
 
 
-def combined(found: list[Estimate], independent: float) -> tuple[Reals, Reals]:
+@dataclass(frozen=True, eq=False)
+class _Combined:
+    """Parameters as the motion alone tells them; all of shape (parameters,), SI."""
+
+    values: Reals
+    half: Reals
+    """Half the width of the bounds."""
+    sd: Reals
+    """Standard deviation as the filter claims it, or the scatter."""
+    assumed: Reals
+    """Standard deviation of a description."""
+    beyond: Reals
+    """How far the values lie from where the filter looked."""
+
+
+def combined(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
     """Give the mean of restarts, and half the width of its bounds: from the larger of scatter and claims.
 
     Restarts over the same samples are not independent: their scatter tells what they have not forgotten.
     Scatter beyond what is claimed tells of a model that does not fit, and a few values tell it badly.
     """
-    values = np.array([each.values for each in found])
-    claimed = np.sqrt(np.array([np.maximum(np.diag(each.covariance), 0.0) for each in found]).mean(axis=0))
-    half = _Z * claimed * np.array([_CLAIMED.get(each, 1.0) for each in found[0].wanted])
+    wanted = found[0].wanted
+    centre = np.array([value_of(described, each) for each in wanted])
+    assumed = np.array([PRIOR_SD[each] for each in wanted]) * centre
+    freed = [_freed(each, centre, _WIDE * assumed) for each in found]
+    values = np.array([each[0] for each in freed])
+    claimed = np.sqrt(np.mean([each[1] for each in freed], axis=0))
+    half = _Z * np.sqrt(np.mean([each[2] for each in freed], axis=0))
+    sd = claimed
     if len(found) > 1:
         scatter = values.std(axis=0, ddof=1)
         few = float(student.ppf(0.5 + 0.5 * _CONFIDENCE, len(found) - 1))
         half = np.maximum(half, np.where(scatter > claimed, few, _Z) * scatter)
-    return values.mean(axis=0), half / np.sqrt(independent)
+        sd = np.maximum(claimed, scatter)
+    looked = np.array([each.begun_at + each.prior_sd * each.moved for each in found])
+    beyond = np.abs(values.mean(axis=0) - looked.mean(axis=0))
+    return _Combined(values.mean(axis=0), half / np.sqrt(independent), sd, assumed, beyond)
 
 
-def _judged(what: Hidden, value: float, half: float, described: float, told: float) -> FoundParameter:
-    why = ""
-    if told > _TOLD:
-        why = f"{what.value} is not told by this motion better than it was assumed"
+def _freed(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, Reals]:
+    """Take back that parameters were looked for near the start alone: values, claimed and likely variances.
+
+    The filter weighs the motion against a narrow prior, without which it loses its track. What a motion tells
+    weakly would stay where the description put it, with bounds as narrow as the prior. In units of that
+    prior the motion's own information is J = P^-1 - 1; with a wide prior in its place nothing is held back.
+    """
+    size = len(found.wanted)
+    inverse = np.linalg.inv(found.covariance)
+    rates, directions = np.linalg.eigh(inverse - np.eye(size))
+    information = (directions * np.maximum(rates, 0.0)) @ directions.T
+    weak = np.diag((found.prior_sd / wide) ** 2)
+    freed = np.linalg.inv(information + weak)
+    pull = weak @ ((centre - found.begun_at) / found.prior_sd)
+    moved = freed @ (inverse @ found.moved + pull)
+    variance = np.diag(freed)
+    # A parameter that wanders is better known than it claims once wandering is all that it does not know;
+    # one that is hardly told claims what is true, and is told worse by what wandering adds.
+    wandering = found.wandered / (found.wandered + np.diag(found.covariance))
+    part = np.array([_CLAIMED.get(each, 1.0) for each in found.wanted])
+    likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2
+    scale = found.prior_sd**2
+    return found.begun_at + found.prior_sd * moved, variance * scale, likely * scale
+
+
+def _judged(what: Hidden, value: float, half: float, described: float, *, is_told: bool) -> FoundParameter:
+    why = "" if is_told else f"{_SHOWN[what][0]} is not told by this motion better than it was assumed"
     half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 

@@ -1,0 +1,98 @@
+"""What a motion without impacts tells of a specimen that is described wrong: as much as it knows, no more."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.analysis.hidden_motion import hidden_motion_in_samples
+from vibench.analysis.hidden_motion._parameters import Hidden, value_of
+from vibench.analysis.hidden_motion._tracking_model import tracked_specimen
+from vibench.sim import gong2025
+
+RATE_HZ, SAMPLES = 51_200.0, 61_440
+NOISE = (5e-3, 3.2e-6)
+"""Of the rig's channels [m/s2, m/s], rms."""
+SPECIMEN = gong2025()
+
+
+def coupled(of0, of1, of2):
+    """The matrix of springs or dampers of the three masses."""
+    return np.array([[of0 + of2, 0, -of2], [0, of1, -of1], [-of2, -of1, of1 + of2]])
+
+
+def recorded(rng, acceleration):
+    """The channels under a spectrum of the base's acceleration, by the linear equations; with noise."""
+    (m0, m1, m2), (k0, k1, k2), (c0, c1, c2) = SPECIMEN.masses, SPECIMEN.stiffnesses, SPECIMEN.dampings
+    omega = 2 * np.pi * np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
+    some = np.flatnonzero(acceleration)
+    w = omega[some]
+    dynamic = (
+        coupled(k0, k1, k2)
+        + 1j * w[:, None, None] * coupled(c0, c1, c2)
+        - (w**2)[:, None, None] * np.diag([m0, m1, m2])
+    )
+    base = -acceleration[some] / w**2
+    push = np.zeros((len(some), 3, 1), dtype=complex)
+    push[:, 0, 0] = (k0 + 1j * w * c0) * base
+    velocity = np.zeros_like(acceleration)
+    velocity[some] = 1j * w * np.linalg.solve(dynamic, push)[:, 0, 0]
+    pair = (np.fft.irfft(each, SAMPLES) for each in (acceleration, velocity))
+    return tuple(each + rms * rng.standard_normal(SAMPLES) for each, rms in zip(pair, NOISE, strict=True))
+
+
+def sine(frequency_hz, level):
+    """A base acceleration of one line, the nearest that repeats."""
+    spectrum = np.zeros(SAMPLES // 2 + 1, dtype=complex)
+    spectrum[round(frequency_hz * SAMPLES / RATE_HZ)] = 0.5 * level * SAMPLES
+    return spectrum
+
+
+def white(rng, rms):
+    """A base acceleration from 20 Hz to 1 kHz."""
+    frequency_hz = np.fft.rfftfreq(SAMPLES, 1 / RATE_HZ)
+    spectrum = rng.standard_normal((2, len(frequency_hz))).T @ np.array([1.0, 1j])
+    spectrum *= (frequency_hz > 20) & (frequency_hz < 1000)
+    return spectrum * rms / np.std(np.fft.irfft(spectrum, SAMPLES))
+
+
+def told(rng, acceleration, factors):
+    """What is determined of dampers described wrong by these factors."""
+    dampings = tuple(float(each) for each in np.array(SPECIMEN.dampings) * factors)
+    motion = hidden_motion_in_samples(
+        *recorded(rng, acceleration), RATE_HZ, replace(SPECIMEN, dampings=dampings)
+    )
+    return {each.what: each for each in motion.parameters if each.is_determined}
+
+
+def covered(found):
+    true = tracked_specimen(SPECIMEN)
+    return [each.low <= value_of(true, what) <= each.high for what, each in found.items()]
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.5, 0.7])
+def test_noise_alone_tells_nothing(factor):
+    assert not told(np.random.default_rng(2), np.zeros(SAMPLES // 2 + 1, dtype=complex), (1, factor, 1))
+
+
+@pytest.mark.thorough
+def test_one_weak_sine_does_not_tell_the_dampers_that_were_described():
+    """Bounds as narrow as the search, about the description, missed the truth in each of ten."""
+    rng = np.random.default_rng(3)
+    inside = []
+    for frequency_hz, level in ((95.0, 0.005), (150.0, 0.2), (260.0, 0.2), (400.0, 1.0)):
+        for factor in (1.5, 0.7):
+            inside += covered(told(rng, sine(frequency_hz, level), (1, factor, 1)))
+    assert inside.count(False) <= 1
+
+
+@pytest.mark.thorough
+def test_weak_noise_tells_dampers_that_are_described_far_off():
+    rng = np.random.default_rng(4)
+    inside, dampers = [], []
+    for factors in ((1, 1.5, 1), (1, 0.7, 1), (1, 1, 0.8), (1.05, 1.3, 0.9)):
+        found = told(rng, white(rng, 0.1), factors)
+        inside += covered(found)
+        dampers.append(Hidden.C1 in found)
+    assert all(dampers)
+    assert inside.count(False) <= 1
