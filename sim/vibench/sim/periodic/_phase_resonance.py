@@ -140,8 +140,8 @@ def phase_resonance_branch(
     Raises
     ------
     ValueError
-        When no mode in the band has this phase, the lower level already reaches the stops, or `of` is no
-        word of `PhaseReference`.
+        When no mode in the band has this phase, or several do, no motion is found at the lower level, it
+        already reaches the stops, or `of` is no word of `PhaseReference`.
 
     """
     (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
@@ -158,7 +158,14 @@ def phase_resonance_branch(
     state = np.concatenate([phasors.real, (2j * math.pi * frequency_hz * phasors).real])
     family = PhaseResonanceFamily(PeriodMap(specimen, OrbitShape.MIRRORED), drive, phase_rad, of)
     guess = np.concatenate([state / family.scales, [0.0, 0.0]])
-    start, _ = correct(family, guess, np.eye(8)[7], steps.tolerance)
+    start, iterations = correct(family, guess, np.eye(8)[7], steps.tolerance)
+    if iterations == 0 or not band_hz[0] <= family.drive_at(start).frequency_hz <= band_hz[1]:
+        # Contacts that act at every p move it away from the linear motion.
+        msg = (
+            f"No motion with this phase is found from {band_hz[0]:g} to {band_hz[1]:g} Hz at {low_m:g} m, "
+            "beginning with the linear one: give a lower level to begin with, or a wider band."
+        )
+        raise ValueError(msg)
     far = LENGTH_PER_DECADE * math.log10(high_m / low_m)
     return follow(family, start, 1.0, (-1e-9, far), steps)
 
@@ -175,12 +182,17 @@ def linear_phase_resonance_hz(
 
     grid = np.linspace(*band_hz, SCAN_POINTS)
     values = [off(float(each)) for each in grid]
-    for k in range(len(grid) - 1):
-        # Falling: motion lags more as the frequency rises through a mode.
-        if values[k] > 0.0 >= values[k + 1]:
-            return float(brentq(off, grid[k], grid[k + 1], xtol=1e-12))
+    # Falling: motion lags more as the frequency rises through a mode.
+    found_hz = [
+        float(brentq(off, grid[k], grid[k + 1], xtol=1e-12))
+        for k in range(len(grid) - 1)
+        if values[k] > 0.0 >= values[k + 1]
+    ]
+    if len(found_hz) == 1:
+        return found_hz[0]
+    where = f"at {', '.join(f'{each:.4g}' for each in found_hz)} Hz" if found_hz else "nowhere"
     msg = (
-        f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz the phase of m0 over the base is nowhere "
+        f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz the phase of m0 over the base is {where} "
         f"{math.degrees(phase_rad):.3g} degrees: give a band around one mode."
     )
     raise ValueError(msg)
