@@ -14,6 +14,7 @@ SHORT = {"how_accurate"}
 """A few seconds; the others measure on the virtual rig, or follow chaos for long."""
 
 
+@pytest.mark.thorough
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     "tutorial",

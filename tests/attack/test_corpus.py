@@ -45,6 +45,7 @@ def test_a_broken_file_of_another_program_is_refused_in_a_sentence_that_names_it
 LONG = "x" * 300
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -199,6 +199,7 @@ class TestWithoutAnEngine:
         assert watched.returncode == 1
         assert f"{script.pid} (alone) drives a bench without one" in watched.stderr
 
+    @pytest.mark.thorough
     def test_a_bench_check_is_stopped(self, vibench_here, tmp_path):
         rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text().replace('"free"', '"wall"')
         (tmp_path / "wall.toml").write_text(rig)

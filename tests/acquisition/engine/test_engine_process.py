@@ -117,6 +117,7 @@ class TestTheJob:
         client.close_bench()
         until_state(client, EngineState.CLOSED)
 
+    @pytest.mark.thorough
     def test_the_newest_samples_are_those_of_the_recording(self, client, shipped_rig, tmp_path):
         running(client, shipped_rig, tmp_path)
         newest_samples = client.look(most=10_000)
@@ -441,6 +442,7 @@ class TestItsEnd:
             process._process.wait(20)
         assert not process.is_alive
 
+    @pytest.mark.thorough
     def test_leaving_a_started_engine_ends_its_run(self, shipped_rig, tmp_path):
         with start_engine() as process:
             running(process.client, shipped_rig, tmp_path)

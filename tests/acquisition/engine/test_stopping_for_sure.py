@@ -138,6 +138,7 @@ class TestAStallDoesNotMakeAnEngineUnstoppable:
         ended_by(tmp_path, "smoke")
         assert list(engines_folder().glob("*.stop-*")) == []
 
+    @pytest.mark.thorough
     def test_a_stop_after_it_finds_the_engine(self, running, tmp_path):
         with stalled(running), pytest.raises(EngineSilent, match=r"does not answer within 0\.3 s"):
             EngineClient.attach(running.address, patience_s=0.3)

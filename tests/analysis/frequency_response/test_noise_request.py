@@ -26,6 +26,7 @@ def response(path, **asked):
         return analyse(recording, FrequencyResponseRequest(**asked)).response
 
 
+@pytest.mark.thorough
 def test_streamed_noise_gives_the_exact_ratio_by_every_estimator(streamed_file):
     found = response(streamed_file())
     # Velocity over acceleration bends by 1 % over a line at 40 Hz: leakage leaves some of that.

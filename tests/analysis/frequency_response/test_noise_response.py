@@ -19,6 +19,8 @@ WEAK_VPP, STRONG_VPP = 0.067, 7.0
 # The weak one long enough for its lines to be finer than the narrowest resonance, of 1.1 Hz.
 DURATION_S = {WEAK_VPP: 18.0, STRONG_VPP: 30.0}
 
+pytestmark = pytest.mark.thorough
+
 
 def noise(amplitude_vpp, duration_s):
     return StreamedNoise(
@@ -63,7 +65,6 @@ def poles():
     return sorted((abs(each) / (2 * np.pi), -each.real / abs(each)) for each in values if each.imag > 0)
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize("estimator", ["frequency_response", "h1", "h2"])
 def test_the_bounds_of_weak_noise_hold_the_closed_form_at_95_of_100_lines(responses, estimator):
     found = getattr(responses[WEAK_VPP], estimator)
@@ -77,7 +78,6 @@ def test_the_bounds_of_weak_noise_hold_the_closed_form_at_95_of_100_lines(respon
     assert np.median(np.abs(found.value / truth - 1)) < 5e-3
 
 
-@pytest.mark.thorough
 def test_weak_noise_shows_the_three_resonances_where_they_are(responses):
     found = responses[WEAK_VPP].resonances
     assert len(found) == 3

@@ -80,6 +80,7 @@ def test_ten_times_the_noise_is_still_followed(world_recording):
     assert np.sqrt(np.mean(error[scored] ** 2)) < 0.3e-6
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("kind", "level_vpp", "largest_rms_m"), [(260.0, 1.5, 1e-6), ("noise", 10.0, 1.5e-6)]
 )

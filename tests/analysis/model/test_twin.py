@@ -29,6 +29,8 @@ NOISE = MultisineNoise(
 )
 DWELL = Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1.0, duration_s=2.5)
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.fixture(scope="module")
 def recordings(tmp_path_factory):
@@ -53,7 +55,6 @@ def chaotic(recordings):
     return laid(recordings / "dwell.h5")
 
 
-@pytest.mark.thorough
 def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
     run = chaotic.laid.run
     assert (run.driven, run.draws) == (Driven.AMPLIFIER, 16)
@@ -61,7 +62,6 @@ def test_a_chaotic_dwell_is_one_of_its_draws(chaotic):
     assert all(each.compared == 1 and each.agrees for each in chaotic.laid.ensemble)
 
 
-@pytest.mark.thorough
 def test_under_the_base_motion_the_same_dwell_is_told_as_one_run_without_a_place(recordings, chaotic):
     base = laid(recordings / "dwell.h5", simulation=Simulation.UNDER_BASE).laid
     assert (base.run.driven, base.run.draws) == (Driven.BASE, 1)

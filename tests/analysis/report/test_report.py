@@ -23,6 +23,8 @@ from vibench.analysis.tables import plus_minus
 VOID = {"meta", "img", "br", "link", "hr"}
 RATE = 6400.0
 
+pytestmark = pytest.mark.thorough
+
 
 class Page(HTMLParser):
     """Collects what a page refers to, and whether its elements are closed in order."""
@@ -69,7 +71,6 @@ def page(written):
     return Page(written.read_text(encoding="utf-8"))
 
 
-@pytest.mark.thorough
 def test_a_report_needs_no_other_file_and_no_network(page):
     assert page.open == []
     assert page.sources
@@ -77,7 +78,6 @@ def test_a_report_needs_no_other_file_and_no_network(page):
     assert all(each.startswith("#") for each in page.links)
 
 
-@pytest.mark.thorough
 def test_a_report_holds_the_results_numbers(page, campaign):
     for found in campaign.noise[0].analysis.response.resonances:
         assert plus_minus(found.frequency_hz, 2 * found.sd_frequency_hz) in page.text

@@ -103,6 +103,7 @@ def test_lorenz_has_the_exponents_of_the_literature():
     assert found.dimension == pytest.approx(2.062, abs=2e-3)
 
 
+@pytest.mark.thorough
 def test_roessler_has_the_exponents_of_the_literature():
     found = roessler(20_000)
     assert found.exponents[0] == pytest.approx(0.0714, abs=4.0 * found.standard_errors[0])

@@ -134,6 +134,7 @@ def test_what_is_played_moves_the_base_as_the_transfer_says():
     assert found == pytest.approx(loop_transfer(model, law, 130.0), rel=1e-3)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("begin", "ratio"), [(Begin.REST, 0.42), (Begin.ABOVE, 2.79)])
 def test_a_branch_among_stops_is_the_one_of_the_side_from_which_its_level_is_met(begin, ratio):
     branch = impact_branch(gong2025(), 1e-6, 97.5, (97.4, 97.6), begin)

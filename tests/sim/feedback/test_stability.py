@@ -85,6 +85,7 @@ def covers(each, size):
     return low < size < high
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("index", [60, 300])
 def test_a_held_motion_is_told_as_stable_or_not_though_only_its_base_and_m0_are_seen(index):
     fitted, size = told(index, 6, 1.0, 1)

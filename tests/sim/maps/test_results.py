@@ -109,6 +109,7 @@ def test_noise_has_no_exponent():
     assert uncertainty_exponent(np.zeros((64, 64), dtype=np.int64)) is None
 
 
+@pytest.mark.thorough
 def test_where_impacts_begin_is_refined_and_what_is_filled_in_wrong_is_in_the_audit():
     """Soft stops are touched without a jump of the response, which alone was looked at."""
     soft = {

@@ -68,7 +68,7 @@ def test_too_short_a_section_says_nothing():
 )
 def test_the_growth_of_a_small_change_says_what_does_not_repeat(logarithms, kind):
     growth = Growth(np.array(logarithms), 0.5 * len(logarithms))
-    assert kind_of(None, growth, forgetting_s=0.25) is kind
+    assert kind_of(None, growth, fading_s=0.25) is kind
 
 
 def test_what_repeats_is_periodic_however_a_change_grew():

@@ -214,6 +214,7 @@ def heavy_on_light():
     return replace(gong2025(0.0, contact="linear"), masses=masses, stiffnesses=stiffnesses)
 
 
+@pytest.mark.thorough
 def test_what_turns_from_displacement_to_velocity_has_not_grown():
     slow = Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0))
     found = solve_scene(slow)

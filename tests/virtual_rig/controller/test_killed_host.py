@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 
 from vibench.acquisition.rig import ControllerConfig, load_rig
 from vibench.virtual_rig import VirtualRig
@@ -22,6 +23,7 @@ while True:
 """
 
 
+@pytest.mark.thorough
 def test_a_controller_whose_host_is_killed_falls_silent_by_itself():
     rig = load_rig("virtual_rig")
     config = ControllerConfig(rate_hz=10_240, latency_s=3e-4, limit_v=2, source="test")

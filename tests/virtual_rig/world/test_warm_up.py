@@ -4,6 +4,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[3]
 PROGRAM = """
 from pathlib import Path
@@ -31,6 +33,7 @@ with open_bench(Path("hardware_configs/virtual_rig_controller.toml")) as bench:
 """
 
 
+@pytest.mark.thorough
 def test_the_first_read_of_a_process_compiles_nothing():
     told = subprocess.run(
         [sys.executable, "-c", PROGRAM], cwd=ROOT, capture_output=True, text=True, check=True, timeout=120

@@ -65,6 +65,7 @@ def test_what_is_in_sight_is_computed_finer(page, waited):
     assert page.picture.frequency_hz[0] == pytest.approx(110.0, abs=1.0)
 
 
+@pytest.mark.thorough
 def test_a_click_shows_the_motion_there_and_opens_it_in_simulate(page, waited):
     mapped(page, waited)
     wanted, pages = [], []

@@ -137,6 +137,7 @@ def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waite
     assert not view._compare.isEnabled()
 
 
+@pytest.mark.thorough
 def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_said(page, waited, tmp_path):
     view = page.chain
     asked(view, ChainRequest(lengths=(2, 5), drive="none"))
