@@ -27,6 +27,8 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
             "frequency_hz, amplitude_m, gap_m",
         ),
         ({"y_m": LEVELS, "chain": ("up",)}, "y_m varies the start"),
+        ({"x_m": LEVELS, "y_m": LEVELS, "random_starts": 8}, "same states at every y_m, which varies"),
+        ({"frequency_hz": FREQUENCIES, "y_m": LEVELS, "random_starts": 8}, "same states at every y_m"),
         ({"frequency_hz": FREQUENCIES, "coarse": 12}, "coarse = 12 is no power of 2"),
         (
             {"frequency_hz": FREQUENCIES, "gap_m": GAPS, "model": "linear"},
