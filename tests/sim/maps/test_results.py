@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim.maps import Map, Range, kick_stability, solve_map, uncertainty_exponent
+from vibench.sim.scene import wilson_share
 from vibench.sim.study import InvalidStudy, PointState
 
 # Over the edge between no contact and contact.
@@ -43,7 +44,8 @@ def test_the_shares_of_a_map_are_those_of_its_points_and_its_audit(adaptive):
         assert motion.share.low <= motion.share.share <= motion.share.high
 
 
-def test_several_starts_tell_how_many_motions_there_are():
+@pytest.fixture(scope="module")
+def several_starts():
     plan = Map(
         frequency_hz=Range(start=100.0, stop=125.0, points=2),
         amplitude_m=Range(start=5e-6, stop=9e-6, points=2),
@@ -51,13 +53,25 @@ def test_several_starts_tell_how_many_motions_there_are():
         periods=600,
         coarse=2,
     )
-    results = solve_map(plan)
-    counts = results.motion_counts
+    return solve_map(plan)
+
+
+def test_several_starts_tell_how_many_motions_there_are(several_starts):
+    counts = several_starts.motion_counts
     for place in np.ndindex(counts.shape):
-        found = results.motions_at(*place)
+        found = several_starts.motions_at(*place)
         assert len(found) == counts[place]
         assert sum(each.share.share for each in found) == pytest.approx(1.0)
     assert counts.max() > 1
+
+
+def test_shares_of_starts_that_every_cell_shares_are_no_surer_than_so_many_starts(several_starts):
+    for found in (several_starts.motions, several_starts.motions_at(0, 0)):
+        assert sum(each.share.share for each in found) == pytest.approx(1.0)
+        for each in found:
+            of_starts = wilson_share(8 * each.share.share, 8)
+            assert each.share.low <= of_starts.low + 1e-12
+            assert each.share.high >= of_starts.high - 1e-12
 
 
 def test_a_basin_map_tells_attractors_apart_and_kicks_them():

@@ -34,7 +34,8 @@ class MapMotion:
     response_ii: float
     share: Share
     """Of the starts, after the drive periods of the map; chaos may die out later. The intervals of all
-    motions hold together in 19 cases of 20."""
+    motions hold together in 19 cases of 20. Random starts are the same draws in every cell: with them each
+    start counts as one trial, however many cells there are."""
 
 
 @dataclass(frozen=True)
@@ -219,7 +220,8 @@ class MapResults(GridResults[Map]):
         ]
         kinds = [list(MotionKind)[int(self.arrays["motion"][place[0]])] for place in places]
         is_free = without_impacts(self.arrays)
-        shares = shares_of([Count(len(place), is_final=True) for place in places])
+        trials = min(total, len(self.plan.start_labels)) if self.plan.random_starts else total
+        shares = shares_of([Count(trials * len(place) / total, is_final=True) for place in places])
         if audit is not None:
             shares = audit.corrected(shares, total // self.plan.grid.shape[-2])
         return tuple(

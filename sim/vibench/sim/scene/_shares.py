@@ -19,7 +19,7 @@ class Share:
     high: float
 
 
-def wilson_share(count: float, trials: int, unsure: float = UNSURE) -> Share:
+def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     """Find the share that ``count`` of ``trials`` stand for, by Wilson's interval.
 
     It holds for few trials, and for none and all of them too (Wilson, J. Am. Stat. Assoc. 22 (1927) 209;
@@ -49,7 +49,8 @@ def wilson_share(count: float, trials: int, unsure: float = UNSURE) -> Share:
 class Count:
     """Trials with one outcome."""
 
-    trials: int
+    trials: float
+    """No whole number where trials hang together and count for fewer."""
     is_final: bool
     """Otherwise they were not followed to their end, and may come to any outcome."""
 
