@@ -154,6 +154,14 @@ def test_an_estimate_grows_with_the_work_and_shrinks_with_the_workers():
     assert math.isfinite(several.most_useful_workers)
 
 
+def test_the_most_that_a_map_takes_grows_with_the_periods_for_which_motions_are_followed():
+    plan = Map(frequency_hz=FREQUENCIES, amplitude_m=2e-5)
+    usual, long = (estimate_map(plan.model_copy(update={"periods": each}), 1) for each in (3000, 300_000))
+    assert usual.work_s <= usual.longest_work_s < 0.02 * long.longest_work_s
+    assert long.work_s == usual.work_s
+    assert f"{long.all_s:.2g} s, or {long.most_s:.2g} s if no motion repeats" in long.sentence
+
+
 @pytest.mark.skipif(not lanes_pay(), reason="this processor has no registers for lanes")
 @pytest.mark.parametrize(
     ("said", "lanes"),

@@ -22,7 +22,9 @@ class MapEstimate:
     coarse_points: int
     """Of the first lattice: a map has at least so many."""
     work_s: float
-    """Of all points on one core."""
+    """Of all points on one core, as such points took here lately."""
+    longest_work_s: float
+    """The same if no motion repeats, so that each is followed for all drive periods of the map."""
     coarse_work_s: float
     """Of the first lattice."""
     workers: int
@@ -31,9 +33,14 @@ class MapEstimate:
     """How motions are followed, as `map_solver` chooses."""
 
     @property
-    def most_s(self) -> float:
+    def all_s(self) -> float:
         """Time until all points are computed."""
         return self._elapsed_s(self.points, self.work_s)
+
+    @property
+    def most_s(self) -> float:
+        """The same if no motion repeats."""
+        return self._elapsed_s(self.points, self.longest_work_s)
 
     @property
     def first_s(self) -> float:
@@ -54,8 +61,9 @@ class MapEstimate:
         """Say it to a person."""
         return (
             f"{self.points} points at most, {self.coarse_points} of them in the first picture; all are "
-            f"planned as {self.work_s:.2g} s of one core. With {self.workers} worker(s): the first picture "
-            f"after {self.first_s:.2g} s, everything after {self.most_s:.2g} s at most, without compiling; "
+            f"planned as {self.work_s:.2g} s of one core, as such points took here lately. With "
+            f"{self.workers} worker(s): the first picture after {self.first_s:.2g} s, everything after "
+            f"{self.all_s:.2g} s, or {self.most_s:.2g} s if no motion repeats, without compiling; "
             f"more than {self.most_useful_workers} workers would wait. The file takes "
             f"{self.file_bytes / 1e6:.1f} MB. Motions are followed {self.followed}."
         )
@@ -64,6 +72,7 @@ class MapEstimate:
         """Plain values for JSON."""
         return {
             **asdict(self),
+            "all_s": self.all_s,
             "most_s": self.most_s,
             "first_s": self.first_s,
             "most_useful_workers": self.most_useful_workers,
@@ -73,7 +82,8 @@ class MapEstimate:
 def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
     """Say what a map will take of ``workers`` threads, by what such points took here lately; none is run.
 
-    How many points refinement will ask for is not known before: the estimate says the least and the most.
+    How many points refinement will ask for, and how many motions repeat, is not known before: the estimate
+    says the least and the most.
     """
     points = MapPoints(plan)
     row_bytes = sum(np.dtype(column.dtype).itemsize * column.components for column in plan.columns)
@@ -82,6 +92,7 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
         points=plan.grid.size,
         coarse_points=len(first),
         work_s=float(points.planned_s.sum()),
+        longest_work_s=float(points.longest_s.sum()),
         coarse_work_s=float(points.planned_s[first].sum()),
         workers=(os.cpu_count() or 1) if workers is None else max(1, workers),
         file_bytes=plan.grid.size * row_bytes,

@@ -1,6 +1,7 @@
 """The points of a map as scenes: what each begins from, what is kept of it, and which are wanted."""
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +10,15 @@ from numpy.typing import NDArray
 from ..kernels import Floats
 from ..lanes import lanes_pay
 from ..model import Outcome
-from ..scene import Given, MotionKind, Scene, expected_cost_s, settle_in_lanes, settle_scene
+from ..scene import (
+    Given,
+    MotionKind,
+    Scene,
+    expected_cost_s,
+    longest_cost_s,
+    settle_in_lanes,
+    settle_scene,
+)
 from ..study import (
     NUMBERS,
     Arrays,
@@ -70,7 +79,12 @@ class MapPoints:
     @cached_property
     def planned_s(self) -> Floats:
         """Time that each point is planned to take, shape (points,)."""
-        return planned_times(self.grid, self._planned)
+        return planned_times(self.grid, lambda number: self._cost_s(number, expected_cost_s))
+
+    @cached_property
+    def longest_s(self) -> Floats:
+        """Time that each point is planned to take if its motion never repeats, shape (points,)."""
+        return planned_times(self.grid, lambda number: self._cost_s(number, longest_cost_s))
 
     @property
     def wanted_first(self) -> NDArray[np.int64]:
@@ -127,9 +141,9 @@ class MapPoints:
         """Say what is kept of a scene that could not be computed."""
         return failed_point(number, error)
 
-    def _planned(self, number: int) -> float:
+    def _cost_s(self, number: int, cost_s: Callable[[Scene, Solver], float]) -> float:
         try:
-            return expected_cost_s(self.plan.scene(self.grid.place(number)), map_solver(self.plan))
+            return cost_s(self.plan.scene(self.grid.place(number)), map_solver(self.plan))
         except ValueError:
             return 0.0
 

@@ -1,6 +1,7 @@
 from ._measured_cost import (
     expected_cost_s as expected_cost_s,
     learn_cost as learn_cost,
+    longest_cost_s as longest_cost_s,
     measure_cost as measure_cost,
 )
 from ._plan import (

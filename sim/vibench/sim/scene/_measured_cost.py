@@ -39,6 +39,15 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
     return cost_ledger().expected(_kind(plan, solver), plan.planned_s).time_s
 
 
+def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
+    """Say how long a solver will take for a scene whose motion never repeats, by what such runs took [s].
+
+    Raises ValueError when the specimen cannot be followed in time.
+    """
+    plan = plan_scene(scene)
+    return cost_ledger().expected(_kind(plan, solver), plan.longest_planned_s).time_s
+
+
 def _kind(plan: ScenePlan, solver: Solver) -> str:
     return f"{SETTLED[solver]}/{plan.kind}" if solver in SETTLED else plan.kind
 

@@ -36,6 +36,8 @@ class ScenePlan:
     """What is modelled, what is carried along, what is not, and why."""
     planned_s: float
     """The work in it, in seconds of a machine that nobody has."""
+    longest_planned_s: float
+    """The same if the motion never repeats and is followed to the end of an automatic duration."""
     kind: str
     """What runs have taken is learnt for each kind, and for what it begins with."""
     largest_p_m: float
@@ -74,15 +76,27 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     method = _method(scene.specimen, motion, scene.duration)
     if method is Method.CLOSED_FORM:
         why = _why_closed(scene.specimen, motion)
-        return ScenePlan(method, (why,), CLOSED_FORM_S, method.value, motion.largest_p_m)
+        return ScenePlan(method, (why,), CLOSED_FORM_S, CLOSED_FORM_S, method.value, motion.largest_p_m)
     sentences = (
         _why_followed(scene.specimen, motion, method),
         *_carried(scene.observe),
         _length(scene.duration),
         *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
     )
-    planned_s = _planned_s(scene, motion, method)
-    return ScenePlan(method, sentences, planned_s, _kind(scene, method), motion.largest_p_m)
+    match scene.duration:
+        case FixedDuration(duration_s=length_s):
+            longest_s = length_s
+        case AutomaticDuration(longest_s=longest_s):
+            length_s = min(SETTLING_S, longest_s)
+    per_s = _planned_per_s(scene, motion, method)
+    return ScenePlan(
+        method,
+        sentences,
+        CLOSED_FORM_S + per_s * length_s,
+        CLOSED_FORM_S + per_s * longest_s,
+        _kind(scene, method),
+        motion.largest_p_m,
+    )
 
 
 def transient_decay_s(motion: LinearMotion) -> float:
@@ -178,16 +192,12 @@ def _kind(scene: Scene, method: Method) -> str:
     return "/".join((method.value, scene.specimen.contact.kind, scene.accuracy.value, duration, observed))
 
 
-def _planned_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
-    match scene.duration:
-        case FixedDuration(duration_s=length_s):
-            pass
-        case AutomaticDuration(longest_s=longest_s):
-            length_s = min(SETTLING_S, longest_s)
+def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
+    """Plan the work in a second of motion [s]."""
     share = abs(motion.steady_p) / min(scene.specimen.gaps_m)
     rate_hz = IMPACTS_PER_PERIOD * scene.drive.frequency_hz * math.sqrt(share) * min(1.0, share) ** 2
     per_s = STEPS_S if method is Method.POLYNOMIAL else FLIGHT_S + IMPACT_S * rate_hz
     runs = 1.0 + (TANGENT if Observable.LYAPUNOV in scene.observe else 0.0)
     runs += FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0
     runs += 1.0 if scene.budget_s > 0.0 else 0.0
-    return CLOSED_FORM_S + per_s * length_s * runs
+    return per_s * runs
