@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.sim import MotionKind
-from vibench.sim.maps import QUANTITIES, MapMotion, MapResults
+from vibench.sim import MotionKind, SpecimenTable, shipped_specimens, usual_specimen
+from vibench.sim.maps import QUANTITIES, Map, MapMotion, MapResults
 
 from ..comparison import Curve
 from ..signals import Reals
@@ -23,6 +23,8 @@ MOTION_CLASSES = (
     ("undecided", "#9a9a9a"),
 )
 """How the motions of a map are told apart, and their colours."""
+NO_NUMBERS = ("name", "about", "sources")
+"""Keys of a specimen that change no motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +70,11 @@ def motion_words(motion: MapMotion) -> str:
 
 
 def map_caption(results: MapResults) -> str:
-    """Say what was computed, what was filled in, and how often that was wrong."""
+    """Say of what it is, what was computed, what was filled in, and how often that was wrong."""
     plan = results.plan
-    values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
-    fixed = [f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and value]
     said = [
         (
-            f"{', '.join((f'Specimen {plan.specimen.name}', *fixed))}; {plan.accuracy.value}; motions "
+            f"{', '.join((_specimen_words(plan.specimen), *_fixed(plan)))}; {plan.accuracy.value}; motions "
             f"followed for up to {plan.periods} drive periods from {len(plan.start_labels)} start(s)."
         ),
         f"{results.computed} of {plan.grid.size} points computed.",
@@ -88,3 +88,34 @@ def map_caption(results: MapResults) -> str:
             "filled)."
         )
     return " ".join(said)
+
+
+def _specimen_words(specimen: SpecimenTable) -> str:
+    """Name a specimen, with what differs from the shipped one of its name, or else from the paper's."""
+    shipped = shipped_specimens().get(specimen.name) or usual_specimen()
+    changed = [
+        f"{key} = {_value_words(specimen.hertz_k if key == 'hertz_stiffness' else value)}"
+        for key, value in specimen
+        if key not in NO_NUMBERS and value not in (None, getattr(shipped, key))
+    ]
+    return f"Specimen {specimen.name}" + (f" ({', '.join(changed)})" if changed else "")
+
+
+def _fixed(plan: Map) -> list[str]:
+    """Say what a map states beside its ranges: all but a start at zero, which is no choice."""
+    law = [] if plan.model is None else [f"model = {plan.model}"]
+    values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
+    is_said = {name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()}
+    return law + [
+        f"{name} = {value:g}" for name, value in values.items() if isinstance(value, float) and is_said[name]
+    ]
+
+
+def _value_words(value: object) -> str:
+    match value:
+        case tuple():
+            return f"[{', '.join(_value_words(each) for each in value)}]"
+        case float():
+            return f"{value:g}"
+        case _:
+            return str(value)
