@@ -77,6 +77,13 @@ def test_a_basin_map_tells_shares_and_kicks(vibench_here, tmp_path):
     assert len(told["kicks"]) == 3 * len(told["motions"])
 
 
+def test_fewer_kicks_than_none_are_refused_before_anything_is_computed(vibench_here, tmp_path):
+    found = vibench_here("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "-3", cwd=tmp_path)
+    assert found.returncode == 2
+    assert "'--kicks': Input should be greater than or equal to 0" in found.stderr
+    assert not (tmp_path / "a").exists()
+
+
 @pytest.mark.parametrize(
     ("text", "more", "said"),
     [

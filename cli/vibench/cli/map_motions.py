@@ -67,7 +67,7 @@ def map_motions(
     kicks: Annotated[
         int,
         typer.Option(
-            "--kicks", metavar="N", help="Of a basin map: kick each motion so often, at three sizes."
+            "--kicks", metavar="N", min=0, help="Of a basin map: kick each motion so often, at three sizes."
         ),
     ] = 0,
     allow_external: AllowExternal = False,

@@ -95,6 +95,8 @@ def test_a_basin_map_tells_attractors_apart_and_kicks_them():
 def test_kicks_need_a_basin_map(adaptive):
     with pytest.raises(InvalidStudy, match="over the start alone"):
         kick_stability(adaptive)
+    with pytest.raises(InvalidStudy, match="-3 kicks are asked for; give 1 or more"):
+        kick_stability(adaptive, kicks=-3)
 
 
 def test_a_straight_boundary_has_exponent_one():

@@ -137,9 +137,11 @@ def kick_stability(
     Raises
     ------
     InvalidStudy
-        When more than the start varies.
+        When more than the start varies, or there is no kick.
 
     """
+    if kicks < 1:
+        raise InvalidStudy(f"{kicks} kicks are asked for; give 1 or more.")
     if not results.plan.is_basin:
         raise InvalidStudy("kicks are asked of a map over drive or specimen; give one over the start alone.")
     found = []
