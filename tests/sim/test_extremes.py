@@ -328,6 +328,8 @@ REFUSED = [
     (lambda: LinearGap(math.inf), "Stop stiffness inf N/m is not allowed"),
     (lambda: HuntCrossley(1e9, -1.0), "Contact loss -1.0 s/m is not allowed"),
     (lambda: Harmonic(0.0, 1e-6), "Drive frequency 0.0 Hz is not allowed"),
+    (lambda: Harmonic(1e300, 1e-6), r"frequency 1e\+300 Hz is not allowed: it must lie between 1e-12 and"),
+    (lambda: LinearSweep(1e-300, 1.0, 1.0, 1e-6), "Sweep start 1e-300 Hz is not allowed"),
     (lambda: Harmonic(100.0, math.nan), "nan m is not allowed"),
     (lambda: Sampled(np.array([]), 1e3), r"shape \(0,\) is not allowed"),
     (lambda: Sampled(np.array([0.0, math.inf, 0.0, 0.0]), 1e3), "Sample 1 of the drive is inf"),

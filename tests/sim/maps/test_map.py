@@ -42,6 +42,15 @@ LEVELS = Range(start=1e-6, stop=2e-5, points=4, spacing="logarithmic")
         ({"frequency_hz": FREQUENCIES, "periods": 10**12}, "less than or equal to 10000000"),
         ({"frequency_hz": {"start": -5.0, "stop": 20.0, "points": 3}}, "Drive frequency -5.0 Hz"),
         ({"frequency_hz": {"start": 50.0, "stop": 20.0, "points": 3}}, "does not ascend"),
+        (
+            {"frequency_hz": {"start": 1e-300, "stop": 1e300, "points": 3}},
+            "frequency 1e-300 Hz is not allowed: it must lie between 1e-12 and 1e.12 Hz",
+        ),
+        (
+            {"x_m": {"start": -1e308, "stop": 1e308, "points": 3}},
+            r"3 points from -1e\+308 to 1e\+308 are no different numbers; give fewer points",
+        ),
+        ({"x_m": {"start": 1.0, "stop": 1.0 + 1e-15, "points": 9}}, "9 points from 1.0 to 1.0000000000000"),
         ({"frequency_hz": FREQUENCIES, "chain": ("up", "up")}, "names a direction twice"),
         (
             {

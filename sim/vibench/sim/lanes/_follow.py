@@ -97,7 +97,7 @@ def _numbers(specimen: Specimen) -> _Numbers | None:
     ):
         return None
     fit = fit_collisions(specimen)
-    if fit is None or not fit.error < FIT_ERROR:
+    if fit is None or not (fit.error < FIT_ERROR and np.all(fit.half > 0.0)):
         return None
     m1, m2 = specimen.masses[1:]
     onto = modes.rows * path[:, None]

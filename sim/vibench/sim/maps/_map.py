@@ -51,6 +51,13 @@ class Range(BaseModel):
             )
         if self.spacing is Spacing.LOGARITHMIC and self.start <= 0.0:
             raise ValueError(f"a logarithmic range cannot start at {self.start:g}; give a positive start")
+        with np.errstate(over="ignore", invalid="ignore"):
+            is_ascending = np.all(np.diff(self.values) > 0.0)
+        if not is_ascending:
+            raise ValueError(
+                f"{self.points} points from {self.start!r} to {self.stop!r} are no different numbers; give "
+                "fewer points, or ends that lie less close together and less far apart"
+            )
         return self
 
     @property

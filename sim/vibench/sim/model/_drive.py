@@ -13,6 +13,8 @@ FEWEST_SAMPLES = 4
 """A cubic spline without end conditions of its own needs four points."""
 SMALLEST_AMPLITUDE_M = 1e-100
 """Below, squares of displacements are no numbers any more: errors of steps and scatters would be zero."""
+LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
+"""Far beyond, powers of a frequency overflow, and lengths in drive periods have no end."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Harmonic:
     phase_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        _require_positive("Drive frequency", self.frequency_hz, "Hz")
+        _require_frequency("Drive frequency", self.frequency_hz)
         _require_amplitude(self.amplitude_m)
         if not math.isfinite(self.phase_rad):
             msg = f"Drive phase {self.phase_rad} rad is not allowed: it must be finite."
@@ -130,6 +132,15 @@ def _require_positive(name: str, value: float, unit: str) -> None:
         raise ValueError(msg)
 
 
+def _require_frequency(name: str, frequency_hz: float) -> None:
+    if not LOWEST_FREQUENCY_HZ <= frequency_hz <= HIGHEST_FREQUENCY_HZ:
+        msg = (
+            f"{name} {frequency_hz} Hz is not allowed: "
+            f"it must lie between {LOWEST_FREQUENCY_HZ:g} and {HIGHEST_FREQUENCY_HZ:g} Hz."
+        )
+        raise ValueError(msg)
+
+
 def _require_amplitude(amplitude_m: float) -> None:
     if amplitude_m != 0.0 and not SMALLEST_AMPLITUDE_M <= amplitude_m < math.inf:
         msg = (
@@ -140,8 +151,8 @@ def _require_amplitude(amplitude_m: float) -> None:
 
 
 def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude_m: float) -> None:
-    _require_positive("Sweep start", start_hz, "Hz")
-    _require_positive("Sweep stop", stop_hz, "Hz")
+    _require_frequency("Sweep start", start_hz)
+    _require_frequency("Sweep stop", stop_hz)
     _require_positive("Sweep duration", duration_s, "s")
     _require_amplitude(amplitude_m)
     if start_hz == stop_hz:
