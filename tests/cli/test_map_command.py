@@ -1,6 +1,7 @@
 """`vibench map` as a user meets it: a folder with a file and a picture, and one sentence for each error."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -82,6 +83,15 @@ def test_fewer_kicks_than_none_are_refused_before_anything_is_computed(vibench_h
     assert found.returncode == 2
     assert "'--kicks': Input should be greater than or equal to 0" in found.stderr
     assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
+def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vibench_here, tmp_path):
+    found = vibench_here("map", plan(tmp_path, MAP), "--out", "/proc/map", cwd=tmp_path)
+    assert found.returncode == 1
+    assert "/proc/map cannot be made a folder: /proc may not be written to. Nothing was computed" in " ".join(
+        found.stderr.split()
+    )
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,6 @@
 """Options that several commands share."""
 
-import os
+import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -40,18 +40,21 @@ def rig_at(bench: Path | None, faults: Path | None) -> Rig:
 
 
 def room_for_folder(path: Path) -> None:
-    """Refuse a folder that cannot be written to, before anything is computed for it; makes none.
+    """Refuse a folder that cannot be written to, before anything is computed for it; leaves none behind.
 
     Raises ConfigurationError when it, or what it would lie in, is a file or may not be written to.
     """
     standing = next(each for each in (path, *path.resolve().parents) if each.exists())
-    if standing.is_dir() and os.access(standing, os.W_OK):
-        return
-    why = "may not be written to" if standing.is_dir() else "is a file"
-    raise ConfigurationError(
-        f"{path} cannot be made a folder: {standing} {why}. Nothing was computed; give a folder that exists, "
-        "or the name of a new one"
-    )
+    try:
+        # Permissions do not say it: who administers a computer has them all, and /proc holds no folders.
+        with tempfile.TemporaryDirectory(dir=standing):
+            return
+    except OSError as error:
+        why = "may not be written to" if standing.is_dir() else "is a file"
+        raise ConfigurationError(
+            f"{path} cannot be made a folder: {standing} {why}. Nothing was computed; give a folder that "
+            "exists, or the name of a new one"
+        ) from error
 
 
 def unused(path: Path) -> Path:
