@@ -99,6 +99,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vib
     [
         (MAP, ("--show", "beauty"), "'beauty'; there are response_i"),
         (MAP, ("--kicks", "5"), "only the start varies"),
+        (MAP, ("--show", "lyapunov"), "this one observes response; give observe = ["),
         (
             DIAGRAM.replace("120", "200"),
             (),

@@ -9,6 +9,7 @@ from vibench.acquisition import load_toml, named
 from vibench.analysis import InvalidRequest, recorded_response
 from vibench.analysis.dynamics import map_caption, motion_words, read_diagram
 from vibench.analysis.report import SHOWN, ImageKind, map_figure
+from vibench.sim import Observable
 from vibench.sim.maps import (
     KickStability,
     Map,
@@ -84,6 +85,11 @@ def map_motions(
     if kicks and not asked.is_basin:
         raise InvalidRequest(
             "--kicks needs a map in which only the start varies; give ranges for two coordinates"
+        )
+    if show == Observable.LYAPUNOV and Observable.LYAPUNOV not in asked.observe:
+        raise InvalidRequest(
+            "--show lyapunov needs a map that finds exponents, and this one observes "
+            f'{", ".join(asked.observe)}; give observe = ["response", "lyapunov"]'
         )
     if like and not asked.is_over_drive:
         raise InvalidRequest(
