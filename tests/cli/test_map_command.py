@@ -31,6 +31,7 @@ vx_m_per_s = { start = -0.5, stop = 0.5, points = 5 }
 periods = 800
 coarse = 2
 """
+LINE = BASIN.replace("{ start = -4e-5, stop = 4e-5, points = 5 }", "0")
 
 
 def plan(folder, text):
@@ -76,6 +77,19 @@ def test_a_basin_map_tells_shares_and_kicks(vibench_here, tmp_path):
     told = json.loads(found.stdout)
     assert sum(each["share"] for each in told["motions"]) == pytest.approx(1.0)
     assert len(told["kicks"]) == 3 * len(told["motions"])
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (BASIN, "too few starts lie near a boundary, or most do."),
+        (LINE, "it needs ranges for two coordinates"),
+    ],
+)
+def test_a_basin_says_why_its_boundary_has_no_exponent(vibench_here, tmp_path, text, why):
+    found = vibench_here("map", plan(tmp_path, text), "--out", "a", cwd=tmp_path)
+    assert found.returncode == 0, found.stderr
+    assert f"The uncertainty exponent is not determined: {why}" in found.stdout
 
 
 def test_fewer_kicks_than_none_are_refused_before_anything_is_computed(vibench_here, tmp_path):

@@ -124,18 +124,25 @@ def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:
     if len(results.motions) > SHOWN_MOTIONS:
         console.print(f"{len(results.motions) - SHOWN_MOTIONS} rarer ones are in the table and in --json.")
     if results.plan.is_basin:
-        rough = _roughness(results)
-        console.print(
-            "The uncertainty exponent is not determined: too few starts lie near a boundary, or most do."
-            if rough is None
-            else f"Uncertainty exponent of the boundary {rough.exponent:.2f} ({rough.low:.2f} to "
-            f"{rough.high:.2f}), so its dimension is {2.0 - rough.exponent:.2f}."
-        )
+        console.print(_boundary_words(results))
     for each in stability:
         console.print(
             f"Motion {each.motion}, kicked by {each.size:g} gaps: comes back in {each.returned.share:.0%} "
             f"({each.returned.low:.0%} to {each.returned.high:.0%})"
         )
+
+
+def _boundary_words(results: MapResults) -> str:
+    unknown = "The uncertainty exponent is not determined:"
+    if len(results.plan.varied) == 1:
+        return f"{unknown} it needs ranges for two coordinates of the start."
+    rough = _roughness(results)
+    if rough is None:
+        return f"{unknown} too few starts lie near a boundary, or most do."
+    return (
+        f"Uncertainty exponent of the boundary {rough.exponent:.2f} ({rough.low:.2f} to {rough.high:.2f}), "
+        f"so its dimension is {2.0 - rough.exponent:.2f}."
+    )
 
 
 def _roughness(results: MapResults) -> UncertaintyExponent | None:
