@@ -24,6 +24,7 @@ from ..study import (
     Arrays,
     Cell,
     Grid,
+    InvalidStudy,
     PointAnswer,
     PointState,
     Solved,
@@ -36,7 +37,7 @@ from ..study import (
 )
 from ._columns import contact_energy_j, labels_of, section_cells
 from ._map import Map
-from ._quantities import OF_SPECIMEN
+from ._quantities import OF_SPECIMEN, START
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 
 JUMP = 0.1
@@ -67,6 +68,13 @@ class MapPoints:
     bundle_s = BUNDLE_S
 
     def __init__(self, plan: Map) -> None:
+        # Asked here, and not of a plan, because files hold such maps of earlier versions.
+        of_start = [each.field for each in plan.varied if each in START]
+        if plan.random_starts and of_start:
+            raise InvalidStudy(
+                f"random_starts = {plan.random_starts} would be the same states at every {of_start[-1]}, "
+                "which varies the start; leave them out, or give ranges of drive or specimen alone."
+            )
         self.plan = plan
         self.grid: Grid = plan.grid
         self._kept = {column.name for column in plan.columns}

@@ -157,11 +157,6 @@ class Map(GridPlan):
             raise ValueError(f"chain = {', '.join(self.chain)} names a direction twice; give each once")
         if self.chain and any(each in START for each in self.varied):
             raise ValueError(f"a chain takes its starts from its neighbours, and {names[0]} varies the start")
-        if self.random_starts and any(each in START for each in self.varied):
-            raise ValueError(
-                f"random_starts = {self.random_starts} would be the same states at every {names[-1]}, which "
-                "varies the start; leave them out, or give ranges of drive or specimen alone"
-            )
         if self.coarse is not None and self.coarse & (self.coarse - 1):
             raise ValueError(f"coarse = {self.coarse} is no power of 2; give 2, 4, 8, 16, 32 or 64")
         if self.window_periods >= self.periods:
