@@ -146,10 +146,11 @@ THOROUGH = "thorough"
 
 def pytest_configure(config: pytest.Config) -> None:
     """Choose what runs where no -m does, and let files be handed out in the order above."""
-    if not config.option.markexpr:
+    asked = config.option.markexpr
+    if asked in ("", THOROUGH):
         names_a_path = config.args_source is config.ArgsSource.ARGS
-        left_out = ON_PURPOSE if names_a_path else (THOROUGH, *ON_PURPOSE)
-        config.option.markexpr = " and ".join(f"not {mark}" for mark in left_out)
+        left_out = ON_PURPOSE if asked or names_a_path else (THOROUGH, *ON_PURPOSE)
+        config.option.markexpr = " and ".join(filter(None, (asked, *(f"not {mark}" for mark in left_out))))
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 
