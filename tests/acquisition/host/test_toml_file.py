@@ -56,6 +56,9 @@ def test_an_excitation_of_no_known_kind_is_told_which_there_are(tmp_path, excita
         ("values = { start = 1.0, step = -1.0 }\n", "values.step = -1.0: input should be greater than 0"),
         ("", "values is missing"),
         ("values = 3\n", "values = 3: give a list, in square brackets"),
+        ("values = [1.0, true]\n", "values.1 = true: give a number"),
+        ("values = { start = 1.0, step = true }\n", "values.step = true: give a number"),
+        ('values = [1.0, "fast"]\n', "values.1 = 'fast': give a number"),
     ],
 )
 def test_the_kind_that_was_meant_gives_the_key(tmp_path, text, told):

@@ -92,13 +92,45 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
 
     """
     try:
-        return model.model_validate(content, context={"folder": folder})
-    except ValidationError as error:
-        raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
+        found = _read_as(content, model, origin, folder)
+        # pydantic takes true for 1 where a number is asked for, but not the word.
+        in_words = _in_words(content)
+        if in_words != content:
+            _read_as(in_words, model, origin, folder)
     except ArithmeticError as error:
         raise ConfigurationError(
             f"{origin}: a number is too large, or too small, to be computed with ({error}); correct it"
         ) from error
+    return found
+
+
+def _read_as(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None) -> Model:
+    try:
+        return model.model_validate(content, context={"folder": folder})
+    except ValidationError as error:
+        raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
+
+
+class _TruthWord(str):
+    """``true`` or ``false`` as a word, which stands where a truth value may, but not where a number must."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def _in_words(content: Any) -> Any:
+    """Give the same content with truth values as words."""
+    match content:
+        case bool():
+            return _TruthWord("true" if content else "false")
+        case dict():
+            return {key: _in_words(value) for key, value in content.items()}
+        case list() | tuple():
+            return [_in_words(value) for value in content]
+        case _:
+            return content
 
 
 MOST_CLAUSES = 5
@@ -240,6 +272,8 @@ _IN_WORDS_OF_TOML = {
     "dict_type": _TABLE,
     "model_type": _TABLE,
     "model_attributes_type": _TABLE,
+    "float_parsing": "give a number",
+    "int_parsing": "give a whole number",
     "union_tag_not_found": "{discriminator} is missing: it says what this is",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }
