@@ -2,9 +2,10 @@
 
 from ..model import Outcome
 from ._ensemble import ErrorOf, ensemble_of
-from ._fixed_run import Pace, SceneRun
+from ._fixed_run import SceneRun
 from ._followed_run import FollowedRun
 from ._linear_motion import LinearMotion, never_touches
+from ._pace import Pace
 from ._prediction import Ensemble, StartMemory
 from ._repetition import FEWEST_NEUTRAL
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene

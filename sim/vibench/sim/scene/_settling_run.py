@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 from typing import TypeVar, cast
 
 from ..model import Outcome
-from ._fixed_run import Pace, SceneRun, growth_of, judged
+from ._fixed_run import SceneRun, judged
 from ._followed_run import FollowedRun, ObservedQuantities, Stretch
 from ._observed_window import follow_strobed, states_of, whole_periods, window_of
+from ._pace import Pace, growth_of
 from ._prediction import MotionKind
 from ._repetition import Repetition, kind_of, wandered_until
 from ._states_alone import Following, StatesAlone

@@ -13,9 +13,9 @@ import numpy as np
 
 from ..kernels import Floats
 from ..model import Outcome, Specimen
-from ._fixed_run import Pace
 from ._followed_run import FollowedRun, ObservedQuantities, Stretch
 from ._observed_window import ObservedWindow, follow_strobed, observe_window, window_of
+from ._pace import Pace
 from ._prediction import MotionKind
 from ._repetition import NEUTRAL, Growth, kind_of
 from ._scatter import WindowScatter, window_scatter

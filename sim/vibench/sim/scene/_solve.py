@@ -10,12 +10,13 @@ from ..exponents import LyapunovEstimate, Precision, lyapunov_exponent
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
 from ._ensemble import ErrorOf, lasting
-from ._fixed_run import Pace, SceneRun, growth_of, pace_of, run_for
+from ._fixed_run import SceneRun, run_for
 from ._followed_run import FollowedRun
 from ._line_spectrum import spectrum_of
 from ._linear_motion import LinearMotion, linear_motion
 from ._observed_window import states_of, whole_periods
 from ._other_starts import ALONE, ensemble_beside, memory_of
+from ._pace import Pace, growth_of, pace_of
 from ._plan import plan_of, transient_decay_s
 from ._prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
 from ._scatter import WindowScatter, window_scatter

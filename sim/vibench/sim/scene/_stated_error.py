@@ -15,9 +15,10 @@ import numpy as np
 
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
-from ._fixed_run import Pace, SceneRun
+from ._fixed_run import SceneRun
 from ._followed_run import FollowedRun, ObservedQuantities
 from ._observed_window import observe_window
+from ._pace import Pace
 from ._prediction import MotionKind, ScenePrediction
 from ._scatter import draws_apart, draws_of_starts
 from ._scene import Scene

@@ -10,9 +10,9 @@ import numpy as np
 from ..kernels import Floats
 from ..lanes import follow_in_lanes, lanes_serve
 from ..model import Outcome, Specimen
-from ._fixed_run import Pace, growth_of
 from ._followed_run import FollowedRun, Stretch
 from ._observed_window import follow_strobed, whole_periods
+from ._pace import Pace, growth_of
 from ._repetition import Growth, Repetition, section_needed, wandered_until
 
 SLICE_S = 0.5
