@@ -1,9 +1,10 @@
 """How often the error that an answer states covers what an independent code answers, on random scenes.
 
-``python benchmarks/error_coverage.py --seed S --scenes 400 [--shard 1/4] [--levels standard]``. Scenes are
-drawn from the contact laws, damping times, gaps, frequencies and amplitudes below, from rest; a part of them
-asks for a short transient, a part for the end of a longer run. Each is answered at every level and by
-`plain_motion`, whose own error is the difference of two tolerances and is allowed on top of what is stated.
+``python benchmarks/error_coverage.py --seed S --scenes 400 [--shard 1/4] [--levels standard] [--lanes]``.
+Scenes are drawn from the contact laws, damping times, gaps, frequencies and amplitudes below, from rest; a
+part of them asks for a short transient, a part for the end of a longer run. Each is answered at every level
+and by `plain_motion`, whose own error is the difference of two tolerances and is allowed on top of what is
+stated.
 
 Three kinds of question are counted apart. *Settled*: the motion repeats throughout the window. *Transient*:
 it does not, but both tolerances give the same answer. *Scattering*: they do not, because growth on the way
@@ -27,6 +28,7 @@ import numpy as np
 from plain_motion import plain_motion
 
 from vibench.sim import Accuracy, FixedDuration, Harmonic, Scene, gong2025, solve_scene
+from vibench.sim.scene import solve_in_lanes
 
 MODELS = (
     "hertz",
@@ -118,11 +120,11 @@ def truth_of(scene):
     return Truth("scattering", np.array(answers), np.zeros(4), None)
 
 
-def judged(scene, truth, level):
+def judged(scene, truth, level, solve):
     """Answer a scene at a level; gives plain values for the table."""
     began = time.process_time()
     asked = Scene(scene.specimen, scene.drive, scene.observe, level, scene.duration, scene.start)
-    found = solve_scene(asked)
+    found = solve(asked)
     taken_s = time.process_time() - began
     errors = [getattr(found, f"{name}_error") for name in NAMES]
     stated = np.array([math.inf if error is None else error for error in errors])
@@ -212,6 +214,7 @@ def main():
     parser.add_argument("--scenes", type=int, default=400)
     parser.add_argument("--shard", default="1/1", help="i/n: every nth scene, from the ith")
     parser.add_argument("--levels", default=",".join(Accuracy), help="of accuracy, with commas")
+    parser.add_argument("--lanes", action="store_true", help="answer as in a curve of many points")
     parser.add_argument("--only", type=int, help="one scene")
     parser.add_argument(
         "--out", type=Path, help="file of JSON lines; the files of all shards can be told together"
@@ -221,6 +224,7 @@ def main():
     if arguments.tell:
         told([json.loads(line) for path in arguments.tell for line in path.read_text().splitlines()])
         return
+    solve = solve_in_lanes if arguments.lanes else solve_scene
     shard, shards = (int(part) for part in arguments.shard.split("/"))
     indices = range(shard - 1, arguments.scenes, shards) if arguments.only is None else [arguments.only]
     rows, given_up = [], 0
@@ -232,7 +236,7 @@ def main():
             print(f"scene {index}: the independent code gave up", file=sys.stderr)
             continue
         for level in arguments.levels.split(","):
-            said = described(scene, index) | judged(scene, truth, Accuracy(level))
+            said = described(scene, index) | judged(scene, truth, Accuracy(level), solve)
             rows.append(said | {"kind": truth.kind, "true_period": truth.period, "own": truth.own.tolist()})
             if arguments.out is not None:
                 with arguments.out.open("a") as file:

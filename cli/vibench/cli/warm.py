@@ -11,17 +11,24 @@ from pathlib import Path
 from vibench.acquisition import MissingLibrary, need_extra, save_toml
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
 from vibench.sim import Accuracy, Harmonic, gong2025, lyapunov_exponent, steady_response
+from vibench.sim.study import Study, solve_study
 
 from .output import console
 
 DRIVE = Harmonic(frequency_hz=260.0, amplitude_m=5e-6)
 """m1 strikes both stops: flight, contact and whole collisions are entered."""
+LONG = Study.model_validate(
+    {"frequencies_hz": [130.0], "amplitudes_m": [20e-6], "duration_s": 3000.0, "budget_s": 0.0}
+)
+"""Worth lanes, and soon known to repeat."""
 
 
 def warm() -> None:
     """Compile the simulation, and the virtual rig where it is installed, before the first use."""
     with told("responses"):
         steady_response(gong2025(), DRIVE, accuracy=Accuracy.QUICK)
+    with told("curves and maps"):
+        solve_study(LONG)
     with told("exponents"):
         lyapunov_exponent(gong2025(), DRIVE, accuracy=Accuracy.QUICK)
     try:

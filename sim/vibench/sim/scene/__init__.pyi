@@ -34,9 +34,11 @@ from ._shares import (
     wilson_share as wilson_share,
 )
 from ._side_by_side import (
-    Settled as Settled,
+    Solved as Solved,
     settle_in_lanes as settle_in_lanes,
     settle_scenes as settle_scenes,
+    solve_in_lanes as solve_in_lanes,
+    solve_scenes as solve_scenes,
 )
 from ._solve import (
     settle_scene as settle_scene,

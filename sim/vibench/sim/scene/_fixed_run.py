@@ -26,6 +26,7 @@ from ._observed_window import (
 from ._pace import EXACTLY, Pace, growth_of
 from ._prediction import MotionKind
 from ._repetition import Repetition, kind_of
+from ._states_alone import Asking, Following, StatesAlone
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +55,9 @@ class SceneRun:
     (4,); zero unless the motion was found to repeat in the window only."""
 
 
-def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> SceneRun:
+def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> Asking[SceneRun]:
     """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
-    lead, is_settled = _lead(run, max(run.time_s, duration_s - window_s - pace.section_s), pace)
+    lead, is_settled = yield from _lead(run, max(run.time_s, duration_s - window_s - pace.section_s), pace)
     last = follow_strobed(run, duration_s - window_s)
     before = pace.repeats([last])
     if before is None:
@@ -101,32 +102,29 @@ def judged(
 
 MOST_LOOKS = 4096
 """States that are kept of a long lead at most: enough to see other starts part from it."""
-SECTIONS = 16
-"""How often it is looked for on a long lead whether the motion repeats: a look costs a section of states."""
+LOOKS = 16
+"""How often it is looked for on a long lead whether the motion repeats, at least."""
+LONGEST_SLICE = 1 << 16
+"""Drive periods between two looks, at most: their states are held."""
 
 
-def _lead(run: FollowedRun, until_s: float, pace: Pace) -> tuple[tuple[Stretch, ...], bool]:
+def _lead(run: FollowedRun, until_s: float, pace: Pace) -> Asking[tuple[tuple[Stretch, ...], bool]]:
     """Advance to an instant, and keep some states on the way; and whether the motion repeated before.
 
     What repeats to rounding is followed no further: the whole cycles that are left are passed over. Where
     steps follow one another without a break nothing repeats so nearly.
     """
+    periods = whole_periods(until_s, pace.frequency_hz)
+    every = max(1, math.ceil(periods / MOST_LOOKS))
+    if not pace.sharpness.noise < EXACTLY:
+        samples = samples_between(pace.frequency_hz / every, run.time_s, until_s)
+        return (run.follow(until_s, samples=samples),), False
     exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
-    may_repeat = pace.sharpness.noise < EXACTLY
-    section_s = pace.section_s if may_repeat else 0.0
-    look_s = max(section_s, until_s / SECTIONS) if may_repeat else until_s
-    rate_hz = pace.frequency_hz / max(1, math.ceil(whole_periods(until_s, pace.frequency_hz) / MOST_LOOKS))
-    path: list[Stretch] = []
-    while run.outcome is Outcome.REACHED_END and run.time_s < until_s:
-        look_at_s = min(until_s, run.time_s + look_s)
-        before_s = max(run.time_s, look_at_s - section_s)
-        path.append(run.follow(before_s, samples=samples_between(rate_hz, run.time_s, before_s)))
-        if not may_repeat:
-            continue
-        path.append(follow_strobed(run, look_at_s))
-        repeats = exact.repeats(path[-1:])
-        if repeats is not None:
-            left = (until_s - run.time_s) * pace.frequency_hz
-            run.pass_over(int(left / repeats.period) * repeats.period)
-            return tuple(path), True
-    return tuple(path), False
+    states = StatesAlone(
+        run, exact, slice_periods=min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE), every=every
+    )
+    yield [Following(states, until_s, math.inf)]
+    if states.repeats is not None:
+        left = (until_s - run.time_s) * pace.frequency_hz
+        run.pass_over(int(left / states.repeats.period) * states.repeats.period)
+    return tuple(states.path), states.repeats is not None

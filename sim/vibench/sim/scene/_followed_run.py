@@ -2,7 +2,7 @@
 
 import math
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Self
 
@@ -84,6 +84,12 @@ class Stretch:
     def length_s(self) -> float:
         """From its start to its end."""
         return self.end_s - self.start_s
+
+    def thinned(self, every: int) -> "Stretch":
+        """Give the same with every so manyth state alone."""
+        first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
+        kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
+        return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
 
 
 class FollowedRun:

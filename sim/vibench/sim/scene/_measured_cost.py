@@ -4,11 +4,11 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from ..costs import FEWEST, cost_ledger
+from ..costs import FEWEST, Expected, cost_ledger
 from ._plan import ScenePlan, plan_scene
 from ._prediction import ScenePrediction
 from ._scene import Scene
-from ._side_by_side import settle_in_lanes
+from ._side_by_side import settle_in_lanes, solve_in_lanes
 from ._solve import settle_scene, solve_scene
 
 MEASURED_S = 0.5
@@ -20,8 +20,12 @@ DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
 Solver = Callable[[Scene], ScenePrediction]
 
 
-SETTLED: dict[Solver, str] = {settle_scene: "settled", settle_in_lanes: "settled in lanes"}
-"""Solvers that find less than `solve_scene`, and what their runs are learnt as."""
+LEARNT_AS: dict[Solver, str] = {
+    settle_scene: "settled",
+    settle_in_lanes: "settled in lanes",
+    solve_in_lanes: "in lanes",
+}
+"""Solvers other than `solve_scene`, and what their runs are learnt as."""
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
@@ -36,7 +40,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
     Raises ValueError when the specimen cannot be followed in time.
     """
     plan = plan_scene(scene)
-    return cost_ledger().expected(_kind(plan, solver), plan.planned_s).time_s
+    return _expected(plan, solver, plan.planned_s).time_s
 
 
 def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
@@ -45,11 +49,17 @@ def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
     Raises ValueError when the specimen cannot be followed in time.
     """
     plan = plan_scene(scene)
-    return cost_ledger().expected(_kind(plan, solver), plan.longest_planned_s).time_s
+    return _expected(plan, solver, plan.longest_planned_s).time_s
+
+
+def _expected(plan: ScenePlan, solver: Solver, planned_s: float) -> Expected:
+    """Go by what a solver's runs took, or else by those of `solve_scene`, which takes longest."""
+    own = cost_ledger().expected(_kind(plan, solver), planned_s)
+    return own if own.runs >= FEWEST else cost_ledger().expected(plan.kind, planned_s)
 
 
 def _kind(plan: ScenePlan, solver: Solver) -> str:
-    return f"{SETTLED[solver]}/{plan.kind}" if solver in SETTLED else plan.kind
+    return f"{LEARNT_AS[solver]}/{plan.kind}" if solver in LEARNT_AS else plan.kind
 
 
 def measure_cost(scene: Scene) -> None:

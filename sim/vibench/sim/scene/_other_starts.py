@@ -10,6 +10,7 @@ from ._prediction import Ensemble, StartMemory
 from ._repetition import FEWEST_NEUTRAL
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
 from ._several_starts import FEWEST, Draw, Horizon, ReachedMotion, SeveralStarts, forgets_its_start
+from ._states_alone import Asking
 
 ALONE = 0.5
 """Share of a budget that is spent on following chaos on; other starts have the rest."""
@@ -46,13 +47,13 @@ def ensemble_beside(
     pace: Pace,
     error_of: ErrorOf,
     draw: Draw | None = None,
-) -> Ensemble | None:
+) -> Asking[Ensemble | None]:
     """Follow other starts beside the one asked for, as the budget of the scene allows or as ``draw`` says.
 
     None where the budget allows too few.
     """
     several = SeveralStarts(begin, asked, pace, _horizon(scene, pace), draw or _draw(scene, asked))
-    several.follow()
+    yield from several.follow()
     if len(several.reached) == 1:
         return None
     return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)

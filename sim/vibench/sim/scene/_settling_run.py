@@ -6,9 +6,8 @@ on by its states alone for as long as a budget allows.
 """
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar, cast
 
 from ..model import Outcome
 from ._fixed_run import SceneRun, judged
@@ -17,9 +16,8 @@ from ._observed_window import follow_strobed, states_of, whole_periods, window_o
 from ._pace import Pace, growth_of
 from ._prediction import MotionKind
 from ._repetition import Repetition, kind_of, wandered_until
-from ._states_alone import Following, StatesAlone
+from ._states_alone import Asking, Following, StatesAlone
 
-Answer = TypeVar("Answer")
 SLICE_S, SLICE_PERIODS = 0.25, 4
 """Between two looks pass this long and this many drive periods, if the window is not shorter."""
 WINDOWS = 2
@@ -38,27 +36,14 @@ class Patience:
     """Nominal cost of following chaos on by its states alone; zero does not follow it on."""
 
 
-Settling = Generator[Following, None, SceneRun]
-"""A motion that is being settled: it asks for motions to be followed, and goes on when they have been."""
-
-
-def alone(asking: Generator[Following, None, Answer]) -> Answer:
-    """Bring one motion to its end by itself."""
-    try:
-        while True:
-            next(asking).by_itself()
-    except StopIteration as end:
-        return cast("Answer", end.value)
-
-
-def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Settling:
+def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRun]:
     """Follow a motion that is at time zero until it repeats or surely never will, and observe it."""
     slice_periods, in_window = _slices(patience.window_s, pace.frequency_hz)
     longest_s = patience.longest_s
     watched_after_s = min(pace.attractor_s, longest_s - in_window * slice_periods / pace.frequency_hz)
     slices = max(0, math.ceil(watched_after_s * pace.frequency_hz / slice_periods))
     begun = StatesAlone(run, pace, slice_periods=slice_periods)
-    yield Following(begun, slices * slice_periods / pace.frequency_hz, math.inf)
+    yield [Following(begun, slices * slice_periods / pace.frequency_hz, math.inf)]
     early = begun.path
     if begun.repeats is not None:
         return _observe_period(run, begun.repeats, early, pace)
@@ -90,7 +75,7 @@ def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Settling:
 
 def _followed_on(
     run: FollowedRun, path: Sequence[Stretch], watched: int, patience: Patience, pace: Pace
-) -> Settling:
+) -> Asking[SceneRun]:
     """Follow chaos on by its states alone, until it dies out or the budget is used up, and observe it.
 
     The last ``watched`` stretches of the path were observed.
@@ -99,7 +84,7 @@ def _followed_on(
     window_s = in_window * slice_periods / pace.frequency_hz
     states = StatesAlone(run, pace, states_of(path))
     until_s = whole_periods(patience.longest_s - window_s, pace.frequency_hz) / pace.frequency_hz
-    yield Following(states, until_s, run.cost_s + patience.alone_s)
+    yield [Following(states, until_s, run.cost_s + patience.alone_s)]
     if states.repeats is not None:
         seen = _observe_period(run, states.repeats, path, pace)
         return replace(seen, grew=True, wandered_until_s=states.wandered_until_s)

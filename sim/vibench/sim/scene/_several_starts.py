@@ -20,7 +20,7 @@ from ._prediction import MotionKind
 from ._repetition import NEUTRAL, Growth, kind_of
 from ._scatter import WindowScatter, window_scatter
 from ._shares import EscapeRate, escape_rate
-from ._states_alone import StatesAlone
+from ._states_alone import Asking, Following, StatesAlone
 
 PUSH = 1e-6
 """Largest difference between starts: displacements over the gap, velocities over gap times 2 pi f."""
@@ -169,19 +169,21 @@ class SeveralStarts:
             return None
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
-    def follow(self) -> None:
+    def follow(self) -> Asking[None]:
         """Follow as many starts as the budget allows, as far as it takes, and observe them."""
         asked, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = asked.cost_s * min(1.0, self._horizon.first_s / asked.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
             return
-        spent_s = self._follow_some(self._draw.clear - 1, budget_s, each_s)
+        spent_s = yield from self._follow_some(self._draw.clear - 1, budget_s, each_s)
         if not self._is_clear:
-            spent_s += self._follow_some(self._draw.fewest - self._draw.clear, budget_s - spent_s, each_s)
+            more = self._draw.fewest - self._draw.clear
+            spent_s += yield from self._follow_some(more, budget_s - spent_s, each_s)
         if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
             # What a start took tells how many more the budget allows.
             each_s = spent_s / (len(self.reached) - 1)
-            self._follow_some(self._draw.most - self._draw.fewest, budget_s - spent_s, each_s)
+            more = self._draw.most - self._draw.fewest
+            yield from self._follow_some(more, budget_s - spent_s, each_s)
 
     @property
     def _is_clear(self) -> bool:
@@ -189,12 +191,12 @@ class SeveralStarts:
         settled = all(each.period is not None for each in self._reached)
         return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
 
-    def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
+    def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> Asking[float]:
         """Follow more starts, as many as a budget allows, and observe them; gives what it cost."""
         count = _as_many(wanted, budget_s, each_s)
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
-        self._follow_rounds(budget_s)
+        yield from self._follow_rounds(budget_s)
         found = [self._observed(each) for each in self._under_way]
         self._under_way = []
         self._reached += [each for each in found if each.run.outcome is Outcome.REACHED_END]
@@ -216,15 +218,18 @@ class SeveralStarts:
         reached = any(each.period is not None for each in self._reached)
         return reached or any(each.repeats is not None for each in self._under_way)
 
-    def _follow_rounds(self, budget_s: float) -> None:
+    def _follow_rounds(self, budget_s: float) -> Asking[None]:
         reach_s = min(self._horizon.first_s, self._horizon.last_s)
         while True:
             left = [each for each in self._under_way if not each.is_over]
-            for place, each in enumerate(left):
-                allowed_s = max(0.0, budget_s - self._cost_s) / (len(left) - place)
-                each.follow(reach_s, each.run.cost_s + allowed_s)
+            allowed_s = max(0.0, budget_s - self._cost_s) / max(1, len(left))
+            yield [Following(each, reach_s, each.run.cost_s + allowed_s) for each in left]
             left = [each for each in left if not each.is_over]
-            if not left or reach_s >= self._horizon.last_s or self._cost_s >= budget_s or self._is_lasting:
+            if not left or self._cost_s >= budget_s or self._is_lasting:
+                return
+            if any(each.run.time_s < reach_s for each in left):
+                continue  # On what the others have not used of their parts.
+            if reach_s >= self._horizon.last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)
             reach_s = min(2.0 * reach_s, lasting_s, self._horizon.last_s)

@@ -1,26 +1,27 @@
-"""Scenes that are settled beside others, as long as states alone are followed. SI units."""
+"""Scenes that are solved beside others, as long as states alone are followed. SI units."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ._prediction import ScenePrediction
 from ._scene import Scene
-from ._solve import settling_scene
-from ._states_alone import Following, follow_all
+from ._solve import settling_scene, solving_scene
+from ._states_alone import Asking, Following, follow_all
 
 
 @dataclass(frozen=True, eq=False)
-class Settled:
-    """What a scene came to that was settled beside others."""
+class Solved:
+    """What a scene came to that was solved beside others."""
 
     prediction: ScenePrediction
     taken_s: float
-    """Processor time of this thread for it [s]; of what was followed together, its part."""
+    """Processor time of this thread for it [s]; of what was followed together, its part. NaN when compiling
+    was part of it."""
 
 
-def settle_scenes(scenes: Sequence[Scene]) -> list[Settled]:
-    """Settle several scenes, each as `settle_scene` does, in lanes as long as states are enough.
+def solve_scenes(scenes: Sequence[Scene]) -> list[Solved]:
+    """Solve several scenes, each as `solve_scene` does, in lanes as long as states are enough.
 
     The answer to each does not depend on the others.
 
@@ -30,11 +31,22 @@ def settle_scenes(scenes: Sequence[Scene]) -> list[Settled]:
         When one of them cannot be followed in time, or not from its start.
 
     """
-    under_way = [settling_scene(scene) for scene in scenes]
+    return _side_by_side(scenes, solving_scene)
+
+
+def settle_scenes(scenes: Sequence[Scene]) -> list[Solved]:
+    """Settle several scenes, each as `settle_scene` does; as `solve_scenes` otherwise."""
+    return _side_by_side(scenes, settling_scene)
+
+
+def _side_by_side(
+    scenes: Sequence[Scene], asking: Callable[[Scene], Asking[ScenePrediction]]
+) -> list[Solved]:
+    under_way = [asking(scene) for scene in scenes]
     answers: dict[int, ScenePrediction] = {}
     taken_s = [0.0] * len(scenes)
     while len(answers) < len(scenes):
-        asked: dict[int, Following] = {}
+        asked: dict[int, Sequence[Following]] = {}
         for place, each in enumerate(under_way):
             if place not in answers:
                 began_s = time.thread_time()
@@ -44,10 +56,19 @@ def settle_scenes(scenes: Sequence[Scene]) -> list[Settled]:
                     answers[place] = end.value
                 taken_s[place] += time.thread_time() - began_s
         began_s = time.thread_time()
-        follow_all(list(asked.values()))
-        for place in asked:
-            taken_s[place] += (time.thread_time() - began_s) / len(asked)
-    return [Settled(answers[place], taken_s[place]) for place in range(len(scenes))]
+        follow_all([each for several in asked.values() for each in several])
+        share_s = (time.thread_time() - began_s) / max(1, sum(len(each) for each in asked.values()))
+        for place, several in asked.items():
+            taken_s[place] += share_s * len(several)
+    return [Solved(answers[place], taken_s[place]) for place in range(len(scenes))]
+
+
+def solve_in_lanes(scene: Scene) -> ScenePrediction:
+    """Solve one scene as `solve_scenes` does among any others: to the last digit the same answer.
+
+    For one scene alone `solve_scene` is faster; of chaos it is another draw.
+    """
+    return solve_scenes([scene])[0].prediction
 
 
 def settle_in_lanes(scene: Scene) -> ScenePrediction:

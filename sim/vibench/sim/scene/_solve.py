@@ -1,7 +1,6 @@
 """The answer to a scene: what was seen, and how far to trust it. SI units."""
 
 import math
-from collections.abc import Generator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +20,7 @@ from ._plan import plan_of, transient_decay_s
 from ._prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
 from ._scatter import WindowScatter, window_scatter
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
-from ._settling_run import Patience, alone, settling
+from ._settling_run import Patience, settling
 from ._several_starts import FEWEST, SEED, TOO_FEW, Draw, ReachedMotion, reached_motion
 from ._stated_error import (
     ROUNDING,
@@ -33,7 +32,7 @@ from ._stated_error import (
     stated_errors,
     with_errors,
 )
-from ._states_alone import Following
+from ._states_alone import Asking, alone
 
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
@@ -56,11 +55,16 @@ def solve_scene(scene: Scene) -> ScenePrediction:
         When the specimen cannot be followed in time, or not from such a start.
 
     """
+    return alone(solving_scene(scene))
+
+
+def solving_scene(scene: Scene) -> Asking[ScenePrediction]:
+    """Do as `solve_scene`, and hand out what may be followed beside others."""
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     plan = plan_of(scene, motion)
     if plan.method is Method.CLOSED_FORM:
         return _in_closed_form(scene, motion)
-    return _followed(scene, plan.method, motion)
+    return (yield from _followed(scene, plan.method, motion))
 
 
 def solve_ensemble(
@@ -100,14 +104,14 @@ def solve_ensemble(
         return None
     begin = FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
     run = begin.apart()
-    seen, pace = _seen(scene, run, motion)
+    seen, pace = alone(_seen(scene, run, motion))
     if run.outcome is not Outcome.REACHED_END:
         return None
     asked = _asked(run, seen, _between_windows(seen))
     errors = stated_errors(scene, begin, run, seen, pace, motion.slowest_rate)
     error_of = _error_of(scene.accuracy, asked, errors, pace)
     draw = Draw(starts, starts, starts, seed, budget_s)
-    return ensemble_beside(scene, begin, asked, pace, error_of, draw)
+    return alone(ensemble_beside(scene, begin, asked, pace, error_of, draw))
 
 
 def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
@@ -175,7 +179,7 @@ def settle_scene(scene: Scene) -> ScenePrediction:
     return alone(settling_scene(scene))
 
 
-def settling_scene(scene: Scene) -> Generator[Following, None, ScenePrediction]:
+def settling_scene(scene: Scene) -> Asking[ScenePrediction]:
     """Do as `settle_scene`, and hand out what may be followed beside others."""
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
     method = plan_of(scene, motion).method
@@ -203,11 +207,11 @@ def _begun(scene: Scene) -> FollowedRun:
     return FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
 
 
-def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePrediction:
+def _followed(scene: Scene, method: Method, motion: LinearMotion) -> Asking[ScenePrediction]:
     """Follow the motion in time, and judge it."""
     begin = _begun(scene)
     run = begin.apart()
-    seen, pace = _seen(scene, run, motion)
+    seen, pace = yield from _seen(scene, run, motion)
     is_whole = run.outcome is Outcome.REACHED_END
     rate = motion.slowest_rate
     errors = stated_errors(scene, begin, run, seen, pace, rate) if is_whole else UNKNOWN_ERRORS
@@ -216,7 +220,8 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> ScenePredic
     ensemble: Ensemble | None = None
     if is_whole and (memory is StartMemory.LOST or Observable.SCATTER in scene.observe):
         asked = _asked(run, seen, drawn)
-        ensemble = ensemble_beside(scene, begin, asked, pace, _error_of(scene.accuracy, asked, errors, pace))
+        error_of = _error_of(scene.accuracy, asked, errors, pace)
+        ensemble = yield from ensemble_beside(scene, begin, asked, pace, error_of)
     return _found(scene, method, run, seen, _Judged(errors, drawn, memory, ensemble))
 
 
@@ -256,14 +261,14 @@ def _found(scene: Scene, method: Method, run: FollowedRun, seen: SceneRun, by: _
     return _with_pictures(scene, found, seen) if is_whole else found
 
 
-def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> tuple[SceneRun, Pace]:
+def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> Asking[tuple[SceneRun, Pace]]:
     """Follow the motion for as long as was asked; chaos alone for a part of the budget."""
-    return alone(_watching(scene, run, motion, ALONE * scene.budget_s))
+    return _watching(scene, run, motion, ALONE * scene.budget_s)
 
 
 def _watching(
     scene: Scene, run: FollowedRun, motion: LinearMotion, alone_s: float
-) -> Generator[Following, None, tuple[SceneRun, Pace]]:
+) -> Asking[tuple[SceneRun, Pace]]:
     """Do the same, chaos alone for so long, and hand out what may be followed beside others."""
     drive = scene.drive
     match scene.duration:
@@ -274,7 +279,7 @@ def _watching(
     pace = pace_of(scene.specimen, drive.frequency_hz, scene.accuracy, motion.slowest_rate, longest_s)
     match scene.duration:
         case FixedDuration(duration_s=duration_s, window_s=window_s):
-            return run_for(run, duration_s, window_s, pace), pace
+            return (yield from run_for(run, duration_s, window_s, pace)), pace
         case AutomaticDuration(window_s=window_s):
             return (yield from settling(run, Patience(window_s, longest_s, alone_s), pace)), pace
 

@@ -1,9 +1,13 @@
-"""A motion followed by its states alone, until it repeats: chaos that has shown itself, and other starts."""
+"""A motion followed by its states alone, until it repeats: leads, lasting chaos, other starts. SI units.
+
+Who needs one yields it, and goes on when it has been followed: alone, or in lanes beside others.
+"""
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -27,18 +31,24 @@ class StatesAlone:
     """A run without a tangent, looked at now and then."""
 
     def __init__(
-        self, run: FollowedRun, pace: Pace, recent: Floats | None = None, slice_periods: int | None = None
+        self,
+        run: FollowedRun,
+        pace: Pace,
+        recent: Floats | None = None,
+        slice_periods: int | None = None,
+        every: int = 1,
     ) -> None:
         run.drop_tangent()
         self.run = run
         self.path: list[Stretch] = []
-        """What was seen of it, state after state."""
+        """What was seen of it: every state, or every so manyth."""
         self.repeats: Repetition | None = None
         """Found; it is followed no further then."""
         self.recent = np.empty((0, 6)) if recent is None else recent
         """States once a drive period, up to now."""
         self._settled_s: float | None = None
         self._pace = pace
+        self._every = every
         self._slice_periods = slice_periods or max(1, math.ceil(SLICE_S * pace.frequency_hz))
         self._kept = section_needed(pace.forgetting_periods) + math.ceil(REMEMBERED * pace.forgetting_periods)
 
@@ -74,7 +84,7 @@ class StatesAlone:
 
     def _noted(self, stretch: Stretch) -> Repetition | None:
         """Keep the states of a stretch, and say whether the motion repeats."""
-        self.path.append(stretch)
+        self.path.append(stretch.thinned(self._every))
         self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
         return self._pace.repeats_in(self.recent)
 
@@ -124,6 +134,21 @@ class Following:
             if run.is_in_flight or run.periods is None:
                 return
             self.alone.follow(min((run.periods + 1) / run.drive.frequency_hz, self.until_s), self.cost_s)
+
+
+Answer = TypeVar("Answer")
+Asking = Generator[Sequence[Following], None, Answer]
+"""What asks for motions to be followed, and goes on when they have been."""
+
+
+def alone(asking: Asking[Answer]) -> Answer:
+    """Bring what asks to its end by itself, one motion after the other."""
+    try:
+        while True:
+            for each in next(asking):
+                each.by_itself()
+    except StopIteration as end:
+        return cast("Answer", end.value)
 
 
 def follow_all(several: Sequence[Following]) -> None:

@@ -22,7 +22,6 @@ from ._errors import (
 )
 from ._executor import (
     Executor as Executor,
-    Solved as Solved,
     Solver as Solver,
 )
 from ._expansion import (

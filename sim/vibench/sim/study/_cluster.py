@@ -13,9 +13,9 @@ from functools import partial
 from distributed import CancelledError, Client, Future
 from distributed.comm import get_address_host_port
 
-from ..scene import Scene, solve_scene
+from ..scene import Scene, Solved, solve_scene
 from ._errors import ClusterLost
-from ._executor import Bundle, Reply, Solved, Solver, solve_timed
+from ._executor import Bundle, Reply, Solver, solve_timed
 from ._software import software
 from ._threads import arrived_in
 

@@ -9,7 +9,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..scene import Method, Scene, ScenePrediction, Settled, learn_cost, settle_in_lanes, settle_scenes
+from ..scene import (
+    Method,
+    Scene,
+    ScenePrediction,
+    Solved,
+    learn_cost,
+    settle_in_lanes,
+    settle_scenes,
+    solve_in_lanes,
+    solve_scenes,
+)
 
 
 @dataclass(frozen=True)
@@ -19,15 +29,6 @@ class Bundle:
     numbers: tuple[int, ...]
     """Which points of the study they are."""
     scenes: tuple[Scene, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """The answer to one scene, and what it cost."""
-
-    prediction: ScenePrediction
-    taken_s: float
-    """Processor time of the thread that computed it [s]; NaN when compiling was part of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +72,10 @@ class Executor(Protocol):
 Solver = Callable[[Scene], ScenePrediction]
 Kind = tuple[object, ...]
 
-TOGETHER: dict[Solver, Callable[[Sequence[Scene]], Sequence[Settled]]] = {settle_in_lanes: settle_scenes}
+TOGETHER: dict[Solver, Callable[[Sequence[Scene]], Sequence[Solved]]] = {
+    settle_in_lanes: settle_scenes,
+    solve_in_lanes: solve_scenes,
+}
 """Solvers that answer several scenes in less time than one after the other."""
 
 _solved_before: set[Kind] = set()
@@ -92,14 +96,14 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
         yield from _noted(scenes, solver, together)
 
 
-def _timed(scene: Scene, solver: Solver) -> Settled:
+def _timed(scene: Scene, solver: Solver) -> Solved:
     start_s = time.thread_time()
     prediction = solver(scene)
-    return Settled(prediction, time.thread_time() - start_s)
+    return Solved(prediction, time.thread_time() - start_s)
 
 
 def _noted(
-    scenes: Sequence[Scene], solver: Solver, solve: Callable[[Sequence[Scene]], Sequence[Settled]]
+    scenes: Sequence[Scene], solver: Solver, solve: Callable[[Sequence[Scene]], Sequence[Solved]]
 ) -> Iterator[Solved]:
     """Solve scenes, and learn what they cost from those whose kernels were compiled before."""
     kinds: list[Kind] = [

@@ -14,16 +14,17 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..kernels import Floats
+from ..lanes import lanes_pay
 from ..model import Outcome
-from ..scene import Given, Rest, Scene, plan_scene
+from ..scene import Given, Rest, Scene, Solved, expected_cost_s, solve_in_lanes, solve_scene
 from ._answers import cells_of, cut_text
 from ._arrays import Arrays, PointAnswer
 from ._axes import Grid
 from ._columns import CONTINUES, DURATION, FINAL_STATE, IDENTITY, IDENTITY_DIGITS, MESSAGE, PHASE, TAKEN, Cell
-from ._executor import Solved
+from ._executor import Solver
 from ._layout import PointState
 from ._point_scheduler import NOBODY
-from ._study import GivenStart, Start, Study
+from ._study import AXES_OF_SPECIMEN, GivenStart, Start, Study
 
 _scenes = TypeAdapter(Scene)
 
@@ -100,18 +101,40 @@ def failed_point(number: int, error: BaseException) -> PointAnswer:
     return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(said)})
 
 
-BUNDLE_S = 0.05
-"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster."""
+BUNDLE_S, LANES_S = 0.05, 0.5
+"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster; and that of
+scenes that fill the lanes."""
+WORTH_A_FIT_S = 3000.0
+"""Motion of one specimen that is worth fitting its collisions, which takes a second [s]."""
+AUTOMATIC_S = 10.0
+"""What an automatic duration counts for there [s]."""
+OTHER_STARTS = 8
+"""What a point counts for whose start may be forgotten: then so many are followed at least."""
+
+
+def study_solver(study: Study) -> Solver:
+    """Choose what computes the points of a study: lanes, or one point after the other.
+
+    Lanes follow motions that do not wait for each other, and pay where a processor has the registers and a
+    specimen is moved for long enough. What they cannot follow (other stops than Hertz's, accuracy
+    *reference*) goes one by one either way.
+    """
+    is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
+    each_s = AUTOMATIC_S if study.duration_s == "auto" else study.duration_s
+    starts = OTHER_STARTS if study.budget_s > 0.0 else 1
+    motion_s = each_s * starts * math.prod(study.grid.shape[AXES_OF_SPECIMEN:])
+    pays = not is_chained and motion_s >= WORTH_A_FIT_S and lanes_pay()
+    return solve_in_lanes if pays else solve_scene
 
 
 class Expansion:
     """The scenes of a study, made when they are asked for."""
 
-    bundle_s = BUNDLE_S
-
     def __init__(self, study: Study) -> None:
         self._study = study
         self.grid = study.grid
+        self._solver = study_solver(study)
+        self.bundle_s = BUNDLE_S if self._solver is solve_scene else LANES_S
 
     @cached_property
     def after(self) -> NDArray[np.int64]:
@@ -183,7 +206,7 @@ class Expansion:
     def _planned(self, number: int) -> float:
         """Planned time of a point; none when its scene is not allowed, which its answer will say."""
         try:
-            return plan_scene(self._unchained(number)).cost_s
+            return expected_cost_s(self._unchained(number), self._solver)
         except ValueError:
             return 0.0
 

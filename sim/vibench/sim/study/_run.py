@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels import Floats
-from ..scene import Scene
+from ..scene import Scene, Solved
 from ._arrays import Arrays, PointAnswer, is_failed, states
 from ._axes import Grid
 from ._columns import TAKEN
-from ._executor import Bundle, Executor, Reply, Solved
+from ._executor import Bundle, Executor, Reply
 from ._expansion import Expansion
 from ._layout import PointState
 from ._point_scheduler import Costs, PointScheduler

@@ -10,6 +10,7 @@ from ..model import chosen
 from ..scene import solve_scene
 from ._errors import ClusterLost
 from ._executor import Executor, Solver
+from ._expansion import study_solver
 from ._grid_plan import GridPlan
 from ._progress import Cancelled, StudyObserver
 from ._results import StudyResults, open_study, results_of
@@ -67,7 +68,8 @@ def solve_study(
         In one sentence: a file of another study, a cluster that does not answer, a full disk, ...
 
     """
-    with executor_of(workers, cluster) as executor, store_of(study, out, existing) as store:
+    solver = study_solver(study)
+    with executor_of(workers, cluster, solver) as executor, store_of(study, out, existing) as store:
         run_study(study, executor, store, observer, cancelled)
         arrays = store.arrays
     return results_of(study, arrays) if out is None else open_study(out)

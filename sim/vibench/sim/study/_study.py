@@ -97,6 +97,10 @@ def _described(said: dict[str, Any]) -> SpecimenTable:
     return found
 
 
+AXES_OF_SPECIMEN = 3
+"""The first axes of a study: contact law, damping, gap."""
+
+
 class Study(GridPlan):
     """What is to be predicted, completely: two equal studies have equal answers."""
 

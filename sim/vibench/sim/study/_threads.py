@@ -8,9 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import TypeVar
 
-from ..scene import Scene, solve_scene
+from ..scene import Scene, Solved, solve_scene
 from ._errors import InvalidStudy
-from ._executor import Bundle, Reply, Solved, Solver, solve_timed
+from ._executor import Bundle, Reply, Solver, solve_timed
 
 Item = TypeVar("Item")
 

@@ -1,0 +1,97 @@
+"""Curves of many points go through lanes: chosen by the plan, the same on any thread, as true as stated."""
+
+import numpy as np
+import pytest
+
+from vibench.sim import Harmonic, MotionKind, Rest, Scene, gong2025, solve_scene
+from vibench.sim.lanes import lanes_pay
+from vibench.sim.scene import FixedDuration, Method, StartMemory, solve_in_lanes, solve_scenes
+from vibench.sim.study import Study, solve_study
+from vibench.sim.study._expansion import study_solver
+
+CURVE = {"frequencies_hz": {"start": 90.0, "stop": 270.0, "step": 9.0}, "amplitudes_m": [20e-6]}
+
+
+@pytest.fixture(scope="module")
+def curve():
+    """Three resonances' worth of points: still, repeating, chaotic, with a few other starts each."""
+    return Study(**CURVE, duration_s=20.0, window_s=1.0, budget_s=0.05)
+
+
+@pytest.fixture(scope="module")
+def answers(curve):
+    return solve_study(curve, workers=1)
+
+
+@pytest.mark.skipif(not lanes_pay(), reason="the processor has no registers that lanes pay in")
+@pytest.mark.parametrize(
+    ("changed", "in_lanes"),
+    [
+        ({}, True),
+        ({"budget_s": 0.0}, False),
+        ({"budget_s": 0.0, "amplitudes_m": [float(k) * 1e-6 for k in range(1, 9)]}, True),
+        ({"starts": ("rest", "up")}, False),
+        ({"frequencies_hz": [260.0]}, False),
+        ({"duration_s": "auto"}, False),
+        ({"duration_s": "auto", "amplitudes_m": [10e-6, 20e-6]}, True),
+        ({"gaps_m": [30e-6, 45e-6], "frequencies_hz": [100.0, 130.0, 160.0, 190.0]}, False),
+    ],
+)
+def test_lanes_are_taken_where_a_specimen_is_followed_for_long_and_no_point_waits(changed, in_lanes):
+    plan = Study(**{**CURVE, "duration_s": 20.0, "window_s": 1.0} | changed)
+    assert (study_solver(plan) is solve_in_lanes) is in_lanes
+
+
+def test_any_number_of_threads_gives_the_same_curve_bit_for_bit(curve, answers, require_equal):
+    require_equal(solve_study(curve, workers=3), answers)
+
+
+def test_a_point_of_a_curve_says_what_it_says_alone(curve, answers):
+    for place in (4, 11, 19):
+        alone = solve_in_lanes(curve.scene((0, 0, 0, 0, 0, place), Rest()))
+        frequency_hz = curve.frequencies_hz[place]
+        assert answers.values("response_i", frequency=frequency_hz).item() == alone.response_i
+        assert answers.values("error_estimate", frequency=frequency_hz).item() == alone.error_estimate
+        np.testing.assert_array_equal(
+            answers.values("final_state", frequency=frequency_hz).ravel(), alone.final_state
+        )
+
+
+def test_where_the_start_is_kept_lanes_answer_what_one_motion_alone_does_within_what_both_state():
+    scenes = [
+        Scene(
+            gong2025(), Harmonic(frequency_hz, amplitude_m), duration=FixedDuration(20.0, 1.0), budget_s=0.05
+        )
+        for frequency_hz in (100.0, 110.0, 120.0, 130.0, 140.0, 150.0, 420.0, 500.0)
+        for amplitude_m in (5e-6, 20e-6)
+    ]
+    kept = []
+    for scene, beside in zip(scenes, solve_scenes(scenes), strict=True):
+        found, alone = beside.prediction, solve_scene(scene)
+        assert (found.memory is StartMemory.LOST) == (alone.memory is StartMemory.LOST)
+        if alone.memory is StartMemory.KEPT:
+            assert (found.motion, found.period) == (alone.motion, alone.period)
+            stated = found.error_estimate + alone.error_estimate
+            assert found.response_i == pytest.approx(alone.response_i, rel=stated)
+            assert found.relative_ii == pytest.approx(alone.relative_ii, rel=stated)
+            kept.append(alone.motion)
+    assert kept.count(MotionKind.PERIODIC) >= 3
+
+
+def test_what_lanes_do_not_serve_is_answered_as_without_them():
+    drive, length = Harmonic(130.0, 20e-6), FixedDuration(2.0, 0.5)
+    scenes = [
+        Scene(gong2025(contact="rigid:0.5"), drive, duration=length, budget_s=0.0),
+        Scene(gong2025(), Harmonic(130.0, 1e-9), duration=FixedDuration(30.0, 0.5)),
+        Scene(gong2025(), drive, accuracy="reference", duration=length, budget_s=0.0),
+    ]
+    found = [each.prediction for each in solve_scenes(scenes)]
+    assert [repr(each) for each in found] == [repr(solve_scene(scene)) for scene in scenes]
+    assert found[1].method is Method.CLOSED_FORM
+
+
+def test_a_long_lead_is_thinned_and_its_start_still_known_to_be_kept():
+    # 13,000 drive periods, of which 4,096 states are held: another start is compared with these.
+    scene = Scene(gong2025(), Harmonic(130.0, 20e-6), duration=FixedDuration(105.0, 0.5))
+    assert solve_scene(scene).memory is StartMemory.KEPT
+    assert solve_in_lanes(scene).memory is StartMemory.KEPT
