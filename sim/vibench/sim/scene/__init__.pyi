@@ -45,3 +45,6 @@ from ._solve import (
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
 )
+from ._states_alone import (
+    lanes_are_worth_it as lanes_are_worth_it,
+)

@@ -32,7 +32,7 @@ from ._stated_error import (
     stated_errors,
     with_errors,
 )
-from ._states_alone import Asking, alone
+from ._states_alone import Asking, alone, in_lanes, lanes_are_worth_it
 
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
@@ -104,6 +104,7 @@ def solve_ensemble(
         return None
     begin = FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
     run = begin.apart()
+    follow = in_lanes if lanes_are_worth_it(starts, scene.duration) else alone
     seen, pace = alone(_seen(scene, run, motion))
     if run.outcome is not Outcome.REACHED_END:
         return None
@@ -111,7 +112,7 @@ def solve_ensemble(
     errors = stated_errors(scene, begin, run, seen, pace, motion.slowest_rate)
     error_of = _error_of(scene.accuracy, asked, errors, pace)
     draw = Draw(starts, starts, starts, seed, budget_s)
-    return alone(ensemble_beside(scene, begin, asked, pace, error_of, draw))
+    return follow(ensemble_beside(scene, begin, asked, pace, error_of, draw))
 
 
 def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:

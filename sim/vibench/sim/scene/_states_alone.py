@@ -12,12 +12,13 @@ from typing import TypeVar, cast
 import numpy as np
 
 from ..kernels import Floats
-from ..lanes import follow_in_lanes, lanes_serve
+from ..lanes import follow_in_lanes, lanes_pay, lanes_serve
 from ..model import Outcome, Specimen
 from ._followed_run import FollowedRun, Stretch
 from ._observed_window import follow_strobed, whole_periods
 from ._pace import Pace, growth_of
 from ._repetition import Growth, Repetition, section_needed, wandered_until
+from ._scene import AutomaticDuration, FixedDuration
 
 SLICE_S = 0.5
 """Time between two looks, at least."""
@@ -147,6 +148,31 @@ def alone(asking: Asking[Answer]) -> Answer:
         while True:
             for each in next(asking):
                 each.by_itself()
+    except StopIteration as end:
+        return cast("Answer", end.value)
+
+
+WORTH_A_FIT_S = 3000.0
+"""Motion of one specimen that is worth fitting its collisions, which takes a second [s]."""
+AUTOMATIC_S = 10.0
+"""What an automatic duration counts for there [s]."""
+
+
+def lanes_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
+    """Whether so many motions of one specimen are followed in less time in lanes than one after the other.
+
+    It hangs on what is asked for and on the processor, and not on what runs took lately: who asks twice has
+    the same answer twice.
+    """
+    each_s = duration.duration_s if isinstance(duration, FixedDuration) else AUTOMATIC_S
+    return motions * each_s >= WORTH_A_FIT_S and lanes_pay()
+
+
+def in_lanes(asking: Asking[Answer]) -> Answer:
+    """Bring what asks to its end, its motions side by side as far as lanes serve."""
+    try:
+        while True:
+            follow_all(next(asking))
     except StopIteration as end:
         return cast("Answer", end.value)
 

@@ -14,9 +14,17 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..kernels import Floats
-from ..lanes import lanes_pay
 from ..model import Outcome
-from ..scene import Given, Rest, Scene, Solved, expected_cost_s, solve_in_lanes, solve_scene
+from ..scene import (
+    Given,
+    Rest,
+    Scene,
+    Solved,
+    expected_cost_s,
+    lanes_are_worth_it,
+    solve_in_lanes,
+    solve_scene,
+)
 from ._answers import cells_of, cut_text
 from ._arrays import Arrays, PointAnswer
 from ._axes import Grid
@@ -104,10 +112,6 @@ def failed_point(number: int, error: BaseException) -> PointAnswer:
 BUNDLE_S, LANES_S = 0.05, 0.5
 """Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster; and that of
 scenes that fill the lanes."""
-WORTH_A_FIT_S = 3000.0
-"""Motion of one specimen that is worth fitting its collisions, which takes a second [s]."""
-AUTOMATIC_S = 10.0
-"""What an automatic duration counts for there [s]."""
 OTHER_STARTS = 8
 """What a point counts for whose start may be forgotten: then so many are followed at least."""
 
@@ -120,10 +124,9 @@ def study_solver(study: Study) -> Solver:
     *reference*) goes one by one either way.
     """
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
-    each_s = AUTOMATIC_S if study.duration_s == "auto" else study.duration_s
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1
-    motion_s = each_s * starts * math.prod(study.grid.shape[AXES_OF_SPECIMEN:])
-    pays = not is_chained and motion_s >= WORTH_A_FIT_S and lanes_pay()
+    motions = starts * math.prod(study.grid.shape[AXES_OF_SPECIMEN:])
+    pays = not is_chained and lanes_are_worth_it(motions, study.duration)
     return solve_in_lanes if pays else solve_scene
 
 

@@ -198,12 +198,14 @@ class Study(GridPlan):
             drive=Harmonic(self.frequencies_hz[frequency], self.amplitudes_m[amplitude], phase_rad),
             observe=self.observe,
             accuracy=self.accuracy,
-            duration=self._duration(),
+            duration=self.duration,
             start=start,
             budget_s=self.budget_s,
         )
 
-    def _duration(self) -> FixedDuration | AutomaticDuration:
+    @property
+    def duration(self) -> FixedDuration | AutomaticDuration:
+        """Of every point."""
         match self.duration_s:
             case "auto":
                 return AutomaticDuration(window_s=self.window_s)
