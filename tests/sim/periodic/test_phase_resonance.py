@@ -75,3 +75,8 @@ def test_what_newton_does_not_find_is_refused_and_not_told_as_a_motion(low_m):
 def test_a_band_that_holds_several_modes_is_refused_with_their_frequencies():
     with pytest.raises(ValueError, match=r"is at 94\.6"):
         phase_resonance_branch(gong2025(), (50.0, 600.0), (1e-8, 1e-7))
+
+
+def test_without_damping_there_is_none():
+    with pytest.raises(ValueError, match="without damping has no phase resonance"):
+        phase_resonance_branch(gong2025(0.0), (92.0, 97.0), (1e-8, 1e-7))

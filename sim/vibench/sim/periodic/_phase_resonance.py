@@ -140,11 +140,17 @@ def phase_resonance_branch(
     Raises
     ------
     ValueError
-        When no mode in the band has this phase, or several do, no motion is found at the lower level, it
-        already reaches the stops, or `of` is no word of `PhaseReference`.
+        When there is no damping, no mode in the band has this phase, or several do, no motion is found at the
+        lower level, it already reaches the stops, or `of` is no word of `PhaseReference`.
 
     """
     (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
+    if not any(specimen.dampings):
+        msg = (
+            "A specimen without damping has no phase resonance: at a resonance its motion without contacts "
+            "grows without end. Give a damping time above 0."
+        )
+        raise ValueError(msg)
     frequency_hz = linear_phase_resonance_hz(specimen, band_hz, of, phase_rad)
     drive = Harmonic(frequency_hz, low_m)
     answer = base_transmissibility(specimen, frequency_hz)[0]
