@@ -42,7 +42,7 @@ def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRu
     longest_s = patience.longest_s
     watched_after_s = min(pace.attractor_s, longest_s - in_window * slice_periods / pace.frequency_hz)
     slices = max(0, math.ceil(watched_after_s * pace.frequency_hz / slice_periods))
-    begun = StatesAlone(run, pace, slice_periods=slice_periods)
+    begun = StatesAlone(run, pace, slice_periods=slice_periods, every=1)
     yield [Following(begun, slices * slice_periods / pace.frequency_hz, math.inf)]
     early = begun.path
     if begun.repeats is not None:

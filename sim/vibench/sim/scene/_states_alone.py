@@ -37,12 +37,12 @@ class StatesAlone:
         pace: Pace,
         recent: Floats | None = None,
         slice_periods: int | None = None,
-        every: int = 1,
+        every: int | None = None,
     ) -> None:
         run.drop_tangent()
         self.run = run
         self.path: list[Stretch] = []
-        """What was seen of it: every state, or every so manyth."""
+        """What was seen of it, with ``every`` so manyth state; nothing unless that is asked for."""
         self.repeats: Repetition | None = None
         """Found; it is followed no further then."""
         self.recent = np.empty((0, 6)) if recent is None else recent
@@ -85,7 +85,8 @@ class StatesAlone:
 
     def _noted(self, stretch: Stretch) -> Repetition | None:
         """Keep the states of a stretch, and say whether the motion repeats."""
-        self.path.append(stretch.thinned(self._every))
+        if self._every is not None:
+            self.path.append(stretch.thinned(self._every))
         self.recent = np.concatenate([self.recent, stretch.states])[-self._kept :]
         return self._pace.repeats_in(self.recent)
 
@@ -99,8 +100,10 @@ class StatesAlone:
         return growth_of(stretches)
 
 
-ROUND_S = 2.0
-"""Time between two looks at motions in lanes, at least."""
+ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
+"""Time between two looks at motions in lanes, and drive periods at most: their states are held meanwhile."""
+HELD_STATES, FULL = 1 << 20, 16
+"""States of all motions in lanes together, at most, and motions at least: more fill lanes no better."""
 TRIES = 8
 """Drive periods that a motion is followed by itself until one ends in flight: lanes begin there."""
 
@@ -126,7 +129,7 @@ class Following:
             return 0
         frequency_hz = run.drive.frequency_hz
         left = whole_periods(self.until_s, frequency_hz) - run.periods
-        return min(left, math.ceil(ROUND_S * frequency_hz))
+        return min(left, math.ceil(ROUND_S * frequency_hz), ROUND_PERIODS)
 
     def to_flight(self) -> None:
         """Follow a motion that is in contact now until a drive period ends in flight, if one does soon."""
@@ -200,19 +203,26 @@ def _follow_rounds(group: Sequence[Following]) -> None:
         for each in under_way:
             each.to_flight()
         ready = [(each, each.periods) for each in under_way if each.periods > 0]
-        if not ready:
-            return
-        runs = [each.alone.run for each, _ in ready]
-        found = follow_in_lanes(
-            runs[0].specimen,
-            runs[0].tolerance,
-            [run.flight for run in runs],
-            [run.state for run in runs],
-            [periods for _, periods in ready],
-        )
-        # One that a lane has lost is where it was, and followed by itself.
+        longest = max((periods for _, periods in ready), default=1)
+        size = max(FULL, HELD_STATES // longest)
         under_way = [
-            each
-            for (each, _), lane in zip(ready, found, strict=True)
-            if lane is not None and not each.alone.note(each.alone.run.take(lane))
+            each for first in range(0, len(ready), size) for each in _round(ready[first : first + size])
         ]
+
+
+def _round(ready: Sequence[tuple[Following, int]]) -> list[Following]:
+    """Follow motions in lanes, each for so many drive periods; gives those that are to be followed on."""
+    runs = [each.alone.run for each, _ in ready]
+    found = follow_in_lanes(
+        runs[0].specimen,
+        runs[0].tolerance,
+        [run.flight for run in runs],
+        [run.state for run in runs],
+        [periods for _, periods in ready],
+    )
+    # One that a lane has lost is where it was, and followed by itself.
+    return [
+        each
+        for (each, _), lane in zip(ready, found, strict=True)
+        if lane is not None and not each.alone.note(each.alone.run.take(lane))
+    ]
