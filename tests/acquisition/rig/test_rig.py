@@ -38,6 +38,8 @@ def edited(tmp_path: Path, old: str, new: str, shipped: Path = VIRTUAL) -> Path:
             "gain = 10.0",
             r"amplifier\.gain_db is missing.*amplifier\.gain is not a known key",
         ),
+        ("low_cut_hz = 0.3", "low_cut_hz = 3e5", "low_cut_hz = 300000 must lie below high_cut_hz"),
+        ("moving_mass_kg = 0.057", "moving_mass_kg = 1.7e308", "too large to be computed with"),
         ("delay_s = 8e-6", "delay_s = -1.0", r"vibrometer\.delay_s = -1\.0: .*greater than or equal to 0"),
         ("delay_s = 8e-6", "delay_s = nan", r"vibrometer\.delay_s = nan: .*finite"),
         ('resource = "USB0', 'resource = "COM3', r"generator\.resource = 'COM3.*match pattern"),

@@ -81,3 +81,8 @@ def test_a_rig_that_states_no_noise_is_told_so_and_a_sweep_promises_nothing():
     assert "the sensors' noise is not stated" in first.sentence
     sweep = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=6)
     assert expected_uncertainty(Measurement(name="up", excitation=sweep), RIG) == ()
+
+
+def test_a_dwell_of_hours_a_period_promises_nothing():
+    slow = Dwell(amplitude_vpp=1.5, frequency_hz=1e-4, settle_s=0.1, duration_s=1)
+    assert expected_uncertainty(Measurement(name="slow", excitation=slow), RIG) == ()

@@ -74,3 +74,8 @@ def test_a_stop_counts_as_untouched_only_by_proof():
     soft, none = gong2025(contact="power:3"), gong2025(contact="linear")
     assert not never_touches(soft, linear_motion(soft, quiet, (0.0,) * 6))
     assert never_touches(none, linear_motion(none, loud, (0.0,) * 6))
+
+
+def test_numbers_that_grow_beyond_all_bounds_are_refused_in_a_sentence():
+    with pytest.raises(ValueError, match="cannot be computed: its numbers are too far apart"):
+        linear_motion(gong2025(1e300), DRIVE, np.zeros(6))

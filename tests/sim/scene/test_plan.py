@@ -56,3 +56,12 @@ def test_contacts_and_long_runs_cost_more():
         return plan_scene(Scene(gong2025(), drive, duration=FixedDuration(duration_s, 5.0))).planned_s
 
     assert cost(1e-9, 30.0) < cost(5e-6, 30.0) < cost(50e-6, 30.0) < cost(50e-6, 300.0)
+
+
+def test_a_hundred_times_the_drive_periods_cost_more_without_a_contact():
+    def cost(frequency_hz):
+        drive = Harmonic(frequency_hz, 1e-9)
+        length = FixedDuration(2.0, 1.9)
+        return plan_scene(Scene(gong2025(), drive, duration=length, budget_s=0.0)).planned_s
+
+    assert cost(1e6) > 30.0 * cost(1e4)

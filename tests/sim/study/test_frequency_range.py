@@ -43,3 +43,9 @@ def test_what_is_no_range_is_left_to_its_validator():
     assert listed("all") == "all"
     assert listed({"start": 1, "stop": 2}) == {"start": 1, "stop": 2}
     assert listed([1.0, "two"]) == [1.0, "two"]
+
+
+@pytest.mark.parametrize("start", ["true", None, "20"])
+def test_a_range_takes_three_numbers(start):
+    with pytest.raises(ValueError, match="give three numbers"):
+        listed({"start": start, "stop": 2.0, "step": 1.0})

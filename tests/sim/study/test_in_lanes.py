@@ -5,8 +5,16 @@ import pytest
 
 from vibench.sim import Harmonic, MotionKind, Rest, Scene, gong2025, solve_scene
 from vibench.sim.lanes import lanes_pay
-from vibench.sim.scene import FixedDuration, Method, StartMemory, solve_in_lanes, solve_scenes
-from vibench.sim.study import Study, solve_study
+from vibench.sim.scene import (
+    FixedDuration,
+    Given,
+    Method,
+    StartMemory,
+    _side_by_side,
+    solve_in_lanes,
+    solve_scenes,
+)
+from vibench.sim.study import Study, planned_work_s, solve_study
 from vibench.sim.study._expansion import study_solver
 
 CURVE = {"frequencies_hz": {"start": 90.0, "stop": 270.0, "step": 9.0}, "amplitudes_m": [20e-6]}
@@ -95,3 +103,34 @@ def test_a_long_lead_is_thinned_and_its_start_still_known_to_be_kept():
     scene = Scene(gong2025(), Harmonic(130.0, 20e-6), duration=FixedDuration(105.0, 0.5))
     assert solve_scene(scene).memory is StartMemory.KEPT
     assert solve_in_lanes(scene).memory is StartMemory.KEPT
+
+
+@pytest.mark.parametrize(("phase_rad", "length"), [(0.5 * np.pi, (20.0, 1.0)), (1.57, (20.0, 1.0))])
+def test_a_start_is_kept_though_the_motion_is_in_contact_once_a_period(phase_rad, length):
+    drive = Harmonic(130.0, 20e-6, phase_rad)
+    scene = Scene(gong2025(), drive, duration=FixedDuration(*length), budget_s=0.02)
+    assert solve_scene(scene).memory is StartMemory.KEPT
+    assert solve_in_lanes(scene).memory is StartMemory.KEPT
+
+
+def test_on_its_way_to_the_attractor_a_motion_is_followed_by_itself():
+    # m1 rattles: more than a hundred impacts a period, whose errors add up until they are forgotten.
+    state = (-4.911e-05, -5.537e-05, 9.979e-06, -0.02334, 0.01178, 0.03798)
+    drive, length = Harmonic(105.98, 3.15e-07), FixedDuration(3.0, 1.0)
+    scene = Scene(gong2025(), drive, duration=length, start=Given(state), budget_s=0.02)
+    assert repr(solve_in_lanes(scene)) == repr(solve_scene(scene))
+
+
+def test_scenes_that_hold_many_states_go_together_in_smaller_groups_and_answer_the_same(monkeypatch):
+    scenes = [
+        Scene(gong2025(), Harmonic(hz, 20e-6), duration=FixedDuration(6.0, 0.5), budget_s=0.02)
+        for hz in (130.0, 150.0, 260.0)
+    ]
+    together = [repr(each.prediction) for each in solve_scenes(scenes)]
+    monkeypatch.setattr(_side_by_side, "MOST_HELD", 1.0)
+    assert [repr(each.prediction) for each in solve_scenes(scenes)] == together
+
+
+def test_work_that_nobody_can_compute_is_planned_as_none():
+    study = Study(**CURVE, damping_times_s=[0.0, 1e300])
+    assert np.isfinite(planned_work_s(study))

@@ -92,16 +92,15 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
 
     """
     try:
-        found = _read_as(content, model, origin, folder)
         # pydantic takes true for 1 where a number is asked for, but not the word.
         in_words = _in_words(content)
         if in_words != content:
             _read_as(in_words, model, origin, folder)
+        return _read_as(content, model, origin, folder)
     except ArithmeticError as error:
         raise ConfigurationError(
             f"{origin}: a number is too large, or too small, to be computed with ({error}); correct it"
         ) from error
-    return found
 
 
 def _read_as(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None) -> Model:

@@ -14,6 +14,8 @@ from ..instruments import Knob
 from ._output import OutputConfig
 from ._virtual import VirtualConfig, fastest_sample_rate_hz
 
+_LARGEST = 1e250
+"""Of a shaker's numbers, in SI units: products of some are formed."""
 HIGH_Z: Literal["high-z"] = "high-z"
 
 
@@ -95,6 +97,14 @@ class AmplifierConfig(FrozenModel):
     high_cut_hz: PositiveFloat
     """Upper -3 dB frequency, first order [Hz]."""
 
+    @model_validator(mode="after")
+    def _has_a_band(self) -> Self:
+        if self.low_cut_hz < self.high_cut_hz:
+            return self
+        raise ValueError(
+            f"low_cut_hz = {self.low_cut_hz:g} must lie below high_cut_hz = {self.high_cut_hz:g}; correct one"
+        )
+
     @property
     def gain(self) -> float:
         """Output volts per input volt."""
@@ -127,6 +137,13 @@ class ShakerConfig(FrozenModel):
     coil_inductance_h: PositiveFloat
     source: str = Field(min_length=1)
     limits: ShakerLimits
+
+    @model_validator(mode="after")
+    def _can_be_computed_with(self) -> Self:
+        for name, value in self.model_dump().items():
+            if isinstance(value, float) and value > _LARGEST:
+                raise ValueError(f"{name} = {value:g} is too large to be computed with; correct it")
+        return self
 
 
 class VibrometerConfig(FrozenModel):

@@ -195,6 +195,9 @@ def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_h
 
 
 def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -> Iterator[Expected]:
+    """Say what is to be expected of a sine; nothing where a window has no period for each of its tenths."""
+    if at_hz * _WINDOW_S < _TENTHS:
+        return
     specimen = rig.specimen.specimen()
     amplitude_m = float(base_motion(measurement.excitation, rig, np.array([at_hz])).amplitude_m[0])
     chance = _simulated_scatter(specimen, amplitude_m, at_hz)

@@ -342,7 +342,7 @@ def _laid_over(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, An
     old, new = base.get(SOURCES, {}), said.get(SOURCES, {})
     if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
         return {**kept, **said}
-    return {**kept, **said, SOURCES: {**{key: old[key] for key in old.keys() - replaced}, **new}}
+    return {**kept, **said, SOURCES: {**{key: old[key] for key in old if key not in replaced}, **new}}
 
 
 def _complaint(specimen: str, error: ValidationError) -> str:

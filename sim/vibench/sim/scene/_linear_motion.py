@@ -78,13 +78,21 @@ class LinearMotion:
 def linear_motion(specimen: Specimen, drive: Harmonic, start: ArrayLike) -> LinearMotion:
     """Find the motion that begins in a state, shape (6,), as long as nothing is touched.
 
-    Raises ValueError when two modes coincide (critical damping).
+    Raises ValueError when two modes coincide (critical damping), or numbers grow beyond all bounds.
     """
-    form = modal_form(specimen)
-    steady, _ = harmonic_motion(specimen, 2.0 * math.pi * drive.frequency_hz, drive.amplitude_m)
-    turn = complex(math.cos(drive.phase_rad), math.sin(drive.phase_rad))
-    free = np.asarray(start, dtype=np.float64) - (steady * turn).real
-    return LinearMotion(drive, form.rates, (form.rows @ free)[:, None] * form.shapes, steady)
+    with np.errstate(all="ignore"):
+        form = modal_form(specimen)
+        steady, _ = harmonic_motion(specimen, 2.0 * math.pi * drive.frequency_hz, drive.amplitude_m)
+        turn = complex(math.cos(drive.phase_rad), math.sin(drive.phase_rad))
+        free = np.asarray(start, dtype=np.float64) - (steady * turn).real
+        modes = (form.rows @ free)[:, None] * form.shapes
+    if not (np.all(np.isfinite(modes)) and np.all(np.isfinite(steady))):
+        msg = (
+            f"The motion of this specimen under {drive.amplitude_m:g} m at {drive.frequency_hz:g} Hz cannot "
+            "be computed: its numbers are too far apart. Correct masses, springs, dampings, drive or start."
+        )
+        raise ValueError(msg)
+    return LinearMotion(drive, form.rates, modes, steady)
 
 
 def never_touches(specimen: Specimen, motion: LinearMotion) -> bool:

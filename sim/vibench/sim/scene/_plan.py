@@ -16,8 +16,9 @@ DECAYED_SHARE = 1e-9
 CLOSED_FORM_S = 5e-4
 """Time for a closed form [s]; this and the next three as a plan counts it. What a machine makes of it, and of
 all that a plan cannot know, is learnt from what runs took (`vibench.sim.costs`)."""
-FLIGHT_S, IMPACT_S, STEPS_S = 5e-5, 1e-6, 3e-4
-"""Time for a second of flight, for an impact, and for a second under a force at every p [s]."""
+FLIGHT_S, PERIOD_S, IMPACT_S, STEPS_S = 5e-5, 1e-7, 1e-6, 3e-4
+"""Time for a second of flight, for a drive period of it, for an impact, and for a second under a force at
+every p [s]."""
 TANGENT = 1.5
 """Time with a tangent vector over the time without."""
 SETTLING_S = 10.0
@@ -196,7 +197,8 @@ def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
     """Plan the work in a second of motion [s]."""
     share = abs(motion.steady_p) / min(scene.specimen.gaps_m)
     rate_hz = IMPACTS_PER_PERIOD * scene.drive.frequency_hz * math.sqrt(share) * min(1.0, share) ** 2
-    per_s = STEPS_S if method is Method.POLYNOMIAL else FLIGHT_S + IMPACT_S * rate_hz
+    flight_s = FLIGHT_S + PERIOD_S * scene.drive.frequency_hz
+    per_s = STEPS_S if method is Method.POLYNOMIAL else flight_s + IMPACT_S * rate_hz
     runs = 1.0 + (TANGENT if Observable.LYAPUNOV in scene.observe else 0.0)
     runs += FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0
     runs += 1.0 if scene.budget_s > 0.0 else 0.0

@@ -34,6 +34,8 @@ class Patience:
     """It is followed no longer, and called undecided if need be; for a window at least."""
     alone_s: float
     """Nominal cost of following chaos on by its states alone; zero does not follow it on."""
+    is_exact: bool = True
+    """On the way to its attractor a motion carries each error along: it is followed by itself there."""
 
 
 def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRun]:
@@ -43,7 +45,10 @@ def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRu
     watched_after_s = min(pace.attractor_s, longest_s - in_window * slice_periods / pace.frequency_hz)
     slices = max(0, math.ceil(watched_after_s * pace.frequency_hz / slice_periods))
     begun = StatesAlone(run, pace, slice_periods=slice_periods, every=1)
-    yield [Following(begun, slices * slice_periods / pace.frequency_hz, math.inf)]
+    way = Following(begun, slices * slice_periods / pace.frequency_hz, math.inf)
+    if patience.is_exact:
+        way.by_itself()
+    yield [way]
     early = begun.path
     if begun.repeats is not None:
         return _observe_period(run, begun.repeats, early, pace)

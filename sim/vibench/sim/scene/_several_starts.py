@@ -10,9 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels import Floats
-from ..model import Outcome, Specimen
+from ..model import Outcome, Specimen, Y, Z
 from ._followed_run import FollowedRun, ObservedQuantities, Stretch
 from ._observed_window import ObservedWindow, follow_strobed, observe_window, window_of
 from ._pace import Pace
@@ -28,6 +29,8 @@ SEED = 2025
 PARTED = 0.01
 """Starts whose displacements have come so far apart, over the size of the motion, have forgotten where they
 began: that is ten thousand times as far as they were."""
+TOUCHING = 0.999
+"""Of a gap: m1 that is so far out may be in contact."""
 LEAST_SIZE = 1e-3
 """Of a gap: what a motion counts for at least, when starts are said to have parted."""
 CLEAR, FEWEST, MOST = 8, 16, 64
@@ -82,10 +85,18 @@ def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
     twin = begin.pushed(pushes(begin.specimen, begin.drive.frequency_hz, 1, SEED)[0])
     for stretch in path:
         beside = twin.follow(stretch.end_s, samples=stretch.samples)
-        apart_m = np.abs(beside.states[:, :3] - stretch.states[:, :3]).max(initial=0.0)
+        pressed = _pressed(begin.specimen, beside.states) & _pressed(begin.specimen, stretch.states)
+        apart_m = np.abs(beside.states[~pressed, :3] - stretch.states[~pressed, :3]).max(initial=0.0)
         if not apart_m < PARTED * size_m:
             return True
     return False
+
+
+def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
+    """Say of each state, shape (n, 6), whether m1 is at a stop: there lanes give the flight after it."""
+    lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
+    p = states[:, Y] - states[:, Z]
+    return np.asarray((p >= upper_m) | (p <= -lower_m))
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,15 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ._pace import FEWEST_TIMES
 from ._prediction import ScenePrediction
-from ._scene import Scene
+from ._scene import AutomaticDuration, FixedDuration, Scene
+from ._several_starts import FEWEST
 from ._solve import settling_scene, solving_scene
-from ._states_alone import Asking, Following, follow_all
+from ._states_alone import REMEMBERED, Asking, Following, follow_all
+
+MOST_HELD = 2e7
+"""States of scenes that are solved together, about: a gigabyte."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +47,25 @@ def settle_scenes(scenes: Sequence[Scene]) -> list[Solved]:
 def _side_by_side(
     scenes: Sequence[Scene], asking: Callable[[Scene], Asking[ScenePrediction]]
 ) -> list[Solved]:
+    found: list[Solved] = []
+    together: list[Scene] = []
+    for scene in scenes:
+        if together and sum(map(_held_states, (*together, scene))) > MOST_HELD:
+            found += _solved(together, asking)
+            together = []
+        together.append(scene)
+    return found + _solved(together, asking)
+
+
+def _held_states(scene: Scene) -> float:
+    """Say how many states of a scene are held at a time, of all its starts, at most."""
+    match scene.duration:
+        case FixedDuration(duration_s=longest_s) | AutomaticDuration(longest_s=longest_s):
+            per_start = REMEMBERED * longest_s / FEWEST_TIMES * scene.drive.frequency_hz
+    return per_start * (FEWEST if scene.budget_s > 0.0 else 1.0)
+
+
+def _solved(scenes: Sequence[Scene], asking: Callable[[Scene], Asking[ScenePrediction]]) -> list[Solved]:
     under_way = [asking(scene) for scene in scenes]
     answers: dict[int, ScenePrediction] = {}
     taken_s = [0.0] * len(scenes)

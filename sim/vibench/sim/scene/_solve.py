@@ -190,7 +190,7 @@ def settling_scene(scene: Scene) -> Asking[ScenePrediction]:
         length_s = math.ceil(found.duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
         return replace(found, duration_s=length_s, final_state=_state(motion.state(length_s)))
     run = _begun(scene)
-    seen, _ = yield from _watching(scene, run, motion, math.inf)
+    seen, _ = yield from _watching(scene, run, motion, math.inf, is_exact=False)
     return _found(scene, method, run, seen, _Judged())
 
 
@@ -268,7 +268,7 @@ def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> Asking[tuple[
 
 
 def _watching(
-    scene: Scene, run: FollowedRun, motion: LinearMotion, alone_s: float
+    scene: Scene, run: FollowedRun, motion: LinearMotion, alone_s: float, *, is_exact: bool = True
 ) -> Asking[tuple[SceneRun, Pace]]:
     """Do the same, chaos alone for so long, and hand out what may be followed beside others."""
     drive = scene.drive
@@ -282,7 +282,8 @@ def _watching(
         case FixedDuration(duration_s=duration_s, window_s=window_s):
             return (yield from run_for(run, duration_s, window_s, pace)), pace
         case AutomaticDuration(window_s=window_s):
-            return (yield from settling(run, Patience(window_s, longest_s, alone_s), pace)), pace
+            patience = Patience(window_s, longest_s, alone_s, is_exact)
+            return (yield from settling(run, patience, pace)), pace
 
 
 def _between_windows(seen: SceneRun) -> WindowScatter | None:

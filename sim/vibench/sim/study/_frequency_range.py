@@ -45,6 +45,10 @@ def listed(given: object) -> object:
             **rest,
         } if not rest:
             return frequency_range(_number(start), _number(stop), _number(step))
+        case {"start": start, "stop": stop, "step": step, **rest} if not rest:
+            raise ValueError(
+                f"a range from {start!r} to {stop!r} in steps of {step!r} is not allowed: give three numbers"
+            )
         case list() | tuple():
             return _flattened(given)
         case _:
