@@ -123,8 +123,9 @@ def _lead(run: FollowedRun, until_s: float, pace: Pace) -> Asking[tuple[tuple[St
     states = StatesAlone(
         run, exact, slice_periods=min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE), every=every
     )
-    # On the way to its attractor a motion carries each error along.
-    states.follow(min(until_s, pace.attractor_s))
+    # On the way to its attractor a motion carries each error along; lanes begin at a whole drive period.
+    way_s = math.ceil(pace.attractor_s * pace.frequency_hz) / pace.frequency_hz
+    states.follow(min(until_s, way_s))
     yield [Following(states, until_s, math.inf)]
     if states.repeats is not None:
         left = (until_s - run.time_s) * pace.frequency_hz
