@@ -115,3 +115,15 @@ def test_roundings_that_grow_are_in_the_error_of_a_law_that_is_flown_exactly(
     for one, one_error in found:
         for other, other_error in found:
             assert abs(one - other) <= one_error + other_error
+
+
+def test_what_steps_change_before_starts_come_apart_is_stated_too():
+    # The largest p comes early, where no two starts differ yet, and is off by 1.6e-5 at quick.
+    start = Given((-3.011e-05, -5.022e-05, 4.918e-05, -0.03867, 0.003417, -0.01607))
+    drive, length = Harmonic(300.749, 1.661e-05, 4.993954), FixedDuration(0.3, 0.3)
+    found, truth = (
+        solve_scene(Scene(gong2025(5e-6), drive, accuracy=level, duration=length, start=start, budget_s=0.01))
+        for level in (Accuracy.QUICK, Accuracy.REFERENCE)
+    )
+    off = abs(found.relative_i / truth.relative_i - 1.0)
+    assert 1e-6 < off < found.relative_i_error < 1e-3

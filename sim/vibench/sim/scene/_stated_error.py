@@ -94,7 +94,8 @@ def stated_errors(
         if float(np.max(off)) < PARTED:
             return StatedErrors(SAFETY * off + sure, float(np.max(off)))
     added = error_per_period(run, scene.accuracy)
-    return StatedErrors(_drawn(begin, seen, slowest_rate) + SAFETY * added + seen.leaked, added)
+    drawn = _drawn(begin, seen, scene.accuracy, slowest_rate)
+    return StatedErrors(drawn + SAFETY * added + seen.leaked, added)
 
 
 def _rounding(answer: Floats) -> Floats:
@@ -102,21 +103,26 @@ def _rounding(answer: Floats) -> Floats:
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
-def _drawn(begin: FollowedRun, seen: SceneRun, slowest_rate: float) -> Floats:
+def _drawn(begin: FollowedRun, seen: SceneRun, accuracy: Accuracy, slowest_rate: float) -> Floats:
     """Find what two draws differ by, relatively, shape (4,)."""
     memories = -slowest_rate * seen.window.begins.time_s
     if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
         drawn = draws_apart(seen.blocks, len(seen.window.blocks))
         if drawn is not None:
             return drawn
-    return draws_of_starts(seen.window.responses_m, _more_starts(begin, seen))
+    return draws_of_starts(seen.window.responses_m, _more_starts(begin, seen, accuracy))
 
 
-def _more_starts(begin: FollowedRun, seen: SceneRun) -> list[Floats]:
-    """Follow a few more starts, and observe the same window of them; NaN where one is lost."""
-    found = []
+def _more_starts(begin: FollowedRun, seen: SceneRun, accuracy: Accuracy) -> list[Floats]:
+    """Follow a few more starts, and observe the same window of them; NaN where one is lost.
+
+    The first at a stricter accuracy: what the steps have changed before starts come apart is common to all
+    others.
+    """
+    found: list[Floats] = []
+    first = begin.apart(STRICTER[accuracy])
     for push in pushes(begin.specimen, begin.drive.frequency_hz, MEMBERS, SEED):
-        other = begin.pushed(push)
+        other = (begin if found else first).pushed(push)
         other.follow(seen.window.begins.time_s)
         window = observe_window(other, seen.window.length_s)
         is_lost = other.outcome is not Outcome.REACHED_END
