@@ -34,7 +34,7 @@ def synthetic():
 def analysed(synthetic, tmp_path_factory):
     """Analyse a mass that moves twice as far as its base, plus a distortion of its velocity."""
 
-    def played(distorted, realisations=REALISATIONS):
+    def played(distorted, realisations=REALISATIONS, drive_noise_m=0.0):
         plan = OddMultisine(
             amplitude_vpp=0.2,
             band_start_hz=60.0,
@@ -57,13 +57,23 @@ def analysed(synthetic, tmp_path_factory):
             velocities.append(velocity)
             start_s = number * time_s.size / synthetic.RATE + SETTLE_S
             parts.append(synthetic.Part("realisation", start_s, start_s + played_s, {"realisation": number}))
-        base = synthetic.Motion(*np.concatenate(motions, axis=1))
+        motion, acceleration = np.concatenate(motions, axis=1)
+        base = synthetic.Motion(motion + drive_noise_m * rng.standard_normal(motion.size), acceleration)
         folder = tmp_path_factory.mktemp("odd")
         path = synthetic.write_recording(folder, plan, base, np.concatenate(velocities), parts, name="odd")
         with open_recording(path) as recording:
             return analyse(recording)
 
     return played
+
+
+def test_a_line_is_driven_where_the_plan_drives_it_however_noisy_the_recorded_drive(analysed):
+    quiet, noisy = (analysed(np.zeros_like, drive_noise_m=noise) for noise in (0.0, 2e-6))
+    driven = np.rint(noisy.response.frequency_response.frequency_hz / REPETITION_HZ)
+    np.testing.assert_array_equal(driven, quiet.excitation.excited_lines)
+    off = noisy.response.frequency_response.magnitude / 2 - 1
+    assert np.max(np.abs(off)) < 0.01
+    assert not set(driven) & set(noisy.response.periodic.detection.order)
 
 
 def test_a_square_shows_on_even_lines_and_a_cube_on_odd_ones(analysed):

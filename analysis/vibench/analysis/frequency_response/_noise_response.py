@@ -101,9 +101,7 @@ def repeated_response(
             f"none of the {noise.realisations} planned realisations of noise holds two whole periods of "
             f"{1 / noise.repetition_hz:g} s without a fault{bad.text}; measure again"
         )
-    periodic = sums.frequency_response(
-        delay_s=channels.response_delay_s, band_hz=(noise.band_start_hz, noise.band_stop_hz)
-    )
+    periodic = sums.frequency_response(delay_s=channels.response_delay_s, orders=noise.lines)
     order = np.rint(periodic.frequency_response.frequency_hz / noise.repetition_hz).astype(int)
     motion = sums.motion()[..., order]
 

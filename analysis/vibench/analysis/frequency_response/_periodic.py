@@ -104,10 +104,6 @@ def best_linear_approximation(
     )
 
 
-EVERYTHING = (0.0, float("inf"))
-"""The band that keeps all driven lines."""
-
-
 @dataclass(frozen=True)
 class DetectionLines:
     """Lines that were not driven, inside the driven band: what is on them, the specimen made."""
@@ -218,7 +214,7 @@ class PeriodicSums:
         return np.stack([[one.base[:lines], one.response[:lines]] for one in self._realisations])
 
     def frequency_response(
-        self, *, delay_s: float = 0.0, band_hz: tuple[float, float] = EVERYTHING
+        self, *, delay_s: float = 0.0, orders: Integers | None = None
     ) -> PeriodicFrequencyResponse:
         """Give the transmission of the realisations added so far, at the driven lines.
 
@@ -230,8 +226,9 @@ class PeriodicSums:
         delay_s
             By how much the response channel lags the base channel (vibrometer decoder, filters);
             removed from the phase.
-        band_hz
-            Lowest and highest line to keep: a held waveform also drives images far above its band.
+        orders
+            Of the lines that are driven, as multiples of the repetition frequency; where they are not known,
+            those that carry drive: a converter's noise and images of a held waveform may pass for it.
 
         """
         if not self._realisations:
@@ -243,7 +240,7 @@ class PeriodicSums:
         covariance = np.mean([one.covariance[:, :, :lines] for one in self._realisations], axis=0)
         period = float(np.mean([one.repetition.period_samples for one in self._realisations]))
         frequency_hz = np.arange(lines, dtype=np.float64) * (self._sample_rate_hz / period)
-        driven = driven_lines(drive) & _within(frequency_hz, band_hz, self._sample_rate_hz / period)
+        driven = driven_lines(drive) if orders is None else _lines_of(orders, frequency_hz)
         periods = self._realisations[0].repetition.periods
         estimate = best_linear_approximation(
             drive[:, driven], base[:, driven], response[:, driven], covariance[:, :, driven], periods
@@ -287,16 +284,15 @@ class PeriodicSums:
         )
 
 
-def _within(frequency_hz: Reals, band_hz: tuple[float, float], spacing_hz: float) -> Flags:
-    """Lines in a band; its edges move with the generator's clock, so a tenth of a line is granted."""
-    margin_hz = 0.1 * spacing_hz
-    kept = (frequency_hz >= band_hz[0] - margin_hz) & (frequency_hz <= band_hz[1] + margin_hz)
-    if not np.any(kept):
+def _lines_of(orders: Integers, frequency_hz: Reals) -> Flags:
+    """Mark the lines of these orders, as far as the sample rate shows them."""
+    marked = np.isin(np.arange(frequency_hz.size), orders)
+    if not np.any(marked):
         raise InvalidRequest(
-            f"no line lies between {band_hz[0]:g} and {band_hz[1]:g} Hz; "
-            f"the lines are {spacing_hz:g} Hz apart, up to {frequency_hz[-1]:g} Hz"
+            f"the lowest line asked for is {np.min(orders)}; lines are known up to {frequency_hz.size - 1}, "
+            f"{frequency_hz[-1]:g} Hz: record with a higher sample rate"
         )
-    return kept
+    return np.asarray(marked)
 
 
 def _detection(frequency_hz: Reals, driven: Flags, response: Complexes, variance: Reals) -> DetectionLines:
