@@ -62,6 +62,15 @@ def test_between_the_jumps_the_way_decides_which_motion_there_is(analysis):
     assert up[0.2] == pytest.approx(down[0.2], rel=0.01)
 
 
+def test_the_largest_of_a_step_is_not_that_of_the_steps_beside_it(analysis):
+    """Without contact the motion is a sine, and both responses are one."""
+    found = analysis.response
+    rising = [
+        way == "up" and level < 0.65 for way, level in zip(found.direction, found.amplitude_vpp, strict=True)
+    ]
+    np.testing.assert_allclose(found.response_i[rising], found.response_ii[rising], rtol=5e-3)
+
+
 def test_figure_and_summary_tell_both_jumps(analysis):
     (figure,) = result_figures(CampaignResults("levels", (Result(analysis, None),), ()))
     assert "between 0.6 and 0.7 Vpp" in figure.caption

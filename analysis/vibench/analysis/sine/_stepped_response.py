@@ -28,7 +28,7 @@ from ._dwell import DwellResponse, dwell_response
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | BranchContinuation | HeldResponse
 """What is recorded frequency by frequency, or level by level."""
 _EDGE_PERIODS = 60.0
-"""Drive periods that integration disturbs at each end; read beyond the step, where there is more."""
+"""Drive periods that integration disturbs at each end."""
 
 
 @dataclass(frozen=True)
@@ -90,25 +90,46 @@ def stepped_response(
 
 
 def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | None:
+    data = channels.read(stretch.start, stretch.stop)
+    if np.isnan(data).any():
+        return None
     near_hz = float(stretch.numbers["frequency_hz"])
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
-    start, stop = max(0, stretch.start - edge), min(channels.samples, stretch.stop + edge)
-    data = channels.read(start, stop)
-    if np.isnan(data).any():
-        return None
-    longest_s = (stop - start - 2 * edge) / rate
-    drive, base, response = data
+    # What came before and after was at another frequency or level, and integration would bring it in.
+    drive, base, response = _continued(data, rate / near_hz, edge)
     return dwell_response(
         drive,
         base,
         response,
         rate,
         near_hz=near_hz,
-        window_s=min(plan.record_s, longest_s),
+        window_s=min(plan.record_s, data.shape[1] / rate),
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([near_hz]))[0]),
     )
+
+
+def _continued(data: Reals, period_samples: float, edge: int) -> Reals:
+    """Go on at both ends with what was so many samples further inside; shape (3, samples + 2 edge).
+
+    The last row, the response, tells how far: whole drive periods, those after which it repeats best.
+    """
+    before = _repeats_after(data[-1], period_samples)
+    after = _repeats_after(data[-1, ::-1], period_samples)
+    inside, outside = data.shape[1], np.arange(edge)
+    places = np.concatenate(
+        [(before - 1 - outside % before)[::-1], np.arange(inside), inside - after + outside % after]
+    )
+    return data[:, places]
+
+
+def _repeats_after(motion: Reals, period_samples: float) -> int:
+    """Find after how many samples the first period of a motion comes again most nearly."""
+    period = round(period_samples)
+    shifts = np.rint(np.arange(1.0, motion.size / period_samples - 1.0) * period_samples).astype(int)
+    apart = [np.sum((motion[shift : shift + period] - motion[:period]) ** 2) for shift in shifts]
+    return int(shifts[np.argmin(apart)]) if apart else motion.size
 
 
 @dataclass(frozen=True, eq=False)
