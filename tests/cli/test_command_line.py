@@ -9,9 +9,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from rich.progress import Progress
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState
+from vibench.cli.output import errors, words
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = """
@@ -209,3 +211,12 @@ def test_options_that_make_no_sense_play_nothing(vibench_here, tmp_path, words, 
     assert result.returncode == 1
     assert said in result.stderr
     assert not (tmp_path / "recordings").exists()
+
+
+@pytest.mark.parametrize("name", [":smile:", "[red]rig[/red]", r"C:\[bold]", "[/]"])
+def test_a_name_is_shown_as_it_is_whatever_it_looks_like(vibench_here, tmp_path, name):
+    refused = vibench_here("verify", f"{name}.h5", cwd=tmp_path)
+    assert f"{name}.h5" in refused.stderr + refused.stdout
+    bars = Progress(words("{task.description}"), console=errors)
+    bars.add_task(name)
+    assert bars.columns[0].render(bars.tasks[0]).plain == name

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
+from rich.text import Text
 from typer.core import TyperCommand, TyperGroup
 
 from vibench.acquisition import AcquisitionError, CheckStopped, shortened
@@ -25,6 +25,7 @@ from vibench.sim.study import StudyError
 
 from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
 from .exit_code import ExitCode
+from .output import errors
 
 
 @dataclass(frozen=True)
@@ -324,14 +325,9 @@ NAME_SHOWN = 80
 
 def complain(error: BaseException) -> None:
     """Show an error on standard error: its sentence, then what else went wrong on the way out."""
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
-    console.print(f"[bold red]error:[/] {_plain(shortened(str(error), LONGEST_SENTENCE))}")
+    errors.print(Text("error:", style="bold red"), shortened(str(error), LONGEST_SENTENCE))
     for note in getattr(error, "__notes__", ()):
-        console.print(f"  {_plain(note)}")
-
-
-def _plain(text: str) -> str:
-    return text.replace("[", r"\[")
+        errors.print(f"  {note}")
 
 
 if __name__ == "__main__":

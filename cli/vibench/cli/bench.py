@@ -86,10 +86,8 @@ def check(
     if as_json:
         print_json(result.model_dump(mode="json"))
     else:
-        console.print(
-            f"{result.rig}: {result.verdict.value}, {result.checked:%Y-%m-%d %H:%M %Z}", markup=False
-        )
-        console.print(result.report.text(), markup=False, soft_wrap=True)
+        console.print(f"{result.rig}: {result.verdict.value}, {result.checked:%Y-%m-%d %H:%M %Z}")
+        console.print(result.report.text())
     if result.verdict is Verdict.FAIL:
         raise typer.Exit(ExitCode.FAILED)
 

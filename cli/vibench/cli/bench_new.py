@@ -55,14 +55,14 @@ class Answers:
         """Answer a question of the configuration; nothing: as the template has it."""
         answer = self.given.get(question.key, "")
         if choices:
-            console.print(f"seen: {', '.join(choices)}", markup=False)
-        console.print(f"{question.text} [{held}] {answer}", markup=False, soft_wrap=True)
+            console.print(f"seen: {', '.join(choices)}")
+        console.print(f"{question.text} [{held}] {answer}")
         return answer
 
     def wired(self, pair: str) -> str:
         """Say whether a pair of ends is plugged in."""
         answer = self.given.get(_WIRED, "")
-        console.print(f"Plug {pair}: {answer}", markup=False, soft_wrap=True)
+        console.print(f"Plug {pair}: {answer}")
         return "" if answer.strip().casefold() in _NOT_YET else answer
 
     def knobs(self, knobs: tuple[Knob, ...]) -> KnobSheet:
@@ -97,7 +97,7 @@ def _flat(table: Mapping[str, Any], before: str = "") -> list[tuple[str, Any]]:
 
 def _asked_at_terminal(question: Question, choices: Sequence[str], held: str) -> str:
     for number, choice in enumerate(choices, start=1):
-        console.print(f"  {number}: {choice}", markup=False)
+        console.print(f"  {number}: {choice}")
     answer = str(typer.prompt(f"{question.text} [{held}]", default="", show_default=False))
     if answer.isdigit() and 1 <= int(answer) <= len(choices):
         return choices[int(answer) - 1]
@@ -123,7 +123,7 @@ def _configured_at_terminal(template: Path, target: Path, seen: InstrumentList, 
 
 
 def _asked_again(error: ConfigurationError) -> None:
-    console.print(f"! {error}", markup=False, soft_wrap=True)
+    console.print(f"! {error}")
 
 
 def _wired_at_terminal(target: Path, pair: str) -> str:
@@ -149,19 +149,19 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
         )
     seen = list_rig_instruments(load_rig(template))
     for remark in seen.remarks:
-        console.print(f"! {remark}", markup=False)
+        console.print(f"! {remark}")
     operator = _operator_at_terminal() if given is None else given.operator
     note = f"{operator}, {datetime.now(UTC).astimezone().date()}"
     if given is None:
         rig = _configured_at_terminal(template, target, seen, note)
     else:
         rig = configured(template, target, seen, given.ask, note, given.questions)
-    console.print(f"\nwritten: {target}\n", markup=False)
+    console.print(f"\nwritten: {target}\n")
     page = _day(rig, target, operator, given)
     kept = _free(target.with_suffix(".first_day.md"))
     kept.write_text(page.text, encoding="utf-8")
-    console.print(page.text, markup=False, soft_wrap=True)
-    console.print(f"kept: {kept}", markup=False)
+    console.print(page.text)
+    console.print(f"kept: {kept}")
     return page
 
 

@@ -48,7 +48,7 @@ def _show(entries: Sequence[CatalogueEntry]) -> None:
     widths = [max(len(row[column]) for row in rows) for column in range(len(COLUMNS))]
     for row in rows:
         line = "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        console.print(line.rstrip(), markup=False)
+        console.print(line.rstrip())
 
 
 def _row(entry: CatalogueEntry) -> tuple[str, ...]:

@@ -6,21 +6,21 @@ from types import TracebackType
 from typing import Self
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TimeElapsedColumn, TimeRemainingColumn
 
 from vibench.acquisition.engine import DRIVING, EngineMessage, EngineStatus, MessageKind, RowStatus, RunStatus
 
-from .output import console
+from .output import console, words
 
 INTERVAL_S = 0.1
 """How often the terminal is drawn [s]."""
 COLUMNS = (
-    TextColumn("{task.description:<24}"),
+    words("{task.description:<24}"),
     BarColumn(bar_width=30),
-    TextColumn("{task.completed:6.0f} of {task.total:.0f} s"),
+    words("{task.completed:6.0f} of {task.total:.0f} s"),
     TimeElapsedColumn(),
     TimeRemainingColumn(),
-    TextColumn("{task.fields[state]}"),
+    words("{task.fields[state]}"),
 )
 
 
@@ -74,7 +74,7 @@ class EngineBars:
         self._told.add(row.name)
         if row.name == self._name:
             self._drop()
-        self._bars.console.print(f"{row.state:11} {row.file or row.name}  ({row.reason})", markup=False)
+        self._bars.console.print(f"{row.state:11} {row.file or row.name}  ({row.reason})")
 
     def _drop(self) -> None:
         if self._one is not None:
@@ -85,7 +85,7 @@ class EngineBars:
         if message.number > self._messages:
             self._messages = message.number
             if message.kind is MessageKind.WARNING:
-                self._bars.console.print(sentence(message), markup=False)
+                self._bars.console.print(sentence(message))
 
 
 def sentence(message: EngineMessage) -> str:

@@ -59,7 +59,7 @@ def _tell(file: Path, as_json: bool) -> None:
         print_json({"file": str(file), "channels": [asdict(each) for each in channels]})
         return
     for each in channels:
-        console.print(_line(each), markup=False)
+        console.print(_line(each))
     console.print("Say in a mapping what they are (docs/exchange.md), and give it with --mapping.")
 
 

@@ -63,10 +63,10 @@ def tell_estimate(
             told = {name: [each.to_dict() for each in found] for name, found in known.items()}
             print_json(document | {"uncertainty": told})
         case Form.TEXT:
-            console.print(estimate_text(expected), markup=False)
+            console.print(estimate_text(expected))
             for name, found in known.items():
                 for each in found:
-                    console.print(f"{name}: {each.sentence}", markup=False)
+                    console.print(f"{name}: {each.sentence}")
 
 
 def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...]]:

@@ -7,10 +7,17 @@ from pathlib import Path
 
 import typer
 from rich.console import Console
+from rich.progress import TextColumn
 from rich.text import Text
 
-# No markup: a path may hold what looks like some.
-console = Console(highlight=False, soft_wrap=True, markup=False)
+# Neither markup nor emoji: names and paths may hold what looks like some.
+console = Console(highlight=False, soft_wrap=True, markup=False, emoji=False)
+errors = Console(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
+
+
+def words(text_format: str) -> TextColumn:
+    """Make a column of progress bars that shows names as they are."""
+    return TextColumn(text_format, markup=False)
 
 
 def bold(text: object) -> Text:

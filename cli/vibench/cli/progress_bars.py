@@ -3,26 +3,24 @@
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
     TaskProgressColumn,
-    TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 
 from vibench.sim.study import StudyObserver, StudyProgress
 
-from .output import console
+from .output import console, errors, words
 
 
 @contextmanager
 def analysis_bar(recordings: int) -> Iterator[Callable[[], None]]:
     """Show how many of the recordings are analysed; call what it gives after each."""
-    columns = (TextColumn("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
+    columns = (words("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
     with Progress(*columns, TimeElapsedColumn(), console=console) as bars:
         bar = bars.add_task("analysis and simulation", total=recordings)
         yield lambda: bars.advance(bar)
@@ -36,13 +34,13 @@ MINUTES_OF_AN_HOUR = 60.0
 def study_bar(points: int) -> Iterator[StudyObserver]:
     """Show the bar while inside; what it gives is told how far the study is."""
     columns = (
-        TextColumn("points"),
+        words("points"),
         BarColumn(bar_width=30),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("{task.fields[left]}"),
+        words("{task.fields[left]}"),
     )
-    with Progress(*columns, console=Console(stderr=True)) as bars:
+    with Progress(*columns, console=errors) as bars:
         bar = bars.add_task("points", total=points, left="")
 
         def watch(progress: StudyProgress) -> None:
@@ -68,7 +66,7 @@ def _duration(seconds: float) -> str:
 @contextmanager
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
     """Show the bar while inside; what it gives is told how many values came since the last call."""
-    columns = (TextColumn("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
-    with Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True)) as bars:
+    columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
+    with Progress(*columns, TimeRemainingColumn(), console=errors) as bars:
         bar = bars.add_task(what, total=values)
         yield lambda done: bars.advance(bar, done)

@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TimeElapsedColumn
 
 from vibench.analysis import ProgressObserver
+
+from .output import errors, words
 
 
 class ReadingBar:
@@ -29,11 +30,10 @@ class ReadingBar:
 def reading_bar() -> Iterator[ProgressObserver]:
     """Show the bar while inside, on a terminal only; it leaves nothing behind."""
     columns = (
-        TextColumn("{task.description}"),
+        words("{task.description}"),
         BarColumn(bar_width=30),
         TaskProgressColumn(),
         TimeElapsedColumn(),
     )
-    screen = Console(stderr=True)
-    with Progress(*columns, console=screen, transient=True, disable=not screen.is_terminal) as bars:
+    with Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal) as bars:
         yield ReadingBar(bars, bars.add_task("opening", total=None))

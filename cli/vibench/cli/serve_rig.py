@@ -54,7 +54,7 @@ def serve_rig(
         for title, lines in _hints(rig):
             console.print(title)
             for line in lines:
-                console.print(f"  {line}", soft_wrap=True)
+                console.print(f"  {line}")
         if rig.token is not None:
             console.print("\nOther computers can reach it; it lets in whoever has the token:")
             console.print(

@@ -50,9 +50,9 @@ def show_specimen(
     elif as_toml:
         typer.echo(toml_text(table), nl=False)
     else:
-        console.print(": ".join(filter(None, (table.name, table.about))), markup=False)
+        console.print(": ".join(filter(None, (table.name, table.about))))
         for name, value in facts.items():
-            console.print(f"  {_heading(name)}: {_shown(value)}", markup=False)
+            console.print(f"  {_heading(name)}: {_shown(value)}")
 
 
 def figures_of(specimen: Specimen) -> dict[str, object]:
@@ -88,7 +88,7 @@ def _list(as_json: bool) -> None:
     for title, rows in (("Specimens (--specimen)", specimens), ("Contact laws (--model)", laws)):
         console.print(title)
         for name, about in rows.items():
-            console.print(f"  {name:28} {about}", markup=False)
+            console.print(f"  {name:28} {about}")
 
 
 _UNITS = {"_kg": "kg", "_ns_per_m": "N s/m", "_n_per_m": "N/m", "_hz": "Hz", "_m": "m"}

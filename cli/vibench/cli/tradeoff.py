@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
@@ -24,7 +23,7 @@ from vibench.sim.accuracy_benchmark import (
     measure_accuracy,
 )
 
-from .output import console, print_json
+from .output import console, errors, print_json, words
 from .paths import AsJson, room_for_folder
 
 _SHORTEST_S = 0.05
@@ -51,8 +50,8 @@ def tradeoff(
     folder = _folder(out, markdown)
     if folder is not None:
         room_for_folder(folder)
-    columns = (TextColumn("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
-    with Progress(*columns, TimeElapsedColumn(), console=Console(stderr=True)) as bars:
+    columns = (words("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=errors) as bars:
         bar = bars.add_task("", total=_STEPS)
 
         def step(name: str) -> None:

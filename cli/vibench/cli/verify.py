@@ -52,7 +52,7 @@ def verify(
         )
     else:
         for each in found:
-            console.print(f"{each.verdict:10}  {each.path}: {each.sentence}", markup=False)
+            console.print(f"{each.verdict:10}  {each.path}: {each.sentence}")
         console.print(", ".join(f"{count} {verdict}" for verdict, count in counts.items()) or "no recordings")
     bad = [each for each in found if each.is_bad]
     if bad:
