@@ -312,7 +312,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     tracked, rate = motion.tracked, motion.sample_rate_hz
     yield (
         f"{motion.name}: p was tracked in {100 * tracked.share_followed:.4g} % of "
-        f"{tracked.p.size / rate:.3g} s, with {tracked.collisions.count} impacts"
+        f"{tracked.p.size / rate:.3g} s, impacts: {tracked.collisions.count}"
         + (
             f"; standard deviation of p {MICRO * float(np.nanmedian(tracked.p_sd)):.2g} µm"
             if tracked.share_followed
@@ -325,7 +325,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
         yield f"Not followed for {1e3 * total / rate:.3g} ms: {reason}."
     told = [each for each in motion.free_gaps if each is not None]
     yield (
-        f"Without a contact model: {motion.free.impacts.samples.size} impacts"
+        f"Without a contact model, impacts: {motion.free.impacts.samples.size}"
         + "".join(
             f", {side} gap {with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
             for side, gap in zip(("lower", "upper"), motion.free_gaps, strict=True)
