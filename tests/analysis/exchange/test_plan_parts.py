@@ -62,6 +62,8 @@ def test_told_parts_take_the_plans_labels_in_order():
 
 def test_parts_behind_the_end_of_the_file_are_left_out():
     assert len(laid_parts(mapped(NOISE), 1000.0, 3000)) == 2
+    (cut,) = laid_parts(mapped(NOISE, parts=[{"start_s": 1, "stop_s": 1e308}]), 1000.0, 3000)
+    assert cut.start == 1000 < 3000 < cut.stop
 
 
 @pytest.mark.parametrize(
@@ -70,6 +72,7 @@ def test_parts_behind_the_end_of_the_file_are_left_out():
         ([(1, 2), (3, 4), (5, 6), (7, 8)], "4 parts are given, and the plan of m has 3"),
         ([(1, 3), (2, 4)], "in the order of time"),
         ([(11, 12)], "no part of the plan begins within the 10 s"),
+        ([(1e307, 1e308)], "no part of the plan begins within the 10 s"),
     ],
 )
 def test_parts_that_cannot_be_are_refused(told, said):

@@ -117,7 +117,8 @@ def test_noise_that_repeats_takes_an_estimator_and_refuses_segments(noise_file):
             {"resolution_hz": 1.0, "averages": 9.0},
             "a resolution and a number of averages were given; give one",
         ),
-        ({"resolution_hz": 0.0}, "must be more than 0"),
+        ({"resolution_hz": 0.0}, "must be finite and more than 0"),
+        ({"segment_s": np.inf}, "a segment length of inf was asked for; it must be finite"),
         ({"averages": 1.0}, "needs more than 1"),
         ({"estimator": Estimator.HV}, "without a noise ratio"),
         ({"noise_ratio": 1.0}, "only hv"),
@@ -130,11 +131,19 @@ def test_a_request_without_meaning_says_what_is_allowed(asked, said):
         FrequencyResponseRequest(**asked)
 
 
-def test_a_resolution_that_the_record_cannot_give_is_refused_with_its_length(streamed_file):
+@pytest.mark.parametrize(
+    ("asked", "length"),
+    [
+        ({"resolution_hz": 0.05}, "30 s"),
+        ({"resolution_hz": 1e-308}, "inf s"),
+        ({"segment_s": 1e308}, "inf s"),
+    ],
+)
+def test_a_resolution_that_the_record_cannot_give_is_refused_with_its_length(streamed_file, asked, length):
     with pytest.raises(
-        NotEnoughData, match="20 s of noise were recorded, less than two segments of the 30 s"
+        NotEnoughData, match=f"20 s of noise were recorded, less than two segments of the {length}"
     ):
-        response(streamed_file(), resolution_hz=0.05)
+        response(streamed_file(), **asked)
 
 
 def test_a_view_turns_displacements_into_what_was_recorded(streamed_file):

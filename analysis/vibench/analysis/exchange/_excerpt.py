@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from math import isfinite
 
 from vibench.acquisition.recording import ChannelHeader, RecordedBlock, Recording
 
@@ -94,14 +95,19 @@ def excerpt(
             f"{recording.path.name} holds no samples ({recording.state.value}): none to export"
         )
     rate = recording.sample_rate_hz
-    start = 0 if from_s is None else round(from_s * rate)
-    stop = recording.samples if to_s is None else round(to_s * rate)
+    start = 0 if from_s is None else _sample(from_s * rate)
+    stop = recording.samples if to_s is None else _sample(to_s * rate)
     if not 0 <= start < stop <= recording.samples:
         raise InvalidRequest(
             f"{_moment(from_s, 'the beginning')} to {_moment(to_s, 'the end')} was asked for; "
             f"{recording.path.name} goes from 0 to {recording.duration_s:.9g} s; give a stretch inside"
         )
     return Excerpt(recording, tuple(recording.channel(role) for role in wanted), start, stop)
+
+
+def _sample(place: float) -> int:
+    """Round to a sample; what is no number, or beyond all of them, lies outside every recording."""
+    return round(place) if isfinite(place) else -1
 
 
 def _moment(time_s: float | None, otherwise: str) -> str:

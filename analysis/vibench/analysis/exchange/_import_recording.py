@@ -61,9 +61,9 @@ def laid_parts(mapping: ImportMapping, sample_rate_hz: float, samples: int) -> t
     planned = list(_planned(mapping.measurement.excitation))
     stretches = _told(mapping, planned) if mapping.parts else _in_turn(mapping.begins_s, planned)
     laid = [
-        LaidPart(each.segment, round(start_s * sample_rate_hz), round(stop_s * sample_rate_hz))
+        LaidPart(each.segment, round(start_s * sample_rate_hz), round(min(stop_s * sample_rate_hz, FARTHEST)))
         for each, (start_s, stop_s) in zip(planned, stretches, strict=False)
-        if round(start_s * sample_rate_hz) < samples
+        if start_s * sample_rate_hz < FARTHEST and round(start_s * sample_rate_hz) < samples
     ]
     if not laid:
         raise InvalidRequest(
@@ -111,6 +111,8 @@ def _told(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterator[tuple
     return ((each.start_s, each.stop_s) for each in parts)
 
 
+FARTHEST = 2.0**62
+"""A sample beyond the end of every file."""
 RATE_TOLERANCE = 1e-4
 """How far a mapping's sample rate may lie from the file's: clocks differ less."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e100

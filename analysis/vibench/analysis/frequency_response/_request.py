@@ -156,7 +156,7 @@ class FrequencyResponseRequest:
             raise InvalidRequest(f"{' and '.join(given)} were given; give one, the others follow from it")
         for name, value in given.items():
             if not (np.isfinite(value) and value > 0):
-                raise InvalidRequest(f"{name} of {value:g} was asked for; it must be more than 0")
+                raise InvalidRequest(f"{name} of {value:g} was asked for; it must be finite and more than 0")
         if self.averages is not None and self.averages <= 1:
             raise InvalidRequest(f"{self.averages:g} averages were asked for; a coherence needs more than 1")
         if self.estimator is Estimator.HV and self.noise_ratio is None:
@@ -194,19 +194,21 @@ class FrequencyResponseRequest:
             When the record does not hold two segments of the length asked for.
 
         """
-        chosen = self._wished(samples, sample_rate_hz)
-        if samples < chosen + hop_samples(chosen, self.overlap):
+        wished = self._wished(samples, sample_rate_hz)
+        # Beyond the record first: what is beyond all numbers is no whole one.
+        if samples < wished or samples < wished + hop_samples(int(wished), self.overlap):
             raise NotEnoughData(
                 f"{samples / sample_rate_hz:.3g} s of noise were recorded, less than two segments of the "
-                f"{chosen / sample_rate_hz:.3g} s asked for: ask for a coarser resolution, or measure longer"
+                f"{wished / sample_rate_hz:.3g} s asked for: ask for a coarser resolution, or measure longer"
             )
-        return chosen
+        return int(wished)
 
-    def _wished(self, samples: int, sample_rate_hz: float) -> int:
+    def _wished(self, samples: int, sample_rate_hz: float) -> float:
         if self.resolution_hz is not None:
-            return max(2, int(np.ceil(_bandwidth_lines(self.window) * sample_rate_hz / self.resolution_hz)))
+            lines = float(_bandwidth_lines(self.window))
+            return max(2.0, float(np.ceil(lines * sample_rate_hz / self.resolution_hz)))
         if self.segment_s is not None:
-            return max(2, round(self.segment_s * sample_rate_hz))
+            return max(2.0, float(np.rint(self.segment_s * sample_rate_hz)))
         if self.averages is not None:
             return longest_segment(samples, self.averages, self.window, self.overlap)
         return min(round(_SEGMENT_S * sample_rate_hz), 2 * samples // (_LEAST_SEGMENTS + 1))
