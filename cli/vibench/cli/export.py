@@ -43,7 +43,8 @@ def export(
         bool,
         typer.Option(
             "--spectra",
-            help="Densities of the channels, and of noise the frequency response, in place of samples (uff).",
+            help="Densities of the channels over what was played, and of noise the frequency response, in "
+            "place of samples (uff).",
         ),
     ] = False,
     quantity: Annotated[

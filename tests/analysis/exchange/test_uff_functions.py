@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from vibench.analysis import FrequencyResponseRequest, InvalidRequest
+from vibench.acquisition import Block, open_recording
+from vibench.acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording
+from vibench.analysis import FrequencyResponseRequest, InvalidRequest, NotEnoughData
 from vibench.analysis.exchange import (
     Format,
     FunctionAxis,
@@ -16,10 +19,21 @@ from vibench.analysis.exchange import (
 )
 from vibench.analysis.results import spectral_functions
 from vibench.analysis.spectra import spectral_density
+from vibench.cli.__main__ import app
 
 pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
 RESPONSE = FunctionAxis("m0_velocity", "m0 velocity", "velocity", "m/s")
 REFERENCE = FunctionAxis("drive_voltage", "base acceleration", "acceleration", "m/s2")
+
+RATE_HZ = 2000.0
+VOLTS = 2.0
+RUN = [
+    ("check", 0.6, 0.1),
+    ("ramp_up", 0.5, 1.0),
+    ("", 0.4, VOLTS),
+    ("dwell", 2.5, VOLTS),
+    ("ramp_down", 0.5, 1.0),
+]
 
 
 def function(frequency_hz, values, kind=FunctionType.FREQUENCY_RESPONSE):
@@ -80,6 +94,62 @@ def test_densities_are_those_of_the_chosen_channels_and_seconds(known, known_val
     assert read["ordinate_axis_units_lab"].strip() == "(m s-1)2/Hz"
     np.testing.assert_allclose(read["x"], wanted.frequency_hz)
     np.testing.assert_allclose(read["data"], wanted.density, rtol=1e-10)
+
+
+def recorded(path, parts):
+    """Write a recording of parts: label, seconds, volts of a sine of 100 Hz."""
+    channel = ChannelHeader("drive_voltage", "dev/ai0", "voltage", "V", 1.0, range_v=5.0)
+    header = RecordingHeader((channel,), RATE_HZ, None, Origin.SIMULATED)
+    with create_recording(path, header) as writer:
+        now = 0
+        for label, duration_s, volts in parts:
+            end = now + round(duration_s * RATE_HZ)
+            if label:
+                writer.begin_segment(label)
+            sine = volts * np.sin(2 * np.pi * 100.0 * np.arange(now, end) / RATE_HZ)
+            writer.append(Block(now, sine[np.newaxis]))
+            if label:
+                writer.end_segment()
+            now = end
+    return writer.path
+
+
+@pytest.mark.parametrize(
+    ("parts", "lines_hz", "told"),
+    [
+        (RUN, 1.0, "over 2.5 s of dwell"),
+        (
+            [*RUN, ("ramp_up", 0.4, 0.5), ("step", 1.9, VOLTS), ("step", 0.3, 0.1)],
+            1.0,
+            "over 4.4 s of dwell and step",
+        ),
+        (
+            [("check", 3.0, 0.1), ("realisation", 0.25, VOLTS), ("ramp_down", 0.3, 0.5)],
+            4.0,
+            "over 0.25 s of realisation",
+        ),
+        ([("", 2.5, VOLTS)], 1.0, "over 2.5 s of the recording"),
+    ],
+)
+def test_densities_are_over_what_was_played_and_say_so(tmp_path, parts, lines_hz, told):
+    run = CliRunner().invoke(
+        app, ["export", str(recorded(tmp_path / "a.h5", parts)), "--to", "uff", "--spectra"]
+    )
+    assert run.exit_code == 0, run.output
+    read = pyuff.UFF(str(tmp_path / "a.uff")).read_sets(1)
+    assert read["x"][1] == pytest.approx(lines_hz)
+    # Parseval: what stands at all lines together is the mean square of what was played.
+    assert read["data"].sum() * lines_hz == pytest.approx(VOLTS**2 / 2, rel=1e-3)
+    assert read["id4"].endswith(told), read["id4"]
+
+
+def test_where_nothing_was_played_there_are_no_densities(tmp_path):
+    with open_recording(recorded(tmp_path / "a.h5", RUN)) as recording:
+        for stretch in ((0.0, 1.5), (0.0, 2.4)):
+            with pytest.raises(
+                NotEnoughData, match=r"need 1 s in one piece of what was played.*; choose more of it"
+            ):
+                spectral_functions(excerpt(recording, (), *stretch), FrequencyResponseRequest())
 
 
 def test_a_format_without_a_place_for_spectra_says_which_has_one(known, tmp_path):
