@@ -1,5 +1,6 @@
 """`vibench import`: somebody else's file as a recording."""
 
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -64,7 +65,12 @@ def _tell(file: Path, as_json: bool) -> None:
 
 
 def _line(channel: SourceChannel) -> str:
-    rate = "" if channel.sample_rate_hz is None else f", {channel.sample_rate_hz:.9g} samples/s"
+    low, high = channel.rates_hz
+    rate = ""
+    if channel.sample_rate_hz is not None:
+        rate = f", {channel.sample_rate_hz:.9g} samples/s"
+    elif math.isfinite(high):
+        rate = f", about {(low + high) / 2:.5g} samples/s"
     unit = f", {channel.unit}" if channel.unit else ""
     label = f" ({channel.label})" if channel.label else ""
     return f"{channel.name!r}{label}: {channel.samples} samples{rate}{unit}"

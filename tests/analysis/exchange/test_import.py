@@ -363,6 +363,71 @@ def test_a_rate_far_from_the_files_own_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("heading", "unit_s", "digits"),
+    [
+        ("t [s]", 1.0, 9),
+        ("Zeit (s)", 1.0, 9),
+        ("Time [ms]", 1e-3, 6),
+        ("time (\u00b5s)", 1e-6, 3),
+        ("time [s]", 1.0, 2),
+    ],
+)
+@pytest.mark.parametrize("rate_hz", [8000.0, 8020.0, 1000.0])
+def test_a_rate_that_contradicts_a_column_of_times_is_refused(tmp_path, heading, unit_s, digits, rate_hz):
+    rows = (f"{k / rate_hz / unit_s:.{digits}f};{value!r}\n" for k, value in enumerate(signals()[0].tolist()))
+    (tmp_path / "a.csv").write_text(f"{heading};v\n" + "".join(rows), encoding="utf-8")
+    meaning = mapping(tmp_path, ("v", "m0_velocity", ""))
+    if rate_hz == RATE_HZ:
+        assert imported(tmp_path / "a.csv", meaning)[0].sample_rate_hz == RATE_HZ
+        return
+    with pytest.raises(InvalidRequest, match=r"a\.csv says .* samples/s, and the mapping 8000; correct"):
+        imported(tmp_path / "a.csv", meaning)
+    assert not (tmp_path / "made.h5").exists()
+
+
+@pytest.mark.parametrize(
+    ("increment", "unit", "said"),
+    [
+        (
+            "  1.95313E-05",
+            "s",
+            "says about 51200 samples/s, and the mapping 8000; correct the mapping, or export",
+        ),
+        ("  1.25000D-04", "s", None),
+        ("  2.00000E-01", "ms", "says about 5000 samples/s"),
+        ("  2.00000E-01", "r", None),
+        ("  0.00000E+00", "s", None),
+        ("             ", "s", None),
+    ],
+)
+def test_a_rate_that_contradicts_a_universal_file_is_refused(known, tmp_path, increment, unit, said):
+    path, _ = export_samples(excerpt(known, ("m0_velocity",), to_s=1.0), Format.UFF, tmp_path / "a.uff")
+    lines = path.read_bytes().split(b"\n", 19)
+    lines[12] = b"NONE"
+    lines[14] = lines[14][:43] + increment.encode() + lines[14][56:]
+    lines[15] = lines[15][:46] + unit.encode().ljust(20)
+    path.write_bytes(b"\n".join(lines))
+    meaning = mapping(
+        tmp_path, ("1", "m0_velocity", ""), head=DWELL.replace("settle_s = 1,", "settle_s = 0,")
+    )
+    if said is None:
+        assert imported(path, meaning)[0].sample_rate_hz == RATE_HZ
+        return
+    with pytest.raises(InvalidRequest, match=said):
+        imported(path, meaning)
+
+
+@pytest.mark.parametrize("to", [Format.UFF, Format.MAT, Format.CSV])
+def test_a_rate_that_contradicts_what_was_exported_here_is_refused(known, tmp_path, to):
+    path, *_ = export_samples(excerpt(known, to_s=0.5), to, tmp_path / f"a.{to.value}")
+    source = "m0_velocity.values" if to is Format.MAT else "m0_velocity"
+    for each in (path, known.path):
+        meaning = mapping(tmp_path, (source if each is path else "/m0_velocity", "m0_velocity", ""))
+        with pytest.raises(InvalidRequest, match="says 51200 samples/s, and the mapping 8000"):
+            imported(each, meaning, tmp_path / "made.h5")
+
+
+@pytest.mark.parametrize(
     ("name", "content", "said"),
     [
         ("a.pkl", b"\x80\x04", "cannot be imported"),

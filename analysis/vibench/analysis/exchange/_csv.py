@@ -14,7 +14,7 @@ import numpy as np
 
 from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
-from ._source_channel import SourceChannel, TableSource
+from ._source_channel import SourceChannel, TableSource, rate_bounds
 
 TIME_FORMAT = "%.9f"
 """Nanoseconds since the recording's first sample."""
@@ -42,6 +42,8 @@ LONGEST_HEAD = 200
 DELIMITERS = (";", "\t", ",", None)
 """In the order in which they are tried; None stands for blanks. A comma beside another is a decimal one."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
+TIME = re.compile(r"(time|zeit|temps)|t$", re.IGNORECASE)
+"""What a column of times is called."""
 UNEVEN = 1e-3
 """How far a sample may lie from its place on an even axis of time, in sample intervals."""
 
@@ -57,11 +59,16 @@ def opened_csv(path: Path) -> Iterator[TableSource]:
         lines = (_with_points(line, delimiter) for line in islice(file, first, None))
         table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, comments=None)
     labels = _labels(head, delimiter, table.shape[1])
-    rate = _sample_rate_hz(labels[0], table[:, 0])
+    rate, bounds = _sample_rate_hz(labels[0], table[:, 0])
     yield TableSource(
         {
             SourceChannel(
-                str(number), len(table), UNIT.sub("", label).strip(), rate, _unit(label)
+                str(number),
+                len(table),
+                UNIT.sub("", label).strip(),
+                rate,
+                _unit(label),
+                rate_bounds_hz=bounds,
             ): np.ascontiguousarray(column)
             for number, (label, column) in enumerate(zip(labels, table.T, strict=True), start=1)
         }
@@ -101,12 +108,15 @@ def _unit(label: str) -> str:
     return "" if found is None else found[1]
 
 
-def _sample_rate_hz(label: str, values: Reals) -> float | None:
-    """Take the rate from a first column that is called time and is even; None otherwise."""
-    if not label.lower().startswith("time") or _unit(label) not in {"s", ""} or len(values) < 2:
-        return None
-    interval_s = (values[-1] - values[0]) / (len(values) - 1)
-    if not interval_s > 0:
-        return None
-    even_s = values[0] + interval_s * np.arange(len(values))
-    return float(1 / interval_s) if np.all(np.abs(values - even_s) < UNEVEN * interval_s) else None
+def _sample_rate_hz(label: str, values: Reals) -> tuple[float | None, tuple[float, float] | None]:
+    """Take the rate from a first column that is called time: exact where it is even, else bounds of it."""
+    if not TIME.match(UNIT.sub("", label).strip()) or len(values) < 2:
+        return None, None
+    with np.errstate(invalid="ignore", over="ignore"):
+        interval = float(values[-1] - values[0]) / (len(values) - 1)
+        off = float(np.max(np.abs(values - values[0] - interval * np.arange(len(values)))))
+    exact = rate_bounds(interval, 0.0, _unit(label))
+    if exact is not None and off < UNEVEN * interval:
+        return exact[0], None
+    # Each end may be as far off as any sample is.
+    return None, rate_bounds(interval, 2 * off / (len(values) - 1), _unit(label))

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 import h5py
@@ -113,6 +114,7 @@ def _channel(dataset: h5py.Dataset, name: str, samples: int) -> SourceChannel:
         unit=unit,
         step=scale if is_exact else None,
         origin=_origin(dataset.file),
+        sample_rate_hz=_rate_hz(dataset.file),
     )
 
 
@@ -120,6 +122,12 @@ def _origin(file: h5py.File) -> Origin | None:
     """Read what a recording, or a file made of one, says of itself."""
     said = _text(file, "origin") if "origin" in file.attrs else ""
     return Origin(said) if said in set(Origin) else None
+
+
+def _rate_hz(file: h5py.File) -> float | None:
+    """Read what a recording says of itself."""
+    said = np.ravel(file.attrs.get("sample_rate_hz", 0.0))
+    return float(said[0]) if said.size == 1 and said.dtype.kind in "iuf" and 0 < said[0] < inf else None
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:

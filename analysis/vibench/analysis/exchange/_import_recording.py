@@ -212,12 +212,14 @@ def _sample_rate_hz(wanted: Sequence[_Wanted], mapping: ImportMapping, path: Pat
         why = "does not say its sample rate exactly" if not said else "says several sample rates"
         raise InvalidRequest(f"{path.name} {why}; give sample_rate_hz in the mapping")
     rate = given if given is not None else next(each for each in said if each is not None)
-    far = [each for each in said if each is not None and abs(each - rate) > RATE_TOLERANCE * rate]
-    if far:
-        raise InvalidRequest(
-            f"{path.name} says {far[0]:.9g} samples/s, and the mapping {rate:.9g}; correct the mapping, "
-            "or leave its sample_rate_hz out"
-        )
+    for exact, (low, high) in ((each.source.sample_rate_hz, each.source.rates_hz) for each in wanted):
+        if not low * (1 - RATE_TOLERANCE) <= rate <= high * (1 + RATE_TOLERANCE):
+            told = f"about {(low + high) / 2:.5g}" if exact is None else f"{exact:.9g}"
+            way = "export the file again" if exact is None else "leave its sample_rate_hz out"
+            raise InvalidRequest(
+                f"{path.name} says {told} samples/s, and the mapping {rate:.9g}; correct the mapping, "
+                f"or {way}"
+            )
     return rate
 
 

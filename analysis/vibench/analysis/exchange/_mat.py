@@ -7,7 +7,8 @@ import json
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -136,7 +137,16 @@ def opened_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     except (MatReadError, zlib.error) as error:  # neither is a kind of ValueError
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
-    yield TableSource(dict(_numbers(own, "")))
+    rate_hz = _rate_hz(own)
+    yield TableSource({replace(each, sample_rate_hz=rate_hz): values for each, values in _numbers(own, "")})
+
+
+def _rate_hz(own: Mapping[str, Any]) -> float | None:
+    """Read what a recording that was exported says of itself."""
+    match own:
+        case {"recording": {"sample_rate_hz": float() | int() as rate_hz}} if 0 < rate_hz < inf:
+            return float(rate_hz)
+    return None
 
 
 def _numbers(struct: Mapping[str, Any], prefix: str) -> Iterator[tuple[SourceChannel, Any]]:

@@ -5,10 +5,27 @@ A table held in memory as a source: what formats give that cannot be read in str
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 
 from vibench.acquisition.recording import Origin
 
 from ..signals import Reals
+
+LEAST_INTERVAL_S = 1e-100
+"""Shorter is no time between samples, and its inverse may be no number."""
+SECONDS = {
+    **dict.fromkeys(("", "none", "s", "sec", "second", "seconds"), 1.0),
+    "ms": 1e-3,
+    **dict.fromkeys(("us", "\u03bcs"), 1e-6),
+}
+"""Of a unit of time, by its text without regard to case."""
+
+
+def rate_bounds(interval: float, uncertainty: float, unit: str) -> tuple[float, float] | None:
+    """Turn an interval between samples, in a unit of time, into bounds of the rate [Hz]; None if none."""
+    second = SECONDS.get(unit.casefold(), 0.0)
+    shortest, longest = second * (interval - uncertainty), second * (interval + uncertainty)
+    return (1 / longest, 1 / shortest) if LEAST_INTERVAL_S < shortest <= longest < inf else None
 
 
 @dataclass(frozen=True)
@@ -21,7 +38,7 @@ class SourceChannel:
     label: str = ""
     """What its maker called it; others may be called the same."""
     sample_rate_hz: float | None = None
-    """None when the file does not say."""
+    """None when the file does not say, or not exactly."""
     unit: str = ""
     step: float | None = None
     """Distance of neighbouring values when they come from integers, so that they are kept exactly."""
@@ -29,6 +46,14 @@ class SourceChannel:
     """Whether it was measured or simulated; None when the file does not say."""
     full_scale: float | None = None
     """Largest value the file can hold, where that is the converter's range."""
+    rate_bounds_hz: tuple[float, float] | None = None
+    """The same where the file does not say it exactly, but tells times in few digits."""
+
+    @property
+    def rates_hz(self) -> tuple[float, float]:
+        """Between which the rate lies, as far as the file tells it."""
+        exact = self.sample_rate_hz
+        return (self.rate_bounds_hz or (0.0, inf)) if exact is None else (exact, exact)
 
 
 @dataclass(frozen=True, eq=False)

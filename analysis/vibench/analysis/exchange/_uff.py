@@ -29,7 +29,7 @@ from vibench.acquisition.recording import ChannelHeader, Origin
 from ..errors import UnusableData
 from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
-from ._source_channel import SourceChannel
+from ._source_channel import SourceChannel, rate_bounds
 
 DELIMITER = "    -1"
 TIME_RESPONSE = 1
@@ -133,6 +133,8 @@ def date_line(started_utc: str) -> str:
 HEADER_LINES = 11
 LEAST_TEXT = 2
 """Characters of a number in free text: a digit and what divides it from the next."""
+DIGITS = 5e-6
+"""How far an increment of time may lie from the truth, as a share: it has six digits."""
 IEEE = 2
 BYTE_ORDERS = {1: "<", 2: ">"}
 WIDTHS = {REAL_SINGLE: 13, REAL_DOUBLE: 20}
@@ -257,7 +259,17 @@ def _channel(number: int, header: list[str]) -> SourceChannel:
         sample_rate_hz=rates[0] if rates else None,
         origin=next(filter(None, map(told_origin, header[:5])), None),
         unit=header[8][46:66].strip().removesuffix("NONE"),
+        rate_bounds_hz=_rate_bounds(header),
     )
+
+
+def _rate_bounds(header: list[str]) -> tuple[float, float] | None:
+    """Take the increment of time for what its digits are worth; None where it is none, or in another unit."""
+    try:
+        increment = float(header[6][43:56].upper().replace("D", "E"))
+    except ValueError:
+        return None
+    return rate_bounds(increment, DIGITS * increment, header[7][46:66].strip())
 
 
 def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:
