@@ -3,6 +3,7 @@
 import contextlib
 import json
 import shutil
+from zipfile import ZipFile
 
 import h5py
 import numpy as np
@@ -11,6 +12,16 @@ import pytest
 from vibench.acquisition import Block
 from vibench.acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording
 
+LICENCE = "https://creativecommons.org/licenses/by/4.0/"
+TINY = """
+name = "tiny"
+[defaults]
+ramp_s = 0.1
+ramp_step_s = 0.02
+[[measurements]]
+name = "tone"
+excitation = { kind = "dwell", amplitude_vpp = 0.1, frequency_hz = 150, settle_s = 0, duration_s = 0.2 }
+"""
 SECRET = b"root:x:0:0:root:/root:/bin/bash\n" * 200
 
 
@@ -95,6 +106,62 @@ def test_the_catalogue_names_a_damaged_recording_and_fails(vibench_here, folder)
         "damaged",
         "intact",
     ]
+
+
+def packed(vibench_here, folder):
+    """Pack a folder; gives what was said, and the crate's entities by name."""
+    found = vibench_here("pack", ".", "--license", LICENCE, "--out", "crate.zip", cwd=folder)
+    with ZipFile(folder / "crate.zip") as archive:
+        names = set(archive.namelist())
+        graph = json.loads(archive.read("ro-crate-metadata.json"))["@graph"]
+    return found, names, {each["@id"]: each for each in graph}
+
+
+def test_a_whole_folder_is_packed_without_a_complaint(vibench_here, folder):
+    found, names, graph = packed(vibench_here, folder)
+    assert (found.returncode, "error" in found.stderr) == (0, False), found.stderr
+    assert {"one.h5", "two.h5", "three.h5"} < names
+    assert "; complete: " in graph["two.h5"]["description"]
+    assert "cannot be trusted" not in graph["./"]["description"]
+
+
+def test_a_recording_that_is_not_finished_is_left_out_of_a_crate_and_named(vibench_here, folder):
+    with growing(folder / "four.h5"):
+        shutil.copy(folder / "four.h5.part", folder / "five.h5.part")
+    found, names, _ = packed(vibench_here, folder)
+    assert (found.returncode, "five.h5.part" in names) == (0, False)
+    assert "note: five.h5.part is not finished and was left out" in found.stderr
+
+
+def test_a_crate_calls_no_damaged_recording_complete(vibench_here, folder):
+    damage(folder / "two.h5")
+    (folder / "three.h5").write_bytes((folder / "three.h5").read_bytes()[:5000])
+    found, names, graph = packed(vibench_here, folder)
+    assert found.returncode == 1
+    errors = [line for line in found.stderr.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 2
+    assert "two.h5 cannot be trusted (damaged: not as it was sealed: data of /m0_velocity)" in found.stderr
+    assert "three.h5 cannot be trusted (unreadable: " in found.stderr
+    # Nothing is left out for it: a deposit may be all that remains.
+    assert {"one.h5", "two.h5", "three.h5"} < names
+    for name in ("two.h5", "three.h5"):
+        assert graph[name]["description"].startswith("Cannot be trusted")
+        assert "complete" not in graph[name]["description"]
+        assert name in graph["./"]["description"]
+    assert "; complete: " in graph["one.h5"]["description"]
+
+
+def test_a_crate_names_what_its_campaign_made_and_does_not_lie_there(vibench_here, folder):
+    campaign = folder / "tiny.toml"
+    campaign.write_text(TINY)
+    made = vibench_here("measure", "tiny.toml", "--out", ".", "--check", "waived", cwd=folder)
+    assert made.returncode == 0, made.stderr
+    (folder / "tone.h5").unlink()
+    found, names, graph = packed(vibench_here, folder)
+    assert found.returncode == 1
+    assert "error: tone.h5 cannot be trusted (missing: the campaign made it for tone)" in found.stderr
+    assert "tone.h5" not in {*names, *graph}
+    assert "tone.h5 cannot be trusted (missing" in graph["./"]["description"]
 
 
 @pytest.mark.parametrize(

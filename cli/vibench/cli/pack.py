@@ -5,8 +5,11 @@ from typing import Annotated
 
 import typer
 
+from vibench.acquisition.campaign import verify_recordings
+from vibench.acquisition.recording import SealState, seal_key
 from vibench.analysis.exchange import CrateFacts, pack_folder
 
+from .exit_code import ExitCode
 from .output import console
 from .progress_bars import transfer_bar
 
@@ -31,6 +34,17 @@ def pack(
     crate = here.with_name(f"{here.name}.zip") if out is None else out
     facts = CrateFacts(licence, tuple(author or ()), title, description)
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    found = verify_recordings(folder, key=seal_key())
+    untrusted = {
+        each.path: f"{each.verdict.replace('_', ' ')}: {each.sentence}" for each in found if each.is_bad
+    }
     with transfer_bar("pack", size) as observer:
-        packed = pack_folder(folder, crate, facts, observer)
+        packed = pack_folder(folder, crate, facts, untrusted, observer)
     console.print(f"packed {len(packed)} files into {crate}")
+    for name in (each.path for each in found if each.verdict == SealState.UNFINISHED):
+        typer.echo(f"note: {name} is not finished and was left out; vibench recover finishes it", err=True)
+    for name, why in untrusted.items():
+        way = "the crate says so; restore it and pack again, or deposit the crate as it is"
+        typer.echo(f"error: {name} cannot be trusted ({why.rstrip('.')}): {way}", err=True)
+    if untrusted:
+        raise typer.Exit(ExitCode.FAILED)

@@ -26,7 +26,7 @@ def folder(known_file, tmp_path):
 
 @pytest.fixture
 def crate(folder, tmp_path):
-    pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE, ("Ada L.",), "Known"))
+    pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE, ("Ada L.",), "Known"), {})
     return tmp_path / "crate.zip"
 
 
@@ -45,14 +45,14 @@ def test_every_byte_is_packed_and_described(folder, crate):
 
 def test_a_crate_is_never_overwritten(folder, crate):
     with pytest.raises(InvalidRequest, match="exists"):
-        pack_folder(folder, crate, CrateFacts(LICENCE))
+        pack_folder(folder, crate, CrateFacts(LICENCE), {})
 
 
 def test_what_cannot_be_deposited_is_refused(folder, tmp_path):
     with pytest.raises(InvalidRequest, match="no address of a licence"):
-        pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"))
+        pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"), {})
     with pytest.raises(NotEnoughData, match="no recording"):
-        pack_folder(folder / "report", tmp_path / "x.zip", CrateFacts(LICENCE))
+        pack_folder(folder / "report", tmp_path / "x.zip", CrateFacts(LICENCE), {})
     assert not (tmp_path / "x.zip").exists()
 
 

@@ -6,7 +6,7 @@ they ended, which channels in which units, and with which software.
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from mimetypes import guess_type
@@ -40,7 +40,11 @@ class CrateFacts:
 
 
 def pack_folder(
-    folder: Path, crate: Path, facts: CrateFacts, observer: TransferObserver = unobserved
+    folder: Path,
+    crate: Path,
+    facts: CrateFacts,
+    untrusted: Mapping[str, str],
+    observer: TransferObserver = unobserved,
 ) -> tuple[Path, ...]:
     """Pack everything in a folder, and its description, into a zip; give the files that were packed.
 
@@ -52,6 +56,10 @@ def pack_folder(
         The new zip; nothing is overwritten.
     facts
         Licence, authors, title.
+    untrusted
+        Why a recording cannot be trusted, by its path below the folder: what `vibench.acquisition.campaign`'s
+        ``verify_recordings`` calls bad, recordings that are missing among them. They are packed as they are,
+        and the description says so.
     observer
         Told how many bytes were packed since it was last called.
 
@@ -69,10 +77,13 @@ def pack_folder(
             "https://creativecommons.org/licenses/by/4.0/"
         )
     paths = tuple(path for path in sorted(folder.rglob("*")) if _belongs(path) and path != crate)
-    entities = [_file_entity(path, folder) for path in paths]
+    entities = [_file_entity(path, folder, untrusted) for path in paths]
     if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):
         raise NotEnoughData(f"{folder} holds no recording; give the folder of a campaign")
-    document = {"@context": f"{CONTEXT}/context", "@graph": [*_about(folder, facts, entities), *entities]}
+    document = {
+        "@context": f"{CONTEXT}/context",
+        "@graph": [*_about(folder, facts, untrusted, entities), *entities],
+    }
     with new_file(crate) as unfinished, ZipFile(unfinished, "x", ZIP_DEFLATED) as archive:
         archive.writestr(METADATA, json.dumps(document, indent=2, ensure_ascii=False))
         for path in paths:
@@ -87,8 +98,12 @@ def _belongs(path: Path) -> bool:
     return path.is_file() and path.name != METADATA and path.suffix not in {".tmp", ".part"}
 
 
-def _about(folder: Path, facts: CrateFacts, entities: Sequence[Entity]) -> Iterator[Entity]:
+def _about(
+    folder: Path, facts: CrateFacts, untrusted: Mapping[str, str], entities: Sequence[Entity]
+) -> Iterator[Entity]:
     """Describe the description, the crate, its licence, its authors, and the software."""
+    described = facts.description or "Recordings of vibro-impact shaker tests, made with vibench"
+    warned = (f"{name} cannot be trusted ({why})" for name, why in untrusted.items())
     people = [{"@id": f"#author-{number}"} for number, _ in enumerate(facts.authors, 1)]
     yield {
         "@id": METADATA,
@@ -100,7 +115,7 @@ def _about(folder: Path, facts: CrateFacts, entities: Sequence[Entity]) -> Itera
         "@id": "./",
         "@type": "Dataset",
         "name": facts.title or folder.resolve().name,
-        "description": facts.description or "Recordings of vibro-impact shaker tests, made with vibench",
+        "description": "; ".join((described, *warned)),
         "datePublished": datetime.now(UTC).date().isoformat(),
         "license": {"@id": facts.licence},
         **({"author": people} if people else {}),
@@ -116,7 +131,7 @@ def _about(folder: Path, facts: CrateFacts, entities: Sequence[Entity]) -> Itera
         yield {**person, "@type": "Person", "name": name}
 
 
-def _file_entity(path: Path, folder: Path) -> Entity:
+def _file_entity(path: Path, folder: Path, untrusted: Mapping[str, str]) -> Entity:
     with path.open("rb") as file:
         checksum = hashlib.file_digest(file, "sha256").hexdigest()
     entity = {
@@ -131,9 +146,12 @@ def _file_entity(path: Path, folder: Path) -> Entity:
         return entity
     try:
         with open_recording(path) as recording:
-            return {**entity, **_recording_facts(recording)}
+            entity |= _recording_facts(recording)
     except RecordingError as error:
-        return {**entity, "description": f"Cannot be read as a recording: {error}"}
+        entity["description"] = f"Cannot be read as a recording: {error}"
+    if why := untrusted.get(str(entity["@id"])):
+        entity["description"] = f"Cannot be trusted ({why})"
+    return entity
 
 
 def _recording_facts(recording: Recording) -> Entity:
