@@ -97,6 +97,7 @@ def test_a_response_that_stays_has_no_jump_and_none_is_seen_across_the_turning_p
         drive_amplitude_m=np.ones(steps),
         response_i=np.ones(steps),
         noise_bias_i=np.zeros(steps),
+        noise_error_i=np.zeros(steps),
         response_ii=np.array([1.0, 1.1, 1.2, 5.0, 5.1, 4.9]),
         sd_response_ii=np.zeros(steps),
         phase_rad=np.zeros(steps),

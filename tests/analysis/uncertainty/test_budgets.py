@@ -143,7 +143,9 @@ def test_a_motion_that_never_repeats_has_chance_in_response_i(dwell_file):
     results = analyse_files([dwell_file("strong")], "strong", Simulation.LEFT_OUT)
     (strong,) = results.results
     _, first, second = budgets_of(strong)
-    assert first.share(Cause.CHANCE) > 5 * first.share(Cause.NOISE)
+    assert first.share(Cause.CHANCE) > 0.005
+    # No silence was recorded that would tell noise from chaos.
+    assert first.share(Cause.NOISE) is None
     assert second.share(Cause.CHANCE) > 0.0
     said = campaign_summary(results)["results"][0]["uncertainty"]
     assert [each["quantity"] for each in said] == ["base amplitude A0", "Response I", "Response II"]

@@ -87,6 +87,7 @@ from ._run_state import (
 )
 from ._schedule import (
     CHECK_FREQUENCY_HZ,
+    CHECK_QUIET_S,
     CHECK_S,
     HUSH_S,
     Phase,
@@ -106,6 +107,7 @@ from ._sweep import (
 __all__ = [
     "BYTES_PER_SAMPLE",
     "CHECK_FREQUENCY_HZ",
+    "CHECK_QUIET_S",
     "CHECK_S",
     "EXCITATION_KINDS",
     "FEWEST_STAIRS",

@@ -3,6 +3,7 @@ from ._period import (
     shortest_period as shortest_period,
 )
 from ._verdict import (
+    SMALL as SMALL,
     MotionKind as MotionKind,
     MotionVerdict as MotionVerdict,
     begin_of_last_motion as begin_of_last_motion,

@@ -158,7 +158,7 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
         )
     if last.noise_level > LARGEST_NOISE:
         return _undecided(
-            f"the vibrometer's noise is {100 * last.noise_level:.0f} % of the orbit, which may hide whether "
+            f"noise is {100 * last.noise_level:.0f} % of the orbit, which may hide whether "
             "it repeats, or that there is any motion at all; raise the level or use a finer range",
             evidence,
         )

@@ -86,7 +86,8 @@ def _measured(analysis: DwellAnalysis) -> Json:
         "drive_amplitude_m": found.drive.amplitude_m,
         "sd_drive_amplitude_m": found.drive.sd_amplitude_m,
         "drive_distortion": found.drive.distortion,
-        **named(found, "window_s", "response_i", "noise_bias_i", "response_ii"),
+        **named(found, "window_s", "response_i", "noise_bias_i", "noise_error_i"),
+        **named(found, "noise_source", "response_ii"),
         **named(found, "sd_response_ii", "phase_rad", "sd_phase_rad"),
         "lines": [
             {

@@ -6,7 +6,7 @@ Tracked where the motion can be followed; else from statistics of its chaos.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import isfinite
+from math import isfinite, isnan
 from pathlib import Path
 
 from vibench.acquisition import open_recording
@@ -109,9 +109,10 @@ class CollisionNumbers:
 
 
 def peakedness(dwell: DwellAnalysis) -> float:
-    """Response I without its noise over Response II: 1 for a sine."""
+    """Response I without its noise, where that is determined, over Response II: 1 for a sine."""
     found = dwell.response
-    return (found.response_i - found.noise_bias_i) / found.response_ii
+    lift = 0.0 if isnan(found.noise_bias_i) else found.noise_bias_i
+    return (found.response_i - lift) / found.response_ii
 
 
 def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:

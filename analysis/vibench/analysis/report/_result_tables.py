@@ -191,8 +191,11 @@ def _dwell_row(result: DwellResult) -> tuple[str, ...]:
     found, laid = result.analysis.response, result.laid
     plan = result.analysis.excitation
     amplitude, first, second = budgets_of(result)
-    is_small = abs(found.noise_bias_i) < _SMALLEST_BIAS
-    bias = f"below {_SMALLEST_BIAS:g}" if is_small else f"{found.noise_bias_i:.1g}"
+    if np.isnan(found.noise_bias_i):
+        bias = "not determined"
+    else:
+        is_small = found.noise_bias_i < _SMALLEST_BIAS
+        bias = f"below {_SMALLEST_BIAS:g}" if is_small else f"{found.noise_bias_i:.1g}"
     return (
         f"{plan.amplitude_vpp:g} Vpp, {plan.frequency_hz:g} Hz",
         amplitude.text.removesuffix(f" {amplitude.unit}").strip("()"),

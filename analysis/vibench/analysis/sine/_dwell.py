@@ -14,13 +14,14 @@ from ..tones import (
     TrackedOrders,
     cycles_needed,
     drive_level,
-    noise_bias,
+    noise_lift,
     order_label,
     order_turns,
     peaks,
     steady_phase,
     tracked_orders,
 )
+from ._background import NOTHING, Background, background_of, heard_in, left_between, louder
 
 _LOWEST_ORDER = 0.1
 """Displacement is kept down to this part of the drive frequency, where drift and hum begin to matter."""
@@ -30,8 +31,6 @@ _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
 """Part of the sample rate where a vibrometer shows its own noise: no mode and no impact reaches there."""
 _NOISE_SEGMENT = 4096
-_EXPLAINED = 1.5
-"""Residual over noise up to which the orders are the whole motion."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +56,11 @@ class DwellResponse(Labelled):
     response_i: float
     """Largest |x| over the window, divided by the drive amplitude."""
     noise_bias_i: float
-    """By how much noise is expected to have lifted it."""
+    """By how much noise is expected to have lifted it; NaN where the noise is not determined."""
+    noise_error_i: float
+    """Root mean square error that noise makes of it, the lift included; NaN likewise."""
+    noise_source: str
+    """What tells that noise, or why it is not determined."""
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
@@ -70,7 +73,7 @@ class DwellResponse(Labelled):
     noise_density: float
     """Of the velocity channel [m/s per root hertz]."""
     noise_displacement_m: float
-    """What that is in displacement, root mean square within its band [m]."""
+    """What that is in displacement, root mean square within its band; or what was heard in silence [m]."""
     displacement: ConvertedSignal
     """x over the record [m]; its settled part holds the window."""
     spectrum: AmplitudeSpectrum
@@ -90,6 +93,7 @@ def dwell_response(
     orders: tuple[float, ...] = ALL_ORDERS,
     delay_s: float = 0.0,
     sensors: complex = 1.0,
+    silence: Reals = NOTHING,
 ) -> DwellResponse:
     """Analyse the last seconds of a dwell.
 
@@ -111,6 +115,8 @@ def dwell_response(
         By how much the response channel lags the base channel [s].
     sensors
         Gain of the response's sensor over that of the base's at the drive frequency, without their delays.
+    silence
+        Response velocity before anything played, where it was recorded [m/s].
 
     """
     displacement = converted_signal(
@@ -132,15 +138,21 @@ def dwell_response(
     ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
     each = turn * parts.order(1.0) / base_parts.order(1.0) / ratio
     scatter = float(np.std(each, ddof=1)) / np.sqrt(2 * each.size)
-    noise_density, noise_m, independent = _noise(response, displacement, window_s)
+    noise_density, sensor = _sensor_noise(response, displacement)
+    silent = heard_in(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
+    repeated = _repeated(motion, phase, orders)
+    rest = left_between(motion - repeated, sample_rate_hz)
+    noise = background_of(rest, float(np.std(motion)), sensor, silent)
+    lift = noise_lift(repeated if noise.is_rest else motion, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
     spectrum = spectrum.converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
     return DwellResponse(
         drive=level,
         window_s=window_s,
         response_i=float(np.max(np.abs(motion))) / level.amplitude_m,
-        noise_bias_i=noise_bias(_clean(motion, phase, noise_m, orders), noise_m, independent)
-        / level.amplitude_m,
+        noise_bias_i=lift.bias / level.amplitude_m,
+        noise_error_i=lift.error / level.amplitude_m,
+        noise_source=noise.source,
         response_ii=abs(ratio),
         sd_response_ii=abs(ratio) * scatter,
         phase_rad=float(np.angle(ratio)),
@@ -148,7 +160,7 @@ def dwell_response(
         orders=orders,
         order_displacement=whole.value[:, 0] / (1j * omega * np.asarray(orders)),
         noise_density=noise_density,
-        noise_displacement_m=noise_m,
+        noise_displacement_m=louder(silent, sensor).rms_m,
         displacement=displacement,
         spectrum=spectrum,
         lines=_order_lines(whole, parts, level.frequency_hz)
@@ -184,8 +196,8 @@ def _whole_and_parts(
     return whole, parts
 
 
-def _noise(response: Reals, displacement: ConvertedSignal, window_s: float) -> tuple[float, float, float]:
-    """Density of the velocity's noise, rms of it in displacement, and how often that renews itself."""
+def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float, Background]:
+    """Density of the velocity's noise, where nothing else reaches, and what it is in displacement."""
     rate = displacement.sample_rate_hz
     density = spectral_density(response, rate, segment_samples=min(_NOISE_SEGMENT, response.size // 2))
     quiet = (density.frequency_hz > _NOISE_BAND[0] * rate) & (density.frequency_hz < _NOISE_BAND[1] * rate)
@@ -193,17 +205,12 @@ def _noise(response: Reals, displacement: ConvertedSignal, window_s: float) -> t
     low, high = displacement.low_hz, displacement.high_hz
     # White velocity noise integrated once: density ~ 1/f^2, with rms frequency sqrt(low high).
     rms_m = level / (2 * np.pi) * np.sqrt(1 / low - 1 / high)
-    return level, float(rms_m), 2 * np.sqrt(low * high) * window_s
+    return level, Background(float(rms_m), float(np.sqrt(low * high)), "velocity channel")
 
 
-def _clean(motion: Reals, phase: Reals, noise_m: float, orders: tuple[float, ...]) -> Reals:
-    """Motion without its noise where the orders explain all but noise; else as recorded.
-
-    Noise added once more to a record that holds it lifts its maximum less than it did the first time.
-    """
+def _repeated(motion: Reals, phase: Reals, orders: tuple[float, ...]) -> Reals:
+    """Give what of a motion repeats with the drive."""
     fit = tracked_orders(motion, phase, interval_samples=motion.size, orders=orders)
-    if fit.residual_rms[0] > _EXPLAINED * noise_m:
-        return motion
     return np.asarray(np.real(fit.value[:, 0] @ order_turns(phase, orders)))
 
 

@@ -17,6 +17,7 @@ from ..recordings import (
     specimen_of,
 )
 from ..signals import Envelope, Reals, envelope
+from ._background import silence_before
 from ._dwell import DwellResponse, dwell_response
 from ._dwell_motion import DwellMotion, IrregularMotion
 from ._terminal_level import TerminalLevel
@@ -70,6 +71,7 @@ def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float
         towards_hz=towards_hz,
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([dwell.frequency_hz]))[0]),
+        silence=silence_before(channels),
     )
 
 

@@ -161,7 +161,7 @@ def _section(channels: Channels, response: DwellResponse) -> Section:
 
 
 def _points(section: Section, response: DwellResponse, sample_rate_hz: float) -> Points:
-    """Points over the size of the orbit, and the vibrometer's noise in the same measure."""
+    """Points over the size of the orbit, and the noise in the same measure."""
     sizes = np.array(
         [
             np.sqrt(2 * np.mean(section.orbit_displacement_m**2)),

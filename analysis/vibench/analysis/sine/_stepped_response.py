@@ -23,6 +23,7 @@ from ..recordings import (
 )
 from ..signals import Reals
 from ..tables import Labelled
+from ._background import silence_before
 from ._dwell import DwellResponse, dwell_response
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | BranchContinuation | HeldResponse
@@ -44,6 +45,8 @@ class SteppedResponse(Labelled):
     drive_amplitude_m: Reals
     response_i: Reals
     noise_bias_i: Reals
+    noise_error_i: Reals
+    """Root mean square error that noise makes of Response I; NaN, as its lift is, where not determined."""
     response_ii: Reals
     sd_response_ii: Reals
     phase_rad: Reals
@@ -82,6 +85,7 @@ def stepped_response(
         drive_amplitude_m=np.array([each.drive.amplitude_m for each in steps]),
         response_i=np.array([each.response_i for each in steps]),
         noise_bias_i=np.array([each.noise_bias_i for each in steps]),
+        noise_error_i=np.array([each.noise_error_i for each in steps]),
         response_ii=np.array([each.response_ii for each in steps]),
         sd_response_ii=np.array([each.sd_response_ii for each in steps]),
         phase_rad=np.array([each.phase_rad for each in steps]),
@@ -107,6 +111,7 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
         window_s=min(plan.record_s, data.shape[1] / rate),
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([near_hz]))[0]),
+        silence=silence_before(channels),
     )
 
 

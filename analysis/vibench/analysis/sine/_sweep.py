@@ -13,7 +13,7 @@ from scipy import fft
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..signals import Decimator, Quantity, Reals, converted_signal, decimation_factor
 from ..tables import Labelled
-from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_bias, tracked_orders
+from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_lift, tracked_orders
 
 _MARGIN = 0.5
 """Kept around the drive's band, as a fraction of its ends; the outer half is the filter's edge."""
@@ -133,6 +133,7 @@ class SweepResponse(Labelled):
     response_i: Reals
     """Largest |x| over the drive amplitude."""
     noise_bias_i: Reals
+    noise_error_i: Reals
     """By how much noise is expected to have lifted Response I."""
     response_ii: Reals
     """Amplitude of x at the drive frequency over the drive amplitude."""
@@ -275,7 +276,7 @@ class SweepSums:
         peak_m = np.max(np.abs(intervals), axis=1)
         noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
         independent = 2 * np.sqrt(low_hz * high_hz) * self._interval / self._rate_hz
-        bias_m = np.array([noise_bias(each, noise_m, independent) for each in intervals])
+        bias_m, error_m = np.transpose([noise_lift(each, noise_m, independent) for each in intervals])
         ratio = 1j * omega * velocity.order(1.0) / base.order(1.0) * np.exp(1j * omega * delay_s)
         relative = np.hypot(
             velocity.sd[fundamental] / velocity.amplitude[fundamental],
@@ -294,6 +295,7 @@ class SweepSums:
             peak_displacement_m=peak_m,
             response_i=peak_m / amplitude_m,
             noise_bias_i=bias_m / amplitude_m,
+            noise_error_i=error_m / amplitude_m,
             response_ii=np.abs(ratio),
             sd_response_ii=np.abs(ratio) * relative,
             phase_rad=np.angle(ratio),

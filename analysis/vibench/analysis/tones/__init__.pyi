@@ -4,8 +4,8 @@ from ._drive_level import (
     drive_level as drive_level,
     noise_drive_level as noise_drive_level,
 )
-from ._noise_bias import (
-    noise_bias as noise_bias,
+from ._noise_lift import (
+    noise_lift as noise_lift,
 )
 from ._order_tracking import (
     ALL_ORDERS as ALL_ORDERS,

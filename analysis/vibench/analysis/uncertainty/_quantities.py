@@ -88,9 +88,7 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
     is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
     scatter = Cause.NOISE if is_steady else Cause.CHANCE
     drive = found.drive
-    noise = Contribution(
-        Cause.NOISE, found.noise_displacement_m / drive.amplitude_m / found.response_i, "velocity channel"
-    )
+    noise = _noise(found.noise_error_i / found.response_i, found.noise_source)
     return (
         _amplitude(drive.amplitude_m, drive.sd_amplitude_m, stated, scatter),
         Budget(
@@ -109,6 +107,11 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
             ),
         ),
     )
+
+
+def _noise(relative: float, source: str) -> Contribution:
+    """Noise as far as it is determined: NaN is not."""
+    return Contribution(Cause.NOISE, None if np.isnan(relative) else float(relative), source)
 
 
 def _ratio(stated: Stated) -> tuple[Contribution, ...]:
@@ -176,7 +179,7 @@ def stepped_budgets(analysis: SteppedSineAnalysis, laid: AbstractOverlay[Any] | 
     found = analysis.response
     if not found.response_ii.size:
         return ()
-    collides = found.response_i - found.noise_bias_i > _PEAKED * found.response_ii
+    collides = found.response_i - np.nan_to_num(found.noise_bias_i) > _PEAKED * found.response_ii
     return tuple(_largest(analysis.facts, found, collides, laid))
 
 
@@ -187,14 +190,14 @@ def _largest(
     laid: AbstractOverlay[Any] | None,
 ) -> Iterator[Budget]:
     stated = stated_of(facts.bench)
-    bias, sd = found.noise_bias_i, found.sd_response_ii
+    error, sd = found.noise_error_i, found.sd_response_ii
     for name, values, scatter, source in (
-        (RESPONSE_I, found.response_i, bias, "noise that lifts a maximum"),
+        (RESPONSE_I, found.response_i, error, "noise that lifts a maximum"),
         (RESPONSE_II, found.response_ii, sd, "parts of the interval"),
     ):
         top = int(np.argmax(values))
         value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
-        own = Contribution(Cause.NOISE, float(scatter[top]) / value, source)
+        own = _noise(float(scatter[top]) / value, source)
         if collides[top]:
             own = _drawn(laid, name, top) or (
                 Contribution(Cause.CHANCE, None, "no draws of the twin tell it")

@@ -1,0 +1,99 @@
+"""Bounds of a weak Response I hold its truth, whatever shakes the bench: the noise is taken where it acts."""
+
+import json
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_bench, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement
+from vibench.acquisition.rig import load_rig
+from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
+from vibench.analysis.chaos import MotionKind
+from vibench.analysis.report._result_tables import dwell_table
+from vibench.analysis.uncertainty import Cause
+from vibench.sim import base_transmissibility
+
+RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
+WEAK_VPP = 0.01
+AMPLIFIER_NOISE_V = (0.0, 0.02)
+"""That of the generator alone, which is white and fills resonances; and a floor that outdoes the drive."""
+
+
+def measured(folder, excitation, **virtual):
+    """Measure on a virtual rig of its own, with its check, and give the result of the recording."""
+    rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update=virtual)})
+    path = folder / "weak.h5"
+    with open_bench(rig) as bench:
+        run_measurement(bench, Measurement(name="weak", excitation=excitation, ramp_s=0.5), path)
+    return analyse_files([path], "weak", Simulation.LEFT_OUT).results[0]
+
+
+def linear(frequency_hz):
+    """Both Responses of the specimen without noise, which touches no stop at this level."""
+    return float(abs(base_transmissibility(RIG.specimen.specimen(), [frequency_hz])[0, 0]))
+
+
+def covers(budget, truth):
+    return abs(budget.value - truth) <= budget.expanded
+
+
+def dwell(frequency_hz, amplitude_vpp=WEAK_VPP, duration_s=3.0):
+    return Dwell(amplitude_vpp=amplitude_vpp, frequency_hz=frequency_hz, settle_s=2.0, duration_s=duration_s)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("frequency_hz", [95.0, 180.0, 260.0])
+def test_bounds_of_response_i_hold_it_in_noise_of_the_bench(frequency_hz, tmp_path):
+    held = []
+    for noise_v, seed in product(AMPLIFIER_NOISE_V, range(1, 7)):
+        folder = tmp_path / f"{noise_v}_{seed}"
+        folder.mkdir()
+        found = measured(folder, dwell(frequency_hz), seed=seed, amplifier_noise_v=noise_v)
+        first = budgets_of(found)[1]
+        assert Cause.NOISE not in first.not_stated
+        held.append(covers(first, linear(frequency_hz)))
+    # Of 95 %, two misses in twelve have a chance of 12 %, three of 2 %.
+    assert np.count_nonzero(held) >= len(held) - 2, held
+
+
+def test_noise_that_moves_the_bench_more_than_the_drive_is_in_the_bounds(tmp_path):
+    found = measured(tmp_path, dwell(180.0), seed=1, amplifier_noise_v=0.02)
+    first = budgets_of(found)[1]
+    assert first.value > 2 * linear(180.0)
+    assert covers(first, linear(180.0)), first.sentence
+
+
+def test_chaos_is_not_taken_for_noise(tmp_path):
+    found = measured(tmp_path, dwell(260.0, amplitude_vpp=0.5), seed=1)
+    first = budgets_of(found)[1]
+    assert found.analysis.response.response_i > 1.5 * found.analysis.response.response_ii
+    assert first.share(Cause.NOISE) < 0.01
+    assert first.contributions[-2].source == "silence before the check"
+
+
+def test_noise_that_is_heard_before_is_not_called_chaos(tmp_path):
+    """Of eight seeds this one's points look like more than linear noise to the surrogates."""
+    found = measured(tmp_path, dwell(180.0), seed=8, amplifier_noise_v=0.005)
+    assert found.analysis.motion.verdict.kind is MotionKind.UNDECIDED
+
+
+def test_without_a_silence_what_is_no_small_part_of_a_motion_is_not_determined(tmp_path):
+    """The same recording once more, its check left out."""
+    rig = RIG.model_copy(update={"virtual": RIG.virtual.model_copy(update={"amplifier_noise_v": 0.02})})
+    path = tmp_path / "weak.h5"
+    plan = Measurement(name="weak", excitation=dwell(180.0), ramp_s=0.5)
+    with open_bench(rig) as bench:
+        run_measurement(bench, plan, path, bench_check="recently passed")
+    found = analyse_files([path], "weak", Simulation.LEFT_OUT)
+    (result,) = found.results
+    first = budgets_of(result)[1]
+    assert Cause.NOISE in first.not_stated
+    (noise,) = [each for each in first.contributions if each.cause is Cause.NOISE]
+    assert "no silence was recorded" in noise.source
+    assert dwell_table([result]).rows[0][3] == "not determined"
+    measured_numbers = campaign_summary(found)["results"][0]["measured"]
+    assert measured_numbers["noise_bias_i"] is None
+    json.dumps(measured_numbers, allow_nan=False)
