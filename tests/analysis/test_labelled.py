@@ -4,11 +4,13 @@ import dataclasses
 import importlib
 import inspect
 import pkgutil
+import typing
 
 import numpy as np
 import pytest
 
 from vibench import analysis
+from vibench.acquisition import open_recording
 from vibench.analysis import (
     chaos,
     dynamics,
@@ -23,7 +25,9 @@ from vibench.analysis import (
     transmissibility,
     uncertainty,
 )
+from vibench.analysis.model_updating import FittedValue, Parameter
 from vibench.analysis.tables import Labelled, holds_array, unit_of
+from vibench.analysis.uncertainty import Budget
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
 NOT_ROOMS_OF_RESULTS = {"exchange", "figures", "paper_figures", "simulation"}
@@ -156,6 +160,188 @@ def wholes():
     yield from (model_updating.SpecimenFit, recordings.AbstractAnalysis, uncertainty.Budget)
     yield from (chaos.MotionVerdict, sine.DwellMotion, frequency_response.Distortion)
     yield from (kinds.Result, results_room.ComparedRecording)
+
+
+_PURE = """
+averages block_points blocks cells coherence coherence_significance collides confidence covariance
+damping_ratio damping_ratios differs dimension dimension_high dimension_low distortion distortion_share
+down draws edge_samples ends error_estimate events exponent first first_sample half_width holdable
+impact_cell impacts index innovation_level is_colliding is_significant is_similar is_stable
+largest_multiplier left_out left_over level limit linear lines lines_used logarithm lost_samples
+multiplier multiplier_imaginary multiplier_real multiplier_u n_eff neighbour_correlation noise_bias_i
+noise_share order orders overlap overloaded_samples pairs period period_samples periods
+planned_stretches realisations reduced_chi_square reference_coherence relative relative_i relative_sd
+relative_sd_magnitude residue residue_acceleration response_i response_ii restarts restitution runs
+sd_damping_ratio sd_exponent sd_response_ii sd_samples segment_samples segments_excluded segments_used
+share_at_full_scale share_told sides spectrum_error standard_errors statistic stop strobe_sample
+surrogates transmission turns_per_period up whole_stretches
+"""
+PURE = set(_PURE.split())
+"""Counts, shares, ratios, flags and numbers of samples: names that mean the same in every result."""
+PURE_HERE = {
+    *(f"ZeroOne.{name}" for name in ("k", "spread")),
+    *(f"Evidence.{name}" for name in ("spread", "noise")),
+    *(f"Points.{name}" for name in ("value", "noise")),
+    *(f"Similarity.{name}" for name in ("difference", "threshold", "rate", "low", "high")),
+    *(f"Curve.{name}" for name in ("magnitude", "lower", "upper")),
+    *(f"Resonance.{name}" for name in ("peak_magnitude", "sd_peak_magnitude")),
+    *(f"Jump.{name}" for name in ("before", "after")),
+    "Divergence.size",
+    "Divergence.last",
+    "Collisions.samples",
+    "FreeImpacts.samples",
+    "AmplitudeSpectrum.samples",
+    "EnsembleCurve.measured",
+    "CollisionNumbers.misfit",
+    "Suspect.behind",
+}
+"""The same of names that mean something else in another result."""
+UNIT_NOT_KNOWN = {
+    "LiveSpectrum.amplitude_density": "of channels that are not in it",
+    "FrequencyResponseSettings.noise_ratio": "of the two channels that somebody chose",
+    "PowerLaw.terms": "pairs of exponent and force, which become no variable",
+    "RecordingFacts.confirmations": "words and numbers of the user, which become no variable",
+}
+
+
+def parts_of(annotation):
+    """Dataclasses that a type names, inside of tuples and unions too."""
+    for each in typing.get_args(annotation):
+        yield from parts_of(each)
+    if inspect.isclass(annotation) and dataclasses.is_dataclass(annotation):
+        yield annotation
+
+
+def is_number(annotation):
+    inner = typing.get_args(annotation)
+    return holds_array(annotation) or annotation in {int, float, complex} or any(map(is_number, inner))
+
+
+def kinds_below(kind):
+    yield kind
+    for each in kind.__subclasses__():
+        yield from kinds_below(each)
+
+
+def reached():
+    """Every result there is, and every kind of part in them, with the annotations of its fields."""
+    for each in pkgutil.walk_packages(analysis.__path__, "vibench.analysis."):
+        importlib.import_module(each.name)
+    found, waiting = {}, [each for each in kinds_below(Labelled) if each.__module__.startswith("vibench.")]
+    while waiting:
+        kind = waiting.pop()
+        if kind in found or not dataclasses.is_dataclass(kind):
+            continue
+        hints = typing.get_type_hints(kind)
+        found[kind] = {each.name: hints[each.name] for each in dataclasses.fields(kind)}
+        named = [part for each in found[kind].values() for part in parts_of(each)]
+        waiting += [each for part in named for each in kinds_below(part)]
+    return found
+
+
+def test_every_number_of_every_result_has_a_unit_or_is_a_pure_number():
+    lacking = set()
+    for kind, hints in reached().items():
+        numbers = {name for name, each in hints.items() if is_number(each) and not list(parts_of(each))}
+        properties = inspect.getmembers(kind, lambda member: isinstance(member, property))
+        numbers |= {
+            name
+            for name, each in properties
+            if not name.startswith("_") and holds_array(each.fget.__annotations__.get("return", ""))
+        }
+        told = {*getattr(kind, "OWN_UNITS", ()), *PURE, *filter(unit_of, numbers)}
+        lacking |= {f"{kind.__name__}.{name}" for name in numbers - told}
+    assert sorted(lacking - PURE_HERE - set(UNIT_NOT_KNOWN)) == []
+
+
+def test_whoever_holds_a_part_in_some_unit_says_in_which():
+    """What is held by a type variable, as `response` of an analysis, says its units by itself."""
+    found = reached()
+    silent = [
+        f"{kind.__name__}.{name}"
+        for kind, hints in found.items()
+        for name, each in hints.items()
+        for part in parts_of(each)
+        if any("{unit}" in unit for unit in getattr(part, "OWN_UNITS", {}).values())
+        and name not in getattr(kind, "OWN_UNITS", {})
+    ]
+    assert silent == []
+
+
+def test_a_unit_is_told_of_nothing_that_is_not_there():
+    wrong = [
+        f"{kind.__name__}.{name}"
+        for kind, hints in reached().items()
+        for name in getattr(kind, "OWN_UNITS", {})
+        if name not in hints and not isinstance(getattr(kind, name, None), property)
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize(
+    ("kind", "units"),
+    [
+        (
+            "dwell",
+            {
+                "response_order_displacement": "m",
+                "response_noise_density": "m s-1 Hz-0.5",
+                "response_displacement_samples": "m",
+                "response_displacement_settled": "m",
+                "response_spectrum_amplitude": "m",
+                "response_spectrum_value": "m",
+                "displacement_lower": "m",
+            },
+        ),
+        (
+            "noise",
+            {
+                "response_base_level_rms_acceleration": "m s-2",
+                "response_frequency_response_magnitude": "1",
+                "response_periodic_frequency_response_magnitude": "s",
+                "response_periodic_noise_variance": "(s)2",
+                "response_periodic_detection_noise_amplitude": "m s-1",
+            },
+        ),
+        (
+            "sweep",
+            {
+                "response_velocity_amplitude": "m s-1",
+                "response_harmonics_sd": "m",
+                "spectrogram_density": "(m s-1)2 Hz-1",
+                "collisions_threshold": "m s-1",
+            },
+        ),
+        ("stepped", {"response_drive_amplitude_m": "m"}),
+    ],
+)
+def test_what_a_recording_told_has_its_units(request, kind, units):
+    made = request.getfixturevalue(f"{kind}_file")
+    with open_recording(made() if callable(made) else made) as recording:
+        data = analysis.analyse(recording).to_xarray()
+        channels = recording.channels
+    for number, channel in enumerate(channels, 1):
+        of = f"facts_channels_{number}_"
+        for each in ("rms", "peak", "full_scale", "envelope_lower", "envelope_upper"):
+            units = {**units, of + each: channel.unit}
+        units[f"{of}header_physical_per_volt"] = f"{channel.unit} V-1"
+    assert {name: data[name].attrs.get("units") for name in units} == units
+    assert "" not in [each.attrs.get("units") for each in data.variables.values()]
+
+
+def test_rows_of_several_units_have_them_beside_their_values():
+    f0 = FittedValue(Parameter.F0, 95.0, 94.0, 96.0, 0.5, 95.5)
+    m0 = dataclasses.replace(f0, parameter=Parameter.M0)
+
+    @dataclasses.dataclass(frozen=True)
+    class Fitted(Labelled):
+        values: tuple[FittedValue, ...]
+
+    mixed, alike = Fitted((f0, m0)).to_xarray(), Fitted((f0, f0)).to_xarray()
+    assert mixed["values_value_units"].to_numpy().tolist() == ["Hz", "kg"]
+    assert "units" not in mixed["values_value"].attrs
+    assert alike["values_value"].attrs["units"] == "Hz"
+    assert Budget("level", 1.0, "µm", ()).to_xarray()["value"].attrs["units"] == "µm"
 
 
 def test_every_result_with_arrays_has_the_method():

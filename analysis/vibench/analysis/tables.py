@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -116,6 +117,9 @@ UNITS = {
     "_rad": "rad",
     "_j": "J",
     "_v": "V",
+    "_a": "A",
+    "_n": "N",
+    "_deg": "degree",
     "_vpp": "V",
     "_decibel": "dB",
     "_kg": "kg",
@@ -133,14 +137,22 @@ COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m
 class Labelled:
     """A result that becomes a labelled Dataset: fields and bounds by their names, with units."""
 
+    OWN_UNITS: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """Units of values whose name says none, and of parts what ``{unit}`` is in theirs; ``{0.name}``: a field.
+
+    Any class that is a part of a result may have it.
+    """
+
     def to_xarray(self) -> "xarray.Dataset":
         """Give all numbers of the result as an `xarray.Dataset`.
 
         Arrays lie over the result's frequencies or times where they have as many values; bounds
         (``magnitude_lower``) and deviations (``sd_...``) stand beside their values; what is inside of a part
         has the part's name before its own (``response_frequency_hz``). Parts of single numbers, such as
-        resonances, lie below each other (``resonances_frequency_hz``); others are numbered. Each variable has
-        the attribute ``units`` where its name says one; texts and settings that are words are attributes.
+        resonances, lie below each other (``resonances_frequency_hz``); others are numbered. Each variable
+        has the attribute ``units`` unless it is a pure number or its unit depends on what was given;
+        rows of several units have them beside their values (``values_value_units``). Texts and settings that
+        are words are attributes.
 
         Raises
         ------
@@ -154,7 +166,7 @@ class Labelled:
             raise InvalidRequest("xarray is not installed; pip install 'vibench[exchange]'") from error
         variables: dict[str, Any] = {}
         attributes: dict[str, Any] = {"result": type(self).__name__}
-        _collect(self, "", variables, attributes)
+        _collect(self, "", "", variables, attributes)
         made = xarray.Dataset(variables, attrs=attributes)
         return made.set_coords([name for name in made.variables if _is_coordinate(str(name))])
 
@@ -169,6 +181,18 @@ def unit_of(name: str) -> str:
     return UNITS[max(ends, key=len)] if ends else ""
 
 
+def _unit(part: Any, key: str, unit: str) -> str:
+    """Give the unit of one of its values; ``unit`` is what holds the part says of it."""
+    said = getattr(part, "OWN_UNITS", {}).get(key)
+    if said is None:
+        return unit_of(key)
+    return "" if "{unit}" in said and not unit else str(said.format(part, unit=unit))
+
+
+def _attributes(unit: str) -> dict[str, str]:
+    return {"units": unit} if unit else {}
+
+
 def holds_array(annotation: object) -> bool:
     """Say whether a type is one of arrays: numpy 2.5 has an alias where older ones have the class itself."""
     return "ndarray" in str(annotation).lower()
@@ -178,32 +202,34 @@ def _is_coordinate(name: str) -> bool:
     return any(name == each or name.endswith(f"_{each}") for each in COORDINATES)
 
 
-def _collect(part: Any, prefix: str, variables: dict[str, Any], attributes: dict[str, Any]) -> None:
+def _collect(
+    part: Any, prefix: str, unit: str, variables: dict[str, Any], attributes: dict[str, Any]
+) -> None:
     values = dict(_numbers_of(part))
     over = next((name for name in COORDINATES if np.ndim(values.get(name, 0)) == 1), None)
     length = None if over is None else len(values[over])
     for key, value in values.items():
-        name = f"{prefix}{key}"
+        name, own = f"{prefix}{key}", _unit(part, key, unit)
         match value:
             case np.ndarray() if value.dtype != object:
                 first = f"{prefix}{over}" if value.ndim and len(value) == length else f"{name}_number"
                 dimensions = (first, *(f"{name}_{number}" for number in range(2, value.ndim + 1)))[
                     : value.ndim
                 ]
-                variables[name] = (dimensions, value, {"units": unit_of(key)} if unit_of(key) else {})
+                variables[name] = (dimensions, value, _attributes(own))
             case bool() | str():
                 attributes[name] = str(value)
             case int() | float() | complex():
-                variables[name] = ((), value, {"units": unit_of(key)} if unit_of(key) else {})
+                variables[name] = ((), value, _attributes(own))
             case tuple() if value and _is_table(value):
-                _collect_rows(value, name, variables)
+                _collect_rows(value, name, own, variables)
             case tuple() if value and all(is_dataclass(each) for each in value):
                 for row, each in enumerate(value, 1):
-                    _collect(each, f"{name}_{row}_", variables, attributes)
+                    _collect(each, f"{name}_{row}_", own, variables, attributes)
             case tuple() if value and all(isinstance(each, int | float) for each in value):
-                variables[name] = ((f"{name}_number",), np.asarray(value), {"units": unit_of(key)})
+                variables[name] = ((f"{name}_number",), np.asarray(value), _attributes(own))
             case _ if is_dataclass(value):
-                _collect(value, f"{name}_", variables, attributes)
+                _collect(value, f"{name}_", own, variables, attributes)
 
 
 def _is_table(parts: tuple[Any, ...]) -> bool:
@@ -228,16 +254,23 @@ def _row_shape(part: Any) -> tuple[Any, ...] | None:
     return type(part), *lengths
 
 
-def _collect_rows(rows: tuple[Any, ...], name: str, variables: dict[str, Any]) -> None:
+def _collect_rows(rows: tuple[Any, ...], name: str, unit: str, variables: dict[str, Any]) -> None:
     """Lay parts of single numbers below each other: one variable a field, NaN where a row has none."""
     for key, _ in _numbers_of(rows[0]):
         values = [getattr(row, key) for row in rows]
         is_word = any(isinstance(each, str) for each in values)
         kept = [each if each is not None else "" if is_word else math.nan for each in values]
-        attributes = {"units": unit_of(key)} if unit_of(key) and not is_word else {}
+        units = [_unit(row, key, unit) for row in rows]
+        is_one = len(set(units)) == 1
         column = np.asarray(kept)
         dimensions = (f"{name}_number", f"{name}_{key}_2")[: column.ndim]
-        variables[f"{name}_{key}"] = (dimensions, column, attributes)
+        variables[f"{name}_{key}"] = (
+            dimensions,
+            column,
+            _attributes(units[0]) if is_one and not is_word else {},
+        )
+        if not is_one:
+            variables[f"{name}_{key}_units"] = (dimensions[:1], np.asarray(units))
 
 
 def _numbers_of(part: Any) -> Iterator[tuple[str, Any]]:

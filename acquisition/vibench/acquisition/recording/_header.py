@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, fields
+from typing import ClassVar
 
 from ..errors import RecordingError
 from ..instruments import Identity
@@ -32,6 +33,15 @@ class ChannelHeader:
 
     ``physical = physical_per_volt * volts + physical_offset``
     """
+
+    OWN_UNITS: ClassVar = {
+        "physical_per_volt": "{0.unit} V-1",
+        "physical_offset": "{0.unit}",
+        "volts_per_count": "V",
+        "volts_at_zero_count": "V",
+        "sensitivity": "{0.sensitivity_unit}",
+    }
+    """Of values whose name says none; ``{0.unit}`` is the channel's own."""
 
     role: str
     """Name of the channel in the file: ``"drive_voltage"``, ``"m0_velocity"``."""

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,8 @@ class LineEvent:
 @dataclass(frozen=True, eq=False)
 class BranchLine(Labelled):
     """One branch; n points in the order in which it runs."""
+
+    OWN_UNITS: ClassVar = {"states": "m, m, m, m s-1, m s-1, m s-1"}
 
     frequency_hz: Reals
     amplitude_m: Reals

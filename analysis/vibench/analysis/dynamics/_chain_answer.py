@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +82,8 @@ class ChainRun(Labelled):
 @dataclass(frozen=True, eq=False)
 class ChainAnswer(Labelled):
     """Everything that was computed for one request."""
+
+    OWN_UNITS: ClassVar = {"wave_numbers": "rad"}
 
     request: ChainRequest
     runs: tuple[ChainRun, ...]

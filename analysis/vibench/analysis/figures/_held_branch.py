@@ -1,5 +1,6 @@
 """A branch that a fast loop held, over the model's: stable motions solid, unstable ones dashed."""
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
         title=f"Branch held by a fast loop, {analysis.excitation.level_text}",
         caption=" ".join(branch_sentences(analysis.facts.feedback)),
         figure=figure,
-        tables=(table(name, **named(found, *(each for each in found.__dataclass_fields__))),),
+        tables=(table(name, **named(found, *(each.name for each in fields(found)))),),
     )
 
 

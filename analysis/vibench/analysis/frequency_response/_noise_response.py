@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,6 +35,8 @@ _LEAST_PERIODS = 2
 @dataclass(frozen=True)
 class NoiseResponse(Labelled):
     """Transmission of base displacement to m0's displacement, and what was found in it."""
+
+    OWN_UNITS: ClassVar = {"frequency_response": "1", "h1": "1", "h2": "1", "periodic": "s"}
 
     frequency_response: FrequencyResponse
     """The estimate to use: by default referenced to the drive voltage, so that noise biases it nowhere."""

@@ -9,6 +9,7 @@ The best linear approximation over realisations of a periodic drive, its noise a
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -108,6 +109,8 @@ def best_linear_approximation(
 class DetectionLines:
     """Lines that were not driven, inside the driven band: what is on them, the specimen made."""
 
+    OWN_UNITS: ClassVar = {"response_amplitude": "{unit}", "noise_amplitude": "{unit}"}
+
     order: Integers
     """Multiple of the repetition frequency, shape (lines,): even ones show even, odd ones odd distortion."""
     frequency_hz: Reals
@@ -120,6 +123,13 @@ class DetectionLines:
 @dataclass(frozen=True)
 class PeriodicFrequencyResponse(Labelled):
     """Best linear approximation of response over drive, and where its scatter comes from."""
+
+    OWN_UNITS: ClassVar = {
+        "frequency_response": "{unit}",
+        "noise_variance": "({unit})2",
+        "distortion_variance": "({unit})2",
+        "detection": "m s-1",
+    }
 
     frequency_response: FrequencyResponse
     noise_variance: Reals

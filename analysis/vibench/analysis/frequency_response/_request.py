@@ -5,6 +5,7 @@ In which quantities, and on which scale, a transmission is shown.
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -131,6 +132,8 @@ class FrequencyResponseRequest:
 
     At most one of resolution, segment length and averages can be chosen: the other two follow.
     """
+
+    OWN_UNITS: ClassVar = {"noise_ratio": "s2"}
 
     estimator: Estimator = Estimator.DRIVE
     noise_ratio: float | None = None

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -47,6 +48,13 @@ class FrequencyResponseSettings:
 @dataclass(frozen=True)
 class FrequencyResponse(Labelled):
     """Response over drive against frequency, with bounds; all arrays have the shape (lines,)."""
+
+    OWN_UNITS: ClassVar = {
+        "value": "{unit}",
+        "magnitude": "{unit}",
+        "magnitude_lower": "{unit}",
+        "magnitude_upper": "{unit}",
+    }
 
     frequency_hz: Reals
     value: Complexes

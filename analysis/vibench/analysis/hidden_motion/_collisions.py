@@ -1,6 +1,7 @@
 """Every collision of a tracked motion: when, where, how hard, and how deep; followed between the samples."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,6 +32,8 @@ _MOST_STEPS = 400
 @dataclass(frozen=True, eq=False)
 class Collisions(Labelled):
     """Contacts of m1 with its stops in the order of time, arrays of one value each."""
+
+    OWN_UNITS: ClassVar = {"impulses": "N s", "speeds_before": "m s-1", "speeds_after": "m s-1"}
 
     samples: Reals
     """Touch, in samples of the motion."""
@@ -72,7 +75,7 @@ def collisions_of(model: MotionModel, motion: PreparedMotion, piece: TrackedPiec
 
 def joined_collisions(parts: list[Collisions]) -> Collisions:
     """Put those of several pieces after one another."""
-    names = Collisions.__dataclass_fields__
+    names = [each.name for each in fields(Collisions)]
     return Collisions(
         **{name: np.concatenate([getattr(each, name) for each in parts] or [np.empty(0)]) for name in names}
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -49,6 +50,14 @@ _WORST_SCATTER_OF_GAP = 0.1
 class FreeImpacts(Labelled):
     """Impacts told by the force that the channels need, one row each."""
 
+    OWN_UNITS: ClassVar = {
+        "impulses": "N s",
+        "p": "m",
+        "p_sd": "m",
+        "rate_before": "m s-1",
+        "rate_after": "m s-1",
+    }
+
     samples: Reals
     """Middle of the contact, in samples of the motion."""
     sides: Reals
@@ -67,6 +76,8 @@ class FreeImpacts(Labelled):
 @dataclass(frozen=True, eq=False)
 class FreeMotion(Labelled):
     """A whole motion without a contact model."""
+
+    OWN_UNITS: ClassVar = {"p": "m", "p_sd": "m"}
 
     p: Samples
     """[m], NaN where it could not be told; shape (samples,)."""

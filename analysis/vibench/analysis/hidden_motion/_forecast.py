@@ -2,6 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -29,6 +30,8 @@ _NOT_MEASURED = 1e30
 @dataclass(frozen=True, eq=False)
 class Forecast(Labelled):
     """p from now on, one value a sample."""
+
+    OWN_UNITS: ClassVar = {"p": "m", "error": "m"}
 
     first: int
     """Number in the recording of the first sample."""

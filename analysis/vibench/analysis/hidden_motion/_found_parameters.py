@@ -7,12 +7,13 @@ by tracking.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from scipy.stats import t as student
 
 from ..signals import Reals
-from ..tables import Labelled, plus_minus
+from ..tables import Labelled, plus_minus, unit_of
 from ._contact_free import FITTED, FreeGap, free_gaps, free_motion, free_numbers
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
@@ -105,6 +106,13 @@ def with_unit(value: float, half: float, unit: str) -> str:
 class FoundParameter:
     """One parameter as collisions tell it."""
 
+    OWN_UNITS: ClassVar = {
+        "value": "{0.unit}",
+        "low": "{0.unit}",
+        "high": "{0.unit}",
+        "described": "{0.unit}",
+    }
+
     what: Hidden
     value: float
     low: float
@@ -113,6 +121,11 @@ class FoundParameter:
     described: float
     not_determined: str = ""
     """Why there is no value, in a sentence; empty where there is one."""
+
+    @property
+    def unit(self) -> str:
+        """Of the values, SI."""
+        return unit_of(self.what)
 
     @property
     def is_determined(self) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +30,8 @@ MICRO = 1e6
 @dataclass(frozen=True, eq=False)
 class TrackedMotion(Labelled):
     """p as the extended Kalman filter followed and smoothed it; NaN where it was not followed."""
+
+    OWN_UNITS: ClassVar = {"p": "m", "rate": "m s-1", "p_sd": "m"}
 
     p: Samples
     """Relative displacement y - z, shape (samples,) [m]."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,6 +37,8 @@ class HiddenViewRequest:
 @dataclass(frozen=True, eq=False)
 class HiddenView(Labelled):
     """What is drawn of it."""
+
+    OWN_UNITS: ClassVar = {"p": "m", "free_p": "m"}
 
     request: HiddenViewRequest
     time_s: Reals

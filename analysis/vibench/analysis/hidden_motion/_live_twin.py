@@ -7,6 +7,7 @@ millisecond late; the accelerometer's coupling is a state of the filter. Nothing
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -56,6 +57,8 @@ class LiveState(StrEnum):
 @dataclass(frozen=True, eq=False)
 class LiveMotion(Labelled):
     """The newest of the hidden motion."""
+
+    OWN_UNITS: ClassVar = {"p": "m"}
 
     state: LiveState
     why: str

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ LOWEST_RATE_HZ = 10_000.0
 @dataclass(frozen=True)
 class ChannelNoise:
     """White noise of the two channels, rms per sample."""
+
+    OWN_UNITS: ClassVar = {"acceleration": "m s-2", "velocity": "m s-1"}
 
     acceleration: float
     """[m/s2]"""

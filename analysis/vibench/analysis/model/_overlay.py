@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 
@@ -86,6 +86,8 @@ class SweepOverlay(AbstractOverlay[SweepResponse]):
 @dataclass(frozen=True, eq=False)
 class DwellOverlay(AbstractOverlay[DwellResponse]):
     """A dwell, and what the model says of it."""
+
+    OWN_UNITS: ClassVar = {"displacement": "m"}
 
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]

@@ -3,11 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import assert_never
+from typing import ClassVar, assert_never
 
 import numpy as np
 
 from vibench.sim import Specimen
+
+from ..tables import unit_of
 
 
 class Parameter(StrEnum):
@@ -56,6 +58,14 @@ SHOWN = {
 class FittedValue:
     """A parameter with its interval."""
 
+    OWN_UNITS: ClassVar = {
+        "value": "{0.unit}",
+        "low": "{0.unit}",
+        "high": "{0.unit}",
+        "sd": "{0.unit}",
+        "nominal": "{0.unit}",
+    }
+
     parameter: Parameter
     value: float
     low: float
@@ -65,6 +75,11 @@ class FittedValue:
     """Standard deviation; NaN where the interval is one of bounds."""
     nominal: float
     """What the bench configuration says."""
+
+    @property
+    def unit(self) -> str:
+        """Of the values, SI."""
+        return unit_of(self.parameter)
 
 
 def parameter_value(specimen: Specimen, parameter: Parameter) -> float:

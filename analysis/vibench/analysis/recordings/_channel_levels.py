@@ -5,6 +5,7 @@ What makes a channel useless for any analysis: it never moved, or it was cut off
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -24,6 +25,13 @@ _AT_FULL_SCALE = 0.999
 @dataclass(frozen=True)
 class ChannelLevel:
     """One channel over the whole recording."""
+
+    OWN_UNITS: ClassVar = {
+        "envelope": "{0.header.unit}",
+        "rms": "{0.header.unit}",
+        "peak": "{0.header.unit}",
+        "full_scale": "{0.header.unit}",
+    }
 
     header: ChannelHeader
     envelope: Envelope

@@ -1,6 +1,7 @@
 """Smallest and largest values of a long signal, bin by bin: all that a plot of it can show."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -14,6 +15,8 @@ DEFAULT_BINS = 1500
 @dataclass(frozen=True)
 class Envelope(Labelled):
     """Extremes of a signal in equal stretches of time; arrays of shape (bins,)."""
+
+    OWN_UNITS: ClassVar = {"lower": "{unit}", "upper": "{unit}"}
 
     time_s: Reals
     """Middle of each stretch."""

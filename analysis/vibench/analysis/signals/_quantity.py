@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -27,6 +28,8 @@ class Quantity(StrEnum):
 @dataclass(frozen=True)
 class ConvertedSignal:
     """A signal turned into another quantity, and how much of its ends to distrust."""
+
+    OWN_UNITS: ClassVar = {"samples": "{unit}", "settled": "{unit}"}
 
     samples: Reals
     """Shape (samples,) [m, m/s or m/s2]."""

@@ -1,6 +1,7 @@
 """Where in a sweep the masses collide: found from what no order of the drive explains."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -61,6 +62,8 @@ class CollisionRegion:
 @dataclass(frozen=True)
 class Collisions(Labelled):
     """All collision regions of a sweep, in the order of time, and what they were judged by."""
+
+    OWN_UNITS: ClassVar = {"residual_rms": "m s-1", "threshold": "m s-1", "noise_rms": "m s-1"}
 
     regions: tuple[CollisionRegion, ...]
     residual_rms: Reals

@@ -1,6 +1,7 @@
 """What a dwell shows at one frequency: Responses I and II, spectrum, lines, and how the motion repeats."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -50,6 +51,13 @@ class Line:
 @dataclass(frozen=True)
 class DwellResponse(Labelled):
     """One dwell, analysed over its window."""
+
+    OWN_UNITS: ClassVar = {
+        "order_displacement": "m",
+        "noise_density": "m s-1 Hz-0.5",
+        "displacement": "m",
+        "spectrum": "m",
+    }
 
     drive: DriveLevel
     window_s: float

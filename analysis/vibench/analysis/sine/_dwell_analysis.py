@@ -1,6 +1,7 @@
 """From a recorded dwell to its responses over the last seconds."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,6 +35,8 @@ _TIME_BINS = 1200
 @dataclass(frozen=True, eq=False)
 class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
     """A dwell: time signal, spectrum, responses and lines."""
+
+    OWN_UNITS: ClassVar = {"displacement": "m"}
 
     displacement: Envelope
     """x over the dwell [m], without the ends that integration disturbs."""

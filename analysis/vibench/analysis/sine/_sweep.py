@@ -6,6 +6,7 @@ The phase of a recorded sine drive: the clock that a sweep and a dwell are analy
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
+from typing import ClassVar
 
 import numpy as np
 from scipy import fft
@@ -111,6 +112,14 @@ _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqr
 @dataclass(frozen=True)
 class SweepResponse(Labelled):
     """A sweep, interval by interval; arrays of shape (intervals,) unless said otherwise."""
+
+    OWN_UNITS: ClassVar = {
+        "upper": "m s-1",
+        "lower": "m s-1",
+        "velocity": "m s-1",
+        "harmonics": "m",
+        "noise_rms": "m s-1",
+    }
 
     time_s: Reals
     """Middle of each interval, from the first sample of the sweep."""

@@ -1,6 +1,7 @@
 """From a recorded sweep to its responses and a picture of its velocity."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,6 +31,8 @@ _SPECTROGRAM_ORDER = 3.2
 @dataclass(frozen=True, eq=False)
 class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
     """A sweep: envelope, responses and where the masses collide."""
+
+    OWN_UNITS: ClassVar = {"spectrogram": "m s-1"}
 
     collisions: Collisions
     jumps: tuple[Jump, ...]

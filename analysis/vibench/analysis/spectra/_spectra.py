@@ -1,6 +1,7 @@
 """Spectral densities with confidence bounds, and amplitude spectra that read a sine as its amplitude."""
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from scipy import fft
@@ -25,6 +26,13 @@ from ._segment_spectra import SegmentSpectra, pieces
 @dataclass(frozen=True)
 class SpectralDensity(Labelled):
     """One-sided spectral density with bounds; arrays of shape (lines,)."""
+
+    OWN_UNITS: ClassVar = {
+        "density": "({unit})2 Hz-1",
+        "lower": "({unit})2 Hz-1",
+        "upper": "({unit})2 Hz-1",
+        "amplitude_density": "{unit} Hz-0.5",
+    }
 
     frequency_hz: Reals
     density: Reals
@@ -127,6 +135,8 @@ def spectral_density(
 @dataclass(frozen=True)
 class AmplitudeSpectrum(Labelled):
     """Spectrum of one stretch of signal, scaled so that a sine of amplitude 1 reads 1."""
+
+    OWN_UNITS: ClassVar = {"value": "{unit}", "amplitude": "{unit}"}
 
     frequency_hz: Reals
     value: Complexes

@@ -1,6 +1,7 @@
 """What frequencies a long signal holds when: a picture of bounded size from a record of any length."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,6 +17,8 @@ _TAPER = Window.HANN
 @dataclass(frozen=True, eq=False)
 class Spectrogram(Labelled):
     """Root mean square amplitude of each frequency in each stretch of time."""
+
+    OWN_UNITS: ClassVar = {"amplitude": "{unit}", "density": "({unit})2 Hz-1"}
 
     time_s: Reals
     """Middle of each column, from the first sample, shape (columns,)."""

@@ -1,6 +1,7 @@
 """The drive amplitude A0 of the paper: base displacement, from the recorded base acceleration."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,8 @@ class DriveLevel:
 @dataclass(frozen=True)
 class NoiseDriveLevel:
     """How hard the base was driven by noise, within a band."""
+
+    OWN_UNITS: ClassVar = {"rms_acceleration": "m s-2"}
 
     low_hz: float
     high_hz: float

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
+from typing import ClassVar
 
 import numpy as np
 
@@ -32,6 +33,8 @@ def cycles_needed(orders: tuple[float, ...]) -> float:
 @dataclass(frozen=True)
 class TrackedOrders(Labelled):
     """Components of a signal at orders of the drive; signal = Re(sum value_k exp(i k phase)) + residual."""
+
+    OWN_UNITS: ClassVar = {"value": "{unit}", "sd": "{unit}", "residual_rms": "{unit}", "amplitude": "{unit}"}
 
     orders: tuple[float, ...]
     value: Complexes

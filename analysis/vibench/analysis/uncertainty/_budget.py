@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -38,6 +39,8 @@ class Contribution:
 @dataclass(frozen=True)
 class Budget(Labelled):
     """One quantity of one measurement."""
+
+    OWN_UNITS: ClassVar = {"value": "{0.unit}"}
 
     quantity: str
     value: float

@@ -12,6 +12,8 @@ from ._stops import STRICT, LawWord, Reference, Stops, require_nothing, require_
 class Hertz:
     """Elastic sphere on a plane: F = stiffness * penetration^(3/2), no loss of its own."""
 
+    OWN_UNITS: ClassVar = {"stiffness": "N m-1.5"}
+
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     stiffness: float

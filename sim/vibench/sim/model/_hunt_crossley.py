@@ -18,6 +18,8 @@ class HuntCrossley:
     tear it off faster than that do make it pull, as the law says.
     """
 
+    OWN_UNITS: ClassVar = {"stiffness": "N m-1.5", "loss": "s m-1"}
+
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     stiffness: float

@@ -13,6 +13,8 @@ from ._stops import PAPER_INDENTATION_M, STRICT, LawWord, Reference, Stops, numb
 class LinearGap:
     """Stops that are springs: F = stiffness * penetration, no loss of its own."""
 
+    OWN_UNITS: ClassVar = {"stiffness": "N m-1"}
+
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     stiffness: float

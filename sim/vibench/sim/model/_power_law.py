@@ -32,6 +32,8 @@ class PowerLaw:
     The gap plays no part in it (Gong et al. 2025, eq. 3).
     """
 
+    OWN_UNITS: ClassVar = {"reference": "m"}
+
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
 
     reference: float

@@ -26,6 +26,16 @@ Matrix = NDArray[np.float64]
 class Specimen:
     """What is shaken. Index i of a triple belongs to m_i, k_i, c_i of the paper."""
 
+    OWN_UNITS: ClassVar = {
+        "masses": "kg",
+        "stiffnesses": "N m-1",
+        "dampings": "N s m-1",
+        "mass_matrix": "kg",
+        "stiffness_matrix": "N m-1",
+        "damping_matrix": "N s m-1",
+    }
+    """Of values whose name says none."""
+
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
 
     masses: Triple
