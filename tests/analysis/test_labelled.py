@@ -169,7 +169,7 @@ down draws edge_samples ends error_estimate events exponent first first_sample h
 impact_cell impacts index innovation_level is_colliding is_significant is_similar is_stable
 largest_multiplier left_out left_over level limit linear lines lines_used logarithm lost_samples
 multiplier multiplier_imaginary multiplier_real multiplier_u n_eff neighbour_correlation noise_bias_i
-noise_share order orders overlap overloaded_samples pairs period period_samples periods
+noise_error_i noise_share order orders overlap overloaded_samples pairs period period_samples periods
 planned_stretches realisations reduced_chi_square reference_coherence relative relative_i relative_sd
 relative_sd_magnitude residue residue_acceleration response_i response_ii restarts restitution runs
 sd_damping_ratio sd_exponent sd_response_ii sd_samples segment_samples segments_excluded segments_used
