@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings, strategies as st
+from hypothesis.extra.numpy import arrays
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.rig import StatedUncertainty, VibrometerConfig
@@ -13,6 +15,7 @@ from vibench.analysis.model import RESPONSE_I, EnsembleCurve
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine import dwell_response
 from vibench.analysis.uncertainty import Cause, dwell_budgets, stated_of, sweep_budgets
+from vibench.analysis.uncertainty._budget import Contribution
 from vibench.analysis.uncertainty._quantities import sd_of_largest
 
 DRAWS = 150
@@ -177,6 +180,32 @@ def test_the_scatter_of_a_maximum_is_told_from_one_window(bounded):
     true = np.std(values.max(axis=1))
     told = [sd_of_largest(each.reshape(50, -1).max(axis=1)) for each in values]
     assert np.median(told) == pytest.approx(true, rel=0.3)
+
+
+@given(
+    sd=st.floats(allow_infinity=True),
+    value=st.one_of(st.floats(), st.floats(0.1, 10.0)),
+    maxima=arrays(np.float64, 50, elements=st.floats(0.0, 1e3)),
+)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, maxima, request):
+    """Whatever an analysis comes to: nothing heard, a constant signal, a measure that has no sign."""
+    weak = request.getfixturevalue("weak")
+    assert 0.0 <= sd_of_largest(maxima) < np.inf
+    found = replace(
+        weak.analysis.response,
+        response_i=value,
+        noise_error_i=abs(sd),
+        response_ii=value,
+        sd_response_ii=abs(sd),
+    )
+    for budget in dwell_budgets(replace(weak.analysis, response=found), None):
+        for part in budget.contributions:
+            assert part.relative is None or 0.0 <= part.relative < np.inf
+        assert "nan" not in budget.sentence.partition("(k =")[2]
+    if sd < 0:
+        with pytest.raises(ValueError, match="never negative"):
+            Contribution(Cause.NOISE, sd, "a bias, by mistake")
 
 
 def test_a_colliding_sweep_has_chance_and_says_what_only_draws_tell(sweep_file):

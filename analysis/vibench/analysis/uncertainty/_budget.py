@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import hypot
 from typing import ClassVar
 
 import numpy as np
@@ -35,6 +36,20 @@ class Contribution:
     source: str
     """Where the figure comes from, or what is missing."""
 
+    def __post_init__(self) -> None:
+        if self.relative is not None and not 0.0 <= self.relative < np.inf:
+            raise ValueError(
+                f"{self.source}: a standard uncertainty of {self.relative:g} was given; it is finite and "
+                "never negative: give a root mean square, or None"
+            )
+
+
+def scattered(cause: Cause, sd: float, value: float, source: str) -> Contribution:
+    """Give what a standard deviation adds to a value; not stated where their ratio says nothing."""
+    with np.errstate(all="ignore"):
+        relative = float(np.divide(sd, abs(value)))
+    return Contribution(cause, relative if np.isfinite(relative) else None, source)
+
 
 @dataclass(frozen=True)
 class Budget(Labelled):
@@ -51,7 +66,7 @@ class Budget(Labelled):
     def standard(self) -> float:
         """Combined standard uncertainty of what is stated (JCGM 100:2008, eq. 10) [unit]."""
         stated = [each.relative for each in self.contributions if each.relative is not None]
-        return float(abs(self.value) * np.sqrt(np.sum(np.square(stated))))
+        return float(abs(self.value)) * hypot(*stated)
 
     @property
     def expanded(self) -> float:
@@ -73,7 +88,7 @@ class Budget(Labelled):
         """Give the relative standard uncertainty of one cause: 0 if it plays no part, None if not stated."""
         mine = [each.relative for each in self.contributions if each.cause is cause]
         stated = [each for each in mine if each is not None]
-        return None if len(stated) < len(mine) else float(np.sqrt(np.sum(np.square(stated))))
+        return None if len(stated) < len(mine) else hypot(*stated)
 
     @property
     def sentence(self) -> str:

@@ -18,11 +18,13 @@ from ..sine import (
     SweepAnalysis,
     SweepResponse,
 )
-from ._budget import Budget, Cause, Contribution
+from ._budget import Budget, Cause, Contribution, scattered
 from ._stated import Stated, stated_of
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Parts of a window whose maxima tell how that of a whole one scatters."""
+_ALIKE = 1e-12
+"""Differences of maxima over their size that are roundings."""
 _FEWEST_DRAWS = 5
 _PEAKED = 1.05
 """Response I over Response II above which a step is no sine."""
@@ -44,7 +46,7 @@ def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[B
     def scatter(sd: float, value: float) -> tuple[Contribution, ...]:
         parts = ((Cause.NOISE, 1.0 - chance), (Cause.CHANCE, chance))
         return tuple(
-            Contribution(cause, float(sd / abs(value) * np.sqrt(part)), "scatter of the lines")
+            scattered(cause, sd * float(np.sqrt(part)), value, "scatter of the lines")
             for cause, part in parts
             if part > 0.0
         )
@@ -79,7 +81,8 @@ def _chance_share(found: NoiseResponse) -> float:
     if found.periodic is None or found.periodic.distortion_variance is None:
         return 0.0
     more = float(np.median(found.periodic.distortion_variance))
-    return more / (more + float(np.median(found.periodic.noise_variance)))
+    least = float(np.median(found.periodic.noise_variance))
+    return more / (more + least) if more > 0.0 else 0.0
 
 
 def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
@@ -88,7 +91,7 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
     is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
     scatter = Cause.NOISE if is_steady else Cause.CHANCE
     drive = found.drive
-    noise = _noise(found.noise_error_i / found.response_i, found.noise_source)
+    noise = scattered(Cause.NOISE, found.noise_error_i, found.response_i, found.noise_source)
     return (
         _amplitude(drive.amplitude_m, drive.sd_amplitude_m, stated, scatter),
         Budget(
@@ -103,15 +106,10 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
             "",
             (
                 *_ratio(stated),
-                Contribution(scatter, found.sd_response_ii / found.response_ii, "tenths of the window"),
+                scattered(scatter, found.sd_response_ii, found.response_ii, "tenths of the window"),
             ),
         ),
     )
-
-
-def _noise(relative: float, source: str) -> Contribution:
-    """Noise as far as it is determined: NaN is not."""
-    return Contribution(Cause.NOISE, None if np.isnan(relative) else float(relative), source)
 
 
 def _ratio(stated: Stated) -> tuple[Contribution, ...]:
@@ -120,7 +118,7 @@ def _ratio(stated: Stated) -> tuple[Contribution, ...]:
 
 
 def _amplitude(value_m: float, sd_m: float, stated: Stated, scatter: Cause, where: str = "") -> Budget:
-    noise = Contribution(scatter, sd_m / value_m, "parts of the window")
+    noise = scattered(scatter, sd_m, value_m, "parts of the window")
     return Budget(f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), noise))
 
 
@@ -136,8 +134,8 @@ def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contr
     if blocks < _FEWEST_BLOCKS:
         return (Contribution(Cause.CHANCE, None, "the window is too short to tell"),)
     largest = np.max(np.abs(window[: window.size // blocks * blocks].reshape(blocks, -1)), axis=1)
-    relative = float(sd_of_largest(largest) / np.max(largest))
-    return (Contribution(Cause.CHANCE, relative, f"largest |x| of {blocks} parts of the window"),)
+    source = f"largest |x| of {blocks} parts of the window"
+    return (scattered(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source),)
 
 
 def sd_of_largest(maxima: Reals) -> float:
@@ -156,6 +154,8 @@ def sd_of_largest(maxima: Reals) -> float:
             place * (place - 1) / ((count - 1) * (count - 2)),
         )
     )
+    if np.ptp(maxima) <= _ALIKE * first:
+        return 0.0
     skewness = (6 * third - 6 * second + first) / (2 * second - first)
     off = 2 / (3 + skewness) - np.log(2) / np.log(3)
     shape = float(np.clip(7.8590 * off + 2.9554 * off**2, 0.0, 0.5))
@@ -197,7 +197,7 @@ def _largest(
     ):
         top = int(np.argmax(values))
         value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
-        own = _noise(float(scatter[top]) / value, source)
+        own = scattered(Cause.NOISE, float(scatter[top]), value, source)
         if collides[top]:
             own = _drawn(laid, name, top) or (
                 Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
@@ -213,4 +213,4 @@ def _drawn(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribu
     if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
         return None
     source = f"{int(curve.count[place])} simulated draws"
-    return Contribution(Cause.CHANCE, float(curve.relative_sd[place]), source)
+    return scattered(Cause.CHANCE, float(curve.relative_sd[place]), 1.0, source)
