@@ -1,8 +1,10 @@
 """Other people's files become recordings that say and give what the files did."""
 
 import hashlib
+import io
 import json
 import random
+import tempfile
 import tracemalloc
 import wave
 from pathlib import Path
@@ -425,6 +427,94 @@ def test_a_rate_that_contradicts_what_was_exported_here_is_refused(known, tmp_pa
         meaning = mapping(tmp_path, (source if each is path else "/m0_velocity", "m0_velocity", ""))
         with pytest.raises(InvalidRequest, match="says 51200 samples/s, and the mapping 8000"):
             imported(each, meaning, tmp_path / "made.h5")
+
+
+def wav_bytes(width, kept=None, samples=100):
+    with io.BytesIO() as made:
+        with wave.open(made, "wb") as file:
+            file.setparams((2, width, int(RATE_HZ), 0, "NONE", ""))
+            file.writeframes(bytes(2 * width * samples))
+        return made.getvalue()[:kept]
+
+
+def uff_bytes(known, old=b"", new=b"", kept=None):
+    """One channel as a universal file, spoiled in one place or cut off."""
+    with tempfile.TemporaryDirectory() as folder:
+        path, _ = export_samples(
+            excerpt(known, ("m0_velocity",), to_s=0.01), Format.UFF, Path(folder, "a.uff")
+        )
+        raw = path.read_bytes()
+    assert old in raw
+    return raw.replace(old, new)[:kept]
+
+
+def hdf5_bytes(kept):
+    with io.BytesIO() as made:
+        with h5py.File(made, "w") as file:
+            file["v"] = signals()[0]
+        return made.getvalue()[:kept]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.wav", wav_bytes(2, 245), "announces 400 bytes of samples, and 201 follow"),
+        ("a.wav", wav_bytes(2, 248), "announces 400 bytes of samples, and 204 follow"),
+        ("a.wav", wav_bytes(3, 245), "announces 600 bytes of samples, and 201 follow"),
+        ("a.wav", wav_bytes(2, 44), "announces 400 bytes of samples, and 0 follow"),
+        ("a.wav", wav_bytes(2, 30), "announces 16 bytes about its samples, and 10 follow"),
+        ("a.wav", wav_bytes(2, 36), "it ends before its samples"),
+        ("a.uff", {"kept": 1000}, "it ends inside a dataset"),
+        (
+            "a.uff",
+            {"old": b"58b     1     2", "new": b"58b     x     2"},
+            "'x' stands where a whole number belongs",
+        ),
+        ("a.uff", {"old": b"58b     1", "new": b"58b     7"}, "its byte order is 7"),
+        (
+            "a.uff",
+            {"old": b"         4       512", "new": b"         4          "},
+            "'' stands where a whole number",
+        ),
+        ("a.h5", hdf5_bytes(9000), r"announces \d+ bytes, and 9000 are there"),
+        ("a.csv", b"a,b\n1,2\n3,x\n", "line 3 holds 'x' where a number belongs"),
+        ("a.csv", b"a,b\n1,2\n\n3,\n", "line 4 holds '' where a number belongs"),
+        (
+            "a.csv",
+            b"a;b\n1,5;2\n3;4\n3\n",
+            "line 4 has another number of columns than line 2: 1 instead",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said_once_and_in_plain_words(known, tmp_path, name, content, said):
+    (tmp_path / name).write_bytes(uff_bytes(known, **content) if isinstance(content, dict) else content)
+    with pytest.raises(UnusableData, match=said) as refused, opened_source(tmp_path / name) as source:
+        source.read(source.channels[0], 0, source.channels[0].samples)
+    assert str(refused.value).startswith(name)
+    assert str(refused.value).count("again") == 1
+
+
+@pytest.mark.parametrize("text", [b"m/s\xb2", "m/s\u00b2".encode()])
+@pytest.mark.parametrize("is_fixed", [True, False])
+def test_a_unit_in_hdf5_may_be_in_either_encoding(tmp_path, text, is_fixed):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["v"] = signals()[0]
+        kind = h5py.string_dtype("utf-8", len(text) if is_fixed else None)
+        file["v"].attrs.create("units", text, dtype=kind)
+    with opened_source(tmp_path / "a.h5") as source:
+        assert source.channels[0].unit == "m/s\u00b2"
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8", "utf-8-sig", "utf-16"])
+def test_a_heading_may_be_in_any_usual_encoding(tmp_path, encoding):
+    text = "F\u00fchrung am Fu\u00df\nZeit [s];Fu\u00dfpunkt (\u00b5m)\n0,0;1,5\n0,5;-2\n1,0;3\n"
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    with opened_source(tmp_path / "a.csv") as source:
+        _, column = source.channels
+        assert (column.label, column.unit, column.sample_rate_hz) == ("Fu\u00dfpunkt", "\u00b5m", 2.0)
+        assert source.read(column, 0, 3).tolist() == [1.5, -2.0, 3.0]
+    with pytest.raises(InvalidRequest, match=r"no channel 'x'; it has '1' \(Zeit\), '2' \(Fu\u00dfpunkt\)"):
+        imported(tmp_path / "a.csv", mapping(tmp_path, ("x", "m0_velocity", "")))
 
 
 @pytest.mark.parametrize(

@@ -3,12 +3,14 @@
 Columns of text as a source: commas, semicolons, tabs or blanks between them, read whole.
 """
 
+import codecs
 import csv
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -54,10 +56,15 @@ def opened_csv(path: Path) -> Iterator[TableSource]:
 
     ValueError when no line of numbers begins within the first 200, or a later line has others.
     """
-    head, first, delimiter = _beginning(path)
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
+    encoding = _encoding(path)
+    head, first, delimiter = _beginning(path, encoding)
+    with path.open(encoding=encoding, errors="replace") as file:
         lines = (_with_points(line, delimiter) for line in islice(file, first, None))
-        table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, comments=None)
+        try:
+            table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, comments=None)
+        except ValueError as error:
+            file.seek(0)
+            raise ValueError(_what_is_wrong(file, first, delimiter) or str(error)) from error
     labels = _labels(head, delimiter, table.shape[1])
     rate, bounds = _sample_rate_hz(labels[0], table[:, 0])
     yield TableSource(
@@ -75,9 +82,41 @@ def opened_csv(path: Path) -> Iterator[TableSource]:
     )
 
 
-def _beginning(path: Path) -> tuple[list[str], int, str | None]:
+def _encoding(path: Path) -> str:
+    """Tell by its beginning how text is written; who writes ``µ`` in one byte does not say so."""
+    with path.open("rb") as file:
+        head = b"".join(islice(file, LONGEST_HEAD))
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    try:
+        head.decode("utf-8")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "utf-8-sig"
+
+
+def _what_is_wrong(file: TextIO, first: int, delimiter: str | None) -> str:
+    """Name the first line that does not belong to a table of numbers; empty where all do."""
+    columns = 0
+    for number, line in enumerate(file, start=1):
+        cells = _with_points(line, delimiter).split(delimiter)
+        if number <= first or not line.strip():
+            continue
+        columns = columns or len(cells)
+        if len(cells) != columns:
+            return (
+                f"line {number} has another number of columns than line {first + 1}: "
+                f"{len(cells)} instead of {columns}"
+            )
+        for cell in cells:
+            if not _are_numbers([cell]):
+                return f"line {number} holds {cell.strip()!r} where a number belongs"
+    return ""
+
+
+def _beginning(path: Path, encoding: str) -> tuple[list[str], int, str | None]:
     """Find the lines before the numbers, how many they are, and what stands between the numbers."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
+    with path.open(encoding=encoding, errors="replace") as file:
         head: list[str] = []
         for number, line in enumerate(islice(file, LONGEST_HEAD)):
             delimiter = next((each for each in DELIMITERS if each is None or each in line), None)

@@ -1,5 +1,6 @@
 """HDF5 of any layout as a source: netCDF-4, MATLAB 7.3 and instrument makers' own are HDF5 too."""
 
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,9 +15,11 @@ from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5, walk
 
 from ..errors import UnusableData
 from ..signals import Reals
-from ._source_channel import SourceChannel
+from ._source_channel import SourceChannel, text_of
 
 FEWEST_SAMPLES = 2
+TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
+"""What HDF5 says of a file that lost its end."""
 EXACT_KINDS = {"i": 4, "u": 2}
 """Integers of at most so many bytes fit the recording's own."""
 
@@ -73,6 +76,10 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
     except UnsafeHdf5 as error:
         raise UnusableData(f"{path.name} was not read: {str(error)[:300]}") from error
     except OSError as error:
+        if cut := TRUNCATED.search(str(error)):
+            raise UnusableData(
+                f"{path.name} announces {cut[2]} bytes, and {cut[1]} are there; copy or export it again"
+            ) from error
         raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
     with file:
         yield Hdf5Source(file, dict(_places(file)))
@@ -136,4 +143,5 @@ def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:
 
 def _text(item: h5py.HLObject, name: str) -> str:
     value = np.ravel(item.attrs[name])[0]
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    # h5py keeps bytes of variable length that are no UTF-8 as surrogates.
+    return text_of(value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape"))

@@ -28,6 +28,14 @@ def rate_bounds(interval: float, uncertainty: float, unit: str) -> tuple[float, 
     return (1 / longest, 1 / shortest) if LEAST_INTERVAL_S < shortest <= longest < inf else None
 
 
+def text_of(raw: bytes) -> str:
+    """Decode text; makers write ``m/s²`` in one of two encodings, and say in neither which."""
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
 @dataclass(frozen=True)
 class SourceChannel:
     """What the file says of it."""

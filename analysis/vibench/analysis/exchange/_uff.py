@@ -29,7 +29,7 @@ from vibench.acquisition.recording import ChannelHeader, Origin
 from ..errors import UnusableData
 from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
-from ._source_channel import SourceChannel, rate_bounds
+from ._source_channel import SourceChannel, rate_bounds, text_of
 
 DELIMITER = "    -1"
 TIME_RESPONSE = 1
@@ -210,13 +210,15 @@ def _bodies(file: BinaryIO) -> Iterator[tuple[SourceChannel, _Body]]:
 
 def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
     """Find the numbers and go past them; None when they are no samples over time."""
-    ordinate, count, spacing = (int(header[6][at : at + 10]) for at in (0, 10, 20))
+    ordinate, count, spacing = (_whole(header[6][at : at + 10]) for at in (0, 10, 20))
     if count < 0:
         raise ValueError(f"a dataset of {count} numbers")
     offset = file.tell()
     is_binary = kind[6:7].lower() == "b"
     if is_binary:
-        order, numbers, length = (int(kind[a:b]) for a, b in ((7, 13), (13, 19), (31, 43)))
+        order, numbers, length = (_whole(kind[a:b]) for a, b in ((7, 13), (13, 19), (31, 43)))
+        if order not in BYTE_ORDERS:
+            raise ValueError(f"its byte order is {order}, and only 1 (little end first) and 2 are known")
         if numbers != IEEE:
             raise ValueError(f"its binary numbers are of kind {numbers}, and only {IEEE} (IEEE) is known")
         file.seek(offset + (count * SIZES[ordinate] if ordinate in SIZES else length))
@@ -225,20 +227,23 @@ def _body(file: BinaryIO, kind: str, header: list[str]) -> _Body | None:
         order = 0
         _skip_text(file)
         if (most := (file.tell() - offset) // LEAST_TEXT) < count:
-            raise ValueError(f"it announces {count} numbers, and has room for {most}; export it again")
-    is_time = int(header[5][:5]) in TIME_FUNCTIONS and int(header[7][:10]) in {0, TIME_AXIS}
+            raise ValueError(f"it announces {count} numbers, and has room for {most}")
+    is_time = _whole(header[5][:5]) in TIME_FUNCTIONS and _whole(header[7][:10]) in {0, TIME_AXIS}
     if not is_time or ordinate not in SIZES or spacing != EVENLY_SPACED or count < 2:
         return None
     return _Body(offset, file.tell(), count, ordinate, BYTE_ORDERS[order] if is_binary else "")
 
 
-def _line(file: BinaryIO) -> str:
-    """Read a line of a header; makers write ``m/s²`` in one of two encodings, and say in neither which."""
-    raw = file.readline()
+def _whole(text: str) -> int:
     try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
+        return int(text)
+    except ValueError as error:
+        raise ValueError(f"{text.strip()!r} stands where a whole number belongs, in a dataset 58") from error
+
+
+def _line(file: BinaryIO) -> str:
+    """Read a line of a header."""
+    return text_of(file.readline())
 
 
 def _skip_text(file: BinaryIO) -> None:
@@ -246,7 +251,7 @@ def _skip_text(file: BinaryIO) -> None:
     while line := file.readline():
         if line.strip() == DELIMITER.strip().encode():
             return
-    raise ValueError("it ends inside a dataset; copy or export it again")
+    raise ValueError("it ends inside a dataset")
 
 
 def _channel(number: int, header: list[str]) -> SourceChannel:

@@ -3,6 +3,8 @@
 WAV as a source: integers are fractions of full scale, -1 to 1, as every sound program takes them.
 """
 
+import os
+import struct
 import warnings
 import wave
 from collections.abc import Iterator
@@ -60,6 +62,11 @@ def write_wav(excerpt: Excerpt, path: Path, observer: TransferObserver = unobser
             observer(block.values.size)
 
 
+ORDERS = {b"RIFF": "<", b"RIFX": ">"}
+"""How sizes are written; those of RF64 files, over 4 GiB, stand elsewhere."""
+FIRST_CHUNK = 12
+UNKNOWN_SIZE = 2**32 - 1
+"""Of samples that were written to a program that takes them as they come."""
 OFFSETS = {"u": 128.0}
 """Eight bits are stored without sign."""
 
@@ -80,9 +87,10 @@ class WavSource:
 
 @contextmanager
 def opened_wav(path: Path) -> Iterator[WavSource]:
-    """Open a file; ValueError when it is no WAV, or compressed."""
+    """Open a file; ValueError when it is no WAV, or compressed, or cut off."""
+    _require_whole(path)
     rate, data = _read(path)
-    table = data.reshape(len(data), -1)
+    table = data.reshape(len(data), -1) if data.size else np.empty((0, 0))
     is_integer = table.dtype.kind in "iu"
     yield WavSource(
         table,
@@ -97,6 +105,25 @@ def opened_wav(path: Path) -> Iterator[WavSource]:
             for number in range(1, table.shape[1] + 1)
         ),
     )
+
+
+def _require_whole(path: Path) -> None:
+    """Raise ValueError when a file ends before its samples do; its reader says what is no WAV at all."""
+    with path.open("rb") as file:
+        order = ORDERS.get(file.read(4))
+        file.seek(FIRST_CHUNK)
+        while order is not None:
+            name, told = file.read(4), file.read(4)
+            if len(told) < len(name) or not name:
+                raise ValueError("it ends before its samples")
+            (size,) = struct.unpack(f"{order}I", told)
+            left = path.stat().st_size - file.tell()
+            if left < size != UNKNOWN_SIZE:
+                what = "of samples" if name == b"data" else "about its samples"
+                raise ValueError(f"it announces {size} bytes {what}, and {left} follow")
+            if name == b"data":
+                return
+            file.seek(size + size % 2, os.SEEK_CUR)
 
 
 def _read(path: Path) -> tuple[int, NDArray[Any]]:
