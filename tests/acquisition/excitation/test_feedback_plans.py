@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.acquisition import load_campaign
+from vibench.acquisition import ConfigurationError, load_campaign
 from vibench.acquisition.excitation import AbstractFeedback, BaseLevel, Settling
 from vibench.acquisition.excitation._feedback import JumpSearch
 from vibench.acquisition.excitation._settled_sine import MOST_SETTLED_STEPS
@@ -99,3 +99,50 @@ def test_a_displacement_s_acceleration_grows_with_the_square_of_frequency():
 def test_a_plan_that_means_nothing_is_refused(broken, sentence):
     with pytest.raises(ValidationError, match=sentence):
         broken()
+
+
+HELD = """
+name = "held"
+[[measurements]]
+name = "one"
+[measurements.excitation]
+amplitude_vpp = 2.0
+{}
+"""
+A_SINE = "frequency_hz = 260\nduration_s = 5\n"
+STEPS = "frequencies_hz = [200, 210]\n"
+BAND = "band_start_hz = 50\nband_stop_hz = 500\nrepetition_hz = 2\nrealisations = 9\n"
+METRES = "base_level = {{ displacement_m = {} }}"
+PER_S2 = "base_level = {{ acceleration_m_per_s2 = {} }}"
+DENSITY = "spectrum = [{{ frequency_hz = 50, density = {} }}]"
+CORNER = "spectrum = [{{ frequency_hz = {}, density = 1 }}]"
+LESS, MORE = "less than or equal to", "greater than or equal to"
+MODE = "start_hz = 95\nlow_hz = 90\nhigh_hz = 99\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "rest", "key", "given", "allowed"),
+    [
+        ("held_dwell", A_SINE, METRES, "40000000.0", f"{LESS} 1"),
+        ("held_dwell", A_SINE, METRES, "1e-200", f"{MORE} 0.000000000000001"),
+        ("held_dwell", A_SINE, PER_S2, "1000000000.0", f"{LESS} 100000"),
+        ("held_dwell", A_SINE, PER_S2, "1e-99", f"{MORE} 0.000000001"),
+        ("resonance_tracking", MODE, "accelerations_m_per_s2 = [0.3, {}]", "1000000000.0", f"{LESS} 100000"),
+        ("held_response", STEPS, "response_m = {}", "30", f"{LESS} 1"),
+        ("held_noise", BAND, DENSITY, "1e+300", f"{LESS} 10000000000"),
+        ("held_noise", BAND, CORNER, "1e+300", f"{LESS} 100000"),
+    ],
+)  # fmt: skip
+def test_a_held_level_that_no_base_reaches_is_refused_when_its_file_is_read(
+    kind, rest, key, given, allowed, tmp_path
+):
+    path = tmp_path / "held.toml"
+    path.write_text(HELD.format(f'kind = "{kind}"\n{rest}{key.format(given)}\n'))
+    with pytest.raises(ConfigurationError) as refused:
+        load_campaign(path)
+    assert str(refused.value).endswith(f" = {given}: input should be {allowed}")
+
+
+@pytest.mark.parametrize("displacement_m", [1e-15, 2e-6, 1.0])
+def test_a_level_that_a_base_may_have_is_taken(displacement_m):
+    assert BaseLevel(displacement_m=displacement_m).acceleration_at(1.0) > 0.0

@@ -9,6 +9,10 @@ from ..host import FrozenModel
 
 MOST_PERIODS = 100_000
 Share = Annotated[float, Field(gt=0, lt=1)]
+HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
+"""Below what any sensor shows, and beyond what any shaker's stroke allows, a unit was mistaken [m]."""
+HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
+"""Likewise; no shaker reaches ten thousand times gravity [m/s2]."""
 
 
 class Settling(FrozenModel):
@@ -49,9 +53,9 @@ class BaseLevel(FrozenModel):
     the plan, ``amplitude_vpp``, is then the largest that may be used.
     """
 
-    acceleration_m_per_s2: PositiveFloat | None = None
+    acceleration_m_per_s2: HeldMetresPerS2 | None = None
     """Peak of the base's fundamental [m/s2]; or give ``displacement_m``."""
-    displacement_m: PositiveFloat | None = None
+    displacement_m: HeldMetres | None = None
     """Peak of the base's fundamental [m], the same at every frequency; or give ``acceleration_m_per_s2``."""
     tolerance: Share = 0.025
     """How far the measured level may lie from it, as a share."""

@@ -10,7 +10,7 @@ from ..host import FrozenModel
 from ._feedback import BaseLevel
 from ._multisine import Lines
 from ._periodic_noise import PeriodicNoise
-from ._plan import AbstractFeedback, Family
+from ._plan import AbstractFeedback, Family, FrequencyHz
 from ._steps import Samples
 
 Decibels = Annotated[float, Field(gt=0, le=40)]
@@ -19,8 +19,8 @@ Decibels = Annotated[float, Field(gt=0, le=40)]
 class SpectrumPoint(FrozenModel):
     """One corner of a spectrum; between corners it is a straight line over the logarithms of both."""
 
-    frequency_hz: PositiveFloat
-    density: PositiveFloat
+    frequency_hz: FrequencyHz
+    density: Annotated[float, Field(ge=1e-30, le=1e10)]
     """Power spectral density, one-sided [unit squared per Hz]."""
 
 

@@ -8,7 +8,7 @@ from pydantic import Field, PositiveFloat
 from vibench.sim import PhaseReference
 
 from ..recording import SegmentLabel
-from ._feedback import BaseLevel, Share
+from ._feedback import BaseLevel, HeldMetres, Share
 from ._plan import AbstractFeedback
 from ._settled_sine import GLIDE_TONE_S
 from ._stepped_sine import FrequencySteps
@@ -26,7 +26,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
 
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
     kind: Literal["held_response"] = "held_response"
-    response_m: PositiveFloat
+    response_m: HeldMetres
     """Amplitude of m0's fundamental to be held [m]."""
     response_of: PhaseReference = PhaseReference.RELATIVE
     """Which motion of m0 that is: the one against the base, or the absolute one."""

@@ -8,7 +8,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from vibench.sim import PhaseReference
 
 from ..recording import SegmentLabel
-from ._feedback import MOST_PERIODS, BaseLevel, Settling, Share
+from ._feedback import MOST_PERIODS, BaseLevel, HeldMetresPerS2, Settling, Share
 from ._plan import AbstractFeedback, Family, FrequencyHz
 from ._steps import Segment, Step, Tone
 
@@ -45,7 +45,7 @@ class ResonanceTracking(AbstractFeedback):
     """Standard uncertainty of the phase between accelerometer and vibrometer [degrees]."""
     sensor_gain: Share = 0.01
     """Standard uncertainty of the ratio of their sensitivities; it turns the difference of their motions."""
-    accelerations_m_per_s2: tuple[PositiveFloat, ...] = Field(min_length=1, max_length=100)
+    accelerations_m_per_s2: tuple[HeldMetresPerS2, ...] = Field(min_length=1, max_length=100)
     """Levels of the base's fundamental, peak, in the order played [m/s2]."""
     level_tolerance: float = Field(default=0.025, gt=0, lt=1)
     """How far the measured level may lie from its own, as a share."""
