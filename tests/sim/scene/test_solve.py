@@ -114,6 +114,25 @@ def test_nothing_of_chaos_is_passed_over(followed_s):
     assert sum(followed_s) >= 30.0
 
 
+def test_a_small_change_is_carried_at_the_ends_of_lasting_chaos_and_all_through_what_is_not_sure(monkeypatch):
+    carried, follow = [], FollowedRun.follow
+
+    def noted(run, *options, **more):
+        stretch = follow(run, *options, **more)
+        carried.append((stretch.start_s, not np.isnan(stretch.growth)))
+        return stretch
+
+    monkeypatch.setattr(FollowedRun, "follow", noted)
+    length = FixedDuration(14.0, 5.0)
+    chaos = solve_scene(replace(CHAOS, duration=length, budget_s=0.0))
+    in_window = [has for start_s, has in carried if start_s >= 9.0 - 1e-9][:10]
+    assert (chaos.motion, in_window) == (MotionKind.CHAOTIC, 2 * [True] + 5 * [False] + 3 * [True])
+    carried.clear()
+    torus = solve_scene(scene_of("power:3", 225.0, 5e-6, duration=length, budget_s=0.0))
+    assert torus.motion is MotionKind.QUASI_PERIODIC
+    assert all(has for start_s, has in carried[:12] if start_s >= 9.0 - 1e-9)
+
+
 def test_chaos_is_known_for_what_it_is_and_its_scatter_is_stated():
     found = solve_scene(replace(CHAOS, duration=AutomaticDuration()))
     assert (found.motion, found.period) == (MotionKind.CHAOTIC, None)

@@ -57,17 +57,19 @@ class SceneRun:
 
 def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> Asking[SceneRun]:
     """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
-    lead, is_settled = yield from _lead(run, max(run.time_s, duration_s - window_s - pace.section_s), pace)
+    ((lead, is_settled),) = yield from leads([run], duration_s - window_s - pace.section_s, pace)
     last = follow_strobed(run, duration_s - window_s)
     before = pace.repeats([last])
     if before is None:
         run.follow_tangent()
-    window = observe_window(run, window_s, pace.cycle([last]))
+    window = observe_window(run, window_s, pace.cycle([last]), pace.is_chaos if before is None else None)
     seen = judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
     cycle = pace.cycle([last, *window.stretches])
     if window.line_periods % cycle != 0:
         # Its period was found only now: the window is gone through once more, for lines that do not leak.
-        whole = observe_window(window.begins.apart(), window_s, cycle)
+        begins = window.begins.apart()
+        begins.drop_tangent()
+        whole = observe_window(begins, window_s, cycle)
         leaked = np.abs(window.responses_m / whole.responses_m - 1.0)
         seen = replace(seen, window=whole, leaked=leaked)
     path = lead if is_settled else (*lead, last, *window.stretches)
@@ -108,26 +110,33 @@ LONGEST_SLICE = 1 << 16
 """Drive periods between two looks, at most: their states are held."""
 
 
-def _lead(run: FollowedRun, until_s: float, pace: Pace) -> Asking[tuple[tuple[Stretch, ...], bool]]:
-    """Advance to an instant, and keep some states on the way; and whether the motion repeated before.
+def leads(
+    runs: Sequence[FollowedRun], until_s: float, pace: Pace
+) -> Asking[list[tuple[tuple[Stretch, ...], bool]]]:
+    """Advance motions to an instant, and keep some states on the way; and whether each repeated before.
 
     What repeats to rounding is followed no further: the whole cycles that are left are passed over. Where
     steps follow one another without a break nothing repeats so nearly.
     """
+    until_s = max(until_s, *(run.time_s for run in runs))
     periods = whole_periods(until_s, pace.frequency_hz)
     every = max(1, math.ceil(periods / MOST_LOOKS))
     if not pace.sharpness.noise < EXACTLY:
-        samples = samples_between(pace.frequency_hz / every, run.time_s, until_s)
-        return (run.follow(until_s, samples=samples),), False
+        rate_hz = pace.frequency_hz / every
+        return [
+            ((run.follow(until_s, samples=samples_between(rate_hz, run.time_s, until_s)),), False)
+            for run in runs
+        ]
     exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
-    states = StatesAlone(
-        run, exact, slice_periods=min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE), every=every
-    )
+    slice_periods = min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE)
     # On the way to its attractor a motion carries each error along; lanes begin at a whole drive period.
     way_s = math.ceil(pace.attractor_s * pace.frequency_hz) / pace.frequency_hz
-    states.follow(min(until_s, way_s))
-    yield [Following(states, until_s, math.inf)]
-    if states.repeats is not None:
-        left = (until_s - run.time_s) * pace.frequency_hz
-        run.pass_over(int(left / states.repeats.period) * states.repeats.period)
-    return tuple(states.path), states.repeats is not None
+    several = [StatesAlone(run, exact, slice_periods=slice_periods, every=every) for run in runs]
+    for states in several:
+        states.follow(min(until_s, way_s))
+    yield [Following(states, until_s, math.inf) for states in several]
+    for states in several:
+        if states.repeats is not None:
+            left = (until_s - states.run.time_s) * pace.frequency_hz
+            states.run.pass_over(int(left / states.repeats.period) * states.repeats.period)
+    return [(tuple(states.path), states.repeats is not None) for states in several]

@@ -1,7 +1,7 @@
 """The end of a motion, observed: its largest values block by block, and its lines at the drive frequency."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,9 @@ from ._followed_run import FollowedRun, ObservedQuantities, Samples, Stretch
 
 BLOCKS = 10
 """Parts of a window that are kept apart: what the scatter of the whole is found from."""
+FIRST, LAST = 2, 3
+"""Parts at the ends of a window that tell of lasting chaos that it lasted: half of what it grew in is late,
+whether or not a stretch precedes the first."""
 
 
 @dataclass(frozen=True)
@@ -88,11 +91,17 @@ def follow_strobed(
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
 
 
-def observe_window(run: FollowedRun, window_s: float, cycle: int = 1) -> ObservedWindow:
+def observe_window(
+    run: FollowedRun,
+    window_s: float,
+    cycle: int = 1,
+    is_chaos: Callable[[Sequence[Stretch]], bool] | None = None,
+) -> ObservedWindow:
     """Follow a motion through a window that begins now and holds a drive period or more, and observe it.
 
     A motion that repeats after ``cycle`` drive periods has its lines taken over a whole multiple of them, as
-    far as the window holds one: over other lengths its other lines leak in.
+    far as the window holds one: over other lengths its other lines leak in. Where ``is_chaos`` says of the
+    first parts that they surely are, a small change is not carried through the middle, only at the end again.
     """
     begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s
@@ -102,7 +111,14 @@ def observe_window(run: FollowedRun, window_s: float, cycle: int = 1) -> Observe
     count = min(BLOCKS, periods)
     edges = [end_s - (periods * (count - k) // count) / frequency for k in range(1, count)] + [end_s]
     head = [follow_strobed(run, line_s, ObservedQuantities.PEAKS)] if run.time_s < line_s else []
-    parts = [follow_strobed(run, edge, ObservedQuantities.PEAKS_AND_LINES) for edge in edges]
+    parts: list[Stretch] = []
+    for edge in edges:
+        if is_chaos is not None and count == BLOCKS:
+            if len(parts) == FIRST and is_chaos(parts):
+                run.drop_tangent()
+            elif len(parts) == BLOCKS - LAST and math.isnan(parts[-1].growth):
+                run.follow_tangent()
+        parts.append(follow_strobed(run, edge, ObservedQuantities.PEAKS_AND_LINES))
     return window_of(begins, parts, head)
 
 

@@ -9,7 +9,16 @@ from ..kernels import Floats
 from ..model import Accuracy, ContactLaw, PowerLaw, Specimen
 from ._followed_run import Stretch
 from ._observed_window import states_of
-from ._repetition import Growth, Repetition, Sharpness, repetition, section_needed
+from ._prediction import MotionKind
+from ._repetition import (
+    CERTAIN_GROWTH,
+    Growth,
+    Repetition,
+    Sharpness,
+    kind_of,
+    repetition,
+    section_needed,
+)
 
 FORGETTING = 8.0
 """Forgetting times after which a motion that does not repeat is taken to be on its attractor."""
@@ -72,6 +81,12 @@ class Pace:
         """
         found = self.repeats(stretches) or replace(self, sharpness=self.nearly).repeats(stretches)
         return 1 if found is None else found.period
+
+    def is_chaos(self, stretches: Sequence[Stretch]) -> bool:
+        """Say whether a small change has grown in each half of these stretches as only chaos makes it."""
+        growth = growth_of(stretches)
+        is_plenty = min(growth.halves) > CERTAIN_GROWTH
+        return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC
 
     def repeats_in(self, section: Floats) -> Repetition | None:
         """Say whether a motion with these states once a drive period, shape (n, 6), repeats at their end."""

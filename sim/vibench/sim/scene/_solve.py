@@ -109,7 +109,7 @@ def solve_ensemble(
     if run.outcome is not Outcome.REACHED_END:
         return None
     asked = _asked(run, seen, _between_windows(seen))
-    errors = stated_errors(scene, begin, run, seen, pace, motion.slowest_rate)
+    errors = alone(stated_errors(scene, begin, run, seen, pace, motion.slowest_rate))
     error_of = _error_of(scene.accuracy, asked, errors, pace)
     draw = Draw(starts, starts, starts, seed, budget_s)
     return follow(ensemble_beside(scene, begin, asked, pace, error_of, draw))
@@ -214,8 +214,9 @@ def _followed(scene: Scene, method: Method, motion: LinearMotion) -> Asking[Scen
     run = begin.apart()
     seen, pace = yield from _seen(scene, run, motion)
     is_whole = run.outcome is Outcome.REACHED_END
-    rate = motion.slowest_rate
-    errors = stated_errors(scene, begin, run, seen, pace, rate) if is_whole else UNKNOWN_ERRORS
+    errors = UNKNOWN_ERRORS
+    if is_whole:
+        errors = yield from stated_errors(scene, begin, run, seen, pace, motion.slowest_rate)
     drawn = _between_windows(seen) if is_whole else None
     memory = memory_of(scene, begin, seen, motion)
     ensemble: Ensemble | None = None

@@ -15,14 +15,15 @@ import numpy as np
 
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
-from ._fixed_run import SceneRun
+from ._fixed_run import SceneRun, leads
 from ._followed_run import FollowedRun, ObservedQuantities
-from ._observed_window import observe_window
+from ._observed_window import ObservedWindow, observe_window
 from ._pace import Pace
 from ._prediction import MotionKind, ScenePrediction
 from ._scatter import draws_apart, draws_of_starts
 from ._scene import Scene
 from ._several_starts import SEED, pushes
+from ._states_alone import Asking
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
 """Tolerance of the comparison. A hundredth of quick's would not do: a collision in one is better."""
@@ -67,7 +68,7 @@ UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
 
 def stated_errors(
     scene: Scene, begin: FollowedRun, run: FollowedRun, seen: SceneRun, pace: Pace, slowest_rate: float
-) -> StatedErrors:
+) -> Asking[StatedErrors]:
     """Find the errors of an answer.
 
     Parameters
@@ -88,13 +89,13 @@ def stated_errors(
     if seen.repeats is not None and seen.was_settled:
         off = off_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
         return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
-    strict = _strict_answer(scene, begin, seen, run)
-    if strict is not None:
-        off = np.abs(answer - strict) / np.abs(answer)
+    strict = _strict_run(scene, begin, seen, run)
+    if strict.responses_m is not None and strict.is_together:
+        off = np.abs(answer - strict.responses_m) / np.abs(answer)
         if float(np.max(off)) < PARTED:
             return StatedErrors(SAFETY * off + sure, float(np.max(off)))
     added = error_per_period(run, scene.accuracy)
-    drawn = _drawn(begin, seen, scene.accuracy, slowest_rate)
+    drawn = yield from _drawn(begin, seen, strict, pace, slowest_rate)
     return StatedErrors(drawn + SAFETY * added + seen.leaked, added)
 
 
@@ -103,30 +104,47 @@ def _rounding(answer: Floats) -> Floats:
     return ROUNDING * np.repeat(answer[::2], 2) / answer
 
 
-def _drawn(begin: FollowedRun, seen: SceneRun, accuracy: Accuracy, slowest_rate: float) -> Floats:
+@dataclass(frozen=True, eq=False)
+class _StrictRun:
+    """A motion followed from its start at a stricter accuracy."""
+
+    run: FollowedRun
+    """Where it parted from the answer's, on the way to the window, or at the window's end."""
+    responses_m: Floats | None
+    """In the window, shape (4,), if it came there."""
+    is_together: bool
+    """It never parted."""
+
+
+def _drawn(
+    begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace, slowest_rate: float
+) -> Asking[Floats]:
     """Find what two draws differ by, relatively, shape (4,)."""
     memories = -slowest_rate * seen.window.begins.time_s
     if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
         drawn = draws_apart(seen.blocks, len(seen.window.blocks))
         if drawn is not None:
             return drawn
-    return draws_of_starts(seen.window.responses_m, _more_starts(begin, seen, accuracy))
+    others = yield from _more_starts(begin, seen, strict, pace)
+    return draws_of_starts(seen.window.responses_m, others)
 
 
-def _more_starts(begin: FollowedRun, seen: SceneRun, accuracy: Accuracy) -> list[Floats]:
+def _more_starts(begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace) -> Asking[list[Floats]]:
     """Follow a few more starts, and observe the same window of them; NaN where one is lost.
 
-    The first at a stricter accuracy: what the steps have changed before starts come apart is common to all
+    The stricter run is one of them: what the steps have changed before starts come apart is common to all
     others.
     """
-    found: list[Floats] = []
-    first = begin.apart(STRICTER[accuracy])
-    for push in pushes(begin.specimen, begin.drive.frequency_hz, MEMBERS, SEED):
-        other = (begin if found else first).pushed(push)
-        other.follow(seen.window.begins.time_s)
-        window = observe_window(other, seen.window.length_s)
-        is_lost = other.outcome is not Outcome.REACHED_END
-        found.append(np.full(4, np.nan) if is_lost else window.responses_m)
+    pushed = pushes(begin.specimen, begin.drive.frequency_hz, MEMBERS, SEED)
+    runs = [begin.pushed(push) for push in pushed[1:]]
+    found = [strict.responses_m] if strict.responses_m is not None else []
+    if not found:
+        runs.append(strict.run.apart(begin.tolerance))
+    window = seen.window
+    yield from leads(runs, window.begins.time_s - pace.section_s, pace)
+    for run in runs:
+        run.follow(window.begins.time_s)
+        found.append(_responses_in(observe_window(run, window.length_s), run))
     return found
 
 
@@ -167,8 +185,8 @@ def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
     return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
 
 
-def _strict_answer(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> Floats | None:
-    """Responses of the same window by a stricter run from the start; None where it came another way.
+def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> _StrictRun:
+    """Follow a motion from its start at a stricter accuracy until it parts, and else through the window.
 
     Its start is a rounding away, or laws that are flown exactly would be compared with themselves, and a
     motion in which roundings grow would pass for exact.
@@ -181,10 +199,15 @@ def _strict_answer(scene: Scene, begin: FollowedRun, seen: SceneRun, run: Follow
         for each in (loose, strict):
             each.follow(until_s)
         if not _are_together(scene, loose, strict):
-            return None
+            return _StrictRun(strict, None, is_together=False)
     # Lines over as many periods.
-    found = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1)).responses_m
-    return found if _are_together(scene, run, strict) else None
+    window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
+    return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
+
+
+def _responses_in(window: ObservedWindow, run: FollowedRun) -> Floats:
+    """Responses of a window at whose end a run is, shape (4,); NaN if the run was lost."""
+    return window.responses_m if run.outcome is Outcome.REACHED_END else np.full(4, np.nan)
 
 
 def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
