@@ -313,6 +313,9 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     assert all(each.is_true for each in page.shown)
     page.watch_card.mark.setText("tapped the table")
     page.watch_card.wish_mark()
+    # An abort goes before what waits in line.
+    qtbot.waitUntil(lambda: not bench.context.bridge.is_ordering, timeout=PATIENCE_MS)
+    samples = bench.context.bridge.status.samples
     qtbot.waitUntil(lambda: bench.context.bridge.status.samples > samples + 60_000, timeout=PATIENCE_MS)
     bench.user_actions.abort()
     reach(qtbot, bench, EngineState.READY)
