@@ -1,6 +1,7 @@
 """What is said of a scene's cost before it is run, against what it takes."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -68,3 +69,14 @@ def test_a_plan_says_its_cost_how_far_off_it_may_be_and_whence_it_knows(ledger):
     assert (
         "0.001 s within a factor of 1.5, as 3 such runs took on this machine" in plan_scene(scene).explain()
     )
+
+
+def test_what_a_larger_budget_takes_is_learnt_apart(ledger):
+    usual, patient = (Scene(gong2025(), Harmonic(260.0, 5e-6), budget_s=budget_s) for budget_s in (1.0, 10.0))
+    for _ in range(FEWEST):
+        learn_cost(usual, 0.1)
+        learn_cost(patient, 4.0)
+    assert plan_scene(usual).cost_s == pytest.approx(0.1)
+    assert plan_scene(patient).cost_s == pytest.approx(4.0)
+    # Of a budget that was never asked for what all the others took is known.
+    assert 0.1 < plan_scene(replace(patient, budget_s=3.0)).cost_s < 4.0

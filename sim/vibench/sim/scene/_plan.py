@@ -190,7 +190,13 @@ def _kind(scene: Scene, method: Method) -> str:
         case AutomaticDuration():
             duration = "automatic"
     observed = "+".join(sorted(each.value for each in scene.observe))
-    return "/".join((method.value, scene.specimen.contact.kind, scene.accuracy.value, duration, observed))
+    return "/".join(
+        (
+            *(method.value, scene.specimen.contact.kind, scene.accuracy.value, duration, observed),
+            # Where the start is forgotten other starts take as long as they may.
+            f"{scene.budget_s:.0e} s",
+        )
+    )
 
 
 def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
