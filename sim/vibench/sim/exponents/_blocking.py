@@ -1,5 +1,4 @@
 """How well the mean of a correlated series is known: its standard error, by blocks as long as they must be.
-from ..kernels import Floats
 
 Neighbouring values are averaged in pairs, again and again; the error of the mean that the blocks suggest
 grows until they are longer than the memory of the series, and stays (Flyvbjerg and Petersen, J. Chem. Phys.
@@ -9,6 +8,7 @@ longer ones together (Jonsson, Phys. Rev. E 98 (2018) 043304).
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy
@@ -82,6 +82,11 @@ def _first_independent(variances: Floats, correlations: Floats, counts: Floats) 
     ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
     # Of independent values the lagged correlation has the mean -1/n and the variance 1/n.
     evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
-    degrees = np.arange(len(counts), 0, -1)
-    passes = np.flatnonzero(evidence < scipy.stats.chi2.ppf(CONFIDENCE, degrees))
+    passes = np.flatnonzero(evidence < _largest_by_chance(len(counts)))
     return int(passes[0]) if len(passes) else len(counts) - 1
+
+
+@cache
+def _largest_by_chance(levels: int) -> Floats:
+    """Evidence from each length and all longer ones, if blocks are independent."""
+    return np.asarray(scipy.stats.chi2.ppf(CONFIDENCE, np.arange(levels, 0, -1)))
