@@ -41,7 +41,7 @@ def test_the_bracket_holds_the_jump_and_is_as_narrow_as_asked(jump_hz, resolutio
         jump, asked = found(jump_hz, resolution_hz, *ends, height)
         low, high = sorted((jump.before.frequency_hz, jump.after.frequency_hz))
         assert low - 1e-9 <= jump_hz <= high + 1e-9
-        assert jump.width_hz <= resolution_hz * (1 + 1e-9)
+        assert abs(jump.after.frequency_hz - jump.before.frequency_hz) <= resolution_hz * (1 + 1e-9)
         assert len(asked) <= 8
 
 

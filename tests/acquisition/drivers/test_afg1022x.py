@@ -195,11 +195,6 @@ class TestPlaying:
         ]
         assert max(heard) == pytest.approx(OPEN_AMPLITUDE_RANGE_VPP[0])
 
-    def test_an_offset_reaches_the_instrument(self, plugged, generator):
-        generator.load_sine(100.0, 1.0)
-        generator.set_offset(-0.25)
-        assert plugged.instrument.settings(1).offset_v == -0.25
-
     def test_a_burst_counts_its_cycles_and_ends(self, plugged, generator):
         generator.load_sine(100.0, 1.0)
         generator.arm_burst(7)
@@ -237,7 +232,6 @@ class TestLimits:
             (lambda g: g.load_waveform(SINE, 10.1e6, 1.0), "EMEM"),
             (lambda g: g.set_amplitude(10.5), "10.5 Vpp"),
             (lambda g: g.set_frequency(0.0), "0 Hz"),
-            (lambda g: g.set_offset(5.0), "peaks at"),
             (lambda g: g.arm_burst(0), "0 cycles"),
         ],
     )

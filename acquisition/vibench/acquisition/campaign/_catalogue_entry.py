@@ -6,7 +6,6 @@ from typing import Any
 
 from ..errors import RecordingError
 from ..recording import (
-    PART_SUFFIX,
     Recording,
     RecordingState,
     SealCheck,
@@ -59,11 +58,6 @@ class CatalogueEntry:
     def is_bad(self) -> bool:
         """Whether the file is damaged, or cannot be read."""
         return self.state in (UNREADABLE, DAMAGED)
-
-    @property
-    def is_finished(self) -> bool:
-        """Whether the recording has its final name."""
-        return not self.path.endswith(PART_SUFFIX)
 
 
 def read_entry(folder: Path, path: Path, size_bytes: int) -> CatalogueEntry:

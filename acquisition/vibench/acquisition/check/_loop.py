@@ -25,7 +25,6 @@ class SineFit:
     """Standard uncertainty of the amplitude, from what the sine leaves."""
     phase_rad: float
     """Of a cosine, at the first sample."""
-    residual_rms: float
 
 
 @dataclass(frozen=True)
@@ -39,7 +38,7 @@ class ClockRatio:
 def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> SineFit:
     """Fit cosine, sine and a constant.
 
-    The uncertainty is that of white noise, ``residual_rms * sqrt(2 / n)`` (Kay, Fundamentals of
+    The uncertainty is that of white noise, ``residual * sqrt(2 / n)`` (Kay, Fundamentals of
     Statistical Signal Processing, vol. 1, example 3.14).
 
     Parameters
@@ -57,7 +56,6 @@ def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> Sine
         amplitude=hypot(in_phase, quadrature),
         uncertainty=residual * sqrt(2 / volts.size),
         phase_rad=float(np.arctan2(-quadrature, in_phase)),
-        residual_rms=residual,
     )
 
 

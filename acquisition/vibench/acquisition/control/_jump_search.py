@@ -29,11 +29,6 @@ class LocatedJump:
         """Middle of the bracket [Hz]."""
         return 0.5 * (self.before.frequency_hz + self.after.frequency_hz)
 
-    @property
-    def width_hz(self) -> float:
-        """Distance between the two frequencies [Hz]."""
-        return abs(self.after.frequency_hz - self.before.frequency_hz)
-
     def is_jump(self, factor: float) -> bool:
         """Whether the response still changes by more than ``factor`` across the bracket."""
         return ratio(self.before, self.after) > factor

@@ -41,7 +41,6 @@ class Equaliser:
     def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
         self._plan = plan
         self._rate_hz = loop.channels.sample_rate_hz
-        self._channels = loop.channels
         self._factor = loop.rig.generator.terminal_factor()
         self.frequency_hz = plan.lines * plan.repetition_hz
         transfer = RigModel(loop.rig, OnTable.NOTHING).transfer(BaseQuantity.ACCELERATION, self.frequency_hz)

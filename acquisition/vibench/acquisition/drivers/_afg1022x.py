@@ -167,12 +167,6 @@ class AFG1022X:
         with self._changing():
             self._channel.set_panel(panel_vpp)
 
-    def set_offset(self, offset_v: float) -> None:
-        """Add a constant to what is playing; raises LimitExceeded when the peak would pass the limit."""
-        self.model.check_amplitude(self._config, self.playing.panel_vpp, offset_v)
-        with self._changing():
-            self._channel.set_offset(offset_v)
-
     def arm_burst(self, cycles: int) -> None:
         """Play ``cycles`` periods at each `trigger` instead of playing on."""
         with self._changing():

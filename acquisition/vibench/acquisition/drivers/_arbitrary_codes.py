@@ -20,8 +20,6 @@ class ArbitraryCodes:
 
     codes: NDArray[np.uint16]
     """0 to ``top_code``, shape (points,)."""
-    removed_mean: float
-    """Mean of the values as given: taken out, since DC would push the shaker off its centre."""
     top_code: int
     """The code of plus half of the amplitude on the panel; 0 is that of minus half."""
     panel_factor: float
@@ -32,22 +30,13 @@ class ArbitraryCodes:
         """Values that the codes stand for, on the scale of the values as given."""
         return self.panel_factor * (2 * self.codes / self.top_code - 1.0)
 
-    @property
-    def residual_mean(self) -> float:
-        """DC that rounding leaves, on the scale of the values as given."""
-        return float(self.achieved.mean())
-
-    @property
-    def step(self) -> float:
-        """One code, on the scale of the values as given."""
-        return 2 * self.panel_factor / self.top_code
-
 
 def arbitrary_codes(waveform: Samples, model: GeneratorModel) -> ArbitraryCodes:
     """Turn one period of values into codes of the full range.
 
     Code 0 stands for minus, and the highest one for plus, half of the amplitude on the panel. The mean is
-    removed, and what is left is scaled so that its largest magnitude takes an outermost code.
+    removed, since DC would push the shaker off its centre, and what is left is scaled so that its largest
+    magnitude takes an outermost code.
 
     Raises
     ------
@@ -69,8 +58,7 @@ def arbitrary_codes(waveform: Samples, model: GeneratorModel) -> ArbitraryCodes:
             f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "
             "(the amplitude is given apart). Nothing was sent; scale it"
         )
-    mean = float(values.mean())
-    swing = values - mean
+    swing = values - values.mean()
     factor = float(np.max(np.abs(swing)))
     if factor <= np.finfo(np.float64).eps:
         raise LimitExceeded(
@@ -79,4 +67,4 @@ def arbitrary_codes(waveform: Samples, model: GeneratorModel) -> ArbitraryCodes:
         )
     middle = model.top_code / 2
     codes = np.clip(np.rint(middle + swing / factor * middle), 0, model.top_code).astype(np.uint16)
-    return ArbitraryCodes(codes, mean, model.top_code, factor)
+    return ArbitraryCodes(codes, model.top_code, factor)

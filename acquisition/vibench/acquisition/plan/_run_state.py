@@ -30,7 +30,3 @@ class RunState(StrEnum):
     FINISHED = "finished"
     STOPPED = "stopped"
     FAILED = "failed"
-
-
-ENDED = frozenset({RunState.FINISHED, RunState.STOPPED, RunState.FAILED})
-"""States that a run does not leave."""

@@ -161,7 +161,7 @@ class Run(ClosedOnLeaving):
 
     @property
     def outcome(self) -> Outcome:
-        """How the run ended, once its state is one of ``ENDED``."""
+        """How the run ended, once it is finished, stopped or failed."""
         return self._ending.outcome(self._path)
 
     @property

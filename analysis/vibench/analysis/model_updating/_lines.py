@@ -77,8 +77,6 @@ class Descended:
     covariance: Reals
     """Of these, where the model is right."""
     phases: tuple[float, float]
-    log_scale: float
-    """Of the response's sensitivity over the base's, within what is stated of both; 0 where nothing is."""
     further: Reals
     chi_square: float
 
@@ -236,7 +234,7 @@ def _descent(
 
 
 def _described(lines: Lines, allowed: Freedom, found: _Ended) -> Descended:
-    count, scaled = len(lines.free), lines.scale_sd > 0.0
+    count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
     # What Student's distribution leaves of the information (Lange et al. 1989, J. Am. Stat. Assoc. 84).
     spread = 2.0 * max(lines.averages - 1.0, 0.5)
@@ -249,8 +247,7 @@ def _described(lines: Lines, allowed: Freedom, found: _Ended) -> Descended:
         logarithms=found.x[:count],
         covariance=whole[:count, :count],
         phases=(float(phases[0]), float(phases[1])),
-        log_scale=float(found.x[count + CHANNEL_PHASES]) if scaled else 0.0,
-        further=found.x[count + CHANNEL_PHASES + scaled :],
+        further=found.x[count + CHANNEL_PHASES + (lines.scale_sd > 0.0) :],
         chi_square=float(2.0 * found.cost),
     )
 

@@ -32,8 +32,6 @@ class DrivePhase:
     phase_rad: Reals
     frequency_hz: Reals
     """Instantaneous, by the converter's clock."""
-    amplitude: Reals
-    """Peak amplitude of the drive channel [its unit]."""
 
 
 def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: float) -> DrivePhase:
@@ -72,7 +70,6 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
     return DrivePhase(
         phase_rad=phase,
         frequency_hz=np.gradient(phase) * (sample_rate_hz / (2 * np.pi)),
-        amplitude=np.abs(analytic),
     )
 
 

@@ -54,11 +54,6 @@ class Chain:
         return np.asarray([mass for cell in self.cells for mass in cell.masses])
 
     @property
-    def mass_matrix(self) -> Matrix:
-        """M, shape (3 cells, 3 cells) [kg]."""
-        return np.diag(self.masses)
-
-    @property
     def stiffness_matrix(self) -> Matrix:
         """K without contact, shape (3 cells, 3 cells) [N/m]."""
         return _assembled([cell.stiffnesses for cell in self.cells])

@@ -35,45 +35,30 @@ def not_supported(name: str, where: str) -> DaqmxRefusal:
     return DaqmxRefusal(DAQmxErrors.ATTR_NOT_SUPPORTED, f"Property: {name}\n{where}")
 
 
-class AttributeNames:
-    """Names of the numbered attributes of one group, as NI's protocol file spells them."""
-
-    def __init__(self, group: str) -> None:
-        """``group``: ``"Device"``, ``"Channel"``, ``"Timing"``, ... as the protocol's enums begin."""
-        self.group = group
-        self._names: dict[int, str] = {}
-        for enum_name, descriptor in nidaqmx_pb2.DESCRIPTOR.enum_types_by_name.items():
-            is_of_group = enum_name.startswith(group) and enum_name.endswith(_OF_ALL_TYPES)
-            if is_of_group and not enum_name.endswith(_RESET_LIST):
-                self._names.update(
-                    {
-                        value.number: value.name.rpartition(_NAME_MARK)[2]
-                        for value in descriptor.values
-                        if value.number
-                    }
-                )
-
-    def name(self, number: int) -> str:
-        """``"SAMP_CLK_RATE"``, or the bare number for one that the protocol does not name."""
-        return self._names.get(number, f"0x{number:X}")
-
-    def numbers(self) -> Iterable[int]:
-        """All numbers the protocol names."""
-        return self._names
+def _names_of(group: str) -> dict[int, str]:
+    """``"SAMP_CLK_RATE"`` and so on by number, as NI's protocol file spells them."""
+    return {
+        value.number: value.name.rpartition(_NAME_MARK)[2]
+        for name, descriptor in nidaqmx_pb2.DESCRIPTOR.enum_types_by_name.items()
+        if name.startswith(group) and name.endswith(_OF_ALL_TYPES) and not name.endswith(_RESET_LIST)
+        for value in descriptor.values
+        if value.number
+    }
 
 
 class AttributeGroup(Generic[Subject]):
     """The attributes of one kind of thing, read and written by number."""
 
     def __init__(self, group: str, attributes: Attributes[Subject]) -> None:
-        """Join the protocol's names with what is known of them."""
-        self._names = AttributeNames(group)
+        """``group``: ``"Device"``, ``"Channel"``, ``"Timing"``, ... as the protocol's enums begin."""
+        self._group = group
+        self._names = _names_of(group)
         self._attributes = attributes
 
     def _find(self, number: int) -> tuple[str, Attribute[Subject]]:
-        name = self._names.name(number)
+        name = self._names.get(number, f"0x{number:X}")
         if name not in self._attributes:
-            raise not_supported(f"{self._names.group}.{name}", "The simulated driver does not have it.")
+            raise not_supported(f"{self._group}.{name}", "The simulated driver does not have it.")
         return name, self._attributes[name]
 
     def get(self, subject: Subject, number: int) -> object:
@@ -84,14 +69,14 @@ class AttributeGroup(Generic[Subject]):
         """Write the attribute."""
         name, attribute = self._find(number)
         if attribute.set is None:
-            raise not_supported(f"{self._names.group}.{name}", "It can only be read.")
+            raise not_supported(f"{self._group}.{name}", "It can only be read.")
         attribute.set(subject, value)
 
     def reset(self, subject: Subject, number: int) -> None:
         """Give the attribute its first value again."""
         name, attribute = self._find(number)
         if attribute.set is None or attribute.initial is None:
-            raise not_supported(f"{self._names.group}.{name}", "It cannot be reset.")
+            raise not_supported(f"{self._group}.{name}", "It cannot be reset.")
         attribute.set(subject, attribute.initial)
 
 
