@@ -35,8 +35,3 @@ class BandNoise(AbstractExcitation):
     def band_hz(self) -> tuple[float, float]:
         """The edges of the band [Hz]."""
         return self.band_start_hz, self.band_stop_hz
-
-    @property
-    def highest_frequency_hz(self) -> float:
-        """The upper edge of the band [Hz]."""
-        return self.band_stop_hz

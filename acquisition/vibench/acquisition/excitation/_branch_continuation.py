@@ -78,11 +78,6 @@ class BranchContinuation(AbstractFeedback):
         return self.low_hz, self.high_hz
 
     @property
-    def highest_frequency_hz(self) -> float:
-        """The upper end of the range [Hz]."""
-        return self.high_hz
-
-    @property
     def playing_s(self) -> float:
         """All points with the longest search for each [s]."""
         look_s = self.settle_s + self.look_periods / self.low_hz

@@ -140,9 +140,9 @@ class AbstractExcitation(FrozenModel, ABC):
         return 1
 
     @property
-    @abstractmethod
     def highest_frequency_hz(self) -> float:
         """The highest frequency that is meant to be there; what a converter must be able to follow [Hz]."""
+        return self.band_hz[1]
 
     def shown_steps(self) -> Iterator[Step]:
         """List what a preview shows: all steps, unless less says as much."""

@@ -77,11 +77,6 @@ class ResonanceTracking(AbstractFeedback):
         return self.low_hz, self.high_hz
 
     @property
-    def highest_frequency_hz(self) -> float:
-        """The upper end of the range [Hz]."""
-        return self.high_hz
-
-    @property
     def playing_s(self) -> float:
         """All levels with the longest searches [s]."""
         tries_s = (self.most_tries + 2 * self.flank_pairs) * self.settling.longest_wait_s

@@ -115,11 +115,6 @@ class MovingSine(AbstractExcitation):
             case _:
                 return None
 
-    @property
-    def highest_frequency_hz(self) -> float:
-        """The upper end of the sweep [Hz]."""
-        return max(self.start_hz, self.stop_hz)
-
     def cycles(self, time_s: float) -> float:
         """Cycles of the ideal sweep since its start, in closed form."""
         return self.course.cycles(time_s)
