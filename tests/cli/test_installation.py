@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from vibench.acquisition import shipped_folder
-from vibench.cli.environment import VARIABLES
+from vibench.cli.doctor import VARIABLES
 from vibench.cli.exit_code import ExitCode
 from vibench.sim.lanes import lanes_pay
 

@@ -5,15 +5,17 @@ import platform
 import re
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
+from types import MappingProxyType
 
 from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
+from vibench.acquisition.recording import KEY_VARIABLE
+from vibench.acquisition.rig import TOKEN_VARIABLE
 from vibench.sim.kernels import advance_clock
-from vibench.sim.operating_system import state_folder
+from vibench.sim.operating_system import VARIABLE as STATE_VARIABLE, state_folder
 
-from .environment import VARIABLES, shown
 from .output import console, print_json
 from .paths import AsJson
 
@@ -21,6 +23,19 @@ NOT_INSTALLED = "not installed"
 FOR_DEVELOPERS = frozenset({"test", "docs", "peers"})
 """Extras that no question of a user is about."""
 USB_DEVICES = Path("/dev/bus/usb")
+VARIABLES: Mapping[str, str] = MappingProxyType(
+    {
+        STATE_VARIABLE: "folder for locks, bench checks and learnt costs; the user's own if absent",
+        TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
+        KEY_VARIABLE: "file with the key that seals of recordings are signed with",
+        "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",
+        "NUMBA_CACHE_DIR": "folder for compiled kernels; beside the sources if absent",
+        "QT_QPA_PLATFORM": "how Qt draws the window; 'offscreen' where there is no display",
+        "PYQTGRAPH_QT_LIB": "binding of the window's plots; PySide6 if absent",
+    }
+)
+"""The environment variables that vibench reads, and what each is for: docs/installation.md."""
+SECRET = frozenset({TOKEN_VARIABLE})
 
 
 def doctor(as_json: AsJson = False) -> None:
@@ -30,7 +45,11 @@ def doctor(as_json: AsJson = False) -> None:
         "libraries": dict(libraries()),
         "folders": dict(folders()),
         "instruments": dict(instruments()),
-        "environment": {name: shown(name) for name in VARIABLES if name in os.environ},
+        "environment": {
+            name: "(set, secret)" if name in SECRET else os.environ[name]
+            for name in VARIABLES
+            if name in os.environ
+        },
     }
     if as_json:
         print_json(sections)
