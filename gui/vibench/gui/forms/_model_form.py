@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
-from ..widgets import CHOICES, UNITS, SentenceLabel
+from ..widgets import CHOICES, UNITS, SentenceLabel, filled
 from ._editor import ChoiceEditor, Editor, unwrapped, value_editor
 from ._field_facts import FieldFacts, field_facts
 
@@ -334,10 +334,7 @@ class JudgedForm(QWidget, Generic[Model]):
         self.form = ModelForm(model, hidden)
         self._complaint = SentenceLabel(rank="complaint")
         self._complaint.setAccessibleName(f"Complaint about the {name}")
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.form)
-        layout.addWidget(self._complaint)
+        filled(QVBoxLayout(self), self.form, self._complaint, margin=0)
         self.form.changed.connect(self._take)
         UNITS.on_change(self._judge)
         self.form.show_content({})

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QScrollArea, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QScrollArea, QSplitter, QWidget
 
-from ..widgets import Theme
+from ..widgets import Theme, column, title_of
 from ._app_context import AppContext
 from ._file_kind import FileKind
 from ._settings import Remembered
@@ -99,13 +99,7 @@ class SideAndPicture(QSplitter):
 
 def _scrolled(page: str, side: QWidget) -> QScrollArea:
     """Put the title of the page above its left part, and let both be scrolled upright only."""
-    title = QLabel(page)
-    title.setProperty("rank", "title")
-    whole = QWidget()
-    layout = QVBoxLayout(whole)
-    layout.setContentsMargins(0, 0, 0, 0)
-    layout.addWidget(title)
-    layout.addWidget(side, 1)
+    whole = column(title_of(page), (side, 1))
     area = QScrollArea()
     area.setAccessibleName(f"Choices of the {page} page")
     area.setWidgetResizable(True)

@@ -1,7 +1,8 @@
 """Small widgets and words that every part of the window uses.
 
 Colour themes and style sheets, buttons, tables to read, hints in empty areas, notices to the
-person, page names, and times as they are written on labels. It knows neither pages nor engine.
+person, boxes of layouts, page names, and times as they are written on labels. It knows neither pages nor
+engine.
 """
 
 import lazy_loader

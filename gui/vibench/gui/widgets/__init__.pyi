@@ -1,3 +1,10 @@
+from ._boxes import (
+    boxed as boxed,
+    column as column,
+    filled as filled,
+    row as row,
+    title_of as title_of,
+)
 from ._clock import (
     clock as clock,
     moment_text as moment_text,

@@ -6,7 +6,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QAccessible, QAccessibleEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
-from ..widgets import Tone
+from ..widgets import Tone, filled
 
 
 @dataclass(frozen=True)
@@ -54,11 +54,8 @@ class Banner(QFrame):
         widest = max((STOP_TEXT, AT_ONCE_TEXT), key=self._stop.fontMetrics().horizontalAdvance)
         self._stop.setMinimumWidth(round(1.4 * self._stop.fontMetrics().horizontalAdvance(widest)))
         self._stop.clicked.connect(self.stop_wanted)
-        layout = QHBoxLayout(self)
+        layout = filled(QHBoxLayout(self), self._label, (self._detail, 1), self._stop)
         layout.setContentsMargins(10, 6, 10, 6)
-        layout.addWidget(self._label)
-        layout.addWidget(self._detail, 1)
-        layout.addWidget(self._stop)
         self._paint()
 
     @property

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QDialog, QDialogButtonBox, QTextBrowser, QVBoxLayo
 from vibench.acquisition import ConfigurationError, shipped_folder
 
 from ..page import AppContext
-from ..widgets import notice_of, push_button
+from ..widgets import filled, notice_of, push_button
 
 LONGEST_S = 60
 """That the versions may take to be found."""
@@ -28,9 +28,7 @@ class Reader(QDialog):
         self.browser.setOpenExternalLinks(False)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         self.buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self.browser)
-        layout.addWidget(self.buttons)
+        filled(QVBoxLayout(self), self.browser, self.buttons)
         em = self.fontMetrics().height()
         self.resize(50 * em, 38 * em)
 

@@ -12,7 +12,7 @@ from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S
 
 from ..forms import JudgedForm
 from ..page import AppContext, Remembered
-from ..widgets import THEMES, UNITS
+from ..widgets import THEMES, UNITS, filled
 
 
 def whole_path(folder: str) -> str:
@@ -54,9 +54,7 @@ class SettingsDialog(QDialog):
         )
         self.buttons.accepted.connect(self.accept)
         self.buttons.rejected.connect(self.reject)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self.form)
-        layout.addWidget(self.buttons)
+        filled(QVBoxLayout(self), self.form, self.buttons)
         self.setMinimumWidth(30 * self.fontMetrics().height())
         self.form.changed.connect(self._judge)
         self.form.show_value(

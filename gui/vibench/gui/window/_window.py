@@ -10,7 +10,6 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
-    QHBoxLayout,
     QMainWindow,
     QMessageBox,
     QStackedWidget,
@@ -23,7 +22,7 @@ from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
 
 from ..engine_link import Urgency
 from ..page import AppContext, Page, Remembered, UserActions, file_kind
-from ..widgets import RUN, Notice, NoticeKind, Theme, notice_of, palette, style_sheet
+from ..widgets import RUN, Notice, NoticeKind, Theme, filled, notice_of, palette, row, style_sheet
 from ._banner import Banner
 from ._event_loop_monitor import EventLoopMonitor
 from ._menus import AbortKey, build_menus
@@ -179,19 +178,11 @@ class Window(QMainWindow):
         return Urgency.LEAVE if leave is not None and box.clickedButton() is leave else None
 
     def _lay_out(self) -> None:
-        body = QHBoxLayout()
-        body.setContentsMargins(0, 0, 0, 0)
+        body = row(self.navigation, (self._stack, 1))
         body.setSpacing(0)
-        body.addWidget(self.navigation)
-        body.addWidget(self._stack, 1)
         middle = QWidget()
-        layout = QVBoxLayout(middle)
-        layout.setContentsMargins(0, 0, 0, 0)
+        layout = filled(QVBoxLayout(middle), self.banner, self.strip, (body, 1), self.status_line, margin=0)
         layout.setSpacing(0)
-        layout.addWidget(self.banner)
-        layout.addWidget(self.strip)
-        layout.addLayout(body, 1)
-        layout.addWidget(self.status_line)
         self.setCentralWidget(middle)
 
     def _connect(self) -> None:

@@ -1,12 +1,12 @@
 """How recordings are analysed, next to the picture that it makes, and how far the analysis is."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QPushButton, QVBoxLayout, QWidget
 
 from vibench.analysis import AnalysisOptions
 
 from ...forms import JudgedForm
-from ...widgets import TimedBar
+from ...widgets import TimedBar, filled, row
 
 
 class AnalysisPanel(QGroupBox):
@@ -28,13 +28,7 @@ class AnalysisPanel(QGroupBox):
         self._cancel.setAccessibleName("Cancel the analysis")
         self._cancel.setToolTip("Forget what has not been analysed yet")
         self._cancel.clicked.connect(lambda _checked=False: self.cancelled.emit())
-        row = QHBoxLayout()
-        row.addWidget(self._again)
-        row.addWidget(self._bar, 1)
-        row.addWidget(self._cancel)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self.form)
-        layout.addLayout(row)
+        filled(QVBoxLayout(self), self.form, row(self._again, (self._bar, 1), self._cancel))
         for widget in (self._bar, self._cancel):
             # Their place is kept: what begins or ends must move nothing.
             policy = widget.sizePolicy()

@@ -7,7 +7,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFileDialog,
-    QHBoxLayout,
     QSplitter,
     QTabWidget,
     QVBoxLayout,
@@ -19,7 +18,7 @@ from vibench.analysis.dynamics import branch_curves
 
 from ...background import Job
 from ...page import AppContext, FileKind, Page, SideAndPicture
-from ...widgets import COMPARE, Notice, NoticeKind, Theme, notice_of, push_button
+from ...widgets import COMPARE, Notice, NoticeKind, Theme, column, filled, notice_of, push_button, row
 from ._analysis_panel import AnalysisPanel
 from ._curve_list import CurveList, PairBox
 from ._curve_plots import CurvePlots
@@ -204,8 +203,7 @@ class ComparePage(Page):
 
     def _build(self) -> None:
         self._parts = SideAndPicture(self.context, COMPARE, self._side(), self._picture())
-        layout = QVBoxLayout(self)
-        layout.addWidget(self._parts)
+        filled(QVBoxLayout(self), self._parts)
 
     def _side(self) -> QWidget:
         add = push_button("&Add recordings…", "Choose recordings to compare", self._choose_recordings)
@@ -213,19 +211,8 @@ class ComparePage(Page):
             "&Branches…", "Choose files that vibench branches wrote", self._choose_branches
         )
         remove = push_button("&Remove", "Take the chosen curves away", self._remove)
-        row = QHBoxLayout()
-        row.addWidget(add)
-        row.addWidget(branches)
-        row.addWidget(remove)
-        side = QWidget()
-        layout = QVBoxLayout(side)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addLayout(row)
         self.curves.setMinimumHeight(6 * self.fontMetrics().height())
-        layout.addWidget(self.curves, 1)
-        layout.addWidget(self.pair_box)
-        layout.addWidget(self.panel)
-        return side
+        return column(row(add, branches, remove), (self.curves, 1), self.pair_box, self.panel)
 
     def _picture(self) -> QWidget:
         tabs = QTabWidget()
@@ -253,13 +240,4 @@ class ComparePage(Page):
         )
         self._export.setEnabled(False)
         self._report.setEnabled(False)
-        row = QHBoxLayout()
-        row.addStretch(1)
-        for each in (self._markers, show_all, self._report, self._export):
-            row.addWidget(each)
-        picture = QWidget()
-        layout = QVBoxLayout(picture)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(vertical, 1)
-        layout.addLayout(row)
-        return picture
+        return column((vertical, 1), row(1, self._markers, show_all, self._report, self._export))

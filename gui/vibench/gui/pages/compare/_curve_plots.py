@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QSplitter, QVBoxLayout, QWidget
 from vibench.analysis import Curve, CurveDifference, CurveOrigin
 
 from ...plots import GUIDE, LOG_FREQUENCY, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
-from ...widgets import Theme
+from ...widgets import Theme, filled
 
 MAGNITUDE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 DIFFERENCE = PlotAxis("Difference", "dB")
@@ -42,9 +42,7 @@ class CurvePlots(QWidget):
         splitter.addWidget(self.magnitudes)
         splitter.addWidget(self.differences)
         splitter.setSizes([500, 170])
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(splitter)
+        filled(QVBoxLayout(self), splitter, margin=0)
         self._marker_hz: list[float] = [100.0, 300.0]
         self._are_marked = False
         self._lines: list[tuple[pg.InfiniteLine, pg.InfiniteLine]] = []
@@ -80,11 +78,6 @@ class CurvePlots(QWidget):
         """Move a marker."""
         self._marker_hz[number] = frequency_hz
         self._place_markers()
-
-    def show_everything(self) -> None:
-        """Let the axes follow the curves."""
-        for plot in (self.magnitudes, self.differences):
-            plot.show_everything()
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours."""

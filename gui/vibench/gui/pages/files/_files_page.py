@@ -7,7 +7,6 @@ from pathlib import Path
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QFileDialog,
-    QHBoxLayout,
     QLabel,
     QSplitter,
     QVBoxLayout,
@@ -21,7 +20,19 @@ from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, ke
 from ...background import Job
 from ...forms import LineField
 from ...page import AppContext, FileKind, Page, Remembered, Shown
-from ...widgets import COMPARE, FILES, Notice, NoticeKind, SentenceLabel, Theme, notice_of, push_button
+from ...widgets import (
+    COMPARE,
+    FILES,
+    Notice,
+    NoticeKind,
+    SentenceLabel,
+    Theme,
+    column,
+    filled,
+    notice_of,
+    push_button,
+    row,
+)
 from ._file_words import facts_text
 from ._listing import Levels, Listing, listed, made_levels, thumbnails
 from ._recording_table import CampaignChoice, RecordingTable
@@ -249,8 +260,7 @@ class FilesPage(Page):
         self._splitter.setSizes([200, 600])
         self._splitter.setStretchFactor(1, 1)
         self._splitter.setChildrenCollapsible(False)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self._splitter)
+        filled(QVBoxLayout(self), self._splitter)
         kept = self.context.settings.state(Remembered.SPLITTERS, FILES)
         if not kept.isEmpty():
             self._splitter.restoreState(kept)
@@ -258,9 +268,6 @@ class FilesPage(Page):
         self.time_histories.markers_moved.connect(self._say_view)
 
     def _browser(self) -> QWidget:
-        browser = QWidget()
-        browser.setAccessibleName("Browser")
-        bar = QHBoxLayout()
         label = QLabel("F&older")
         self._folder_line = LineField(str(self._folder))
         self._folder_line.setAccessibleName("Folder of the recordings")
@@ -273,51 +280,43 @@ class FilesPage(Page):
         search.setClearButtonEnabled(True)
         search.textChanged.connect(self.table.search)
         search_label.setBuddy(search)
-        bar.addWidget(label)
-        bar.addWidget(self._folder_line, 3)
-        bar.addWidget(push_button("&Choose…", "Choose another folder", self._choose_folder))
-        bar.addWidget(self.campaigns, 1)
-        bar.addWidget(search_label)
-        bar.addWidget(search, 1)
         self._goes_to = QLabel("")
         self._goes_to.setProperty("rank", "second")
         self._count = QLabel("")
         self._count.setProperty("rank", "second")
-        bar.addWidget(self._count)
         self._compare = push_button(
             "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
         )
         self._compare.setEnabled(False)
-        bar.addWidget(self._compare)
-        layout = QVBoxLayout(browser)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addLayout(bar)
-        layout.addWidget(self._goes_to)
-        layout.addWidget(self.table)
+        bar = row(
+            label,
+            (self._folder_line, 3),
+            push_button("&Choose…", "Choose another folder", self._choose_folder),
+            (self.campaigns, 1),
+            search_label,
+            (search, 1),
+            self._count,
+            self._compare,
+        )
+        browser = column(bar, self._goes_to, self.table)
+        browser.setAccessibleName("Browser")
         return browser
 
     def _viewer(self) -> QWidget:
-        viewer = QWidget()
-        viewer.setAccessibleName("Recording")
         self._title = QLabel("No recording is open")
         self._title.setProperty("rank", "title")
         self._facts = SentenceLabel("Choose one in the list above.", rank="second")
-        bar = QHBoxLayout()
         self._view = QLabel("")
         self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
         self._markers.setCheckable(True)
         self._markers.toggled.connect(self.time_histories.show_markers)
-        bar.addWidget(self._view, 1)
-        bar.addWidget(self._markers)
-        bar.addWidget(
-            push_button("Show &all", "Show the whole recording (Home)", self.time_histories.show_all)
+        bar = row(
+            (self._view, 1),
+            self._markers,
+            push_button("Show &all", "Show the whole recording (Home)", self.time_histories.show_all),
+            push_button("Zoom &in", "Show less, closer (+)", lambda: self.time_histories.zoom(0.5)),
+            push_button("Zoom o&ut", "Show more (-)", lambda: self.time_histories.zoom(2.0)),
         )
-        bar.addWidget(push_button("Zoom &in", "Show less, closer (+)", lambda: self.time_histories.zoom(0.5)))
-        bar.addWidget(push_button("Zoom o&ut", "Show more (-)", lambda: self.time_histories.zoom(2.0)))
-        layout = QVBoxLayout(viewer)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self._title)
-        layout.addWidget(self._facts)
-        layout.addWidget(self.pictures, 1)
-        layout.addLayout(bar)
+        viewer = column(self._title, self._facts, (self.pictures, 1), bar)
+        viewer.setAccessibleName("Recording")
         return viewer

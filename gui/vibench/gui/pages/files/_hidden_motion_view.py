@@ -4,7 +4,7 @@ from math import nan
 from pathlib import Path
 
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QCheckBox, QFileDialog, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFileDialog, QLabel, QVBoxLayout, QWidget
 
 from vibench.acquisition.recording import Recording
 from vibench.analysis.hidden_motion import (
@@ -20,7 +20,7 @@ from ...background import Background, LatestRequest
 from ...forms import Choice
 from ...page import Shown
 from ...plots import LIMIT, TIME, Dash, Plot, PlotAxis, curve_style
-from ...widgets import SentenceLabel, Theme
+from ...widgets import SentenceLabel, Theme, filled, row
 
 _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
@@ -57,15 +57,8 @@ class HiddenMotionView(QWidget):
         self._of: HiddenViewRequest | None = None
         """What the picture is of; None while there is none."""
         self._latest_request = LatestRequest(background, hidden_view, self._show, self._fail, _WAIT_MS, self)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 4, 0, 0)
-        chosen = QHBoxLayout()
-        for widget in (QLabel("Specimen"), self.specimen, self.find_numbers):
-            chosen.addWidget(widget)
-        chosen.addStretch(1)
-        layout.addLayout(chosen)
-        layout.addWidget(self.said)
-        layout.addWidget(self.plot, 1)
+        chosen = row(QLabel("Specimen"), self.specimen, self.find_numbers, 1)
+        filled(QVBoxLayout(self), chosen, self.said, (self.plot, 1)).setContentsMargins(0, 4, 0, 0)
         self._clear(_CHOOSE)
 
     @property

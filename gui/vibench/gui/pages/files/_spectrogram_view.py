@@ -23,7 +23,7 @@ from ...background import Background, LatestRequest
 from ...forms import Choice
 from ...page import Shown
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
-from ...widgets import Theme, plain_unit
+from ...widgets import Theme, filled, plain_unit
 from ._file_words import role_text
 from ._hidden_motion_view import HiddenMotionView
 from ._time_histories import RecordingTimeHistories
@@ -181,14 +181,10 @@ class SpectrogramView(QWidget):
             label.setBuddy(choice)
             choice.setAccessibleName(f"Spectrogram: {text.lower()}")
             choice.setToolTip(tip)
-            bar.addWidget(label)
-            bar.addWidget(choice)
+            filled(bar, label, choice)
         bar.addWidget(self.said, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 4, 0, 0)
-        layout.addLayout(bar)
-        for plot in self._plots.values():
-            layout.addWidget(plot, 1)
+        plots = ((plot, 1) for plot in self._plots.values())
+        filled(QVBoxLayout(self), bar, *plots).setContentsMargins(0, 4, 0, 0)
 
 
 class _Image:

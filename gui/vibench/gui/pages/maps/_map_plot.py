@@ -14,7 +14,7 @@ from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
 from vibench.analysis.simulation import MapPicture
 
 from ...plots import FREQUENCY, LineStyle, Plot, PlotAxis, Scale
-from ...widgets import Theme
+from ...widgets import Theme, filled
 
 AMPLITUDE = PlotAxis("Base amplitude A0", "m", scale=Scale.LOGARITHMIC)
 ON_TOP = LineStyle(lambda _theme: "#101010")
@@ -41,9 +41,7 @@ class MapPlot(QWidget):
         self._levels = [self.plot.curve(ON_TOP)]
         self._seen: MapPicture | None = None
         self.plot.scene().sigMouseClicked.connect(self._click)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.plot)
+        filled(QVBoxLayout(self), self.plot, margin=0)
 
     @property
     def in_sight(self) -> tuple[tuple[float, float], tuple[float, float]]:

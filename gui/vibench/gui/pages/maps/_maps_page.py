@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QLabel, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QSplitter, QVBoxLayout, QWidget
 
 from vibench.analysis import recorded_response
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
@@ -21,7 +21,18 @@ from vibench.analysis.simulation import (
 from ...background import Job
 from ...forms import Choice, JudgedForm
 from ...page import AppContext, Page, Shown, SideAndPicture, Simulator
-from ...widgets import MAPS, SIMULATE, Notice, NoticeKind, SentenceLabel, Theme, push_button
+from ...widgets import (
+    MAPS,
+    SIMULATE,
+    Notice,
+    NoticeKind,
+    SentenceLabel,
+    Theme,
+    boxed,
+    column,
+    push_button,
+    row,
+)
 from ._map_plot import COLOURINGS, MapPlot
 from ._motion_view import MotionView
 
@@ -207,23 +218,13 @@ class MapsPage(Page):
         QVBoxLayout(self).addWidget(self._parts)
 
     def _side(self) -> QWidget:
-        scene = QGroupBox("Map")
-        QVBoxLayout(scene).addWidget(self.form)
+        scene = boxed("Map", self.form)
         self._begin = push_button("&Map", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._finer = push_button("Fi&ner", "Compute only what the axes show now", self.begin_in_sight)
         self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
         self._cancel.setEnabled(False)
-        row = QHBoxLayout()
-        for button in (self._begin, self._finer, self._cancel):
-            row.addWidget(button, 1)
-        side = QWidget()
-        layout = QVBoxLayout(side)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scene)
-        layout.addLayout(row)
-        layout.addStretch(1)
-        return side
+        return column(scene, row((self._begin, 1), (self._finer, 1), (self._cancel, 1)), 1)
 
     def _answer(self) -> QWidget:
         self.quantity = Choice()
@@ -241,19 +242,10 @@ class MapsPage(Page):
         legend = QLabel(" ".join(_legend_entry(*each) for each in MOTION_CLASSES))
         legend.setWordWrap(True)
         legend.setAccessibleName("Colours of the kinds of motion")
-        row = QHBoxLayout()
-        row.addWidget(self.quantity)
-        row.addWidget(self._state, 1)
-        row.addWidget(self._open)
-        upper = QWidget()
-        layout = QVBoxLayout(upper)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(legend)
-        layout.addWidget(self.map, 1)
-        layout.addLayout(row)
+        below = row(self.quantity, (self._state, 1), self._open)
         answer = QSplitter(Qt.Orientation.Vertical)
         answer.setAccessibleName("Map and motion")
-        answer.addWidget(upper)
+        answer.addWidget(column(legend, (self.map, 1), below))
         answer.addWidget(self.motion)
         answer.setSizes([MAP_SHARE, 1000 - MAP_SHARE])
         answer.setChildrenCollapsible(False)

@@ -1,11 +1,11 @@
 """The motion at one point of a map: over time, its portrait, and its spectrum."""
 
-from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis.simulation import SettledMotion
 
 from ...plots import FREQUENCY, TIME, Plot, PlotAxis, Scale, curve_style
-from ...widgets import SentenceLabel, Theme
+from ...widgets import SentenceLabel, Theme, filled, row
 
 RELATIVE = PlotAxis("p = y - z", "m", short="p")
 DISPLACEMENT = PlotAxis("m0 displacement", "m", short="x")
@@ -28,13 +28,7 @@ class MotionView(QWidget):
             Plot("Spectrum of m0", FREQUENCY, LINE, theme),
         )
         self.curves = tuple(plot.with_hint("No motion yet.").curve(curve_style(0)) for plot in self.plots)
-        row = QHBoxLayout()
-        for plot in self.plots:
-            row.addWidget(plot, 1)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.said)
-        layout.addLayout(row, 1)
+        filled(QVBoxLayout(self), self.said, (row(*((plot, 1) for plot in self.plots)), 1), margin=0)
 
     def show_nothing(self, why: str) -> None:
         """Show no motion, and say why."""

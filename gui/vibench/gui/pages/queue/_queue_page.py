@@ -9,9 +9,7 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
     QGridLayout,
-    QGroupBox,
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QVBoxLayout,
     QWidget,
@@ -33,7 +31,20 @@ from vibench.acquisition.rig import Rig
 from ...background import LatestRequest
 from ...forms import Choice
 from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
-from ...widgets import Notice, NoticeKind, ReadTable, SentenceLabel, clock, notice_of, push_button
+from ...widgets import (
+    QUEUE,
+    Notice,
+    NoticeKind,
+    ReadTable,
+    SentenceLabel,
+    boxed,
+    clock,
+    filled,
+    notice_of,
+    push_button,
+    row,
+    title_of,
+)
 from ._draft import moved_up, with_measurement, with_sweep, without
 from ._row_words import CampaignPreview, point_rows, preview_campaign
 from ._sweep_form import SweepForm
@@ -297,8 +308,6 @@ class QueuePage(Page):
         self.sweep.refused.connect(lambda text: self._warn(text, "Correct the sweep."))
 
     def _lay_out(self) -> None:
-        title = QLabel("Queue")
-        title.setProperty("rank", "title")
         self.choice.setAccessibleName("Known campaigns")
         self.choice.setToolTip("Campaigns that come with vibench")
         self.choice.addItem("take over a campaign…")
@@ -307,37 +316,19 @@ class QueuePage(Page):
         files = QGridLayout()
         files.addWidget(push_button("Open…", "Open a campaign from a TOML file", self._open), 0, 0)
         files.addWidget(push_button("Save as…", "Save the campaign as a TOML file", self._save), 0, 1)
-        edits = QHBoxLayout()
-        for text, tip, act in (
-            ("&Add the test", "Add the test of the Test page", self._add_test),
-            ("Move &up", "Move the chosen entry up", self._move_up),
-            ("&Remove", "Remove the chosen entry", self._remove),
-        ):
-            edits.addWidget(push_button(text, tip, act))
-        left = QVBoxLayout()
-        left.addWidget(title)
-        left.addWidget(self.choice)
-        left.addLayout(files)
-        left.addWidget(_boxed("Campaign", self.entries, edits), 1)
-        left.addWidget(self.sweep)
-        right = QVBoxLayout()
-        right.addWidget(self.summary)
-        actions = QHBoxLayout()
-        for button in (self.arm_button, self.resume_button, self.hold_button):
-            actions.addWidget(button)
-        right.addLayout(actions)
-        right.addWidget(self.left_alone)
-        right.addWidget(self.progress)
-        right.addWidget(_boxed("Recordings", self.rows), 1)
-        layout = QHBoxLayout(self)
-        layout.addLayout(left, 1)
-        layout.addLayout(right, 1)
-
-
-def _boxed(title: str, table: QWidget, below: QHBoxLayout | None = None) -> QGroupBox:
-    box = QGroupBox(title)
-    layout = QVBoxLayout(box)
-    layout.addWidget(table)
-    if below is not None:
-        layout.addLayout(below)
-    return box
+        edits = row(
+            push_button("&Add the test", "Add the test of the Test page", self._add_test),
+            push_button("Move &up", "Move the chosen entry up", self._move_up),
+            push_button("&Remove", "Remove the chosen entry", self._remove),
+        )
+        campaign = boxed("Campaign", self.entries, edits)
+        left = filled(QVBoxLayout(), title_of(QUEUE), self.choice, files, (campaign, 1), self.sweep)
+        right = filled(
+            QVBoxLayout(),
+            self.summary,
+            row(self.arm_button, self.resume_button, self.hold_button),
+            self.left_alone,
+            self.progress,
+            (boxed("Recordings", self.rows), 1),
+        )
+        filled(QHBoxLayout(self), (left, 1), (right, 1))

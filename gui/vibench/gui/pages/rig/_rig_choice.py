@@ -3,12 +3,13 @@
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QFileDialog, QFormLayout, QHBoxLayout, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QPushButton, QWidget
 
 from vibench.acquisition import ConfigurationError, all_shipped
 from vibench.acquisition.rig import Rig, load_rig
 
 from ...forms import Choice
+from ...widgets import row
 
 PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
 """How fast a simulated bench runs."""
@@ -37,18 +38,15 @@ class RigChoice(QWidget):
         self.pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
         for words in PACES.values():
             self.pace.addItem(words)
-        line = QHBoxLayout()
-        line.addWidget(self._box, 1)
-        line.addWidget(own)
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
-        for text, row, buddy in (
-            ("Configuration", line, self._box),
+        for text, line, buddy in (
+            ("Configuration", row((self._box, 1), own), self._box),
             ("Runs", self.pace, self.pace),
         ):
             label = QLabel(text)
             label.setBuddy(buddy)
-            self._form.addRow(label, row)
+            self._form.addRow(label, line)
         for path in sorted(all_shipped("hardware_configs"), key=lambda each: "virtual" not in each.stem):
             self._add(path)
         self._box.currentIndexChanged.connect(self._load)

@@ -6,9 +6,7 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
-    QGroupBox,
     QHBoxLayout,
-    QLabel,
     QScrollArea,
     QSizePolicy,
     QVBoxLayout,
@@ -20,14 +18,18 @@ from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
 
 from ...page import AppContext, FileKind, Page, Remembered, UserActions
 from ...widgets import (
+    RIG,
     Notice,
     NoticeKind,
     ReadTable,
     SentenceLabel,
+    boxed,
+    filled,
     fitted_unit,
     moment_text,
     notice_of,
     push_button,
+    title_of,
 )
 from ._knob_sheet import KnobSheetForm
 from ._rig_choice import RigChoice
@@ -226,38 +228,22 @@ class RigPage(Page):
         self.choice.refused.connect(lambda error: self.context.say(notice_of(error)))
 
     def _lay_out(self) -> None:
-        left = QVBoxLayout()
-        title = QLabel("Rig")
-        title.setProperty("rank", "title")
-        left.addWidget(title)
-        left.addWidget(self.choice)
-        left.addWidget(self.about)
-        left.addWidget(self.knobs)
-        for button in (self.open_button, self.check_button, self.find_button, self.close_button):
-            left.addWidget(button)
+        buttons = self.open_button, self.check_button, self.find_button, self.close_button
+        side = QWidget()
+        left = filled(QVBoxLayout(side), title_of(RIG), self.choice, self.about, self.knobs, *buttons)
         left.addSpacing(self.fontMetrics().height())
-        left.addWidget(self.first_steps)
-        left.addStretch(1)
-        column = QWidget()
-        column.setLayout(left)
+        filled(left, self.first_steps, 1)
         scroll = QScrollArea()
-        scroll.setWidget(column)
+        scroll.setWidget(side)
         scroll.setWidgetResizable(True)
         scroll.setFrameShape(QScrollArea.Shape.NoFrame)
         scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         bar = scroll.verticalScrollBar().sizeHint().width()
-        scroll.setMinimumWidth(column.minimumSizeHint().width() + bar)
+        scroll.setMinimumWidth(side.minimumSizeHint().width() + bar)
         scroll.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
-        right = QVBoxLayout()
-        right.addWidget(self._boxed("Instruments", self.instruments), 1)
-        right.addWidget(self._boxed("Check", self.verdict, self.findings), 3)
-        layout = QHBoxLayout(self)
-        layout.addWidget(scroll, 2)
-        layout.addLayout(right, 3)
-
-    def _boxed(self, title: str, *widgets: QWidget) -> QGroupBox:
-        box = QGroupBox(title)
-        layout = QVBoxLayout(box)
-        for widget in widgets:
-            layout.addWidget(widget)
-        return box
+        right = filled(
+            QVBoxLayout(),
+            (boxed("Instruments", self.instruments), 1),
+            (boxed("Check", self.verdict, self.findings), 3),
+        )
+        filled(QHBoxLayout(self), (scroll, 2), (right, 3))

@@ -1,11 +1,11 @@
 """Arming in plain words: what is going to happen, then a second, explicit act to start it."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import DRIVING, EngineState, EngineStatus
 
-from ...widgets import SentenceLabel, push_button
+from ...widgets import SentenceLabel, filled, push_button, row
 
 _HINTS = {
     EngineState.CLOSED: "No bench is open. Open one on the Rig page (Ctrl+1).",
@@ -37,14 +37,8 @@ class ArmCard(QGroupBox):
         self.hold_button = push_button(
             "Hold", "Stay where the run is; the drive stays on", self.hold_wanted.emit
         )
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.cancel_button)
-        buttons.addWidget(self.start_button)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self._words)
-        layout.addWidget(self.arm_button)
-        layout.addLayout(buttons)
-        layout.addWidget(self.hold_button)
+        buttons = row(self.cancel_button, self.start_button)
+        filled(QVBoxLayout(self), self._words, self.arm_button, buttons, self.hold_button)
         self._was_armed = False
 
     @property

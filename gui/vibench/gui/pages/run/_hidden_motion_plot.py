@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from vibench.acquisition.engine import EngineStatus, TwinStatus
 
 from ...plots import LIMIT, Dash, LineStyle, Plot, PlotAxis, curve_style
-from ...widgets import Colour, SentenceLabel, Theme
+from ...widgets import Colour, SentenceLabel, Theme, filled
 
 _ACROSS = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
 _UP = PlotAxis("p = y - z", "m", short="p")
@@ -43,10 +43,7 @@ class HiddenMotionPlot(QWidget):
         self.said.setAccessibleName("What the live twin says")
         self._end = (0, -1)
         self.plot.setXRange(-_BACK_S, _AHEAD_S, padding=0)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(8, 4, 0, 0)
-        layout.addWidget(self.said)
-        layout.addWidget(self.plot, 1)
+        filled(QVBoxLayout(self), self.said, (self.plot, 1)).setContentsMargins(8, 4, 0, 0)
         self.clear()
 
     def show_status(self, status: EngineStatus | None) -> None:

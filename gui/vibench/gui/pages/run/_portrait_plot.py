@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QHBoxLayout, QWidget
 from vibench.analysis.live import LiveView, Portrait
 
 from ...plots import Plot, PlotAxis, curve_style
-from ...widgets import Theme
+from ...widgets import Theme, filled
 
 _ACROSS = PlotAxis("m0 displacement", "m", short="x")
 _UP = PlotAxis("m0 velocity", "m/s", short="v")
@@ -34,10 +34,7 @@ class PortraitPlot(QWidget):
         self._strobe = self.orbit.dots(curve_style(3), size=6)
         self._points = self.section.dots(curve_style(3), size=3)
         self._shown: Portrait | None = None
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.orbit, 1)
-        layout.addWidget(self.section, 1)
+        filled(QHBoxLayout(self), (self.orbit, 1), (self.section, 1), margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw the newest periods."""

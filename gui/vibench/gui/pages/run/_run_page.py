@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import EngineClient, EngineState, TwinSwitch
 from vibench.acquisition.plan import EXCITATION_KINDS
@@ -16,7 +16,7 @@ from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
 from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, Shown, UserActions
-from ...widgets import FILES, SentenceLabel, Theme
+from ...widgets import FILES, RUN, SentenceLabel, Theme, filled, title_of
 from ._arm_card import ArmCard
 from ._hidden_motion_plot import HiddenMotionPlot
 from ._portrait_plot import PortraitPlot
@@ -214,13 +214,9 @@ class RunPage(Page):
         self.context.selection.rig_changed.connect(self._show_channels)
 
     def _lay_out(self) -> None:
-        title = QLabel("Run")
-        title.setProperty("rank", "title")
         left = QWidget()
-        column = QVBoxLayout(left)
-        for widget in (title, self.arm_card, self.watch_card, self.summary, self.look_button):
-            column.addWidget(widget)
-        column.addStretch(1)
+        cards = self.arm_card, self.watch_card, self.summary, self.look_button
+        filled(QVBoxLayout(left), title_of(RUN), *cards, 1)
         self.look_button.hide()
         for tabs, name, pictures in (
             (self.left_tabs, "Pictures on the left", (self.frequency_response, self.history, self.envelope)),
@@ -241,8 +237,5 @@ class RunPage(Page):
         right.setSizes([600, 400])
         right.setStretchFactor(0, 3)
         right.setStretchFactor(1, 2)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
         left.setFixedWidth(LEFT_LETTERS * self.fontMetrics().averageCharWidth())
-        layout.addWidget(left, 0)
-        layout.addWidget(right, 1)
+        filled(QHBoxLayout(self), left, (right, 1), margin=0)

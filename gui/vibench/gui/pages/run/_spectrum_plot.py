@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QVBoxLayout, QWidget
 from vibench.analysis.live import LiveView
 
 from ...plots import LOG_FREQUENCY, Plot, PlotAxis, Scale, curve_style
-from ...widgets import UNITS, Theme
+from ...widgets import UNITS, Theme, filled
 from ._time_histories import channel_word
 
 _LEAST = 1e-12
@@ -28,9 +28,7 @@ class SpectrumPlot(QWidget):
         self._curves: list[pg.PlotDataItem] = []
         self._view: LiveView | None = None
         UNITS.on_change(self._draw_anew)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.plot)
+        filled(QVBoxLayout(self), self.plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw what is known by now."""

@@ -6,7 +6,7 @@ from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
 from ...plots import FREQUENCY, PREDICTED, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
-from ...widgets import Theme
+from ...widgets import Theme, filled
 
 
 class SweepHistoryPlot(QWidget):
@@ -26,9 +26,7 @@ class SweepHistoryPlot(QWidget):
         self._first = self.plot.dots(curve_style(3), "I, measured", 3)
         self._second = self.plot.dots(curve_style(0), "II, measured", 3)
         self._shown = 0
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.plot)
+        filled(QVBoxLayout(self), self.plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw all points so far."""
@@ -75,9 +73,7 @@ class SweepEnvelopePlot(QWidget):
         self._upper = self.plot.curve(curve_style(3), "largest")
         self._lower = self.plot.curve(curve_style(0), "smallest")
         self._shown = 0
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.plot)
+        filled(QVBoxLayout(self), self.plot, margin=0)
 
     def show_view(self, view: LiveView) -> None:
         """Draw all points so far, in the order of time."""

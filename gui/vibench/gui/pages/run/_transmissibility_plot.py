@@ -6,7 +6,7 @@ from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
 from ...plots import FREQUENCY, PREDICTED, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
-from ...widgets import Theme
+from ...widgets import Theme, filled
 
 
 class TransmissibilityPlot(QWidget):
@@ -28,13 +28,9 @@ class TransmissibilityPlot(QWidget):
         self._coherence = self.coherence.curve(curve_style(0))
         self.coherence.setYRange(0, 1, padding=0.02)
         self.coherence.setXLink(self.magnitude)
-        layout = QVBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.setSpacing(1)
         # One frequency axis for both: the lower one's.
         self.magnitude.across.show_nothing()
-        layout.addWidget(self.magnitude, 2)
-        layout.addWidget(self.coherence, 1)
+        filled(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
 
     def show_view(self, view: LiveView) -> None:
         """Draw what is known by now."""

@@ -6,7 +6,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFormLayout,
     QGroupBox,
-    QHBoxLayout,
     QLabel,
     QProgressBar,
     QPushButton,
@@ -19,7 +18,7 @@ from vibench.acquisition.engine import DRIVING, EngineStatus, RunStatus, TwinSwi
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...forms import Choice, LineField
-from ...widgets import Theme, Tone, clock, paint_hint
+from ...widgets import Theme, Tone, clock, filled, paint_hint, row
 from ._time_histories import USUAL_SPAN_S, channel_word
 
 _ROW = 1.9
@@ -175,17 +174,9 @@ class WatchCard(QGroupBox):
             label.setBuddy(widget)
             widget.setAccessibleName(text)
             form.addRow(label, widget)
-        marks = QHBoxLayout()
         self.mark.setAccessibleName("Text of the mark")
-        marks.addWidget(self.mark, 1)
-        marks.addWidget(self.mark_button)
-        layout = QVBoxLayout(self)
-        layout.addWidget(self.progress)
-        layout.addLayout(form)
-        layout.addWidget(self.meters)
-        layout.addWidget(self.freeze)
-        layout.addWidget(self.twin)
-        layout.addLayout(marks)
+        marks = row((self.mark, 1), self.mark_button)
+        filled(QVBoxLayout(self), self.progress, form, self.meters, self.freeze, self.twin, marks)
 
 
 def _progress_text(run: RunStatus) -> str:

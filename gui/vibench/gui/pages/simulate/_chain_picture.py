@@ -3,12 +3,11 @@
 import math
 
 import numpy as np
-from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis.dynamics import ChainAnswer, ChainDrive, ChainRun
 
 from ...plots import FREQUENCY, TIME, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
-from ...widgets import Theme
+from ...widgets import Theme, column
 
 ACROSS = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 PLACE = PlotAxis("Cell, from the base", short="Cell")
@@ -32,11 +31,7 @@ class ChainPicture:
         self.across.with_legend().with_hint("Dashed: without contact; grey: gaps of the endless chain.")
         self.motion.with_hint("m0 of every cell over time, with its impacts, in the last run.")
         self.energies.with_legend().with_hint("Mean energy of every cell, in the last run.")
-        self.widget = QWidget()
-        layout = QVBoxLayout(self.widget)
-        layout.setContentsMargins(0, 0, 0, 0)
-        for plot in self.plots:
-            layout.addWidget(plot, 1)
+        self.widget = column(*((plot, 1) for plot in self.plots))
 
     @property
     def plots(self) -> tuple[Plot, Plot, Plot]:

@@ -3,13 +3,13 @@
 from functools import partial
 
 import numpy as np
-from PySide6.QtWidgets import QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from vibench.analysis.dynamics import BranchDiagram, ExponentSpectrum
 from vibench.sim import Parameter
 
 from ...plots import GUIDE, LOG_FREQUENCY, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
-from ...widgets import Theme
+from ...widgets import Theme, column
 
 LEVEL = PlotAxis("Base amplitude A0", "m")
 RESPONSES = (
@@ -40,12 +40,7 @@ class _TwoPlots(QStackedWidget):
             second.with_legend().with_hint("The same motions.")
             second.setXLink(first)
             self.pairs[along] = (first, second)
-            both = QWidget()
-            layout = QVBoxLayout(both)
-            layout.setContentsMargins(0, 0, 0, 0)
-            layout.addWidget(first, 1)
-            layout.addWidget(second, 1)
-            self.addWidget(both)
+            self.addWidget(column((first, 1), (second, 1)))
 
     def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
         """Bring the pair of a parameter to the front, empty."""

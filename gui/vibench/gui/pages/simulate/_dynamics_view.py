@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
-from PySide6.QtWidgets import QGroupBox, QHBoxLayout, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.analysis import Curve
 from vibench.analysis.dynamics import SpecimenChoice
@@ -13,7 +13,7 @@ from vibench.analysis.simulation import Asked, PartialResult, Trouble
 
 from ...forms import JudgedForm
 from ...page import AppContext, Shown, SideAndPicture, Simulator
-from ...widgets import COMPARE, Notice, NoticeKind, SentenceLabel, Theme, push_button
+from ...widgets import COMPARE, Notice, NoticeKind, SentenceLabel, Theme, boxed, column, push_button, row
 
 Request = TypeVar("Request", bound=SpecimenChoice)
 Answer = TypeVar("Answer")
@@ -170,24 +170,12 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         QVBoxLayout(self).addWidget(self._parts)
 
     def _side(self) -> QWidget:
-        scene = QGroupBox("Scene")
-        QVBoxLayout(scene).addWidget(self.form)
-        before = SentenceLabel(self.kind.before, rank="second")
+        scene, before = boxed("Scene", self.form), SentenceLabel(self.kind.before, rank="second")
         self._begin = push_button("Find", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._cancel = push_button("Cancel", "Want no more; what has been found stays", self.cancel)
         self._cancel.setEnabled(False)
-        row = QHBoxLayout()
-        row.addWidget(self._begin, 1)
-        row.addWidget(self._cancel)
-        side = QWidget()
-        layout = QVBoxLayout(side)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scene)
-        layout.addWidget(before)
-        layout.addLayout(row)
-        layout.addStretch(1)
-        return side
+        return column(scene, before, row((self._begin, 1), self._cancel), 1)
 
     def _right(self) -> QWidget:
         self._state = SentenceLabel("Nothing has been asked yet.")
@@ -196,12 +184,4 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
             "Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
         )
         self._compare.setEnabled(False)
-        row = QHBoxLayout()
-        row.addWidget(self._state, 1)
-        row.addWidget(self._compare)
-        right = QWidget()
-        layout = QVBoxLayout(right)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.picture.widget, 1)
-        layout.addLayout(row)
-        return right
+        return column((self.picture.widget, 1), row((self._state, 1), self._compare))

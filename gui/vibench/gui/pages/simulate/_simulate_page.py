@@ -6,8 +6,6 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from PySide6.QtWidgets import (
-    QGroupBox,
-    QHBoxLayout,
     QLabel,
     QTabWidget,
     QVBoxLayout,
@@ -33,7 +31,11 @@ from ...widgets import (
     SentenceLabel,
     Theme,
     TimedBar,
+    boxed,
+    column,
+    filled,
     push_button,
+    row,
 )
 from ._answer_plots import AnswerPlots
 from ._chain_picture import ChainPicture
@@ -200,7 +202,6 @@ class SimulatePage(Page):
 
     def _build(self) -> None:
         self._parts = SideAndPicture(self.context, SIMULATE, self._side(), self._answer())
-        layout = QVBoxLayout(self)
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName("What is simulated")
         self._parts.setAccessibleName("Responses")
@@ -208,29 +209,17 @@ class SimulatePage(Page):
         self.tabs.addTab(self.branches, "Branches")
         self.tabs.addTab(self.spectrum, "Exponents")
         self.tabs.addTab(self.chain, "Chain")
-        layout.addWidget(self.tabs)
+        filled(QVBoxLayout(self), self.tabs)
 
     def _side(self) -> QWidget:
-        scene = QGroupBox("Scene")
-        QVBoxLayout(scene).addWidget(self.form)
-        cost = QGroupBox("Cost and error of this accuracy")
+        scene = boxed("Scene", self.form)
         self._cost = SentenceLabel()
         self._cost.setAccessibleName("Cost and error of this accuracy")
-        QVBoxLayout(cost).addWidget(self._cost)
+        cost = boxed("Cost and error of this accuracy", self._cost)
         self._begin = push_button("&Simulate", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
-        row = QHBoxLayout()
-        row.addWidget(self._begin, 1)
-        row.addWidget(self._cancel)
-        side = QWidget()
-        layout = QVBoxLayout(side)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scene)
-        layout.addWidget(cost)
-        layout.addLayout(row)
-        layout.addStretch(1)
-        return side
+        return column(scene, cost, row((self._begin, 1), self._cancel), 1)
 
     def _answer(self) -> QWidget:
         self._bar = TimedBar("Points simulated", "points")
@@ -240,19 +229,9 @@ class SimulatePage(Page):
         self._compare = push_button(
             "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
         )
-        row = QHBoxLayout()
-        row.addWidget(self._state, 1)
-        row.addWidget(self._bar)
-        row.addWidget(self._compare)
         self.motions = ReadTable(
             "Motions of points whose start is forgotten, and their shares", MOTION_COLUMNS
         )
         self.motions.setMaximumHeight(_LINES * self.motions.verticalHeader().defaultSectionSize())
         self.motions.hide()
-        answer = QWidget()
-        layout = QVBoxLayout(answer)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.plots, 1)
-        layout.addWidget(self.motions)
-        layout.addLayout(row)
-        return answer
+        return column((self.plots, 1), self.motions, row((self._state, 1), self._bar, self._compare))

@@ -19,7 +19,7 @@ from ...plots import (
     SignalCurve,
     curve_style,
 )
-from ...widgets import Theme
+from ...widgets import Theme, filled
 
 if TYPE_CHECKING:
     from vibench.analysis import MeasurementPrediction
@@ -82,10 +82,7 @@ class PreviewPlots(QWidget):
             plot.setMinimumHeight(_LEAST_LINES * self.fontMetrics().height())
         self._signal = SignalCurve(self.time, curve_style(0))
         self._lines = self.spectrum.curve(curve_style(0))
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(self.time, 1)
-        layout.addWidget(self.spectrum, 1)
+        filled(QHBoxLayout(self), (self.time, 1), (self.spectrum, 1), margin=0)
 
     def show_preview(self, seen: MeasurementPreview) -> None:
         """Draw another signal."""

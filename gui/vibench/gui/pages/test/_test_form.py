@@ -5,6 +5,7 @@ from PySide6.QtWidgets import QGroupBox, QScrollArea, QSizePolicy, QVBoxLayout, 
 from vibench.acquisition.plan import Measurement
 
 from ...forms import GroupEditor, JudgedForm
+from ...widgets import filled
 
 USUAL = {
     "amplitude_vpp": 1.0,
@@ -39,10 +40,7 @@ class TestForm(JudgedForm[Measurement]):
         assert isinstance(excitation, GroupEditor)
         excitation.know(USUAL)
         inner = QWidget()
-        inside = QVBoxLayout(inner)
-        inside.setContentsMargins(0, 0, 8, 0)
-        inside.addWidget(self.form)
-        inside.addStretch(1)
+        filled(QVBoxLayout(inner), self.form, 1).setContentsMargins(0, 0, 8, 0)
         scroll = QScrollArea()
         scroll.setWidget(inner)
         scroll.setWidgetResizable(True)

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
-    QGroupBox,
     QHBoxLayout,
-    QLabel,
     QSizePolicy,
     QSplitter,
     QVBoxLayout,
@@ -24,7 +22,21 @@ from vibench.acquisition.rig import BaseQuantity, Rig
 from ...background import LatestRequest
 from ...forms import Choice
 from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
-from ...widgets import Notice, NoticeKind, SentenceLabel, Theme, clock, fitted_unit, notice_of, push_button
+from ...widgets import (
+    TEST,
+    Notice,
+    NoticeKind,
+    SentenceLabel,
+    Theme,
+    boxed,
+    clock,
+    filled,
+    fitted_unit,
+    notice_of,
+    push_button,
+    row,
+    title_of,
+)
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
@@ -282,32 +294,23 @@ class TestPage(Page):
         self.context.selection.rig_changed.connect(self._changed)
 
     def _lay_out(self) -> None:
-        title = QLabel("Test")
-        title.setProperty("rank", "title")
         self.choice.setAccessibleName("Known tests")
         self.choice.setToolTip("Tests that come with vibench, and your own")
-        files = QHBoxLayout()
-        for text, tip, act in (
-            ("Open…", "Open a test from a TOML file", self._open),
-            ("Save as…", "Save this test as a TOML file", self._save),
-        ):
-            files.addWidget(push_button(text, tip, act))
+        files = row(
+            push_button("Open…", "Open a test from a TOML file", self._open),
+            push_button("Save as…", "Save this test as a TOML file", self._save),
+        )
         left = QWidget()
-        column = QVBoxLayout(left)
-        column.addWidget(title)
-        column.addWidget(self.choice)
-        column.addLayout(files)
-        column.addWidget(self.form, 1)
-        column.addWidget(self.arm_button)
+        filled(QVBoxLayout(left), title_of(TEST), self.choice, files, (self.form, 1), self.arm_button)
         grid = QWidget()
         cells = QGridLayout(grid)
         cells.addWidget(self.summary, 0, 0, 1, 2)
-        cells.addWidget(_boxed("What will be played", self.plots), 1, 0, 1, 2)
-        cells.addWidget(_boxed("Against the limits", self.limits), 2, 0)
+        cells.addWidget(boxed("What will be played", (self.plots, 1)), 1, 0, 1, 2)
+        cells.addWidget(boxed("Against the limits", (self.limits, 1)), 2, 0)
         cells.addWidget(
-            _boxed(
+            boxed(
                 "What the specimen is predicted to do",
-                self.prediction,
+                (self.prediction, 1),
                 self.prediction_note,
                 self.expectation,
             ),
@@ -325,9 +328,7 @@ class TestPage(Page):
         splitter.addWidget(grid)
         splitter.setStretchFactor(1, 1)
         splitter.setChildrenCollapsible(False)
-        layout = QHBoxLayout(self)
-        layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(splitter)
+        filled(QHBoxLayout(self), splitter, margin=0)
 
 
 def _kept_test(text: str) -> Measurement | None:
@@ -338,12 +339,3 @@ def _kept_test(text: str) -> Measurement | None:
         return validated(tomllib.loads(text), Measurement, "the last test")
     except (ConfigurationError, tomllib.TOMLDecodeError):
         return None
-
-
-def _boxed(title: str, *widgets: QWidget) -> QGroupBox:
-    box = QGroupBox(title)
-    layout = QVBoxLayout(box)
-    for widget in widgets:
-        layout.addWidget(widget)
-    layout.setStretch(0, 1)
-    return box
