@@ -46,10 +46,8 @@ class ModelForm(QWidget):
 
     changed = Signal()
 
-    def __init__(
-        self, model: type[BaseModel], hidden: frozenset[str] = frozenset(), parent: QWidget | None = None
-    ) -> None:
-        super().__init__(parent)
+    def __init__(self, model: type[BaseModel], hidden: frozenset[str] = frozenset()) -> None:
+        super().__init__()
         self.model = model
         self._fixed: dict[str, Any] = {}
         self._rows: dict[str, _Row] = {}
@@ -326,9 +324,8 @@ class JudgedForm(QWidget, Generic[Model]):
         model: type[Model],
         name: str,
         hidden: frozenset[str] = frozenset(),
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(parent)
+        super().__init__()
         self._model = model
         self._value: Model | None = None
         self.form = ModelForm(model, hidden)

@@ -5,7 +5,7 @@ from math import isfinite
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QFocusEvent, QPaintEvent, QValidator, QWheelEvent
-from PySide6.QtWidgets import QAbstractSpinBox, QWidget
+from PySide6.QtWidgets import QAbstractSpinBox
 
 from vibench.acquisition import ConfigurationError
 
@@ -82,8 +82,8 @@ class QuantityEdit(QAbstractSpinBox):
 
     changed = Signal()
 
-    def __init__(self, unit: str, kind: type[float] | type[int], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, unit: str, kind: type[float] | type[int]) -> None:
+        super().__init__()
         self._unit, self._kind = unit, kind
         self._value: float | int | None = None
         self._complaint = ""

@@ -34,8 +34,8 @@ class Shown:
 class Page(QWidget):
     """One step of the job. It keeps no truth of its own: what is shown is asked for at every tick."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__()
         self.context = context
 
     @property

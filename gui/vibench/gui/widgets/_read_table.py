@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
 from ._hint import paint_hint
 from ._table_copy import offer_copies
@@ -38,9 +38,8 @@ class ReadTable(QTableWidget):
         columns: Sequence[str],
         hint: str = "",
         wide: int = -1,
-        parent: QWidget | None = None,
     ) -> None:
-        super().__init__(0, len(columns), parent)
+        super().__init__(0, len(columns))
         self.setAccessibleName(name)
         self.setHorizontalHeaderLabels(list(columns))
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)

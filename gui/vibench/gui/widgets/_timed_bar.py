@@ -2,7 +2,7 @@
 
 from time import monotonic
 
-from PySide6.QtWidgets import QProgressBar, QWidget
+from PySide6.QtWidgets import QProgressBar
 
 from ._clock import clock
 
@@ -13,8 +13,8 @@ LEAST_S = 1.0
 class TimedBar(QProgressBar):
     """Counts pieces of work; the time left follows from those that are done."""
 
-    def __init__(self, name: str, pieces: str, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, name: str, pieces: str) -> None:
+        super().__init__()
         self.setAccessibleName(name)
         self._pieces = pieces
         self._begun_s = 0.0

@@ -12,7 +12,7 @@ from math import floor, log10
 from types import MappingProxyType, MethodType
 from weakref import WeakMethod
 
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QLabel
 from shiboken6 import isValid
 
 STANDARD_GRAVITY = 9.80665
@@ -158,8 +158,8 @@ UNITS = DisplayUnits()
 class SentenceLabel(QLabel):
     """A wrapped text whose quantities stand in the chosen units, and turn when others are chosen."""
 
-    def __init__(self, text: str = "", rank: str = "", parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, text: str = "", rank: str = "") -> None:
+        super().__init__()
         self._sentence, self._tip = "", ""
         self.setWordWrap(True)
         if rank:

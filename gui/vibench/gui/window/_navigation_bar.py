@@ -1,7 +1,7 @@
 """The navigation bar: the job in order, page by page, with ticks; no page is ever locked."""
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy, QWidget
+from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy
 
 DONE = "✔"
 
@@ -11,8 +11,8 @@ class NavigationBar(QListWidget):
 
     chosen = Signal(str)
 
-    def __init__(self, names: tuple[str, ...], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, names: tuple[str, ...]) -> None:
+        super().__init__()
         self.setObjectName("rail")
         self.setAccessibleName("Pages")
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)

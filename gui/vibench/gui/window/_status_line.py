@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy, QWidget
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy
 
 from ..widgets import Tone
 
@@ -23,8 +23,8 @@ class StatusField(StrEnum):
 class StatusLine(QFrame):
     """A place for each field; a field that is not well is marked by symbol and colour."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setObjectName("statusLine")
         self.setAccessibleName("Status line")
         layout = QHBoxLayout(self)

@@ -1,7 +1,7 @@
 """How recordings are analysed, next to the picture that it makes, and how far the analysis is."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QPushButton, QVBoxLayout
 
 from vibench.analysis import AnalysisOptions
 
@@ -16,8 +16,8 @@ class AnalysisPanel(QGroupBox):
     """Analyse all recordings anew."""
     cancelled = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Analysis", parent)
+    def __init__(self) -> None:
+        super().__init__("Analysis")
         self.form = JudgedForm(AnalysisOptions, "analysis")
         self._again = QPushButton("Anal&yse again")
         self._again.setAccessibleName("Analyse again")

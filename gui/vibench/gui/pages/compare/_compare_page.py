@@ -32,8 +32,8 @@ FILTERS = f"SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;{REPO
 class ComparePage(Page):
     """Curves on the left, their picture on the right, numbers below."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         self.curves = CurveList(context.theme)
         self.plots = CurvePlots(context.theme)
         self.panel = AnalysisPanel()

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
-from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QListWidget, QListWidgetItem, QWidget
+from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QListWidget, QListWidgetItem
 
 from vibench.analysis import AnalysisError, Curve, CurveDifference, CurveKind, CurveOrigin, curve_difference
 
@@ -29,8 +29,8 @@ class CurveList(QListWidget):
 
     changed = Signal()
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.setAccessibleName("Curves")
         self.setSelectionMode(QListWidget.SelectionMode.ExtendedSelection)
         self.setWordWrap(True)
@@ -160,8 +160,8 @@ class PairBox(QGroupBox):
 
     changed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Difference in dB", parent)
+    def __init__(self) -> None:
+        super().__init__("Difference in dB")
         self._curves: dict[str, Curve] = {}
         self._curve, self._reference, self._said = Choice(), Choice(), SentenceLabel(rank="second")
         form = QFormLayout(self)

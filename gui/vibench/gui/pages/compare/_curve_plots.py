@@ -25,8 +25,8 @@ class CurvePlots(QWidget):
 
     markers_moved = Signal()
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.magnitudes = Plot("Curves over frequency", LOG_FREQUENCY, MAGNITUDE, theme).with_hint(
             "Add recordings, or lay a prediction of the Simulate page over them: "
             "their curves appear here, and their peaks below."

@@ -3,7 +3,7 @@
 from math import isfinite
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QTableWidgetItem
 
 from vibench.analysis import Curve, curve_peaks, readings
 
@@ -22,8 +22,8 @@ PEAK_HEADINGS = (
 class NumberTable(ReadTable):
     """A table to read and to copy, with other headings each time; names take the room that is left."""
 
-    def __init__(self, name: str, hint: str, parent: QWidget | None = None) -> None:
-        super().__init__(name, PEAK_HEADINGS[:1], hint, parent=parent)
+    def __init__(self, name: str, hint: str) -> None:
+        super().__init__(name, PEAK_HEADINGS[:1], hint)
         self.setShowGrid(True)
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectItems)
 

@@ -42,8 +42,8 @@ from ._spectrogram_view import Pictures
 class FilesPage(Page):
     """A browser above, the chosen recording below."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         self.table = RecordingTable(context.theme)
         self.pictures = Pictures(context.theme, context.background)
         self.time_histories = self.pictures.time_histories

@@ -32,8 +32,8 @@ _CHOOSE = "Choose a recording in the list above."
 class HiddenMotionView(QWidget):
     """Tracked, and without a contact model, between the stops."""
 
-    def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme, background: Background) -> None:
+        super().__init__()
         self.setAccessibleName("Hidden motion")
         self.plot = Plot("Hidden motion", TIME, _RELATIVE, theme).with_legend()
         self.tracked = self.plot.curve(curve_style(0), "tracked")

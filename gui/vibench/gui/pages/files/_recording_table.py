@@ -17,7 +17,7 @@ from PySide6.QtCore import (
     Signal,
 )
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QWidget
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from vibench.analysis.live import THUMBNAIL_COLUMNS, Thumbnail
 
@@ -35,8 +35,8 @@ class CampaignChoice(Choice):
     chosen = Signal(object)
     """Files of the campaign as a set, None for all."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self.setAccessibleName("Campaign")
         self.setToolTip("List the recordings of one campaign")
         self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
@@ -197,8 +197,8 @@ class _ChosenRows(QSortFilterProxyModel):
 class RecordingTable(QTableView):
     """The table itself: sorted by any column, several rows may be chosen."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.setAccessibleName("Recordings")
         self.recordings = RecordingModel(theme)
         self._sorted = _ChosenRows(self)

@@ -43,8 +43,8 @@ _SHOWN_DB = 80.0
 class SpectrogramView(QWidget):
     """Frequency over time; colours are spectral densities in decibels."""
 
-    def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme, background: Background) -> None:
+        super().__init__()
         self.setAccessibleName("Spectrogram")
         self.channel, self.spacing, self.highest = Choice(), Choice(), Choice()
         for spacing in RowSpacing:
@@ -233,8 +233,8 @@ class _Image:
 class Pictures(QTabWidget):
     """All show the same stretch of the same recording."""
 
-    def __init__(self, theme: Theme, background: Background, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme, background: Background) -> None:
+        super().__init__()
         self.setAccessibleName("Pictures of the recording")
         self.setDocumentMode(True)
         self.time_histories = RecordingTimeHistories(theme)

@@ -43,8 +43,8 @@ class RecordingTimeHistories(QWidget):
     range_changed = Signal()
     markers_moved = Signal()
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.setAccessibleName("Time histories of the recording")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._theme = theme

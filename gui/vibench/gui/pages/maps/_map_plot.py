@@ -31,8 +31,8 @@ class MapPlot(QWidget):
     picked = Signal(float, float)
     """Frequency [Hz] and amplitude [m] of a point that somebody wants to see."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.plot = Plot("Map of motions over frequency and amplitude", FREQUENCY, AMPLITUDE, theme)
         self.plot.with_hint(HINT)
         self.image = pg.ImageItem(axisOrder="row-major")

@@ -45,8 +45,8 @@ DIGITS = 5
 class MapsPage(Page):
     """One map at a time; what nobody wants any more is dropped."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         self.form: JudgedForm[MapRequest] = JudgedForm(MapRequest, "map", frozenset({"described"}))
         self.map = MapPlot(context.theme)
         self.motion = MotionView(context.theme)

@@ -18,8 +18,8 @@ HIGHEST_MULTIPLE = 6.0
 class MotionView(QWidget):
     """Three plots side by side, and what they show in words."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.said = SentenceLabel("A click on the map shows the motion there.")
         self.said.setAccessibleName("The motion at the point that was clicked")
         self.plots = (

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QProgressBar,
     QVBoxLayout,
-    QWidget,
 )
 
 from vibench.acquisition import (
@@ -56,8 +55,8 @@ LOOK_MS = 50
 class QueuePage(Page):
     """Edits the campaign that is armed here, and shows the one that runs."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         self._actions = UserActions(context, self)
         self._history: History[Campaign] = History()
         self._seen: CampaignPreview | None = None

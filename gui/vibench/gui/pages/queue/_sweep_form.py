@@ -2,7 +2,7 @@
 
 from pydantic import ValidationError
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QPushButton, QWidget
+from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QPushButton
 
 from vibench.acquisition.plan import Range, RangeSpacing, SweepAxis
 
@@ -21,8 +21,8 @@ class SweepForm(QGroupBox):
     """The `Axis` and its `Range`."""
     refused = Signal(str)
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Sweep the test over", parent)
+    def __init__(self) -> None:
+        super().__init__("Sweep the test over")
         self.axis, self.spacing = Choice(), Choice()
         for name, _unit, _low, _high in _AXES.values():
             self.axis.addItem(name)

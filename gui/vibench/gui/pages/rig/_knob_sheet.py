@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout
 
 from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import KnobSheet, Rig
@@ -16,8 +16,8 @@ class KnobSheetForm(QGroupBox):
 
     changed = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("Settings made by hand", parent)
+    def __init__(self) -> None:
+        super().__init__("Settings made by hand")
         self._note = QLabel("Look at each knob, then tick it. No instrument can report these.")
         self._note.setWordWrap(True)
         self._note.setProperty("rank", "second")

@@ -22,8 +22,8 @@ class RigChoice(QWidget):
     refused = Signal(object)
     """The ConfigurationError of a file that cannot be read."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self) -> None:
+        super().__init__()
         self._paths: list[Path] = []
         self._rig: Rig | None = None
         self._complaint = ""

@@ -69,8 +69,8 @@ VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ f
 class RigPage(Page):
     """The first step: from a file to a bench that is open and well."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         self._actions = UserActions(context, self)
         self.choice = RigChoice()
         self.knobs = KnobSheetForm()

@@ -1,7 +1,7 @@
 """Arming in plain words: what is going to happen, then a second, explicit act to start it."""
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QGroupBox, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox, QVBoxLayout
 
 from vibench.acquisition.engine import DRIVING, EngineState, EngineStatus
 
@@ -23,8 +23,8 @@ class ArmCard(QGroupBox):
     cancel_wanted = Signal()
     hold_wanted = Signal()
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__("What will happen", parent)
+    def __init__(self) -> None:
+        super().__init__("What will happen")
         self._words = SentenceLabel()
         self._words.setAccessibleName("What will happen")
         self.arm_button = push_button(

@@ -31,8 +31,8 @@ class HiddenMotionPlot(QWidget):
     title = "Hidden motion: m1 between its stops"
     tab = "Hidden motion"
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.plot = Plot(self.title, _ACROSS, _UP, theme).with_hint(_HINT)
         self.told = self.plot.curve(curve_style(0))
         self.forecast = [

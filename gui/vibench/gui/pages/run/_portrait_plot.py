@@ -24,8 +24,8 @@ class PortraitPlot(QWidget):
     title = "Phase portrait and Poincaré section"
     tab = "Phase portrait, Poincaré"
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.orbit = Plot("Phase portrait of the newest periods", _ACROSS, _UP, theme)
         self.section = Plot("Poincaré section of the run so far", _ACROSS, _UP, theme)
         self.orbit.with_hint("The orbit of the newest periods of a sine.")

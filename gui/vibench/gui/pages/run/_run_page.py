@@ -36,8 +36,8 @@ LivePlot: TypeAlias = (
 class RunPage(Page):
     """Viewer of the engine's run: it keeps nothing but what is on the screen."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         theme = context.theme
         self._actions = UserActions(context, self)
         self._view: LiveView | None = None

@@ -19,8 +19,8 @@ class SpectrumPlot(QWidget):
     title = "Spectral density of every channel"
     tab = "Spectrum"
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         label = "Amplitude density, channel's unit / √Hz"
         up = PlotAxis(label, scale=Scale.LOGARITHMIC, short="unit / √Hz")
         self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()

@@ -15,8 +15,8 @@ class SweepHistoryPlot(QWidget):
     title = "Response over frequency"
     tab = "Responses"
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         up = PlotAxis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
         self.plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
         self.plot.with_hint("A point every tenth of a second of a dwell or a sweep; the prediction beneath.")
@@ -65,8 +65,8 @@ class SweepEnvelopePlot(QWidget):
     title = "Sweep envelope"
     tab = "Envelope"
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "m/s"), theme).with_legend()
         self.plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
         self._stripes = self.plot.stripes(LineStyle(lambda theme: theme.traces[3], filled=0.15))

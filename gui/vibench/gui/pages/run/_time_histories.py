@@ -42,8 +42,8 @@ USUAL_SPAN_S = 2.0
 class TimeHistoryPlots(QWidget):
     """Plots over one time axis; they change with the channels of the run."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self._theme = theme
         self._curves: list[pg.PlotDataItem] = []
         self._span_s = 0.0

@@ -15,8 +15,8 @@ class TransmissibilityPlot(QWidget):
     title = "Transmission from base to m0"
     tab = "Transmission"
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         up = PlotAxis("|x / U|", scale=Scale.LOGARITHMIC)
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
         self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")

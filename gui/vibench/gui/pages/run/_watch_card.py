@@ -29,8 +29,8 @@ _WORDS = {LevelVerdict.OVER: "✖ over", LevelVerdict.GOOD: "", LevelVerdict.QUI
 class LevelMeters(QWidget):
     """One row a channel."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self._theme = theme
         self._rows: tuple[tuple[str, Level], ...] = ()
         self.setAccessibleName("Level meters")
@@ -102,8 +102,8 @@ class WatchCard(QGroupBox):
     twin_wanted = Signal(object)
     """A `TwinSwitch`."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__("Watch", parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__("Watch")
         self.progress = QProgressBar()
         self.progress.setAccessibleName("Progress of the run")
         self.progress.setRange(0, 1000)

@@ -34,8 +34,8 @@ _SMALLEST = 1e-6
 class AnswerPlots(QWidget):
     """Drawn anew from the course of a simulation, as often as it grows."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.responses = Plot("Responses over frequency", LOG_FREQUENCY, RESPONSE, theme)
         self.exponents = Plot("Exponent over frequency", LOG_FREQUENCY, EXPONENT, theme)
         self.likeness = Plot("Difference of the two models over frequency", LOG_FREQUENCY, DIFFERENCE, theme)

@@ -50,8 +50,8 @@ _LINES = 6
 class SimulatePage(Page):
     """The form on the left; the answer on the right, as far as it has come."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         self.form: JudgedForm[SimulationRequest] = JudgedForm(
             SimulationRequest, "simulation", frozenset({"described"})
         )

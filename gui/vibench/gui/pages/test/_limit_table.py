@@ -1,7 +1,7 @@
 """The limits: what the test is predicted to do, beside what the rig survives."""
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QTableWidgetItem, QWidget
+from PySide6.QtWidgets import QTableWidgetItem
 
 from vibench.acquisition.plan import LimitCheck, LimitSide
 
@@ -16,10 +16,8 @@ _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 class LimitTable(ReadTable):
     """One row a limit, the most used first."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(
-            "Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1, parent=parent
-        )
+    def __init__(self) -> None:
+        super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
         self.setItemDelegateForColumn(_USED, BarDelegate(self))
         # In a small window the limits are scrolled to: what they are of must be read in any.
         self.horizontalHeader().setMinimumSectionSize(_LEAST_LETTERS * self.fontMetrics().averageCharWidth())

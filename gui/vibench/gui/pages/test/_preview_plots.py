@@ -69,8 +69,8 @@ _LEAST_LINES = 9
 class PreviewPlots(QWidget):
     """Two plots side by side; a zoom into the time signal shows its samples."""
 
-    def __init__(self, theme: Theme, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
         self.time = Plot("Signal at the generator, in time", TIME, PlotAxis("Generator", "V"), theme)
         self.spectrum = Plot(
             "Spectrum of the signal",

@@ -31,8 +31,8 @@ USUAL = {
 class TestForm(JudgedForm[Measurement]):
     """Every value of a measurement; `value` is None while one of them is not allowed."""
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(Measurement, "test", frozenset({"repeats"}), parent)
+    def __init__(self) -> None:
+        super().__init__(Measurement, "test", frozenset({"repeats"}))
         limits = self.form.editors["limits"].widget
         assert isinstance(limits, QGroupBox)
         limits.setTitle("Limits  (1 = the rig's own)")

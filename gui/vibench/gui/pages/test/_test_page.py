@@ -87,8 +87,8 @@ LOOK_MS, PREDICT_MS = 200, 900
 class TestPage(Page):
     """Edits the test that Arm will arm."""
 
-    def __init__(self, context: AppContext, parent: QWidget | None = None) -> None:
-        super().__init__(context, parent)
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
         self._actions = UserActions(context, self)
         self._preview: MeasurementPreview | None = None
         self._history: History[Measurement] = History()
