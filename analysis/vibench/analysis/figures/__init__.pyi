@@ -68,7 +68,6 @@ from ._style import (
     LEVELS as LEVELS,
     LINEAR as LINEAR,
     MEASURED as MEASURED,
-    PREDICTED as PREDICTED,
     SIMULATED as SIMULATED,
     TERMINAL as TERMINAL,
     frequency_axis as frequency_axis,

@@ -6,7 +6,6 @@ from ._map_request import (
     MapRequest as MapRequest,
     MotionRequest as MotionRequest,
     SettledMotion as SettledMotion,
-    picture_of as picture_of,
     settled_motion as settled_motion,
 )
 from ._progress import (

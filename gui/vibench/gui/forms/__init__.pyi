@@ -7,7 +7,6 @@ from ._field_edge import (
 from ._model_form import (
     GroupEditor as GroupEditor,
     JudgedForm as JudgedForm,
-    Loc as Loc,
     ModelForm as ModelForm,
     complaints_of as complaints_of,
 )

@@ -1,5 +1,4 @@
 from ._banner import (
-    CLOSED as CLOSED,
     StateIndicator as StateIndicator,
 )
 from ._display import (
@@ -10,7 +9,4 @@ from ._open_window import (
 )
 from ._screenshots import (
     make_screenshots as make_screenshots,
-)
-from ._status_line import (
-    StatusField as StatusField,
 )

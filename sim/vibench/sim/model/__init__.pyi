@@ -61,11 +61,6 @@ from ._rigid_stops import (
     RigidStops as RigidStops,
 )
 from ._specimen import (
-    ALUMINIUM as ALUMINIUM,
-    PAPER_FREQUENCIES_HZ as PAPER_FREQUENCIES_HZ,
-    PAPER_MASSES as PAPER_MASSES,
-    PAPER_RADIUS_M as PAPER_RADIUS_M,
-    STEEL as STEEL,
     Matrix as Matrix,
     Specimen as Specimen,
     Triple as Triple,

@@ -1,7 +1,5 @@
 from ._afg1022 import (
     AFG1022 as AFG1022,
-    MAKER as MAKER,
-    MODEL as MODEL,
     Reply as Reply,
 )
 from ._keysight_33500b import (
