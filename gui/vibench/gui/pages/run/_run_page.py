@@ -21,16 +21,14 @@ from ._arm_card import ArmCard
 from ._hidden_motion_plot import HiddenMotionPlot
 from ._portrait_plot import PortraitPlot
 from ._spectrum_plot import SpectrumPlot
-from ._sweep_history_plot import SweepEnvelopePlot, SweepHistoryPlot
+from ._sweep_plots import SweepPlot, sweep_envelope, sweep_history
 from ._time_histories import TimeHistoryPlots
 from ._transmissibility_plot import TransmissibilityPlot
 from ._watch_card import WatchCard
 
 LEFT_LETTERS = 44
 """Width of the column on the left: it must not move when its words change."""
-LivePlot: TypeAlias = (
-    TransmissibilityPlot | SpectrumPlot | SweepHistoryPlot | SweepEnvelopePlot | PortraitPlot
-)
+LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
 class RunPage(Page):
@@ -50,8 +48,8 @@ class RunPage(Page):
         self.time_histories = TimeHistoryPlots(theme)
         self.frequency_response = TransmissibilityPlot(theme)
         self.spectrum = SpectrumPlot(theme)
-        self.history = SweepHistoryPlot(theme)
-        self.envelope = SweepEnvelopePlot(theme)
+        self.history = sweep_history(theme)
+        self.envelope = sweep_envelope(theme)
         self.portrait = PortraitPlot(theme)
         self.hidden_motion = HiddenMotionPlot(theme)
         self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()

@@ -7,6 +7,7 @@ from vibench.analysis.live import LiveView
 
 from ...plots import FREQUENCY, PREDICTED, Dash, LineStyle, Plot, PlotAxis, Scale, curve_style
 from ...widgets import Theme, filled
+from ._sweep_plots import show_predicted
 
 
 class TransmissibilityPlot(QWidget):
@@ -22,8 +23,10 @@ class TransmissibilityPlot(QWidget):
         self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
         self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
         self._band = self.magnitude.band(LineStyle(lambda theme: theme.traces[0], filled=0.25))
-        self._predicted = self.magnitude.curve(PREDICTED, "I under sines, simulated")
-        self._linear = self.magnitude.curve(curve_style(2, Dash.DOTTED), "linear, simulated")
+        self._predicted = {
+            "response_i": self.magnitude.curve(PREDICTED, "I under sines, simulated"),
+            "linear": self.magnitude.curve(curve_style(2, Dash.DOTTED), "linear, simulated"),
+        }
         self._measured = self.magnitude.curve(curve_style(0), "measured, 95 % bounds")
         self._coherence = self.coherence.curve(curve_style(0))
         self.coherence.setYRange(0, 1, padding=0.02)
@@ -43,13 +46,7 @@ class TransmissibilityPlot(QWidget):
 
     def show_prediction(self, seen: MeasurementPrediction | None) -> None:
         """Lay a prediction beneath, or none."""
-        if seen is None:
-            self._predicted.clear()
-            self._linear.clear()
-            return
-        found = seen.prediction
-        self._predicted.setData(found.frequency_hz, found.response_i)
-        self._linear.setData(found.frequency_hz, found.linear)
+        show_predicted(self._predicted, seen)
 
     def clear(self) -> None:
         """Forget the last run."""
