@@ -1,6 +1,5 @@
 """Whether a series could be linear noise: surrogates with its spectrum and its values, and nothing else."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +13,6 @@ _ITERATIONS = 200
 _SETTLED = 1e-8
 _SPECTRUM_KEPT = 0.05
 """Relative error of a surrogate's spectrum up to which it stands for the series."""
-
-Statistic = Callable[[Reals], float]
 
 
 @dataclass(frozen=True)
@@ -83,10 +80,8 @@ def prediction_error(series: Reals, delays: int = 3) -> float:
     return float(np.sqrt(np.mean(miss**2)) / np.std(series))
 
 
-def surrogate_test(
-    series: Reals, statistic: Statistic = prediction_error, *, count: int = SURROGATES, seed: int = 0
-) -> SurrogateTest:
-    """Compare a statistic, small for determinism, with that of surrogates.
+def surrogate_test(series: Reals, *, seed: int = 0) -> SurrogateTest:
+    """Compare the error of prediction, small for determinism, with that of surrogates.
 
     Parameters
     ----------
@@ -96,10 +91,10 @@ def surrogate_test(
     """
     matched = _with_matching_ends(series)
     rng = np.random.default_rng(seed)
-    made = [surrogate(matched, rng) for _ in range(count)]
+    made = [surrogate(matched, rng) for _ in range(SURROGATES)]
     return SurrogateTest(
-        statistic=statistic(matched),
-        surrogates=tuple(statistic(each) for each, _ in made),
+        statistic=prediction_error(matched),
+        surrogates=tuple(prediction_error(each) for each, _ in made),
         spectrum_error=max(error for _, error in made),
     )
 

@@ -177,7 +177,6 @@ class SweepSums:
         low_hz: float,
         high_hz: float,
         interval_s: float = 0.1,
-        orders: tuple[float, ...] = ORDERS,
     ) -> None:
         if not 0 < low_hz < high_hz < sample_rate_hz / 4:
             raise InvalidRequest(
@@ -187,7 +186,7 @@ class SweepSums:
         self._factor = decimation_factor(sample_rate_hz, _SAMPLES_PER_CYCLE * high_hz)
         self._rate_hz = sample_rate_hz / self._factor
         self._interval = max(1, round(interval_s * self._rate_hz))
-        self._low_hz, self._high_hz, self._orders = low_hz, high_hz, orders
+        self._low_hz, self._high_hz = low_hz, high_hz
         self._decimator = Decimator(3, self._factor)
         self._parts: list[Reals] = []
         self._carry = np.empty(0)
@@ -225,9 +224,7 @@ class SweepSums:
         if upper.size == 0:
             raise NotEnoughData("the sweep is shorter than one interval; use shorter intervals")
         phase = drive_phase(data[_DRIVE], self._rate_hz, low_hz=self._low_hz, high_hz=self._high_hz)
-        track = partial(
-            tracked_orders, phase_rad=phase.phase_rad, interval_samples=self._interval, orders=self._orders
-        )
+        track = partial(tracked_orders, phase_rad=phase.phase_rad, interval_samples=self._interval)
         velocity, base = track(data[_RESPONSE]), track(data[_BASE])
         frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
         noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
@@ -266,7 +263,7 @@ class SweepSums:
         delay_s: float,
     ) -> SweepResponse:
         omega = 2 * np.pi * frequency_hz
-        fundamental = self._orders.index(1.0)
+        fundamental = ORDERS.index(1.0)
         amplitude_m = np.abs(base.order(1.0)) / omega**2
         low_hz, high_hz = _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
         displacement = converted_signal(

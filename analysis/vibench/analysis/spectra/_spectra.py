@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 from scipy import fft
 
-from ..errors import InvalidRequest, NotEnoughData
+from ..errors import InvalidRequest
 from ..signals import (
     DEFAULT_CONFIDENCE,
     Complexes,
@@ -66,18 +66,9 @@ class SpectralDensity(Labelled):
 class DensitySums:
     """Takes a long signal block by block and gives its spectral density at any moment."""
 
-    def __init__(
-        self,
-        sample_rate_hz: float,
-        *,
-        segment_samples: int,
-        window: Window | str = Window.HANN,
-        overlap: float = 0.5,
-        confidence: float = DEFAULT_CONFIDENCE,
-    ) -> None:
+    def __init__(self, sample_rate_hz: float, *, segment_samples: int, overlap: float = 0.5) -> None:
         self._sample_rate_hz = sample_rate_hz
-        self._confidence = confidence
-        self._spectra = SegmentSpectra(1, segment_samples, window=window, overlap=overlap)
+        self._spectra = SegmentSpectra(1, segment_samples, overlap=overlap)
 
     def add(self, samples: Reals, valid: Flags | None = None) -> None:
         """Take the next samples, shape (samples,)."""
@@ -87,7 +78,7 @@ class DensitySums:
         """Give the spectral density of everything added so far."""
         averages = self._spectra.averages()
         density = averages.density(0, 0, self._sample_rate_hz).real
-        lower, upper = chi_square_bounds(density, averages.n_eff, self._confidence)
+        lower, upper = chi_square_bounds(density, averages.n_eff, DEFAULT_CONFIDENCE)
         return SpectralDensity(
             frequency_hz=averages.frequency_hz(self._sample_rate_hz),
             density=density,
@@ -101,34 +92,21 @@ class DensitySums:
             segment_samples=averages.segment_samples,
             window=averages.window,
             overlap=averages.overlap,
-            confidence=self._confidence,
+            confidence=DEFAULT_CONFIDENCE,
         )
 
 
 def spectral_density(
-    samples: Reals,
-    sample_rate_hz: float,
-    *,
-    segment_samples: int,
-    window: Window | str = Window.HANN,
-    overlap: float = 0.5,
-    valid: Flags | None = None,
-    confidence: float = DEFAULT_CONFIDENCE,
+    samples: Reals, sample_rate_hz: float, *, segment_samples: int, overlap: float = 0.5
 ) -> SpectralDensity:
     """Estimate the spectral density of a signal by Welch's method, with chi-square bounds.
 
     Equal to ``scipy.signal.welch(..., detrend=False)`` for equal settings; see `transmissibility` for the
     parameters and errors.
     """
-    sums = DensitySums(
-        sample_rate_hz,
-        segment_samples=segment_samples,
-        window=window,
-        overlap=overlap,
-        confidence=confidence,
-    )
-    for block, marks in pieces((samples,), valid):
-        sums.add(block[0], marks)
+    sums = DensitySums(sample_rate_hz, segment_samples=segment_samples, overlap=overlap)
+    for block, _ in pieces((samples,), None):
+        sums.add(block[0])
     return sums.density()
 
 
@@ -162,34 +140,24 @@ class AmplitudeSpectrum(Labelled):
 
 
 def amplitude_spectrum(
-    samples: Reals, sample_rate_hz: float, *, last_s: float | None = None, window: Window | str = Window.HANN
+    samples: Reals, sample_rate_hz: float, *, window: Window | str = Window.HANN
 ) -> AmplitudeSpectrum:
-    """Spectrum of a signal, or of its last seconds, in amplitudes of sines.
-
-    Raises NotEnoughData when the signal is shorter than ``last_s``.
+    """Spectrum of a signal in amplitudes of sines.
 
     Parameters
     ----------
     samples
         Shape (samples,); the mean is removed, so that an offset does not hide the lowest lines.
-    last_s
-        How much of the end to use [s]; all of it by default.
     window
         Hann by default; between lines it reads up to 15 % low, where flat top stays within 0.1 %.
 
     """
-    count = samples.size if last_s is None else round(last_s * sample_rate_hz)
+    count = samples.size
     if count < 2:
         raise InvalidRequest(f"a spectrum of {count} samples was asked for; it needs at least 2")
-    if count > samples.size:
-        raise NotEnoughData(
-            f"the last {last_s:g} s were asked for, but the signal is {samples.size / sample_rate_hz:g} s "
-            "long; ask for less"
-        )
     chosen = named_window(window)
     values = taper(chosen, count)
-    part = samples[samples.size - count :]
-    spectrum = fft.rfft((part - np.mean(part)) * values)
+    spectrum = fft.rfft((samples - np.mean(samples)) * values)
     scale = np.full(spectrum.size, 2 / np.sum(values))
     scale[0] /= 2
     if count % 2 == 0:

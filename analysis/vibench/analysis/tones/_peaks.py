@@ -11,6 +11,8 @@ from ..spectra import AmplitudeSpectrum
 
 _NOISE_NEIGHBOURS = 50
 """Lines on either side whose median is taken as the floor around a peak."""
+_LEAST_RATIO = 5.0
+"""A peak stands at least so many times above that floor."""
 _MEDIAN_OF_RAYLEIGH = float(np.sqrt(2 * np.log(2)))
 """Median of the magnitude of complex noise, in standard deviations of one component."""
 
@@ -28,9 +30,7 @@ class Peak:
     """Median amplitude of the lines around it [unit of the spectrum]."""
 
 
-def peaks(
-    spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: int, least_ratio: float = 5.0
-) -> tuple[Peak, ...]:
+def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: int) -> tuple[Peak, ...]:
     """Find the largest peaks of a Hann spectrum in a band, the largest first.
 
     For a sine between two lines the ratio of the two largest Hann values gives the place exactly
@@ -43,8 +43,6 @@ def peaks(
         Where to look; both at least two lines away from 0 and from half the sample rate.
     count
         At most so many.
-    least_ratio
-        A peak stands at least so many times above the median around it.
 
     """
     if spectrum.window is not Window.HANN:
@@ -59,7 +57,7 @@ def peaks(
     found = scipy.signal.find_peaks(amplitude[first - 1 : last + 2])[0] + first - 1
     found = found[(found >= first) & (found <= last)]
     placed = [_placed(spectrum, amplitude, int(line)) for line in found[np.argsort(-amplitude[found])]]
-    return tuple(peak for peak in placed if peak.amplitude > least_ratio * peak.floor)[:count]
+    return tuple(peak for peak in placed if peak.amplitude > _LEAST_RATIO * peak.floor)[:count]
 
 
 def _placed(spectrum: AmplitudeSpectrum, amplitude: Reals, line: int) -> Peak:
