@@ -6,6 +6,8 @@ together but for the card's own delay.
 """
 
 from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from threading import Condition
 from typing import Any, Self
@@ -322,24 +324,13 @@ class SoundCardOutput:
         self.stop()
 
 
-def _portaudio(doing: str) -> "_Told":
-    return _Told(doing)
-
-
-class _Told:
-    """Says what PortAudio's errors mean here."""
-
-    def __init__(self, doing: str) -> None:
-        self._doing = doing
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, _sounddevice().PortAudioError):
-            raise InstrumentLost(
-                f"{self._doing} failed ({error}); see whether the card is plugged in"
-            ) from error
+@contextmanager
+def _portaudio(doing: str) -> Iterator[None]:
+    """Say what PortAudio's errors mean here."""
+    try:
+        yield
+    except _sounddevice().PortAudioError as error:
+        raise InstrumentLost(f"{doing} failed ({error}); see whether the card is plugged in") from error
 
 
 def _require_calibration(rig: Rig) -> None:

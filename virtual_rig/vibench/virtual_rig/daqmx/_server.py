@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
@@ -175,30 +176,19 @@ class DaqServer:
         return handle
 
 
-class _refusals_reported:  # noqa: N801 - reads as a verb where it is used
-    """Turns a refusal into what the client expects: status UNKNOWN, the code in the trailing metadata."""
-
-    def __init__(self, context: grpc.ServicerContext) -> None:
-        self._context = context
-
-    def __enter__(self) -> None:
-        """Nothing to prepare."""
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        match error:
-            case DaqmxRefusal():
-                self._context.set_trailing_metadata(_metadata(error))
-                self._context.abort(grpc.StatusCode.UNKNOWN, str(error))
-            case Unavailable():
-                self._context.abort(grpc.StatusCode.UNAVAILABLE, str(error))
-            case ConfigurationError():  # the world cannot do what the device could
-                refusal = DaqmxRefusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, str(error))
-                self._context.set_trailing_metadata(_metadata(refusal))
-                self._context.abort(grpc.StatusCode.UNKNOWN, str(refusal))
-            case _:
-                return
+@contextmanager
+def _refusals_reported(context: grpc.ServicerContext) -> Iterator[None]:
+    """Turn a refusal into what the client expects: status UNKNOWN, the code in the trailing metadata."""
+    try:
+        try:
+            yield
+        except ConfigurationError as error:  # the world cannot do what the device could
+            raise DaqmxRefusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, str(error)) from error
+    except DaqmxRefusal as refusal:
+        context.set_trailing_metadata(_metadata(refusal))
+        context.abort(grpc.StatusCode.UNKNOWN, str(refusal))
+    except Unavailable as error:
+        context.abort(grpc.StatusCode.UNAVAILABLE, str(error))
 
 
 def _require_address(address: str) -> None:
