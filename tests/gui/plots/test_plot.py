@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel
 
 from vibench.gui.plots import LIMIT, LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
 from vibench.gui.plots._axis import thinned
-from vibench.gui.plots._saved_plot import numbers_of, write_plot
+from vibench.gui.plots._plot_actions import numbers_of, write_plot
 from vibench.gui.widgets import LIGHT, UNITS
 
 

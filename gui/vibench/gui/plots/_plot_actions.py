@@ -1,14 +1,17 @@
-"""What can be done with a plot: by a key while it has the focus, and by its context menu."""
+"""What can be done with a plot: by a key while it has the focus, and by its context menu; how it is saved."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QAction, QGuiApplication, QKeySequence
-
-from ._saved_plot import numbers_of, save_plot
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
+from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QFileDialog, QMessageBox
 
 if TYPE_CHECKING:
     from ._plot import Plot
+
+FILTERS = "PNG (*.png);;SVG (*.svg);;Numbers as CSV (*.csv)"
 
 
 def add_actions(plot: "Plot") -> None:
@@ -30,3 +33,63 @@ def add_actions(plot: "Plot") -> None:
         action.triggered.connect(act)
         plot.addAction(action)
     plot.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+
+
+def save_plot(plot: "Plot") -> None:
+    """Ask where to, and write picture or numbers there."""
+    wish = f"{plot.accessibleName().lower().replace(' ', '_')}.png"
+    options = QFileDialog.Option.DontConfirmOverwrite
+    given, kind = QFileDialog.getSaveFileName(plot, "Save picture or numbers", wish, FILTERS, options=options)
+    if not given:
+        return
+    path = Path(given)
+    path = path if path.suffix else path.with_suffix(kind[kind.index("*") + 1 : kind.index(")")])
+    try:
+        write_plot(plot, path)
+    except OSError as error:
+        QMessageBox.warning(
+            plot, "Not written", f"{path} was not written: {error.strerror}. Choose another name."
+        )
+
+
+def write_plot(plot: "Plot", path: Path) -> None:
+    """Write picture or numbers, as the ending says; nothing is overwritten.
+
+    Raises OSError when something of that name is there, or the file cannot be written.
+    """
+    path.open("xb").close()
+    match path.suffix.lower():
+        case ".csv":
+            path.write_text(numbers_of(plot, ","), encoding="utf-8")
+        case ".svg":
+            _write_svg(plot, path)
+        case _:
+            if not plot.grab().save(str(path)):
+                path.unlink()
+                raise OSError(0, "give an ending: .png, .svg or .csv")
+
+
+def numbers_of(plot: "Plot", separator: str) -> str:
+    """Give what is drawn as rows of curve, place across and value, in the units of the axes."""
+    across, up = plot.across.axis, plot.up.axis
+    rows = [separator.join(("Curve", across.text, up.text))]
+    for number, (name, item) in enumerate(plot.named_curves):
+        if item.xData is not None and item.yData is not None:
+            called = (name or f"{plot.accessibleName()} {number + 1}").replace(separator, ";")
+            rows += [
+                f"{called}{separator}{x * across.shown.per_si:.9g}{separator}{y * up.shown.per_si:.9g}"
+                for x, y in zip(item.xData.tolist(), item.yData.tolist(), strict=True)
+            ]
+    return "\n".join(rows) + "\n"
+
+
+def _write_svg(plot: "Plot", path: Path) -> None:
+    generator = QSvgGenerator()
+    generator.setFileName(str(path))
+    generator.setSize(plot.size())
+    generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
+    # With the usual resolution axes and curves would be shifted against each other.
+    generator.setResolution(plot.logicalDpiX())
+    painter = QPainter(generator)
+    plot.render(painter)
+    painter.end()
