@@ -124,8 +124,6 @@ class SensorParts(NamedTuple):
     full_scale: float
     """In units of the motion."""
     full_scale_v: float
-    over_range: NDArray[np.int64]
-    """Steps at full scale so far, shape (1,)."""
 
 
 @kernel
@@ -137,8 +135,6 @@ def show_steps(values: FloatArray, first: int, parts: SensorParts, volts: FloatA
         seen = volts[n] + parts.noise[first + n]
         if parts.instead.size and not np.isnan(parts.instead[first + n]):
             seen = parts.instead[first + n]
-        if abs(seen) >= parts.full_scale:
-            parts.over_range[0] += 1
         volts[n] = min(max(seen * scale, -parts.full_scale_v), parts.full_scale_v)
 
 
@@ -180,7 +176,6 @@ class Vibrometer:
             )
         bandwidth = first_order(config.bandwidth_hz)
         self.delay_steps = (config.delay_s - bandwidth.delay_s) * grid.rate_hz
-        self._over_range = np.zeros(1, dtype=np.int64)
         self._filter = RunningFilter(bandwidth, grid.step_s)
         self._noise_rms = noise_density * np.sqrt(grid.rate_hz / 2)
         self._full_scale_m_per_s = config.full_scale_m_per_s
@@ -188,11 +183,6 @@ class Vibrometer:
         self._noise = noise
         self._dropouts = dropouts
         self._demanded: list[Disturbance] = []
-
-    @property
-    def over_range_steps(self) -> int:
-        """Steps at full scale since the instrument was switched on: what its red lamp shows."""
-        return int(self._over_range[0])
 
     def disturb(self, disturbance: Disturbance) -> None:
         """Show a level instead of the velocity for some steps: a dropout or an over-range on demand."""
@@ -206,7 +196,7 @@ class Vibrometer:
         overwrite(instead, first_step, self._full_scale_m_per_s, disturbed)
         noise = self._noise_rms * self._noise.draw(first_step, count)
         scale = self._full_scale_m_per_s, self._full_scale_v
-        return SensorParts(self._filter.parts, noise, instead, *scale, self._over_range)
+        return SensorParts(self._filter.parts, noise, instead, *scale)
 
 
 class Accelerometer:
@@ -222,7 +212,6 @@ class Accelerometer:
         """``noise_m_per_s2``: rms in ``FULL_BAND_HZ``."""
         mounted = resonant(config.resonance_hz, ACCELEROMETER_DAMPING_RATIO)
         self._filter = RunningFilter(mounted, grid.step_s)
-        self._over_range = np.zeros(1, dtype=np.int64)
         self._noise_rms = grid.rms_per_step(noise_m_per_s2)
         self._sensitivity = config.sensitivity_v_per_m_per_s2
         self._full_scale_v = config.full_scale_v
@@ -232,4 +221,4 @@ class Accelerometer:
         """Give what the acceleration [m/s2] is shown with in the next steps, without bias."""
         noise = self._noise_rms * self._noise.draw(first_step, count)
         scale = self._full_scale_v / self._sensitivity, self._full_scale_v
-        return SensorParts(self._filter.parts, noise, np.empty(0), *scale, self._over_range)
+        return SensorParts(self._filter.parts, noise, np.empty(0), *scale)
