@@ -3,35 +3,39 @@
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.world._sensors import RunningFilter, first_order, resonant
+from vibench.virtual_rig.world._sensors import first_order, resonant, running_filter
 
 STEP_S = 1 / 102_400
+
+
+def response(running, frequency_hz):
+    """Complex gain of a filter as it runs."""
+    z = np.exp(-2j * np.pi * frequency_hz * STEP_S)
+    return np.polyval(running.parts.numerator[::-1], z) / np.polyval(running.parts.denominator[::-1], z)
 
 
 @pytest.mark.parametrize(
     "analogue", [first_order(50e3), first_order(10e3), resonant(30e3, 0.02), resonant(8e3, 0.3)]
 )
 def test_the_running_filter_has_the_analogue_gain_and_phase(analogue):
-    running = RunningFilter(analogue, STEP_S)
+    running = running_filter(analogue, STEP_S)
     slow, audible = np.array([1.0, 95.0, 266.0, 500.0, 1000.0]), np.array([2e3, 5e3, 10e3])
     for frequency_hz, tolerance in ((slow, 1e-4), (audible, 2e-3)):
-        error = running.response(frequency_hz, STEP_S) / analogue.response(frequency_hz) - 1
+        error = response(running, frequency_hz) / analogue.response(frequency_hz) - 1
         assert np.max(np.abs(error)) < tolerance
 
 
 def test_a_resonance_sits_where_it_belongs_close_to_the_nyquist_frequency():
-    running = RunningFilter(resonant(30e3, 0.02), STEP_S)
+    running = running_filter(resonant(30e3, 0.02), STEP_S)
     frequency_hz = np.arange(25e3, 35e3, 10.0)
-    assert frequency_hz[np.argmax(np.abs(running.response(frequency_hz, STEP_S)))] == pytest.approx(
-        30e3, abs=50
-    )
+    assert frequency_hz[np.argmax(np.abs(response(running, frequency_hz)))] == pytest.approx(30e3, abs=50)
 
 
 def test_what_runs_is_what_the_response_says():
-    running, frequency_hz = RunningFilter(resonant(8e3, 0.3), STEP_S), 3000.0
+    running, frequency_hz = running_filter(resonant(8e3, 0.3), STEP_S), 3000.0
     phase = 2 * np.pi * frequency_hz * STEP_S * np.arange(4000)
     result = np.concatenate([running.run(np.sin(part)) for part in np.split(phase, [1, 7, 3000])])
-    gain = running.response(np.array([frequency_hz]), STEP_S)[0]
+    gain = response(running, np.array([frequency_hz]))[0]
     expected = np.imag(gain * np.exp(1j * phase))
     assert result[-500:] == pytest.approx(expected[-500:], abs=1e-9)
 

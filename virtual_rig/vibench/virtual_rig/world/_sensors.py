@@ -55,36 +55,17 @@ def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
     return LowPass((pole, pole.conjugate()))
 
 
-class RunningFilter:
-    """A low-pass running on a grid of time, its state carried from call to call.
+def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
+    """Design a low-pass for a grid of ``step_s``, at rest to begin with.
 
     The poles are mapped exactly (z = exp(s T)), so a resonance sits where it belongs even close to
     the grid's Nyquist frequency; one that lies beyond has no place there, and would ring at another. The
     zeros are the least-squares fit to the analogue response, phase included, with the gain at zero hertz
     exact.
     """
-
-    def __init__(self, analogue: LowPass, step_s: float) -> None:
-        """Design for a grid of ``step_s`` and start at rest."""
-        poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
-        self._denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
-        self._numerator = _fitted_zeros(analogue, self._denominator, step_s)
-        self._running = RecursiveFilter(self._numerator, self._denominator)
-
-    @property
-    def parts(self) -> FilterParts:
-        """What runs."""
-        return self._running.parts
-
-    def run(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the next output values, one for each input value."""
-        return self._running.run(values)
-
-    def response(self, frequency_hz: NDArray[np.float64], step_s: float) -> NDArray[np.complex128]:
-        """Complex gain of the filter as it runs, shape of ``frequency_hz``."""
-        z = np.exp(-2j * np.pi * np.asarray(frequency_hz) * step_s)
-        gain = np.polynomial.polynomial.polyval(z, self._numerator)
-        return np.asarray(gain / np.polynomial.polynomial.polyval(z, self._denominator))
+    poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
+    denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
+    return RecursiveFilter(_fitted_zeros(analogue, denominator, step_s), denominator)
 
 
 def _fitted_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: float) -> NDArray[np.float64]:
@@ -176,7 +157,7 @@ class Vibrometer:
             )
         bandwidth = first_order(config.bandwidth_hz)
         self.delay_steps = (config.delay_s - bandwidth.delay_s) * grid.rate_hz
-        self._filter = RunningFilter(bandwidth, grid.step_s)
+        self._filter = running_filter(bandwidth, grid.step_s)
         self._noise_rms = noise_density * np.sqrt(grid.rate_hz / 2)
         self._full_scale_m_per_s = config.full_scale_m_per_s
         self._full_scale_v = config.full_scale_v
@@ -211,7 +192,7 @@ class Accelerometer:
     ) -> None:
         """``noise_m_per_s2``: rms in ``FULL_BAND_HZ``."""
         mounted = resonant(config.resonance_hz, ACCELEROMETER_DAMPING_RATIO)
-        self._filter = RunningFilter(mounted, grid.step_s)
+        self._filter = running_filter(mounted, grid.step_s)
         self._noise_rms = grid.rms_per_step(noise_m_per_s2)
         self._sensitivity = config.sensitivity_v_per_m_per_s2
         self._full_scale_v = config.full_scale_v
