@@ -42,19 +42,22 @@ def announced(address: EngineAddress, what: str, press: Callable[[StopLevel, str
 
 
 def announced_engines() -> tuple[Announcement, ...]:
-    """Every engine of this computer whose process lives, oldest first, whether it answers or not."""
+    """Every engine of this computer whose process lives, oldest first, whether it answers or not.
+
+    One that refuses is none: where its process is known to live, it is among `programs_without_engine`.
+    """
     found = []
     for told in announced_programs(Announcement):
-        if _refuses(told.address):
-            withdraw(told.pid)
-        else:
+        if not _refuses(told.address):
             found.append(told)
+        elif not told.process_start:
+            withdraw(told.pid)
     return tuple(found)
 
 
 def programs_without_engine() -> tuple[Program, ...]:
-    """Every script or check of this computer that drives a bench itself, oldest first."""
-    engines = {each.pid for each in announced_programs(Announcement)}
+    """Every script or check that drives a bench, and every engine that lets nobody in, oldest first."""
+    engines = {each.pid for each in announced_engines()}
     return tuple(each for each in announced_programs(Program) if each.pid not in engines)
 
 

@@ -56,6 +56,7 @@ def stop_engine(
 
     """
     level = chosen(StopLevel, level)
+    reason = reason.encode(errors="replace").decode()  # a terminal gives what is no text as surrogates
     if level is StopLevel.HOLD:
         if not isinstance(engine, Announcement):
             raise EngineError(

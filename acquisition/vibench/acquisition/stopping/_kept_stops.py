@@ -9,6 +9,7 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from stat import S_IMODE, S_ISREG
 from threading import get_ident
 
 from vibench.sim.operating_system import process_start, state_folder
@@ -23,7 +24,7 @@ def engines_folder() -> Path:
     """Give the folder in which programs are announced and stops are put down; nobody else's business."""
     folder = state_folder() / "engines"
     folder.mkdir(mode=0o700, exist_ok=True)
-    if folder.stat().st_mode & 0o077:
+    if S_IMODE(folder.stat().st_mode) != 0o700:
         folder.chmod(0o700)
     return folder
 
@@ -58,7 +59,8 @@ class KeptStops:
             if self._obeyed.get(path) == mark:
                 continue
             self._obeyed[path] = mark  # where it cannot be taken away, it is still obeyed only once
-            self._press(level, self._reason(path))
+            # Reading a pipe could wait for ever.
+            self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             with suppress(OSError):
                 path.unlink()
 

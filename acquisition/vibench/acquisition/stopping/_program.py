@@ -9,7 +9,7 @@ from pathlib import Path
 from threading import Lock
 from typing import TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from vibench.sim.operating_system import is_process, process_start
 
@@ -68,32 +68,44 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
 
     """
     try:
-        folder = engines_folder()
+        paths = sorted(engines_folder().iterdir())  # glob would find nothing in a folder that it may not read
     except OSError as error:
         raise AcquisitionError(
             f"what drives a bench cannot be looked for in the state folder ({error}); name the program's own "
             "with VIBENCH_STATE_DIR. In an emergency switch the amplifier off by hand"
         ) from error
     found = []
-    for path in sorted(folder.glob("*.json")):
+    for path in paths:
+        if path.suffix != ".json" or not path.is_file():  # a pipe would be waited for
+            continue
         try:
-            told = model.model_validate_json(path.read_text(encoding="utf-8"))
-        except (ValidationError, OSError):  # another version's, of another kind, or ended in between
+            told = model.model_validate_json(_told(path))
+        except (ValueError, OSError):  # another version's, of another kind, or ended in between
             continue
-        if told.computer not in ("", platform.node()):
-            continue
-        if told.is_alive:
+        is_here = told.computer in ("", platform.node())
+        # A computer may be given another name while a program runs; number and start together are no other's.
+        if told.is_alive and (is_here or told.process_start):
             found.append(told)
-        else:
+        elif is_here:
             withdraw(told.pid)
     _sweep()
     return tuple(sorted(found, key=lambda each: each.started_utc))
 
 
+def _told(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except PermissionError:  # started as root, say: who may write in this folder may stop it all the same
+        pid = int(path.stem)
+        start = process_start(pid) or ""
+        facts = Program(pid=pid, what="a program of another user", started_utc="", process_start=start)
+        return facts.model_dump_json().encode()
+
+
 def withdraw(pid: int) -> None:
     """Take away what a program said of itself; legal where nothing is, or can be taken away."""
     with suppress(OSError):
-        (engines_folder() / f"{pid}.json").unlink()
+        _path(pid).unlink()
 
 
 class _Reached:
@@ -118,7 +130,7 @@ class _Reached:
                 except OSError:
                     kept.close()
                     raise
-                self._kept, self._watchdog = kept, Watchdog(kept.obey, "kept stops")
+                self._kept, self._watchdog = kept, Watchdog(self._look, "kept stops")
             self._inside.append(entry)
 
     def leave(self, entry: tuple[Press, Program]) -> None:
@@ -136,6 +148,18 @@ class _Reached:
             watchdog.close()
             kept.close()
         withdraw(entry[1].pid)
+
+    def _look(self) -> None:
+        """Obey what was put down, and be found: somebody may have emptied the state folder."""
+        kept, inside = self._kept, self._inside
+        if kept is None or not inside:
+            return
+        kept.obey()
+        with suppress(OSError):
+            if not _path(inside[0][1].pid).exists():
+                with self._changing:
+                    if self._inside:
+                        _write(self._inside[0][1])
 
     def _press(self, level: StopLevel, reason: str) -> None:
         for press, _ in tuple(self._inside):
@@ -169,8 +193,12 @@ def reached(press: Press, program: Program) -> Iterator[None]:
         _REACHED.leave(entry)
 
 
+def _path(pid: int) -> Path:
+    return engines_folder() / f"{pid}.json"
+
+
 def _write(program: Program) -> Path:
-    path = engines_folder() / f"{program.pid}.json"
+    path = _path(program.pid)
     coming = path.with_suffix(".coming")
     coming.unlink(missing_ok=True)  # left by a process of the same number that was killed
     # Nobody else may read a token, not even for the moment before the mode is set.
@@ -187,6 +215,6 @@ def _sweep() -> None:
         pid, _, rest = path.name.partition(".")
         start = rest.partition(".")[0] if ".stop-" in rest else ""
         is_announced = (folder / f"{pid}.json").exists()  # perhaps of another computer
-        if not is_announced and pid.isdigit() and not is_process(int(pid), start):
+        if not is_announced and pid.isdecimal() and not is_process(int(pid), start):
             with suppress(OSError):
                 path.unlink()

@@ -1,0 +1,147 @@
+"""What drives a bench is found and stopped, whatever lies in the state folder and happens to it."""
+
+import os
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Event
+from time import monotonic
+
+import pytest
+
+from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on_signal
+from vibench.acquisition.engine import StopDelivery, stop_engine, the_program
+from vibench.acquisition.engine._address import EngineAddress
+from vibench.acquisition.engine._announcement import announced
+from vibench.acquisition.stopping import Program, announced_programs
+from vibench.acquisition.stopping._kept_stops import engines_folder
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes and modes as POSIX has them")
+
+NOBODY = 65534
+
+
+@pytest.fixture(autouse=True)
+def own_state(tmp_path_factory, monkeypatch):
+    state = tmp_path_factory.mktemp("state")
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(state))
+    return state
+
+
+def until(is_so):
+    give_up_s = monotonic() + 20
+    while not is_so():
+        assert monotonic() < give_up_s
+        Event().wait(0.01)
+
+
+def no_text(folder):
+    (folder / "7.json").write_bytes(b"\xff\xfe{")
+
+
+def a_pipe(folder):
+    os.mkfifo(folder / "7.json")
+
+
+def a_folder(folder):
+    (folder / "7.json").mkdir()
+
+
+def a_circle(folder):
+    (folder / "7.json").symlink_to("7.json")
+
+
+def a_power_of_two(folder):
+    (folder / "²").touch()
+
+
+def a_name_that_is_no_text(folder):
+    Path(os.fsdecode(os.fsencode(folder) + b"/\xff.json")).touch()
+
+
+@pytest.mark.timeout(15)
+@pytest.mark.parametrize(
+    "litter", [no_text, a_pipe, a_folder, a_circle, a_power_of_two, a_name_that_is_no_text]
+)
+def test_litter_beside_an_announcement_hides_nobody(litter):
+    switch = StopSwitch()
+    with stop_on_signal(switch, "dwell"):
+        litter(engines_folder())
+        assert stop_engine(the_program(None), StopLevel.ABORT, "smoke") is StopDelivery.TAKEN
+    assert switch.request.reason == "smoke"
+
+
+@pytest.mark.timeout(15)
+def test_a_stop_that_is_a_pipe_is_obeyed_without_a_reason():
+    switch = StopSwitch()
+    with stop_on_signal(switch, "dwell"):
+        (program,) = announced_programs(Program)
+        os.mkfifo(engines_folder() / f"{program.pid}.{program.process_start}.stop-off")
+        until(lambda: switch.request is not None)
+    assert switch.request.level is StopLevel.OFF
+
+
+def test_a_reason_that_is_no_text_stops_as_well():
+    switch = StopSwitch()
+    with stop_on_signal(switch, "dwell"):
+        assert stop_engine(the_program(None), "abort", "smoke \udcff") is StopDelivery.TAKEN
+    assert switch.request.reason == "smoke ?"
+
+
+def test_who_is_announced_stays_so_when_the_state_folder_is_emptied(own_state):
+    switch = StopSwitch()
+    with stop_on_signal(switch, "dwell"):
+        engines_folder().rename(own_state / "moved away")
+        until(lambda: announced_programs(Program))
+        assert stop_engine(the_program(None), "abort", "smoke") is StopDelivery.TAKEN
+
+
+def test_a_computer_that_gets_another_name_finds_its_own(monkeypatch):
+    with stop_on_signal(StopSwitch(), "dwell"):
+        monkeypatch.setattr("platform.node", lambda: "renamed")
+        assert [each.what for each in announced_programs(Program)] == ["dwell"]
+
+
+def test_who_lives_and_refuses_a_connection_is_stopped_all_the_same():
+    pressed = []
+    with announced(
+        EngineAddress(host="127.0.0.1", port=1, token="t"), "night", lambda *told: pressed.append(told)
+    ):
+        assert stop_engine(the_program(None), "abort", "smoke") is StopDelivery.TAKEN
+    assert pressed == [(StopLevel.ABORT, "smoke")]
+
+
+@pytest.fixture
+def of_nobody(monkeypatch):
+    """A state folder of a user who cannot read what root writes there."""
+    if os.geteuid() != 0:
+        pytest.skip("only root can be another user")
+    with TemporaryDirectory() as state:
+        monkeypatch.setenv("VIBENCH_STATE_DIR", state)
+        os.chown(state, NOBODY, NOBODY)
+        os.chown(engines_folder(), NOBODY, NOBODY)
+        yield Path(state)
+        os.seteuid(0)
+
+
+def test_what_root_has_announced_in_a_users_folder_is_stopped_by_that_user(of_nobody):
+    switch = StopSwitch()
+    with stop_on_signal(switch, "dwell"):
+        os.seteuid(NOBODY)
+        assert stop_engine(the_program(None), "abort", "smoke") is StopDelivery.TAKEN
+        os.seteuid(0)
+    assert switch.request.reason == "smoke"
+
+
+def test_a_folder_that_may_not_be_read_is_no_empty_one(of_nobody):
+    os.chown(engines_folder(), 0, 0)
+    os.seteuid(NOBODY)
+    with pytest.raises(AcquisitionError, match="cannot be looked for in the state folder"):
+        the_program(None)
+
+
+def test_a_folder_with_foreign_modes_gets_its_own(of_nobody):
+    engines_folder().chmod(0o300)
+    os.seteuid(NOBODY)
+    with stop_on_signal(StopSwitch(), "dwell"):
+        assert the_program(None).what == "dwell"
