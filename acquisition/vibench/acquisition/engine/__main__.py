@@ -7,7 +7,7 @@ import sys
 from threading import Event, Thread
 from types import FrameType
 
-from ..stopping import Cause
+from ..stopping import Cause, heeded_signals
 from ._engine import Engine
 from ._job_queue import JobQueue
 from ._request_handler import RequestHandler
@@ -54,7 +54,7 @@ def _heed_signals(handler: RequestHandler) -> None:
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
         handler.shutdown(Cause.TERMINATED, f"{signal.Signals(number).name}: ended by the system")
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in heeded_signals():
         signal.signal(number, on_signal)
 
 

@@ -17,6 +17,7 @@ from ._stop import (
     StopSwitch as StopSwitch,
 )
 from ._stop_on_signal import (
+    heeded_signals as heeded_signals,
     stop_on_signal as stop_on_signal,
 )
 from ._watchdog import (

@@ -9,8 +9,12 @@ from types import FrameType
 from ._program import Program, facts_of_this_process, reached
 from ._stop import Cause, StopLevel, StopRequest, StopSwitch
 
-CAUSES = {"SIGINT": Cause.KEYBOARD, "SIGTERM": Cause.TERMINATED, "SIGHUP": Cause.TERMINATED}
-"""By name, since Windows has no SIGHUP."""
+CAUSES = {
+    "SIGINT": Cause.KEYBOARD,
+    # The second last: Ctrl-Break of Windows; the last: no more time of the processor.
+    **dict.fromkeys(("SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU"), Cause.TERMINATED),
+}
+"""By name, since no system has them all: what would end the program at once, and leave the drive on."""
 
 
 @contextmanager
@@ -19,8 +23,8 @@ def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]
 
     ``vibench stop`` finds the program and leaves its stop in the state folder, whatever thread this is;
     ``what`` is what it is called there. SIGINT, SIGTERM and SIGHUP (the terminal was closed) are stops in
-    the main thread, the only one to which Python delivers signals. SIGHUP stays ignored where it was ignored
-    before (nohup): such a run is meant to go on.
+    the main thread, the only one to which Python delivers signals; so is whatever else would end the program
+    (`CAUSES`). SIGHUP stays ignored where it was ignored before (nohup): such a run is meant to go on.
 
     The first ramps down and ends the run as stopped: Ctrl-C as the plan ends, the others faster. A second
     raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones are
@@ -59,7 +63,7 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
             case 2:
                 raise KeyboardInterrupt
 
-    before = {number: signal.signal(number, on_signal) for number in _heeded()}
+    before = {number: signal.signal(number, on_signal) for number in heeded_signals()}
     try:
         yield
     finally:
@@ -67,7 +71,7 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _heeded() -> list[signal.Signals]:
-    """All but a SIGHUP that whoever started the program has chosen to ignore."""
+def heeded_signals() -> list[signal.Signals]:
+    """Give what ends a program softly: not a SIGHUP that whoever started it has chosen to ignore."""
     known = [signal.Signals[name] for name in CAUSES if name in signal.Signals.__members__]
     return [each for each in known if each.name != "SIGHUP" or signal.getsignal(each) is not signal.SIG_IGN]
