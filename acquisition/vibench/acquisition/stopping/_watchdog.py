@@ -1,6 +1,7 @@
 """Something that is looked at all the time, beside whatever else a process does."""
 
 from collections.abc import Callable
+from logging import getLogger
 from threading import Event, Thread
 
 INTERVAL_S = 0.05
@@ -24,4 +25,7 @@ class Watchdog:
 
     def _run(self) -> None:
         while not self._closing.wait(INTERVAL_S):
-            self._look()
+            try:
+                self._look()
+            except Exception:
+                getLogger(__name__).exception("%s", self._thread.name)

@@ -1,0 +1,20 @@
+"""What is looked at all the time is looked at again, whatever a look ran into."""
+
+from threading import Event
+
+from vibench.acquisition.stopping import Watchdog
+
+
+def test_a_look_that_fails_is_not_the_last(caplog):
+    looks, thrice = [], Event()
+
+    def look():
+        looks.append(None)
+        if len(looks) == 3:
+            thrice.set()
+        raise ValueError(len(looks))
+
+    watchdog = Watchdog(look, "watchdog")
+    assert thrice.wait(20)
+    watchdog.close()
+    assert caplog.records[0].exc_info[0] is ValueError
