@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from vibench.acquisition import ConfigurationError
+from vibench.acquisition import ConfigurationError, StopLevel
 from vibench.acquisition.engine import (
     Engine,
     EngineClient,
@@ -75,6 +75,32 @@ def test_a_bench_that_is_being_closed_takes_nothing_on(shipped_rig):
     with pytest.raises(EngineError, match="is being closed"):
         handler.carry_out(VERBS["close"], {})
     jobs.run()
+
+
+class MetByAnother(Engine):
+    """An engine of which somebody else asks something just when its switch has been looked up."""
+
+    met_by = staticmethod(lambda: None)
+
+    @property
+    def switch(self):
+        found, met_by, self.met_by = self._switch, self.met_by, lambda: None
+        met_by()
+        return found
+
+    @switch.setter
+    def switch(self, switch):
+        self._switch = switch
+
+
+def test_a_stop_that_meets_a_start_stops_what_begins(tmp_path):
+    engine = MetByAnother(Supervision.UNATTENDED)
+    handler = RequestHandler(engine, JobQueue(engine))
+    engine.published.enter(EngineState.READY)
+    engine.met_by = lambda: handler.carry_out(VERBS["check"], {"folder": tmp_path, "new_reference": False})
+    handler.carry_out(VERBS["stop"], {"level": StopLevel.OFF, "reason": "smoke"})
+    assert engine.published.state is EngineState.CHECKING
+    assert engine.switch.request.reason == "smoke"
 
 
 @pytest.mark.parametrize(

@@ -342,9 +342,12 @@ class RequestHandler:
             self._is_closing = False
 
     def _stop(self, request: StopRequest) -> None:
-        self._engine.switch.ask(request)
-        if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:
-            self.disarm()
+        switch = None
+        while switch is not self._engine.switch:  # else a start has come in between, with a switch of its own
+            switch = self._engine.switch
+            switch.ask(request)
+            if request.level is not StopLevel.HOLD and self._engine.published.state is EngineState.ARMED:
+                self.disarm()
 
     def _disarm(self) -> None:
         if self._engine.published.state is EngineState.ARMED:
