@@ -1,5 +1,9 @@
 """What viewers see of a run: begun anew with each recording, and its rows only when they are news."""
 
+import shutil
+from threading import Event
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -62,6 +66,7 @@ def test_a_folder_that_went_away_is_a_disk_without_room_and_ends_no_run(publishe
     gone = tmp_path / "gone"
     published.begin(campaign("point"), gone)
     published.tell(progress(gone / "point.h5", 0, 1.0), BENCH)
+    published._beside.wait(10)
     assert published.status().disk_free_bytes == 0
 
 
@@ -74,3 +79,13 @@ def test_what_an_earlier_run_has_made_counts_as_done(published, tmp_path):
     published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
     run = published.status().run
     assert run.campaign_elapsed_s == pytest.approx(twice.duration_s / 2 + run.elapsed_s)
+
+
+def test_a_folder_that_hangs_holds_up_no_run(published, tmp_path, monkeypatch):
+    is_back = Event()
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: is_back.wait() and SimpleNamespace(free=7))
+    published.tell(progress(tmp_path / "point.h5", 0, 1.0), BENCH)
+    assert published.status().samples == 100
+    is_back.set()
+    published._beside.wait(10)
+    assert published.status().disk_free_bytes == 7

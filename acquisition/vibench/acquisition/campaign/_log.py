@@ -9,7 +9,7 @@ from pathlib import Path
 from time import monotonic
 
 from ..errors import RecordingError
-from ..host import ClosedOnLeaving
+from ..host import Beside, ClosedOnLeaving
 from ..plan import measured_s
 from ._event import CampaignEvent, CampaignEventKind
 from ._journal_point import JournalPoint, JournalPointState
@@ -59,10 +59,15 @@ def _ends_a_line(path: Path) -> bool:
 STATUS_SUFFIX = ".status"
 LINE_EVERY_S = 5.0
 """While nothing else happens [s]: a night makes half a megabyte."""
+LEFT_ALONE_S = 1.0
+"""How long the last lines may take [s]."""
 
 
-class StatusLine:
-    """Appends a line whenever something happens, and every few seconds while a point runs."""
+class StatusLine(ClosedOnLeaving):
+    """Appends a line whenever something happens, and every few seconds while a point runs.
+
+    Whoever plays does not wait for it: a folder that hangs would leave the drive on.
+    """
 
     def __init__(
         self, path: Path, campaign: str, points: Sequence[JournalPoint], rest_s: float = 0.0
@@ -79,6 +84,7 @@ class StatusLine:
         self._point_s = 0.0
         self._written = -LINE_EVERY_S
         self._where = ""
+        self._beside = Beside("campaign status")
 
     def __call__(self, event: CampaignEvent) -> None:
         """Write what has happened."""
@@ -101,11 +107,18 @@ class StatusLine:
             state = run.state.value.replace("_", " ")
             self._write(f"{state}, {run.elapsed_s:.0f} of {run.total_s:.0f} s")
 
+    def close(self) -> None:
+        """Let the last lines be written. Legal at any time."""
+        self._beside.wait(LEFT_ALONE_S)
+
     def _write(self, what: str) -> None:
         self._written = monotonic()
         counts = ", ".join(f"{number} {word}" for word, number in self._counts.items())
         utc = datetime.now(UTC).isoformat(timespec="seconds")
         line = f"{utc} {self._campaign} {self._where}: {what} ({counts}, about {self._left()} left)\n"
+        self._beside.do(lambda: self._append(line))
+
+    def _append(self, line: str) -> None:
         # A full disk must not end a measurement for the sake of this line.
         with suppress(OSError), self._path.open("a", encoding="utf-8") as file:
             file.write(line)

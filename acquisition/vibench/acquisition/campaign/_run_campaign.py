@@ -101,7 +101,7 @@ def run_campaign(
         log = session.enter_context(_log_alone(folder, campaign))
         journal = session.enter_context(opened_journal(bench, campaign, folder, existing, changed_bench))
         where = folder / f"{campaign.name}{STATUS_SUFFIX}"
-        status = StatusLine(where, campaign.name, journal.points(), campaign.rest_s)
+        status = session.enter_context(StatusLine(where, campaign.name, journal.points(), campaign.rest_s))
         notifier = Notifier(campaign.name, folder, messengers, log)
         session.enter_context(stop_on_signal(stop, campaign.name))
 

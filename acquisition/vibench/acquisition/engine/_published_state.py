@@ -12,6 +12,7 @@ import numpy as np
 from ..bench import BenchReport
 from ..campaign import CampaignProgress, PointOutcome, PointResult
 from ..errors import AcquisitionError
+from ..host import Beside
 from ..instruments import Block
 from ..plan import Campaign, RunState, measured_s
 from ._sample_buffer import SampleBuffer
@@ -104,6 +105,7 @@ class PublishedState:
         self._armed_until_s = 0.0
         self._folder = Path()
         self._disk_due_s = 0.0
+        self._beside = Beside("disk room")
         self._file = Path()
         self._done_s = 0.0
         self._campaign_s = 0.0
@@ -178,8 +180,8 @@ class PublishedState:
             run=self._run_status(progress),
             levels=levels_of(run.block, bench.channels),
             overloads=self._overloads,
-            **self._disk(),
         )
+        self._look_at_disk()
 
     def twin(self, told: TwinStatus | None) -> None:
         """Show what the live twin tells; None when there is none any more."""
@@ -237,14 +239,13 @@ class PublishedState:
             plan=self._plans.get(progress.name, ""),
         )
 
-    def _disk(self) -> dict[str, int]:
-        if monotonic() < self._disk_due_s:
-            return {}
+    def _look_at_disk(self) -> None:
+        """Look for the room that is left, beside the run: a folder that hangs would leave the drive on."""
+        if monotonic() < self._disk_due_s or self._beside.is_busy:
+            return
         self._disk_due_s = monotonic() + DISK_INTERVAL_S
-        try:
-            return {"disk_free_bytes": shutil.disk_usage(self._folder).free}
-        except OSError:  # the folder is gone: the recorder will say so, and a picture ends no run
-            return {"disk_free_bytes": 0}
+        folder = self._folder
+        self._beside.do(lambda: self._put(disk_free_bytes=_free_bytes(folder)))
 
     def _put_rows(self, rows: tuple[RowStatus, ...]) -> None:
         self._put(rows=rows, rows_number=self._status.rows_number + 1)
@@ -252,6 +253,13 @@ class PublishedState:
     def _put(self, **changes: object) -> None:
         with self._lock:
             self._status = self._status.model_copy(update=changes)
+
+
+def _free_bytes(folder: Path) -> int:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:  # the folder is gone: the recorder will say so, and a picture ends no run
+        return 0
 
 
 def _queued(campaign: Campaign) -> tuple[RowStatus, ...]:

@@ -1,3 +1,6 @@
+from ._beside import (
+    Beside as Beside,
+)
 from ._chosen import (
     ChosenFrom as ChosenFrom,
     chosen as chosen,
