@@ -29,6 +29,7 @@ from .errors import (
     RecordingError as RecordingError,
 )
 from .host import (
+    Beside as Beside,
     ChosenFrom as ChosenFrom,
     FrozenModel as FrozenModel,
     all_shipped as all_shipped,

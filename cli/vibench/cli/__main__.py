@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 from importlib.metadata import version
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, TextIO
 
 import typer
 from rich.text import Text
 from typer.core import TyperCommand, TyperGroup
 
-from vibench.acquisition import AcquisitionError, CheckStopped, shortened
+from vibench.acquisition import AcquisitionError, Beside, CheckStopped, shortened
 from vibench.analysis import AnalysisError
 from vibench.sim import UnreadableTomlError
 from vibench.sim.study import StudyError
@@ -260,6 +260,23 @@ class LogLevel(StrEnum):
     """What instruments are told and answer, too."""
 
 
+class LogBeside(logging.StreamHandler[TextIO]):
+    """Writes beside whoever logs: a terminal that is held up, a pipe that nobody reads, hold up no run."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._beside = Beside("log")
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Let a line be written."""
+        self._beside.do(lambda: super(LogBeside, self).emit(record))
+
+    def close(self) -> None:
+        """Leave the last lines a second."""
+        self._beside.wait(1.0)
+        super().close()
+
+
 @app.callback()
 def vibench(
     log_level: Annotated[
@@ -280,7 +297,7 @@ def vibench(
     ] = False,
 ) -> None:
     """Hold the commands."""
-    handler = logging.StreamHandler()
+    handler = LogBeside()
     handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s"))
     # Ours alone: other libraries log what a broken message of a client did to them, with a traceback.
     ours = logging.getLogger("vibench")
