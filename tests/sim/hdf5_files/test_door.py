@@ -63,12 +63,24 @@ def too_deep(file):
     file.create_group("/".join("abcdefghij" * 4))
 
 
+def too_many_links(file):
+    for number in range(25_000):
+        file[f"link {number}"] = file["own"] if number % 2 else h5py.SoftLink("/own")
+
+
+def too_many_attributes(file):
+    for number in range(1_100):
+        file["own"].attrs[f"a{number}"] = number
+
+
 @pytest.mark.parametrize(
     ("fill", "said"),
     [
         (huge, "declares 4000000000000 bytes, of which 0 are stored"),
         (huge_chunks, "chunks of 4000000000 bytes"),
         (too_deep, "more than 32 deep"),
+        (too_many_links, "more than 20000 objects"),
+        (too_many_attributes, "more than 1000 attributes"),
     ],
 )
 def test_sizes_that_cannot_be_are_refused_before_anything_is_read(make, fill, said):

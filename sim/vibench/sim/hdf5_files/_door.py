@@ -8,7 +8,9 @@ from pathlib import Path
 import h5py
 
 MOST_OBJECTS = 20_000
-"""Groups and datasets of one file; a recording has about forty."""
+"""Links to groups and datasets of one file; a recording has about forty."""
+MOST_ATTRIBUTES = 1_000
+"""Of one object; a channel of a recording has about twenty-five."""
 DEEPEST = 32
 """Groups in groups."""
 LARGEST_ATTRIBUTE_BYTES = 1_000_000
@@ -95,6 +97,7 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
 
     """
     seen = {_address(file)}
+    links = 0
     waiting = [(file.name, file, 0)]
     while waiting:
         path, item, depth = waiting.pop()
@@ -103,6 +106,9 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
             continue
         if depth == DEEPEST:
             raise UnsafeHdf5(f"its groups lie more than {DEEPEST} deep in one another")
+        links += len(item)  # before they are looked at: any number may lead to one object
+        if links > MOST_OBJECTS:
+            raise UnsafeHdf5(f"it holds more than {MOST_OBJECTS} objects")
         for name in sorted(item, reverse=True):
             if not _leads_to_own_object(item, name):
                 continue
@@ -110,8 +116,6 @@ def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
             if _address(below) in seen:
                 continue
             seen.add(_address(below))
-            if len(seen) > MOST_OBJECTS:
-                raise UnsafeHdf5(f"it holds more than {MOST_OBJECTS} objects")
             waiting.append((f"{path.rstrip('/')}/{name}", below, depth + 1))
 
 
@@ -134,6 +138,8 @@ def _address(item: h5py.HLObject) -> tuple[int, int]:
 
 
 def _require_attributes(item: h5py.HLObject) -> None:
+    if len(item.attrs) > MOST_ATTRIBUTES:
+        raise UnsafeHdf5(f"{item.name} has more than {MOST_ATTRIBUTES} attributes")
     for name in item.attrs:
         attribute = item.attrs.get_id(name)
         size = math.prod(attribute.shape or ()) * attribute.dtype.itemsize
