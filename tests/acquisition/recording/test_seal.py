@@ -17,6 +17,7 @@ from vibench.acquisition.recording import (
     ResultArray,
     SealDepth,
     SealState,
+    _seal,
     create_recording,
     part_of,
     recover,
@@ -180,6 +181,13 @@ def test_a_recording_without_a_seal_is_told_as_such(recorded):
         assert "before recordings had one" in found.sentence
 
 
+def test_where_a_key_is_given_no_seal_is_no_excuse(recorded, key_file):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        del file["seal"]
+    assert state_of(path, key=seal_key(key_file)) is SealState.OTHER_KEY
+
+
 def test_a_recovered_recording_is_sealed_when_it_is_recovered(tmp_path, make_header, make_block):
     writer = create_recording(tmp_path / "a.h5", make_header())
     writer.append(make_block(0, 2000)[1])
@@ -315,3 +323,26 @@ def test_nothing_is_added_to_a_damaged_recording(recorded):
     with open_recording(path) as recording, pytest.raises(RecordingError, match="nothing was added"):
         recording.save_results("spectrum", {}, {})
     assert path.read_bytes() == before
+
+
+def test_a_result_that_is_small_only_while_it_is_packed_is_not_read(with_result, monkeypatch):
+    monkeypatch.setattr(_seal, "LARGEST_TABLE_BYTES", 1000)
+    with h5py.File(with_result, "r+") as file:
+        del file["results/spectrum/H"]
+        file["results/spectrum"].create_dataset("H", shape=(100, 100), dtype="f8", compression="gzip")
+    with open_recording(with_result) as recording:
+        found = recording.check_result_seals()["spectrum"]
+    assert found.state is SealState.DAMAGED
+    assert "/results/spectrum/H holds 8e+04 bytes, which no result has" in found.sentence
+
+
+@pytest.mark.parametrize("what", [np.zeros(3), h5py.SoftLink("/results")])
+def test_what_is_no_group_of_results_is_refused_in_a_sentence(recorded, what):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        del file["results"]
+        file["results"] = what
+    with open_recording(path) as recording:
+        assert recording.check_seal("whole").state is SealState.INTACT
+        with pytest.raises(RecordingError, match="the results cannot be read"):
+            recording.check_result_seals()

@@ -87,8 +87,11 @@ def write_result(
 
 def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
     """Give the group of every result, by name; RecordingError where something else stands."""
-    results = file.get(layout.RESULTS)
-    found = {} if results is None else dict(results.items())
+    try:
+        results = file.get(layout.RESULTS)
+        found = {} if results is None else dict(results.items())
+    except (OSError, RuntimeError, KeyError, AttributeError) as error:
+        raise RecordingError(f"the results cannot be read ({error})") from error
     for name, group in found.items():
         if not isinstance(group, h5py.Group):
             raise RecordingError(f"{name!r} among the results is no result")

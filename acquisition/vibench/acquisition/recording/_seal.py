@@ -33,6 +33,8 @@ RESULT_MARKS = (f"seal_{SHA256}", f"seal_{HMAC}", f"seal_{KEY_ID}")
 LINKS = ("DIMENSION_LIST", "REFERENCE_LIST")
 """How HDF5 notes which axis belongs to what: addresses inside the file, by which no number is read."""
 PIECE_ITEMS = 4 * layout.CHUNK_SAMPLES
+LARGEST_TABLE_BYTES = 500_000_000
+"""What has several axes is read at once: results, of some megabytes."""
 QUICK_BYTES = 65_536
 """A quick look reads datasets up to this size: all texts and tables, and no samples of a whole recording."""
 KEY_VARIABLE = "VIBENCH_SEAL_KEY"
@@ -135,7 +137,7 @@ def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -
 def check_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> SealCheck:
     """Hold a finished recording against its seal."""
     if layout.SEAL not in file:
-        return SealCheck(SealState.UNSEALED, "it has no seal: it was made before recordings had one", "")
+        return _unsealed("it was made before recordings had one", key)
     try:
         marks = read_attributes(file[layout.SEAL])
         text = read_text_dataset(file[layout.SEAL], MANIFEST)
@@ -168,7 +170,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
         marks = read_attributes(group)
         said, signature, key_id = (str(marks.get(each, "")) for each in RESULT_MARKS)
         if not said:
-            return SealCheck(SealState.UNSEALED, "it has no seal: it was saved before results had one", "")
+            return _unsealed("it was saved before results had one", key)
         text = _result_text(group)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
         return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
@@ -180,6 +182,8 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
     """Give a dataset's data in pieces, in the order in which it is hashed."""
     if dataset.ndim != 1:
+        if dataset.nbytes > LARGEST_TABLE_BYTES:  # of a small file, compressed
+            raise RecordingError(f"{dataset.name} holds {dataset.nbytes:.2g} bytes, which no result has")
         yield np.asarray(dataset[()])
         return
     for begin in range(0, len(dataset), PIECE_ITEMS):
@@ -254,6 +258,13 @@ def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[
     raw = text.encode()
     values = (_sha256(raw),) if key is None else (_sha256(raw), key.signature(raw), key.name)
     return dict(zip(names, values, strict=False))
+
+
+def _unsealed(excuse: str, key: SealKey | None) -> SealCheck:
+    """Whoever takes away a seal could say what they like: where a key is given, that is no excuse."""
+    if key is None:
+        return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
+    return SealCheck(SealState.OTHER_KEY, f"it has no seal, and none by the key given ({key.name})", "")
 
 
 def _judged_signature(text: str, signed: list[str], key: SealKey | None, seal: str) -> SealCheck:
