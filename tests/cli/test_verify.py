@@ -2,7 +2,9 @@
 
 import contextlib
 import json
+import os
 import shutil
+import sys
 from zipfile import ZipFile
 
 import h5py
@@ -235,3 +237,14 @@ def test_one_bad_recording_does_not_spoil_a_folder(vibench_here, folder):
     analysed = vibench_here("analyse", ".", "--json", cwd=folder)
     assert analysed.returncode == 1
     assert len([line for line in analysed.stderr.splitlines() if line.startswith("error: ")]) == 4
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
+def test_a_name_that_is_no_text_is_refused_in_a_sentence_where_it_would_stand_in_a_file(folder, vibench_here):
+    name = os.fsdecode(b"\xff.h5")
+    (folder / "one.h5").rename(folder / name)
+    told = vibench_here("export", name, "--to", "csv", "--out", "x", cwd=folder)
+    assert told.returncode == 1
+    assert r"\udcff" in told.stderr
+    assert "holds bytes that are no text; rename the file or folder" in told.stderr
+    assert "Traceback" not in told.stderr

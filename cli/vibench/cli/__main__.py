@@ -315,6 +315,11 @@ def main() -> None:
     except (AcquisitionError, AnalysisError, StudyError, UnreadableTomlError) as error:
         complain(error)
         sys.exit(ExitCode.FAILED)
+    except UnicodeEncodeError as error:  # of a path: files hold text
+        name = str(error.object).encode(errors="backslashreplace").decode()
+        name = shortened(name, NAME_SHOWN)
+        complain(OSError(f"{name} holds bytes that are no text; rename the file or folder"))
+        sys.exit(ExitCode.FAILED)
     except OSError as error:
         if error.errno not in DISK_ERRORS:
             raise

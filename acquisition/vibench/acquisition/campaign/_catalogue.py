@@ -15,7 +15,7 @@ from pathlib import Path
 from ..errors import RecordingError
 from ..host import chosen
 from ..recording import PART_SUFFIX, SUFFIX
-from ._catalogue_entry import CatalogueEntry, read_entry
+from ._catalogue_entry import CatalogueEntry, place_below, read_entry
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 2
@@ -95,13 +95,15 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
     for path in recordings_below(folder):
         try:
             found = path.stat()
+            size_bytes, stamp = found.st_size, _stamp(found)
         except FileNotFoundError:  # it got its final name while we looked
             continue
-        where = path.relative_to(folder).as_posix()
-        stamp = _stamp(found)
+        except OSError:  # a link that leads to itself: its entry says that it cannot be read
+            size_bytes, stamp = 0, ""
+        where = place_below(folder, path)
         # A .part says "interrupted" when its program is dead, and no byte of it changes for that.
         if known.pop(where, None) != stamp or path.suffix == PART_SUFFIX:
-            entry = read_entry(folder, path, found.st_size)
+            entry = read_entry(where, path, size_bytes)
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
             connection.execute(
                 f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - question marks alone

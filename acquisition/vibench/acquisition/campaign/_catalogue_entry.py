@@ -1,5 +1,6 @@
 """What a catalogue says of one recording, read from the file itself."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,15 +61,19 @@ class CatalogueEntry:
         return self.state in (UNREADABLE, DAMAGED)
 
 
-def read_entry(folder: Path, path: Path, size_bytes: int) -> CatalogueEntry:
+def place_below(folder: Path, path: Path) -> str:
+    """Say where a recording lies; of a name that is no text, as much as can be said."""
+    return os.fsencode(path.relative_to(folder).as_posix()).decode(errors="replace")
+
+
+def read_entry(where: str, path: Path, size_bytes: int) -> CatalogueEntry:
     """Read what a catalogue wants to know; a file that cannot be read becomes an entry that says why."""
-    where = path.relative_to(folder).as_posix()
     try:
         with open_recording(path) as recording:
             return _entry(recording, where, size_bytes)
     except RecordingError as error:
-        stem = path.name.split(".")[0]
-        return CatalogueEntry(where, stem, UNREADABLE, str(error), "cannot be read", size_bytes=size_bytes)
+        stem, reason = Path(where).name.split(".")[0], str(error).encode(errors="replace").decode()
+        return CatalogueEntry(where, stem, UNREADABLE, reason, "cannot be read", size_bytes=size_bytes)
 
 
 def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
@@ -127,6 +132,8 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
         minded.append(recording.state.value)
     if seal.state is SealState.UNSEALED:
         minded.append("no seal")
+    if seal.state is SealState.OTHER_KEY:
+        minded.append("not signed with the key given")
     roles = ", ".join(dict.fromkeys(each.channel for each in recording.overloads))
     if roles:
         minded.append(f"near full scale: {roles}")

@@ -69,25 +69,29 @@ class Journal(ClosedOnLeaving):
         Raises RecordingError when the file is no journal, or of a newer version.
         """
         with closed_on_error(connected(path)) as connection:
-            require_version(path, connection)
             with sentences(path):
+                require_version(path, connection)
                 brought_up(connection)
             return cls(path, connection)
 
     @property
     def campaign(self) -> Campaign:
         """The plan it was begun with."""
-        return Campaign.model_validate_json(self._fact("plan_json"))
+        with sentences(self.path):
+            return Campaign.model_validate_json(self._fact("plan_json"))
 
     @property
     def bench(self) -> BenchIdentity:
         """The bench it was begun on, or the one accepted since."""
-        row = self._connection.execute("SELECT identity_json FROM benches ORDER BY rowid DESC").fetchone()
-        return BenchIdentity.model_validate_json(row["identity_json"])
+        command = "SELECT identity_json FROM benches ORDER BY rowid DESC"
+        with sentences(self.path):
+            (identity,) = self._connection.execute(command).fetchone()
+            return BenchIdentity.model_validate_json(identity)
 
     def points(self) -> tuple[JournalPoint, ...]:
         """Every point, in the order in which they are made."""
-        return points_of(self._connection)
+        with sentences(self.path):
+            return points_of(self._connection)
 
     def accept_bench(self, bench: BenchIdentity) -> None:
         """Go on with another bench; the earlier ones stay on record."""

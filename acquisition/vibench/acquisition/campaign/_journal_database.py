@@ -65,7 +65,7 @@ FROM points ORDER BY place
 
 def is_begun(path: Path) -> bool:
     """Whether a journal stands there; one whose program died before its first commit does not."""
-    if not path.exists():
+    if not path.is_file():
         return False
     with sentences(path), closing(opened_to_look(path)) as connection:
         return (
@@ -139,9 +139,14 @@ def require_version(path: Path, connection: sqlite3.Connection) -> None:
 
 @contextmanager
 def sentences(path: Path) -> Iterator[None]:
-    """Let an error of the database become a sentence."""
+    """Let an error of the database become a sentence, and what stands in it that cannot be."""
     try:
         yield
+    except (ValueError, TypeError, LookupError) as error:  # pydantic's; columns gone
+        raise RecordingError(
+            f"the journal {path} cannot be understood ({str(error).splitlines()[0]}): it is damaged, or of "
+            "another version. Nothing was changed; put back a copy, or move it away: what lies there is found"
+        ) from error
     except sqlite3.Error as error:
         raise RecordingError(
             f"the journal {path} cannot be read or written ({error}). What was recorded is kept; see that "

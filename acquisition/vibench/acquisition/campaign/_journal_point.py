@@ -1,5 +1,6 @@
 """A point as a campaign's journal knows it, for the campaign itself and for whoever looks."""
 
+import re
 import sqlite3
 from contextlib import closing
 from dataclasses import dataclass
@@ -56,11 +57,18 @@ def read_journal(path: Path) -> tuple[JournalPoint, ...]:
         When there is no journal, or it is not one.
 
     """
-    if not path.exists():
-        raise RecordingError(f"{path} does not exist; give the path of a campaign's journal.")
+    if not path.is_file():
+        raise RecordingError(f"{path} does not exist, or is no file; give the path of a campaign's journal.")
     with sentences(path), closing(opened_to_look(path)) as connection:
         require_version(path, connection)
         return points_of(connection)
+
+
+def _own_name(file: str) -> str:
+    """Refuse a file outside the journal's folder: what lies there is recovered, and cleared of copies."""
+    if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
+        raise ValueError(f"{file[:80]!r} is no name of a recording")
+    return file
 
 
 def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
@@ -74,7 +82,7 @@ def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
             state=JournalPointState(row["state"]),
             reason_code=ReasonCode(row["why"]),
             reason=row["reason"],
-            file=row["file"],
+            file=_own_name(row["file"]),
             attempts=row["attempts"],
             is_followed_up=bool(row["is_followed_up"]),
             begun_utc=row["begun_utc"],

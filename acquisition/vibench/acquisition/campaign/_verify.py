@@ -1,14 +1,14 @@
 """Every recording of a folder held against its seal, and against the campaigns' journals beside it."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import RecordingError
 from ..recording import SUFFIX, SealDepth, SealKey, SealState, open_recording
 from ._catalogue import recordings_below
-from ._catalogue_entry import UNREADABLE
+from ._catalogue_entry import UNREADABLE, place_below
 from ._journal import JOURNAL_SUFFIX
+from ._journal_database import is_begun
 from ._journal_point import JournalPoint, JournalPointState, read_journal
 
 MISSING = "missing"
@@ -62,30 +62,27 @@ def verify_recordings(
     is_folder = place.is_dir() and not place.name.endswith(SUFFIX)
     paths = tuple(recordings_below(place)) if is_folder else (place,)
     root = place if is_folder else place.parent
-    folders = sorted({path.parent for path in paths} | ({place} if is_folder else set()))
-    known = {path: point for folder in folders for path, point in _counted_on(folder)}
+    known: dict[Path, JournalPoint] = {}
+    broken = []
+    for journal in sorted(root.rglob(f"*{JOURNAL_SUFFIX}") if is_folder else root.glob(f"*{JOURNAL_SUFFIX}")):
+        try:
+            points = read_journal(journal) if is_begun(journal) else ()
+        except RecordingError as error:
+            broken.append(VerifiedRecording(place_below(root, journal), UNREADABLE, str(error), "", {}))
+            continue
+        known |= {
+            journal.parent / point.file: point for point in points if point.state is JournalPointState.DONE
+        }
     found = [_verified(path, root, known.get(path), SealDepth(depth), key) for path in paths]
     if is_folder:
         found += [_missing(path, root, point) for path, point in known.items() if not path.exists()]
-    return tuple(found)
-
-
-def _counted_on(folder: Path) -> Iterator[tuple[Path, JournalPoint]]:
-    """Give the recordings that the journals of a folder call done; a broken journal counts on none."""
-    for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
-        try:
-            points = read_journal(journal)
-        except RecordingError:
-            continue
-        for point in points:
-            if point.state is JournalPointState.DONE:
-                yield folder / point.file, point
+    return (*found, *broken)
 
 
 def _verified(
     path: Path, root: Path, point: JournalPoint | None, depth: SealDepth, key: SealKey | None
 ) -> VerifiedRecording:
-    where = path.relative_to(root).as_posix()
+    where = place_below(root, path)
     try:
         with open_recording(path) as recording:
             found = recording.check_seal(depth, key)
@@ -104,5 +101,5 @@ def _verified(
 
 def _missing(path: Path, root: Path, point: JournalPoint) -> VerifiedRecording:
     return VerifiedRecording(
-        path.relative_to(root).as_posix(), MISSING, f"the campaign made it for {point.name}", point.seal, {}
+        place_below(root, path), MISSING, f"the campaign made it for {point.name}", point.seal, {}
     )
