@@ -3,6 +3,7 @@
 import os
 import shutil
 import sqlite3
+import sys
 
 import h5py
 import pytest
@@ -17,6 +18,7 @@ from vibench.acquisition.campaign import (
     read_journal,
     verify_recordings,
 )
+from vibench.acquisition.errors import CheckFailed, RecordingError
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
 
 
@@ -204,3 +206,89 @@ def test_recordings_from_before_seals_are_kept_and_told_as_such(bench, folder):
     own = [each for each in verify_recordings(folder) if "/" not in each.path]
     assert {(each.verdict, each.is_bad) for each in own} == {("unsealed", False)}
     assert {each.verdict for each in list_recordings(folder) if "/" not in each.path} == {"no seal"}
+
+
+def said_by(statement):
+    def damage(folder):
+        connection = sqlite3.connect(folder / "c.campaign.sqlite")
+        connection.execute("PRAGMA ignore_check_constraints = 1")
+        connection.execute(statement)
+        connection.commit()
+        connection.close()
+
+    return damage
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        said_by("UPDATE points SET file = '../older/two.h5', state = 'running' WHERE name = 'two'"),
+        said_by("UPDATE points SET file = '/etc/two.h5' WHERE name = 'two'"),
+        said_by("UPDATE points SET file = hex(zeroblob(4000)) || '.h5' WHERE name = 'two'"),
+        said_by("UPDATE points SET file = x'ff' WHERE name = 'two'"),
+        said_by("UPDATE points SET state = 'lost' WHERE name = 'two'"),
+        said_by("UPDATE points SET measurement_json = '{}' WHERE name = 'two'"),
+        said_by("UPDATE campaign SET value = 'x' WHERE key = 'version'"),
+        said_by("UPDATE campaign SET value = 'x' WHERE key = 'plan_json'"),
+        said_by("UPDATE benches SET identity_json = 'x'"),
+        said_by("DELETE FROM benches"),
+        said_by("ALTER TABLE points RENAME COLUMN file TO fine"),
+    ],
+)
+def test_a_journal_that_says_what_cannot_be_is_refused_in_a_sentence(bench, folder, damage):
+    damage(folder)
+    older = sorted((folder / "older").iterdir())
+    with pytest.raises(RecordingError, match=r"c\.campaign\.sqlite cannot be understood"):
+        run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert sorted((folder / "older").iterdir()) == older
+
+
+@pytest.mark.timeout(30)
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes as POSIX has them")
+def test_a_journal_that_is_a_pipe_is_not_waited_for(folder):
+    (folder / "c.campaign.sqlite").unlink()
+    os.mkfifo(folder / "c.campaign.sqlite")
+    with pytest.raises(RecordingError, match="is no file"):
+        read_journal(folder / "c.campaign.sqlite")
+
+
+def test_verifying_names_a_journal_that_cannot_be_read(folder):
+    said_by("UPDATE points SET measurement_json = '{}'")(folder)
+    bad = [each for each in verify_recordings(folder) if each.is_bad]
+    assert [(each.path, each.verdict) for each in bad] == [("c.campaign.sqlite", "unreadable")]
+
+
+def test_verifying_misses_recordings_of_a_folder_that_has_none_left(folder):
+    for path in (folder / "older").glob("*.h5"):
+        path.unlink()
+    bad = {each.path: each.verdict for each in verify_recordings(folder) if each.is_bad}
+    assert bad == dict.fromkeys(("older/one.h5", "older/two.h5", "older/three.h5"), "missing")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of any bytes, as Linux has them")
+def test_a_name_that_is_no_text_and_a_link_to_itself_spoil_no_list(folder):
+    shutil.copy(folder / "two.h5", os.fsdecode(os.fsencode(folder) + b"/\xff.h5"))
+    (folder / "circle.h5").symlink_to("circle.h5")
+    listed = {each.path: each.is_bad for each in list_recordings(folder) if "/" not in each.path}
+    assert listed == {
+        "one.h5": False, "two.h5": False, "three.h5": False, "\ufffd.h5": False, "circle.h5": True,
+    }  # fmt: skip
+    assert {each.path for each in verify_recordings(folder) if each.is_bad} == {"circle.h5"}
+
+
+RENAMED = CAMPAIGN.model_copy(update={"name": "d"})
+
+
+def test_a_campaign_that_got_another_name_counts_on_nothing_that_its_former_journal_disowns(bench, folder):
+    exchanged_for_an_older_one(folder)
+    made = run_campaign(bench, RENAMED, folder, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
+    assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
+
+
+def test_without_a_journal_recordings_of_another_bench_are_not_taken_for_its_own(new_bench, rig, folder):
+    other = new_bench(rig.model_copy(update={"name": "another bench"}))
+    with pytest.raises(CheckFailed, match=r"name was .* and is 'another bench'"):
+        run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME)
+    made = run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME, changed_bench="accept")
+    assert {each.outcome for each in made} == {PointOutcome.KEPT}

@@ -1,5 +1,6 @@
 """The files of a point: one an attempt, ``NAME.h5``, ``NAME.2.h5``, ..., none of them ever overwritten."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from ..errors import RecordingError
@@ -22,17 +23,18 @@ def next_attempt(folder: Path, name: str) -> Path:
 
 
 def complete_attempt(
-    folder: Path, name: str, measurement: Measurement, depth: SealDepth
+    folder: Path, name: str, measurement: Measurement, depth: SealDepth, seals: Mapping[str, str]
 ) -> KeptRecording | None:
     """Find a complete recording of a point; the last damaged one where there is no sound one, or None.
 
-    Raises RecordingError when one is complete, but was made by another plan.
+    ``seals`` are those that journals in the folder have of its files. Raises RecordingError when one is
+    complete, but was made by another plan.
     """
     damaged: KeptRecording | None = None
     for path in attempts_in(folder, name):
         if not path.exists():
             continue
-        found = looked_at(path, measurement, depth)
+        found = looked_at(path, measurement, depth, seals.get(path.name, ""))
         if found.damage:
             damaged = found
         if not found.is_complete:

@@ -37,7 +37,12 @@ class BenchIdentity(FrozenModel):
 
     def differences(self, now: "BenchIdentity") -> tuple[str, ...]:
         """Say in a clause each what differs in ``now``."""
-        return tuple(_differences("", self.model_dump(mode="json"), now.model_dump(mode="json")))
+        return differences(self.model_dump(mode="json"), now.model_dump(mode="json"))
+
+
+def differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
+    """Say in a clause each what differs between two descriptions."""
+    return tuple(_differences("", before, now))
 
 
 def _differences(place: str, before: Any, now: Any) -> Iterator[str]:

@@ -1,7 +1,9 @@
 """Whether a recording that lies in the folder may be counted on: held against its seal, plan and journal."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from pydantic import ValidationError
 
@@ -23,6 +25,8 @@ class KeptRecording:
     damage: str
     """A sentence on what is wrong with the file; empty for a sound one, or one without a seal."""
     is_of_this_plan: bool
+    rig: Mapping[str, Any] = field(default_factory=dict)
+    """The configuration of the bench that made it."""
 
     @property
     def is_complete(self) -> bool:
@@ -49,6 +53,7 @@ def looked_at(path: Path, measurement: Measurement, depth: SealDepth, seal: str 
                 found.seal,
                 damage,
                 is_made,
+                recording.bench,
             )
     except RecordingError as error:
         return KeptRecording(path, None, "", 0.0, "", str(error), is_of_this_plan=False)

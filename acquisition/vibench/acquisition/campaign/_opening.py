@@ -4,6 +4,7 @@ After a crash, journal and folder are brought together: what is true of the poin
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import assert_never
@@ -14,8 +15,8 @@ from ..plan import Campaign, Measurement, Point, played_alike, require_within_li
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run import drive_for
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
-from ._bench_identity import BenchIdentity
-from ._journal import Journal, journal_path
+from ._bench_identity import BenchIdentity, differences
+from ._journal import JOURNAL_SUFFIX, Journal, journal_path
 from ._journal_database import is_begun
 from ._journal_point import JournalPoint, JournalPointState, read_journal
 from ._kept_recording import KeptRecording, looked_at
@@ -47,10 +48,17 @@ def reconcile(journal: Journal, folder: Path) -> None:
 def found_recordings(points: Sequence[Point], folder: Path, depth: SealDepth) -> dict[str, KeptRecording]:
     """Find what lies in the folder already, for a campaign whose journal is lost, or older than journals.
 
-    Damaged recordings are among them. Raises RecordingError when a recording is complete, but was made by
+    Damaged recordings are among them, and those whose seal is not what any journal of the folder has: the
+    campaign may have got another name. Raises RecordingError when a recording is complete, but was made by
     another plan.
     """
-    found = {each.name: complete_attempt(folder, each.name, each.measurement, depth) for each in points}
+    seals: dict[str, str] = {}
+    for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
+        with suppress(RecordingError):
+            seals |= {each.file: each.seal for each in read_journal(journal) if each.seal}
+    found = {
+        each.name: complete_attempt(folder, each.name, each.measurement, depth, seals) for each in points
+    }
     return {name: kept for name, kept in found.items() if kept is not None}
 
 
@@ -162,6 +170,9 @@ def opened_journal(
             return _gone_on_with(path, campaign, identity, folder, changed)
         case ExistingRecordings.RESUME:
             found = found_recordings(campaign.points(), folder, SealDepth.WHOLE)
+            if changed is ChangedBench.REFUSE:
+                for kept in (each for each in found.values() if not each.damage):
+                    _require_no_differences(differences(kept.rig, bench.rig.model_dump(mode="json")))
             journal = Journal.begin(path, campaign, identity)
             for name, kept in found.items():
                 if kept.damage:
@@ -175,7 +186,10 @@ def opened_journal(
 
 def require_same_bench(begun_on: BenchIdentity, now: BenchIdentity) -> None:
     """Refuse to go on with a campaign on another bench; raises CheckFailed."""
-    found = begun_on.differences(now)
+    _require_no_differences(begun_on.differences(now))
+
+
+def _require_no_differences(found: tuple[str, ...]) -> None:
     if found:
         shown = "; ".join(found[:MOST_DIFFERENCES])
         more = f"; and {len(found) - MOST_DIFFERENCES} more" if len(found) > MOST_DIFFERENCES else ""
