@@ -124,6 +124,7 @@ def test_where_no_engine_runs_it_is_said():
     told = vibench("stop")
     assert told.returncode == 1
     assert "no engine is running; 'vibench measure' and 'vibench gui' start one" in told.stderr
+    assert f"looked for in {os.environ['VIBENCH_STATE_DIR']}" in told.stderr
 
 
 def test_where_the_state_folder_cannot_be_made_it_is_said(vibench_here, tmp_path):

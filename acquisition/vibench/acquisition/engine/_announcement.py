@@ -4,6 +4,8 @@ import socket
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
+from vibench.sim.operating_system import state_folder
+
 from ..stopping import (
     AnyProgram,
     Program,
@@ -84,7 +86,10 @@ def the_engine(pid: int | None) -> Announcement:
         raise EngineError(
             f"{wanted}; {_named(others)} drives a bench without one, and can only be stopped: 'vibench stop'"
         )
-    raise EngineError(f"{wanted}; 'vibench measure' and 'vibench gui' start one")
+    raise EngineError(
+        f"{wanted}; 'vibench measure' and 'vibench gui' start one. It was looked for in {state_folder()}: "
+        "one of another user, or with another VIBENCH_STATE_DIR, is stopped from there"
+    )
 
 
 def the_program(pid: int | None) -> Program:
