@@ -79,6 +79,11 @@ def stop(
                 "kept, and obeyed when it comes back; what it drives goes on until then: in an emergency "
                 "switch the amplifier off by hand"
             )
+        case StopDelivery.UNHEEDED:
+            raise EngineSilent(
+                f"{name} was told to stop ({level.value}), and goes on driving: an instrument hangs, or the "
+                "computer does. It stops when that ends; in an emergency switch the amplifier off by hand"
+            )
         case StopDelivery.TAKEN:
             console.print(f"{name}: has taken the stop ({level.value}) that was left for it.")
         case StopDelivery.TOLD if level is StopLevel.HOLD:

@@ -166,7 +166,7 @@ class PublishedState:
             for name, each in campaign.recordings()
         }
         self._put_rows(_queued(campaign))
-        self._put(state=EngineState.RUNNING, armed=None)
+        self._put(state=EngineState.RUNNING, armed=None, run=None)
 
     def tell(self, progress: CampaignProgress, bench: BenchFacts) -> None:
         """Show what a block has changed."""

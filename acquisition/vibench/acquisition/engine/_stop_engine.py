@@ -11,10 +11,13 @@ from ..host import chosen
 from ..stopping import Program, StopLevel, put_down
 from ._announcement import Announcement
 from ._client import EngineClient
-from ._errors import EngineError, EngineGone
+from ._errors import EngineError, EngineGone, EngineSilent
+from ._state import EngineState
 
 PATIENCE_S = 1.0
 """How long an engine may take to answer, and then to take what was put down; both take milliseconds [s]."""
+HEEDED_S = 5.0
+"""How long an engine that has answered may go on driving; a block and a setting are some tenths [s]."""
 LOOK_S = 0.02
 
 
@@ -25,6 +28,8 @@ class StopDelivery(StrEnum):
     """It has answered."""
     TAKEN = "taken"
     """It has taken the stop that was put down for it: it is no engine, or one that did not answer."""
+    UNHEEDED = "unheeded"
+    """It has answered, and goes on driving: whatever plays there hangs."""
     KEPT = "kept"
     """It did neither: its process lives, and obeys as soon as it comes back."""
 
@@ -71,7 +76,7 @@ def stop_engine(
             raise EngineGone(f"no stop could be left in the state folder for process {engine.pid}: {trouble}")
         return _taken_or_kept(engine, path)
     try:
-        _tell(engine, level, reason)
+        delivery = _tell(engine, level, reason)
     except EngineError as error:
         if path is not None:
             return _taken_or_kept(engine, path)
@@ -81,7 +86,7 @@ def stop_engine(
     if path is not None:
         with suppress(OSError):
             path.unlink()
-    return StopDelivery.TOLD
+    return delivery
 
 
 def _put_down(engine: Program, level: StopLevel, reason: str) -> tuple[Path | None, str]:
@@ -91,13 +96,32 @@ def _put_down(engine: Program, level: StopLevel, reason: str) -> tuple[Path | No
         return None, str(error)
 
 
-def _tell(engine: Announcement, level: StopLevel, reason: str) -> None:
+def _tell(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:
     with EngineClient.attach(engine.address, patience_s=PATIENCE_S) as client:
         client.stop(level, reason)
+        try:
+            if level is StopLevel.HOLD or _until(lambda: _heeds(client), HEEDED_S):
+                return StopDelivery.TOLD
+        except EngineSilent:
+            return StopDelivery.UNHEEDED
+        except EngineGone:  # a command's engine ends with what it drove
+            return StopDelivery.TOLD
+    return StopDelivery.UNHEEDED
+
+
+def _heeds(client: EngineClient) -> bool:
+    status = client.status()
+    match status.state:
+        case EngineState.CHECKING:
+            return False
+        case EngineState.RUNNING | EngineState.HELD:  # before its first run, and between two, nothing plays
+            return status.run is None or status.run.amplitude_vpp == 0.0
+        case _:
+            return True
 
 
 def _taken_or_kept(engine: Program, path: Path) -> StopDelivery:
-    if _until(lambda: not path.exists()):
+    if _until(lambda: not path.exists(), PATIENCE_S):
         return StopDelivery.TAKEN
     if engine.is_alive:
         return StopDelivery.KEPT
@@ -106,8 +130,8 @@ def _taken_or_kept(engine: Program, path: Path) -> StopDelivery:
     raise EngineGone(f"process {engine.pid} ({engine.what}) has ended; look at the bench")
 
 
-def _until(is_so: Callable[[], bool]) -> bool:
-    give_up_s, pause = monotonic() + PATIENCE_S, Event()
+def _until(is_so: Callable[[], bool], within_s: float) -> bool:
+    give_up_s, pause = monotonic() + within_s, Event()
     while not is_so():
         if monotonic() > give_up_s:
             return False

@@ -1,0 +1,62 @@
+"""Who stops an engine is told whether what it drives has heeded that."""
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import Block, StopLevel
+from vibench.acquisition.campaign import CampaignProgress
+from vibench.acquisition.engine import (
+    BenchFacts,
+    Engine,
+    EngineState,
+    JobQueue,
+    RequestHandler,
+    StopDelivery,
+    Supervision,
+    _stop_engine,
+    serving,
+    stop_engine,
+    the_engine,
+)
+from vibench.acquisition.engine._status import ChannelFacts
+from vibench.acquisition.plan import RunState
+from vibench.acquisition.run import Progress
+
+from .conftest import campaign
+
+CHANNEL = ChannelFacts(role="m0_velocity", unit="m/s", units_per_volt=0.1, full_scale_v=5.0)
+BENCH = BenchFacts(
+    rig_name="bench", is_simulated=True, identities={}, channels=(CHANNEL,), sample_rate_hz=1000.0
+)
+
+
+@pytest.fixture
+def driving(tmp_path, monkeypatch):
+    """An engine whose run has told of a block at 1.5 Vpp, and then of nothing more."""
+    monkeypatch.setattr(_stop_engine, "HEEDED_S", 0.3)
+    engine = Engine(Supervision.UNATTENDED)
+    run = Progress(RunState.RECORDING, None, Block(0, np.zeros((1, 100))), 0.1, 10.0, 1.5, 260.0)
+    engine.published.begin(campaign("point"), tmp_path)
+    engine.published.tell(CampaignProgress("point", 1, 1, tmp_path / "point.h5", run), BENCH)
+    with serving(RequestHandler(engine, JobQueue(engine)), "night"):
+        yield engine
+
+
+def test_where_a_run_hangs_with_the_drive_on_a_stop_is_not_called_done(driving):
+    assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.UNHEEDED
+    assert driving.switch.request.level is StopLevel.ABORT
+
+
+@pytest.mark.parametrize("state", [EngineState.RAMPING_DOWN, EngineState.READY, EngineState.FAULT])
+def test_a_run_that_ends_has_heeded_it(driving, state):
+    driving.published.enter(state)
+    assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD
+
+
+def test_before_the_first_run_of_a_campaign_nothing_plays(driving, tmp_path):
+    driving.published.begin(campaign("point"), tmp_path)
+    assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD
+
+
+def test_a_hold_is_only_told(driving):
+    assert stop_engine(the_engine(None), "hold") is StopDelivery.TOLD
