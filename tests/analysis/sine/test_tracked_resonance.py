@@ -4,8 +4,13 @@ import math
 
 import pytest
 
-from vibench.acquisition.recording import DwellNote, ResonanceNote
-from vibench.analysis.sine import backbone_sentence, lost_levels, tracked_resonances
+from vibench.acquisition.recording import DwellNote, ResonanceNote, Steadiness
+from vibench.analysis.sine import (
+    backbone_sentence,
+    feedback_sentences,
+    lost_levels,
+    tracked_resonances,
+)
 
 
 def note(number, base, frequency_hz, **more):
@@ -49,6 +54,18 @@ def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
     assert [each.number for each in tracked_resonances(notes)] == [0]
     assert lost_levels(notes) == (2.0, 3.0)
     assert tracked_resonances([lost(0, 1.0)]) == ()
+
+
+def test_a_level_that_was_not_met_says_in_how_many_periods_and_what_was_there_instead():
+    missed = note(1, 0.3, None, frequency_u_hz=None, lock="not met within the tries", periods=150)
+    moved = missed.model_copy(update={"phase_deg": -86.4, "at_hz": 96.351, "motion": Steadiness.UNSETTLED})
+    met = note(2, 0.4, 98.6, periods=120)
+    found, not_found = feedback_sentences([met, moved])
+    assert found == "Phase resonance at 98.600 ± 0.060 Hz (0.4 m/s², 120 periods)."
+    assert not_found == (
+        "No phase resonance at 0.3 m/s²: not met within the tries; after 150 periods the phase was -86.4° at "
+        "96.351 Hz, the level within tolerance, the motion unsettled."
+    )
 
 
 @pytest.mark.parametrize(

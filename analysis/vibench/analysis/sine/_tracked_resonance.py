@@ -91,8 +91,13 @@ def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
 def _resonance(note: ResonanceNote) -> str:
     level = f"{note.asked_m_per_s2:g} m/s²"
     if note.frequency_hz is None or note.frequency_u_hz is None:
-        return f"No phase resonance at {level}: {note.lock.value}."
-    text = f"Phase resonance at {plus_minus(note.frequency_hz, 2 * note.frequency_u_hz)} Hz ({level})"
+        after = f"after {note.periods} periods " if note.periods else ""
+        return (
+            f"No phase resonance at {level}: {note.lock.value}; {after}the phase was {note.phase_deg:.1f}° "
+            f"at {note.at_hz:.5g} Hz, the level {note.held.value}, the motion {note.motion.value}."
+        )
+    took = f", {note.periods} periods" if note.periods else ""
+    text = f"Phase resonance at {plus_minus(note.frequency_hz, 2 * note.frequency_u_hz)} Hz ({level}{took})"
     if note.mode_hz is None or note.mode_u_hz is None:
         return f"{text}."
     return (
