@@ -2,6 +2,8 @@
 
 import json
 import sys
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +12,8 @@ from vibench.acquisition.campaign import CampaignEstimate
 from vibench.cli.measure import estimate_text
 
 from .killed_campaign import short_points, slow_rig
+
+HARDWARE_CONFIGS = Path(__file__).parents[2] / "hardware_configs"
 
 
 def test_an_estimate_is_one_json_document_and_makes_nothing(vibench_here, tmp_path):
@@ -84,6 +88,9 @@ def test_an_estimate_in_words_names_lead_ins_and_a_disk_that_is_too_small():
     assert rest == "0:02:00 of it are silence between recordings"
     assert second == "0:01:00 of it lead to points along their chains"
     assert third.startswith("The disk may be full before the end")
+    # Feedback ends when it has found what it searches for.
+    searching = estimate_text(replace(expected, searching=1))
+    assert searching.startswith("3 recordings (2 kept), at most 1:02:03 (h:min:s) of rig time")
 
 
 def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench_here, tmp_path):
@@ -92,6 +99,18 @@ def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench_
     assert result.returncode == 1
     assert "close every quotation mark" in result.stderr
     assert not list(tmp_path.glob("out/*.h5*"))
+
+
+def test_an_estimate_refuses_a_branch_that_the_fast_loop_does_not_hold_with_the_number(
+    vibench_here, tmp_path
+):
+    usual = (HARDWARE_CONFIGS / "virtual_rig_controller.toml").read_text(encoding="utf-8")
+    bench = tmp_path / "late.toml"
+    bench.write_text(usual.replace("latency_s = 3e-4", "latency_s = 2e-3"), encoding="utf-8")
+    result = vibench_here("measure", "branch", "--bench", bench, "--out", "out", "--estimate", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "largest multiplier is 1.21 at 116.29 Hz" in result.stderr
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_estimate_says_that_a_bench_lacks_what_a_plan_is_played_with(vibench_here, tmp_path):

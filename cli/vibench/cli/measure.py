@@ -77,7 +77,8 @@ def expected_of(campaign: Campaign, rig: Rig) -> dict[str, tuple["Expected", ...
 
 def estimate_text(expected: CampaignEstimate) -> str:
     """Put an estimate into a few lines."""
-    length = timedelta(seconds=round(expected.duration_s))
+    most = "at most " if expected.searching else ""
+    length = f"{most}{timedelta(seconds=round(expected.duration_s))}"
     kept = f" ({expected.kept} kept)" if expected.kept else ""
     room = f"about {expected.total_bytes / 1e6:.0f} MB; {expected.free_bytes / 1e6:.0f} MB are free"
     count = "1 recording" if expected.recordings == 1 else f"{expected.recordings} recordings"

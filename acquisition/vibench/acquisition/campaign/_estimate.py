@@ -4,6 +4,8 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..control import require_holdable
+from ..excitation import AbstractFeedback
 from ..plan import BYTES_PER_SAMPLE, Campaign, measured_s, require_played
 from ..rig import Rig, channels_of
 from ._opening import planned_recordings
@@ -33,6 +35,8 @@ class CampaignEstimate:
     """Of all recordings, finished."""
     free_bytes: int
     """On the disk of the folder, now."""
+    searching: int = 0
+    """How many of the recordings end sooner where their feedback needs less than its longest searches."""
 
     @property
     def needed_bytes(self) -> int:
@@ -56,12 +60,16 @@ def estimate_campaign(
         When the folder holds recordings of the campaign and ``existing`` refuses that.
     ConfigurationError
         When the rig lacks what a measurement is played with.
+    LimitExceeded
+        When its fast loop does not hold the motions that one asks for.
 
     """
     for each in campaign.measurements:
         require_played(each, rig)
     planned = planned_recordings(campaign, folder, existing)
     missing = [each.measurement for each in planned if not each.is_complete]
+    for each in missing:
+        require_holdable(each, rig)
     durations_s = [measured_s(each) for each in missing]
     bytes_per_s = rig.daq.sample_rate_hz * len(channels_of(rig)) * BYTES_PER_SAMPLE
     rest_s = campaign.rest_s * max(0, len(missing) - 1)
@@ -74,6 +82,7 @@ def estimate_campaign(
         largest_bytes=round(max(durations_s, default=0.0) * bytes_per_s),
         total_bytes=round(sum(durations_s) * bytes_per_s * WRITTEN_SHARE),
         free_bytes=shutil.disk_usage(_existing_part(folder)).free,
+        searching=sum(isinstance(each.excitation, AbstractFeedback) for each in missing),
     )
 
 

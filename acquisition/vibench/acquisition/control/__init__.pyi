@@ -6,3 +6,4 @@ from ._controllers import (
     CONTROLLERS as CONTROLLERS,
     feedback_controller as feedback_controller,
 )
+from ._fast_loop import require_holdable as require_holdable

@@ -21,7 +21,7 @@ from vibench.sim.feedback import (
 from ..errors import ConfigurationError, LimitExceeded
 from ..excitation import BranchContinuation
 from ..instruments import LoopBlock, LoopFeedback
-from ..plan import fast_loop_time_s
+from ..plan import Measurement, fast_loop_time_s
 from ..rig import ControllerConfig, Rig, amplifier_of, shaker_of, specimen_of
 
 Coefficients = NDArray[np.complex128]
@@ -79,6 +79,13 @@ def fast_loop(rig: Rig) -> FastLoop:
     timing = LoopTiming(controller.rate_hz, controller.latency_s)
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), timing)
     return FastLoop(rig, plant, designed_law(plant))
+
+
+def require_holdable(measurement: Measurement, rig: Rig) -> None:
+    """Refuse a measurement whose motions the rig's fast loop does not hold, see `require_held`."""
+    match measurement.excitation:
+        case BranchContinuation() as plan:
+            require_held(fast_loop(rig), plan)
 
 
 def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
