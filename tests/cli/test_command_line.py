@@ -204,6 +204,77 @@ def test_a_number_with_its_unit_is_refused_with_what_was_given_and_what_may_stan
 
 @pytest.mark.parametrize(
     ("words", "said"),
+    [
+        (("stop", "--level", "hard"), "'--level': 'hard' is not one of 'hold', 'ramp', 'abort', 'off'"),
+        (("--log-level", "loud", "doctor"), "'--log-level': 'loud' is not one of 'warning', 'info', 'debug'"),
+        (("analyse", "x.h5", "--draws=-3"), "-3"),
+        (("analyse", "x.h5", "--draws", "1e9"), "'1e9'"),
+        (("analyse", "x.h5", "--draws", "many"), "'many' is no number"),
+    ],
+)
+def test_a_word_or_number_that_is_not_allowed_is_refused_with_what_was_given(
+    vibench_here, tmp_path, words, said
+):
+    result = vibench_here(*words, cwd=tmp_path)
+    assert result.returncode == 2
+    assert said in " ".join(result.stderr.replace("│", " ").split())
+
+
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        (("measure", "quick", "--out", ""), "--out"),
+        (("measure", "quick", "--out="), "--out"),
+        (("examples", "--copy", ""), "--copy"),
+        (("specimen", ""), "an argument"),
+        (("export", "a.h5", "--to", "csv", "--channels", ""), "--channels"),
+        (("bench", "new", ""), "an argument"),
+    ],
+)
+def test_nothing_is_no_path_and_no_name(vibench_here, tmp_path, words, place):
+    """An empty variable of the shell filled the folder that the user stood in."""
+    result = vibench_here(*words, cwd=tmp_path)
+    assert result.returncode == 2
+    assert f"{place} was given as '', with nothing in it" in " ".join(result.stderr.replace("│", " ").split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_may_end_with_an_equals_sign(vibench_here, tmp_path):
+    assert "no specimen is called 'x='" in vibench_here("specimen", "x=", cwd=tmp_path).stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("specimen", "--toml"), "--toml was given without a specimen"),
+        (
+            ("predict", "--amplitude", "1e-6", "--frequency", "9", "--resume"),
+            "--resume was given without --out",
+        ),
+        (
+            ("export", "a.h5", "--to", "uff", "--quantity", "velocity"),
+            "--quantity was given without --spectra",
+        ),
+    ],
+)
+def test_an_option_that_would_do_nothing_is_refused(vibench_here, tmp_path, words, said):
+    result = vibench_here(*words, cwd=tmp_path)
+    assert result.returncode == 1
+    assert said in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize("words", [("tradeoff",), ("reproduce", "--out", "new")])
+def test_a_page_that_is_a_folder_is_refused_before_anything_is_computed(vibench_here, tmp_path, words):
+    (tmp_path / "pages").mkdir()
+    result = vibench_here(*words, "--markdown", "pages", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "pages is a folder. Nothing was computed; give the name of a page" in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
     [(("--json",), "add --estimate"), (("--notify", "no-such-program --now"), "is no program")],
 )
 def test_options_that_make_no_sense_play_nothing(vibench_here, tmp_path, words, said):

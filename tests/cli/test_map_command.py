@@ -95,7 +95,7 @@ def test_a_basin_says_why_its_boundary_has_no_exponent(vibench_here, tmp_path, t
 def test_fewer_kicks_than_none_are_refused_before_anything_is_computed(vibench_here, tmp_path):
     found = vibench_here("map", plan(tmp_path, BASIN), "--out", "a", "--kicks", "-3", cwd=tmp_path)
     assert found.returncode == 2
-    assert "'--kicks': Input should be greater than or equal to 0" in found.stderr
+    assert "'--kicks': '-3' was given; it should be greater than or equal to 0" in found.stderr
     assert not (tmp_path / "a").exists()
 
 

@@ -7,7 +7,8 @@ import errno
 import importlib
 import logging
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib.metadata import version
@@ -58,22 +59,39 @@ class LateCommand(TyperCommand):
         """Read the arguments as the command itself does."""
         command = typer.main.get_command(self._place.load())
         command.name = self.name
-        try:
+        with told_in_full([] if named.get("resilient_parsing") else args):
             return command.make_context(info_name, [*args], *given, **named)
-        except typer.BadParameter as error:
-            _name_what_was_given(error, args)
-            raise
 
 
-def _name_what_was_given(error: typer.BadParameter, args: Sequence[str]) -> None:
-    """Say of an option that takes a number what stands there and what may."""
-    option = error.param
-    if option is None or not any(kind in error.message for kind in ("number", "float", "integer")):
+@contextmanager
+def told_in_full(args: Sequence[str]) -> Iterator[None]:
+    """Refuse arguments with nothing in them, and say of an option what stands there and what may."""
+    words = ["", *(part for each in args for part in (each.split("=", 1) if each[:2] == "--" else [each]))]
+    empty = next((before for before, word in pairwise(words) if not word), None)
+    if empty is not None:
+        place = empty if empty.startswith("--") else "an argument"
+        raise typer.BadParameter(
+            f"{place} was given as '', with nothing in it; give a value, or leave it out. A variable of the "
+            "shell that is not set leaves nothing there."
+        )
+    try:
+        yield
+    except typer.BadParameter as error:
+        _name_what_was_given(error, words)
+        raise
+
+
+def _name_what_was_given(error: typer.BadParameter, words: Sequence[str]) -> None:
+    error.message = error.message.removeprefix("Value error, ")
+    names = () if error.param is None else error.param.opts
+    given = next((word for before, word in pairwise(words) if before in names), None)
+    if given is None:
         return
-    for word, following in pairwise([*(part for each in args for part in each.split("=", 1)), ""]):
-        if word in option.opts and not _is_number(following):
-            advice = "give one in SI units and without their names, such as 5 or 5e-6"
-            error.message = f"{following!r} is no number; {advice}."
+    if any(kind in error.message for kind in ("number", "float", "integer")) and not _is_number(given):
+        advice = "give one in SI units and without their names, such as 5 or 5e-6"
+        error.message = f"{given!r} is no number; {advice}."
+    elif error.message.startswith("Input should be "):
+        error.message = f"{given!r} was given; it {error.message.removeprefix('Input ').partition(', ')[0]}."
 
 
 def _is_number(text: str) -> bool:
@@ -91,6 +109,10 @@ def late_commands(places: Mapping[str, Place]) -> type[TyperGroup]:
         def __init__(self, **settings: Any) -> None:
             super().__init__(**settings)
             self.commands = {name: LateCommand(name, place) for name, place in places.items()}
+
+        def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
+            with told_in_full([] if named.get("resilient_parsing") else args):
+                return super().make_context(info_name, args, *given, **named)
 
     return LateCommands
 

@@ -8,6 +8,7 @@ import typer
 from vibench.acquisition import open_recording
 from vibench.analysis import (
     FrequencyResponseRequest,
+    InvalidRequest,
     MagnitudeScale,
     quantities_named,
     spectral_functions,
@@ -48,17 +49,26 @@ def export(
         ),
     ] = False,
     quantity: Annotated[
-        str,
-        typer.Option("--quantity", help="Of m0 over base, for --spectra: as in 'vibench analyse'."),
-    ] = "displacement",
+        str | None,
+        typer.Option(
+            "--quantity",
+            help="Of m0 over base, for --spectra: as in 'vibench analyse'; displacement if absent.",
+        ),
+    ] = None,
     allow_external: AllowExternal = False,
 ) -> None:
     """Write a recording's samples or spectra, with units, as a file that other programs read."""
+    if quantity is not None and not spectra:
+        raise InvalidRequest(
+            "--quantity was given without --spectra, and samples are of every channel; give both"
+        )
     with external_data(allow_external), open_recording(recording) as opened:
-        chosen = excerpt(opened, tuple(channels.split(",")) if channels else (), from_s, to_s)
+        chosen = excerpt(
+            opened, tuple(each.strip() for each in channels.split(",")) if channels else (), from_s, to_s
+        )
         path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
         if spectra:
-            view = quantities_named(quantity, MagnitudeScale.LOG)
+            view = quantities_named(quantity or "displacement", MagnitudeScale.LOG)
             functions = spectral_functions(chosen, FrequencyResponseRequest(view=view))
             _tell(export_functions(chosen, functions, to, path))
             return

@@ -57,6 +57,16 @@ def room_for_folder(path: Path) -> None:
         ) from error
 
 
+def room_for_page(path: Path) -> None:
+    """Refuse a page that cannot be written, before anything is computed for it.
+
+    Raises ConfigurationError when it is a folder, or its folder cannot be made.
+    """
+    if path.is_dir():
+        raise ConfigurationError(f"{path} is a folder. Nothing was computed; give the name of a page in it")
+    room_for_folder(path.parent)
+
+
 def unused(path: Path) -> Path:
     """Give a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
     candidate, number = path, 1

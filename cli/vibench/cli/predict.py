@@ -96,6 +96,8 @@ def predict(
     as_json: AsJson = False,
 ) -> None:
     """Predict the responses of m0 and of p over frequency."""
+    if resume and out is None:
+        raise InvalidRequest("--resume was given without --out, and only a file is gone on with; give both")
     asked = _study(
         {
             "specimen": described(specimen),

@@ -25,7 +25,7 @@ from vibench.analysis.reproduction import (
 from vibench.sim import Accuracy
 
 from .output import bold, console
-from .paths import room_for_folder
+from .paths import room_for_folder, room_for_page
 from .study import KeptStudies, Workers
 
 PAGE = "reproduction.md"
@@ -51,12 +51,12 @@ def reproduce(
 ) -> None:
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
-    for folder in (out, *([] if markdown is None else [markdown.parent])):
-        room_for_folder(folder)
+    room_for_folder(out)
+    page = out / PAGE if markdown is None else markdown
+    room_for_page(page)
     studies = KeptStudies(out / "studies", workers)
     evidence = Evidence(studies)
     found = reproduction(SECTIONS, evidence, options, lambda step: console.print(f"measuring {step}"))
-    page = out / PAGE if markdown is None else markdown
     page.parent.mkdir(parents=True, exist_ok=True)
     pictures = tuple(_pictures(found, evidence, options, page))
     page.write_text(reproduction_document(found, pictures), encoding="utf-8")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import toml_text
+from vibench.analysis import InvalidRequest
 from vibench.sim import CONTACT_LAWS, Specimen, shipped_specimens
 
 from .output import bold, console, print_json
@@ -39,6 +40,10 @@ def show_specimen(
     if forces is not None:
         _draw(specimen, forces)
         return
+    if specimen is None and as_toml:
+        raise InvalidRequest(
+            f"--toml was given without a specimen; name a file, or one of {', '.join(shipped_specimens())}"
+        )
     if specimen is None:
         _list(as_json)
         return

@@ -24,7 +24,7 @@ from vibench.sim.accuracy_benchmark import (
 )
 
 from .output import console, errors, print_json, words
-from .paths import AsJson, room_for_folder
+from .paths import AsJson, room_for_folder, room_for_page
 
 _SHORTEST_S = 0.05
 _LONGEST_S = 60.0
@@ -50,6 +50,8 @@ def tradeoff(
     folder = _folder(out, markdown)
     if folder is not None:
         room_for_folder(folder)
+    if markdown is not None:
+        room_for_page(markdown)
     columns = (words("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
     with Progress(*columns, TimeElapsedColumn(), console=errors) as bars:
         bar = bars.add_task("", total=_STEPS)
