@@ -291,3 +291,28 @@ def test_a_name_is_shown_as_it_is_whatever_it_looks_like(vibench_here, tmp_path,
     bars = Progress(words("{task.description}"), console=errors)
     bars.add_task(name)
     assert bars.columns[0].render(bars.tasks[0]).plain == name
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("spectrum", "--frequency", "240"),
+        ("branches", "--frequency", "85:130"),
+        ("chain", "--cells", "2", "--frequency", "100"),
+    ],
+)
+def test_micrometres_typed_as_metres_are_doubted_by_every_command(vibench_here, tmp_path, words):
+    """What would compute for minutes is refused here, after the doubt, by where its answer was to go."""
+    (tmp_path / "file").write_text("no folder", encoding="utf-8")
+    given = ("--amplitude", "5", "--gap", "45", "--out", "file")
+    said = vibench_here(*words, *given, cwd=tmp_path).stderr
+    assert "warning: a gap of 45 m is wide for a specimen on a shaker" in said
+    said = vibench_here(*words, *given[:2], *given[4:], cwd=tmp_path).stderr
+    assert "warning: an amplitude of 5 m is 1.1e+05 times the gap" in said
+    assert "if 5 micrometres were meant, give 5e-06" in said
+
+
+def test_micrometres_typed_as_metres_are_doubted_in_a_map(vibench_here, tmp_path):
+    (tmp_path / "map.toml").write_text("gap_m = 45\namplitude_m = { start = 1, stop = 50, points = 5 }\n")
+    said = vibench_here("map", "map.toml", "--out", "map", "--estimate", cwd=tmp_path).stderr
+    assert "warning: a gap of 45 m" in said

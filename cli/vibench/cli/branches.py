@@ -116,6 +116,7 @@ def branches(
         model,
         damping_time,
         gap,
+        amplitude,
         method=method,
         harmonics=harmonics,
         places=places,

@@ -85,6 +85,7 @@ def chain(
         model,
         damping_time,
         gap,
+        amplitude,
         others=tuple(described(each) for each in others),
         lengths=_lengths(cells),
         **_drive(amplitude, frequency, recording),

@@ -14,17 +14,18 @@ from vibench.sim.maps import (
     KickStability,
     Map,
     MapResults,
+    Range,
     UncertaintyExponent,
     estimate_map,
     kick_stability,
     solve_map,
     uncertainty_exponent,
 )
-from vibench.sim.study import ExistingStudy
+from vibench.sim.study import ExistingStudy, plausibility_warnings
 
 from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
-from .output import bold, console, print_json
+from .output import bold, console, print_json, print_warnings
 from .paths import AsJson, room_for_folder
 from .progress_bars import study_bar
 from .study import Cluster, Workers, complain_about_points
@@ -76,6 +77,8 @@ def map_motions(
 ) -> None:
     """Map the motions over two parameters or two coordinates of the start, or along one parameter."""
     asked = load_toml(named(plan, "studies/maps"), Map)
+    gaps_m = asked.specimen.specimen().gaps_m if asked.gap_m is None else _ends(asked.gap_m)
+    print_warnings(plausibility_warnings(_ends(asked.amplitude_m), gaps_m))
     if show not in (None, *SHOWN):
         raise InvalidRequest(f"--show was given as {show!r}; there are {', '.join(SHOWN)}")
     if only_estimate:
@@ -114,6 +117,10 @@ def map_motions(
         tell(results, stability)
         console.print("The figure:", bold(drawn[0].resolve()))
     complain_about_points(results)
+
+
+def _ends(given: float | Range) -> tuple[float, ...]:
+    return (given.start, given.stop) if isinstance(given, Range) else (given,)
 
 
 def tell(results: MapResults, stability: tuple[KickStability, ...]) -> None:

@@ -112,7 +112,9 @@ def predict(
             "budget_s": _budget(budget),
         }
     )
-    print_warnings(plausibility_warnings(asked))
+    print_warnings(
+        plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
+    )
     began = time.monotonic()
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:

@@ -15,6 +15,9 @@ from vibench.sim import (
     shipped_specimens,
     usual_specimen,
 )
+from vibench.sim.study import plausibility_warnings
+
+from .output import print_warnings
 
 SPECIMENS_HELP = "A specimen's file, or one of these: " + "; ".join(
     f"{name} ({each.about})" for name, each in shipped_specimens().items()
@@ -57,18 +60,24 @@ def asked_of_specimen(
     model: str | None,
     damping_time: float | None,
     gap: float | None,
+    amplitude: str | None,
     **options: Any,
 ) -> Asked:
     """Make a question about a specimen, or say in one sentence which option is not allowed.
+
+    Warns of amplitudes and gaps that look like a slip; ``amplitude`` is what was typed, read before.
 
     Raises InvalidRequest with what was given.
     """
     replaced = {"model": model, "damping_time_s": damping_time, "gap_m": gap}
     given = {name: value for name, value in replaced.items() if value is not None}
     try:
-        return kind.model_validate({"described": described(specimen), **given, **options})
+        made = kind.model_validate({"described": described(specimen), **given, **options})
     except ValidationError as error:
         first = error.errors()[0]
         said = first["msg"].removeprefix("Value error, ")
         place = ".".join(str(each) for each in first["loc"])
         raise InvalidRequest(f"{place} was given as {first['input']!r}: {said}" if place else said) from error
+    ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])
+    print_warnings(plausibility_warnings(ends_m, made.shaken.gaps_m))
+    return made

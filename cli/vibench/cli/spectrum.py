@@ -57,6 +57,7 @@ def spectrum(
         model,
         damping_time,
         gap,
+        amplitude,
         **_drive(a, f),
         accuracy=accuracy,
         duration_s=duration,

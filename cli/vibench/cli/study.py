@@ -55,7 +55,9 @@ def study(
 ) -> None:
     """Predict responses over every combination of what a file lists, longest first."""
     asked = load_toml(named(plan, "studies"), Study)
-    print_warnings(plausibility_warnings(asked))
+    print_warnings(
+        plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
+    )
     if only_estimate:
         tell_work(asked, as_json)
         return
