@@ -34,6 +34,7 @@ from .model import (
     base_response as base_response,
     base_transmissibility as base_transmissibility,
     bound_matrices as bound_matrices,
+    fault_in_words as fault_in_words,
     gong2025 as gong2025,
     hertz_stiffness as hertz_stiffness,
     load_specimen as load_specimen,

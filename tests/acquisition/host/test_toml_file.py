@@ -1,7 +1,9 @@
 """A file's faults are told by the keys of the file, whatever they are called."""
 
+from typing import Annotated
+
 import pytest
-from pydantic import PositiveFloat
+from pydantic import AwareDatetime, Field, PositiveFloat
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.errors import ConfigurationError
@@ -68,3 +70,51 @@ def test_the_kind_that_was_meant_gives_the_key(tmp_path, text, told):
         load_toml(file, Plan)
     assert str(refused.value).startswith(f"{file}: {told}")
     assert ";" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("name", '"my campaign"'), "name = 'my campaign': it names a file; give 1 to 64 letters"),
+        (("name", '""'), "name = '': it names a file"),
+        (("name", "3"), "name = 3: give text, in quotes"),
+        (("rest_s", "2026-01-01"), "rest_s = 2026-01-01: "),
+    ],
+)
+def test_a_newcomers_campaign_is_refused_in_words_of_toml(tmp_path, change, told):
+    given = {"name": '"mine"', change[0]: change[1]}
+    file = tmp_path / "campaign.toml"
+    file.write_text("\n".join(f"{key} = {value}" for key, value in given.items()))
+    with pytest.raises(ConfigurationError) as refused:
+        load_campaign(file)
+    assert told in str(refused.value)
+    assert "pattern" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("few = []\n", "few = []: give 1 or more of them, not 0"),
+        ("few = [1.0, 2.0, 3.0]\n", "few = [1.0, 2.0, 3.0]: give 2 of them or fewer, not 3"),
+        ("pair = [1.0, 2.0, 3.0]\n", "pair = [1.0, 2.0, 3.0]: give 2 of them or fewer, not 3"),
+        ('label = ""\n', "label = '': give text of 1 or more letters"),
+        ('label = "abcd"\n', "label = 'abcd': give 3 letters or fewer"),
+        ("number = 2.5\n", "number = 2.5: give a whole number"),
+        ("began = 2026-01-01\n", "began = 2026-01-01: give a date, time and time zone, such as 2026-"),
+        ("began = 2026-01-01T00:00:00\n", "began = 2026-01-01T00:00:00: give a date, time and time zone"),
+        ('began = "yesterday"\n', "began = 'yesterday': give a date, time and time zone"),
+    ],
+)
+def test_what_a_value_should_be_is_said_without_a_word_of_python(tmp_path, text, told):
+    class Words(FrozenModel):
+        few: Annotated[tuple[float, ...], Field(min_length=1, max_length=2)] = (1.0,)
+        pair: tuple[float, float] = (1.0, 2.0)
+        label: Annotated[str, Field(min_length=1, max_length=3)] = "a"
+        number: int = 1
+        began: AwareDatetime | None = None
+
+    file = tmp_path / "words.toml"
+    file.write_text(text)
+    with pytest.raises(ConfigurationError) as refused:
+        load_toml(file, Words)
+    assert str(refused.value).startswith(f"{file}: {told}")

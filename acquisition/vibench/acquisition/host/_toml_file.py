@@ -1,16 +1,16 @@
 """TOML files: read and validated, or refused with file, key and what is allowed; written to be read back."""
 
 import json
-import re
 import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import date
 from itertools import compress
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from vibench.sim import UnreadableTomlError, toml_table
+from vibench.sim import UnreadableTomlError, fault_in_words, toml_table
 
 from ..errors import ConfigurationError
 from ._schema import FORMAT, VERSION, schema_line
@@ -260,29 +260,8 @@ def _key(detail: Any) -> str:
     return shortened(".".join(str(part) for part in detail["loc"]), 120) or "the whole file"
 
 
-_ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
-"""A word as Python shows it, ``<Start.UP: 'up'>``."""
-
-
-_LIST, _TABLE = "give a list, in square brackets", "give a table"
-_IN_WORDS_OF_TOML = {
-    "list_type": _LIST,
-    "tuple_type": _LIST,
-    "dict_type": _TABLE,
-    "model_type": _TABLE,
-    "model_attributes_type": _TABLE,
-    "float_parsing": "give a number",
-    "int_parsing": "give a whole number",
-    "union_tag_not_found": "{discriminator} is missing: it says what this is",
-    "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
-}
-"""What pydantic says in words of Python, by its type of fault."""
-
-
 def _complaint(detail: Any) -> str:
-    plain = _IN_WORDS_OF_TOML.get(detail["type"])
-    said = str(detail["msg"]) if plain is None else plain.format(**detail.get("ctx", {}))
-    reason = _ENUM_MEMBER.sub(r"\1", shortened(said.removeprefix("Value error, ")))
+    reason = shortened(fault_in_words(detail))
     if not detail["loc"]:
         return reason
     return f"{_key(detail)} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
@@ -291,7 +270,13 @@ def _complaint(detail: Any) -> str:
 def _shown(value: object) -> str:
     longest = 60
     # Written whole, a list of a million numbers would take longer than all else.
-    text = reprlib.repr(value) if isinstance(value, list | tuple | dict) else repr(value)
+    match value:
+        case list() | tuple() | dict():
+            text = reprlib.repr(value)
+        case date():
+            text = value.isoformat()
+        case _:
+            text = repr(value)
     return text if len(text) <= longest else f"{text[:longest]}..."
 
 

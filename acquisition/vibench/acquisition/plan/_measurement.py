@@ -3,16 +3,26 @@
 A point: one recording that a campaign wants, and the chain of points that it belongs to.
 """
 
+import re
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated, Self
 
-from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt, model_validator
 
 from ..excitation import Excitation
 from ..host import FrozenModel
 
-Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")]
+_NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
+
+
+def _is_of_a_file(said: object) -> object:
+    if isinstance(said, str) and re.search(_NAME, said) is None:
+        raise ValueError("it names a file; give 1 to 64 letters a to z, digits, _ and -, not _ or - first")
+    return said
+
+
+Name = Annotated[str, Field(pattern=_NAME), BeforeValidator(_is_of_a_file)]
 """Becomes part of a file's name: letters, digits, ``_`` and ``-``, at most 64 of them."""
 
 LONGEST_S = 30 * 86400.0

@@ -87,6 +87,7 @@ from ._state import (
 )
 from ._toml_table import (
     UnreadableTomlError as UnreadableTomlError,
+    fault_in_words as fault_in_words,
     toml_table as toml_table,
 )
 from ._word import (

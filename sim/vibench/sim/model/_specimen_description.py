@@ -33,7 +33,7 @@ from pydantic import (
 from ._contact_law import model_named
 from ._elasticity import Elasticity, hertz_stiffness
 from ._specimen import Gaps, Specimen, Triple
-from ._toml_table import toml_table
+from ._toml_table import fault_in_words, toml_table
 
 BASE = "model"
 """Key of the described specimen that a table starts from."""
@@ -172,7 +172,8 @@ class SpecimenDescription(_Described):
         except ValidationError as error:
             fault = max(error.errors(), key=lambda each: len(each["loc"]))
             within = ".".join(str(part) for part in fault["loc"][1:])
-            raise ValueError(f"{within}: {fault['msg']}" if within else fault["msg"]) from error
+            said = f"{within} is missing" if fault["type"] == "missing" else fault_in_words(fault)
+            raise ValueError(f"{within}: {said}" if within and within not in said else said) from error
 
     @field_serializer("gap_m", when_used="json")
     def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
@@ -349,7 +350,7 @@ def _complaint(specimen: str, error: ValidationError) -> str:
     """Say the first fault: the key, what was given, and what is allowed."""
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"] if isinstance(part, int) or part in _KEYS)
-    said = first["msg"].removeprefix("Value error, ")
+    said = fault_in_words(first)
     match first["type"]:
         case "missing":
             fault = f"{key} is missing"
