@@ -42,6 +42,7 @@ from .host import (
     naming_its_extra as naming_its_extra,
     need_extra as need_extra,
     save_toml as save_toml,
+    schema_line as schema_line,
     shipped as shipped,
     shipped_folder as shipped_folder,
     shortened as shortened,

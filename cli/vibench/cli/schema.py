@@ -10,7 +10,9 @@ from .output import print_json
 
 
 def schema(
-    kind: Annotated[str, typer.Argument(metavar="KIND", help="campaign, rig, study, map or mapping.")],
+    kind: Annotated[
+        str, typer.Argument(metavar="KIND", help="campaign, rig, study, map, mapping or specimen.")
+    ],
 ) -> None:
     """Print the JSON Schema (draft 4) of a kind of TOML file, for an editor that checks as one types."""
     print_json(json_schema(kind))

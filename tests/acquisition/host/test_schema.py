@@ -21,12 +21,20 @@ from vibench.acquisition import (
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import Rig
 from vibench.analysis.exchange import ImportMapping
+from vibench.sim import SpecimenDescription, SpecimenTable, load_specimen, shipped_specimens
 from vibench.sim.maps import Map
 from vibench.sim.study import Study
 
 jsonschema = pytest.importorskip("jsonschema", reason="pip install vibench[test] brings jsonschema")
 
-MODELS = {"campaign": Campaign, "rig": Rig, "study": Study, "map": Map, "mapping": ImportMapping}
+MODELS = {
+    "campaign": Campaign,
+    "rig": Rig,
+    "study": Study,
+    "map": Map,
+    "mapping": ImportMapping,
+    "specimen": SpecimenDescription,
+}
 FOLDERS = {"campaign": "campaigns", "rig": "hardware_configs", "study": "studies", "map": "studies/maps"}
 MAPPING = """
 specimen = "gong2025"
@@ -159,6 +167,31 @@ def test_a_file_that_is_written_names_its_schema_and_comes_back(tmp_path):
     assert uri == (shipped_folder("schemas") / "campaign-1.schema.json").as_uri()
     assert load_campaign(tmp_path / "mine.toml") == campaign
     assert faults("campaign", text) == []
+
+
+ONE_SIDED = 'model = "gong2025"\ngap_m = [30e-6, inf]'
+
+
+@pytest.mark.parametrize("kind", [SpecimenDescription, SpecimenTable])
+def test_a_specimen_that_is_written_names_its_schema_and_passes_it(kind, tmp_path):
+    (tmp_path / "one_sided.toml").write_text(ONE_SIDED, encoding="utf-8")
+    assert faults("specimen", ONE_SIDED) == []
+    for name in (*shipped_specimens(), str(tmp_path / "one_sided.toml")):
+        described = kind.model_validate(load_specimen(name).model_dump())
+        save_toml(described, tmp_path / "mine.toml")
+        text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
+        schema = shipped_folder("schemas") / "specimen-1.schema.json"
+        assert text.startswith(f"#:schema {schema.as_uri()}\n")
+        assert faults("specimen", text) == []
+        assert load_specimen(str(tmp_path / "mine.toml")) == load_specimen(name)
+
+
+@pytest.mark.parametrize("slip", ["gap = 3e-5", "gap_m = [3e-5]", 'gap_m = [3e-5, "open"]', "contact = 3"])
+def test_a_slip_in_a_specimen_is_shown_while_it_is_typed(slip, tmp_path):
+    (tmp_path / "mine.toml").write_text(f'model = "gong2025"\n{slip}\n', encoding="utf-8")
+    with pytest.raises(ValueError, match=slip.split(" ", maxsplit=1)[0]):
+        load_specimen(str(tmp_path / "mine.toml"))
+    assert faults("specimen", f'model = "gong2025"\n{slip}') != []
 
 
 @pytest.mark.parametrize("version", ["2", "0", '"1"', "true", "1.0"])

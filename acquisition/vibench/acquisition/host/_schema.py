@@ -61,9 +61,21 @@ def _with_a_base(schema: Json) -> None:
     """Let a specimen start from a named one; a name alone is that one."""
     for name, part in schema["definitions"].items():
         if "masses_kg" in part.get("properties", {}):
-            part["properties"]["model"] = _SPECIMEN
-            part.pop("required", None)
+            _starts_from_another(part)
             schema["definitions"][name] = {"anyOf": [{"type": "string"}, part]}
+
+
+def _starts_from_another(part: Json) -> None:
+    """Let a specimen leave out what the one that it names says, and have a stop on one side."""
+    part["properties"]["model"] = _SPECIMEN
+    part.pop("required", None)
+    for side in part["properties"]["gap_m"]["anyOf"][1]["items"]:
+        side["type"], side["pattern"] = ["number", "string"], "^inf$"
+
+
+def _as_a_specimen(schema: Json) -> None:
+    _starts_from_another(schema)
+    del schema["properties"][FORMAT]
 
 
 def _with_ranges(schema: Json) -> None:
@@ -94,6 +106,7 @@ SCHEMAS: Mapping[str, _Kind] = MappingProxyType(
         "study": _Kind("vibench.sim.study", "Study", _with_ranges),
         "map": _Kind("vibench.sim.maps", "Map", _with_a_base),
         "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
+        "specimen": _Kind("vibench.sim", "SpecimenDescription", _as_a_specimen),
     }
 )
 """Word of a kind of file: what it is. Loaded by name: the models stand in higher rooms."""
@@ -105,7 +118,7 @@ def json_schema(kind: str) -> Json:
     Parameters
     ----------
     kind
-        ``campaign``, ``rig``, ``study``, ``map`` or ``mapping``.
+        ``campaign``, ``rig``, ``study``, ``map``, ``mapping`` or ``specimen``.
 
     Raises
     ------
@@ -116,8 +129,8 @@ def json_schema(kind: str) -> Json:
     if kind not in SCHEMAS:
         raise ConfigurationError(f"there is no schema of {kind!r}; there are {', '.join(SCHEMAS)}")
     made: Json = _draft_4(SCHEMAS[kind].load().model_json_schema())
-    SCHEMAS[kind].widen(made)
     made["properties"][FORMAT] = {"enum": [VERSION]}
+    SCHEMAS[kind].widen(made)
     return {"$schema": DRAFT, "title": f"vibench {kind}, version {VERSION}", **made}
 
 
@@ -127,8 +140,18 @@ def schema_name(kind: str) -> str:
 
 
 def schema_line(model: BaseModel, schemas: Path) -> str:
-    """Give the line that tells an editor the schema of a file, or nothing where there is none."""
-    kind = next((kind for kind, each in SCHEMAS.items() if each.model == type(model).__name__), None)
+    """Give the line that tells an editor the schema of a file, or nothing where there is none.
+
+    Parameters
+    ----------
+    model
+        What the file holds.
+    schemas
+        Folder of the schemas, as ``shipped_folder("schemas")`` gives it.
+
+    """
+    names = {each.__name__ for each in type(model).__mro__}
+    kind = next((kind for kind, each in SCHEMAS.items() if each.model in names), None)
     return "" if kind is None else f"#:schema {(schemas / schema_name(kind)).as_uri()}\n"
 
 
