@@ -5,13 +5,16 @@ import doctest
 import importlib
 import importlib.util
 import re
+import shlex
 import tomllib
 from functools import cache
 from pathlib import Path
 
 import pytest
+import typer
 
 from vibench.acquisition.instruments import PlugInKind
+from vibench.cli.__main__ import COMMANDS, app
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -107,6 +110,46 @@ def test_every_import_of_ours_in_the_code_of_a_document_works(document):
                     if not resolves(f"{node.module}.{each.name}")
                 ]
     assert missing == []
+
+
+BLOCK = re.compile(r"^```\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
+COMMAND = re.compile(r"^(vibench [^#\n]*)", flags=re.MULTILINE)
+TYPED = re.compile(r"^\$ (vibench .*)|`(vibench [^`]*)`", flags=re.MULTILINE)
+
+
+def commands_of(document):
+    """Words of every command in a document: in blocks without a language, in transcripts, in the text."""
+    text = text_of(document).replace("\\\n", " ")
+    found = [each for block in BLOCK.findall(text) for each in COMMAND.findall(block)]
+    found += [first or other for first, other in TYPED.findall(text)]
+    return [shlex.split(each) for each in found]
+
+
+def option_names(command):
+    return {each for parameter in command.params for each in (*parameter.opts, *parameter.secondary_opts)}
+
+
+@every_document
+def test_every_command_in_a_document_exists_with_all_its_options(document):
+    for words in commands_of(document):
+        known = option_names(typer.main.get_command(app)) | {"--help"}
+        name = next((each for each in words if each in COMMANDS), None)
+        assert name or not words[1][0].islower(), words
+        if name is not None:
+            command = typer.main.get_command(COMMANDS[name].load())
+            known |= option_names(command)
+            for each in getattr(command, "commands", {}).values():
+                known |= option_names(each)
+        asked = {each.split("=")[0].rstrip(".,") for each in words if each.startswith("--")}
+        assert asked <= known, words
+
+
+@every_document
+def test_commands_in_a_document_work_outside_a_checkout(document):
+    """What is shipped is found by its name; its path leads there in a checkout alone."""
+    paths = re.compile(r"(campaigns|hardware_configs|studies)/")
+    wrong = [words for words in commands_of(document) if any(map(paths.match, words))]
+    assert wrong == [] or "decisions" in document.parts
 
 
 def code_of_the_readme(saying):
