@@ -143,6 +143,8 @@ def test_another_file_is_no_branches(tmp_path):
     for name in ("x.h5", "y.h5", "z.h5"):
         with pytest.raises(InvalidRequest, match="give a file that vibench branches wrote"):
             read_diagram(tmp_path / name)
+    with pytest.raises(InvalidRequest, match=r"z\.h5 does not exist, or is no file"):
+        read_diagram(tmp_path / "z.h5")
 
 
 def test_the_document_is_json_with_every_point(computed):

@@ -36,8 +36,27 @@ def feedback_controller(
 ) -> Controller[None]:
     """Control a measurement with feedback, from its ramp up to its ramp down.
 
-    Raises ConfigurationError when the rig lacks a channel that feedback listens to; before anything is
-    yielded.
+    Parameters
+    ----------
+    measurement
+        Of a kind of excitation that has a controller.
+    rig
+        What it is carried out on.
+    channels
+        Those that are read, in the order of the rows of samples.
+    sample_rate_hz
+        Of all of them.
+
+    Yields
+    ------
+    ControlAction
+        What is played next. The samples of each phase, shape (channels, n) [V], are sent back in.
+
+    Raises
+    ------
+    ConfigurationError
+        When the rig lacks a channel that feedback listens to; before anything is yielded.
+
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
     return CONTROLLERS[measurement.excitation.kind](loop, measurement.excitation)

@@ -74,7 +74,7 @@ def expected_under_check(
     terminal_v
         Peak at the generator's terminal [V].
     quantity
-        Of base or specimen.
+        Of base or specimen, which says the unit: SI, such as m/s2 for an acceleration.
 
     """
     model = RigModel(rig)

@@ -41,7 +41,7 @@ def diagram_of(request: BranchRequest) -> BranchDiagram:
 
 
 def spectrum_points(request: SpectrumRequest) -> Iterator[SpectrumPoint]:
-    """Give each point as soon as it has been computed."""
+    """Compute the exponents of each value of a request, in order, and give each as soon as it is known."""
     specimen = request.shaken
     for value in request.values:
         began = time.perf_counter()

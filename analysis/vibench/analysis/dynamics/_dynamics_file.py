@@ -106,7 +106,7 @@ def write_diagram(diagram: BranchDiagram, path: Path) -> Path:
 
 
 def read_diagram(path: Path) -> BranchDiagram:
-    """Read branches back.
+    """Read the branches that `write_diagram` or ``vibench branches`` wrote.
 
     Raises
     ------
@@ -114,6 +114,8 @@ def read_diagram(path: Path) -> BranchDiagram:
         When the file is not there, or holds none.
 
     """
+    if not path.is_file():
+        raise InvalidRequest(f"{path} does not exist, or is no file; give a file that vibench branches wrote")
     try:
         with h5py.File(path, "r") as file:
             if file.attrs.get("format") != BRANCHES_FORMAT:

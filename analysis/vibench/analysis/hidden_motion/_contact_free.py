@@ -221,7 +221,10 @@ def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
 
 
 def measured_gaps(impacts: FreeImpacts) -> Reals:
-    """Give the gap as each impact measured it: |p| less the depth that belongs to its impulse [m]."""
+    """Give the gap as each impact measured it: |p| less the depth that belongs to its impulse [m].
+
+    Shape (impacts,); NaN where a side has too few of them to tell a gap.
+    """
     line = _gap_line(impacts)
     lower, upper = (np.nan if each is None else each.value_m for each in line.gaps)
     return np.asarray(np.where(impacts.sides < 0, lower, upper) + line.residuals)

@@ -35,7 +35,21 @@ def write_comparison(
     pair: Pair | None = None,
     markers_hz: Sequence[float] = (),
 ) -> Path:
-    """Write what the path's suffix names; a name that is taken becomes ``NAME-2``. Gives the path written.
+    """Write a comparison as a report, a table or a picture; gives the path written.
+
+    Parameters
+    ----------
+    path
+        Its suffix says what is made: ``.html``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``. A name that
+        is taken becomes ``NAME-2``.
+    curves
+        What the table and the pictures show, over frequency [Hz].
+    recordings
+        What the report is of.
+    pair
+        Two of the curves, whose difference is shown beside them.
+    markers_hz
+        Vertical lines in pictures.
 
     Raises
     ------

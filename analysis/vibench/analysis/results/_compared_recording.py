@@ -97,6 +97,8 @@ def recorded_response(path: Path) -> RecordedLevel:
     ------
     NotEnoughData
         When the recording is of another kind, or of one frequency.
+    RecordingError
+        When the file is no recording.
 
     """
     found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)

@@ -103,7 +103,8 @@ def periodic_branch(
 ) -> Branch:
     """Follow a periodic motion along frequency [Hz] or drive amplitude [m], from where it is to ``stop``.
 
-    The branch ends at ``stop``, or back at its start's value where it turned round.
+    The branch ends at ``stop``, or back at its start's value where it turned round. Pseudo-arclength
+    continuation (Keller 1977): steps along the curve, so that folds are passed.
 
     Raises
     ------

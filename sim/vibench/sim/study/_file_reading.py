@@ -47,7 +47,14 @@ def read_plan(path: Path, kind: type[Plan]) -> Plan:
 
 
 def read_arrays(path: Path, plan: GridPlan) -> Arrays:
-    """Read every answer, each of shape (points, ...); a point that is under way counts as missing."""
+    """Read every answer, each of shape (points, ...); a point that is under way counts as missing.
+
+    Raises
+    ------
+    StudyError
+        When the file cannot be read, or is of another kind than the plan.
+
+    """
     with _opened(path, type(plan)) as file:
         return _arrays(file, plan)
 
