@@ -75,6 +75,15 @@ def test_a_chaotic_dwell_is_told_to_be_chance_and_a_quiet_one_noise():
     assert {each.cause for each in dwell(0.05)} == {Cause.NOISE}
 
 
+def test_response_i_of_a_quiet_dwell_is_not_promised_from_the_sensors_noise_alone():
+    """A recording of it has 0.7 % where the sensors' noise, averaged over the window, makes 0.002 %."""
+    excitation = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=2, duration_s=8)
+    first, second = expected_uncertainty(Measurement(name="dwell", excitation=excitation), RIG)
+    assert first.after(5.0) is None
+    assert "Response I: not known beforehand, for noise in the motion lifts" in first.sentence
+    assert 1e-6 < second.after(5.0) < 1e-3
+
+
 def test_a_rig_that_states_no_noise_is_told_so_and_a_sweep_promises_nothing():
     silent = RIG.model_copy(update={"virtual": None})
     (first, *_) = expected_uncertainty(Measurement(name="weak", excitation=NOISE), silent)

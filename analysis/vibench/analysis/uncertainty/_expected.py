@@ -70,8 +70,10 @@ class Expected:
     @property
     def _how(self) -> str:
         if self.scatter is None:
+            heard = "noise in the motion lifts the largest value, and only a recording tells it"
             return {
-                Cause.NOISE: "not known beforehand, for the sensors' noise is not stated",
+                Cause.NOISE: "not known beforehand, for "
+                + (heard if self.quantity == RESPONSE_I else "the sensors' noise is not stated"),
                 Cause.CHANCE: "not known beforehand, for the masses will collide under this noise",
             }[self.cause]
         if self.scatter == 0.0:
@@ -217,7 +219,9 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
         elif scatter > _STEADY:
             yield Expected(name, _WINDOW_S, scatter, Cause.CHANCE, lasting, missing)
         else:
-            yield Expected(name, _WINDOW_S, by_noise, Cause.NOISE, lasting, missing)
+            # What generator and amplifier hiss moves the masses, and no rig states it.
+            told = None if name == RESPONSE_I else by_noise
+            yield Expected(name, _WINDOW_S, told, Cause.NOISE, lasting, missing)
 
 
 def _simulated_scatter(specimen: Specimen, amplitude_m: float, at_hz: float) -> tuple[float, float]:

@@ -221,7 +221,8 @@ class TestPage(Page):
             f"{seen.basis}. {collides}"
         )
         told = [each.sentence for each in prediction.expected]
-        self.expectation.setText(f"Will be known: {told[0]} …" if len(told) > 1 else "".join(told))
+        known = [each.sentence for each in prediction.expected if each.scatter is not None]
+        self.expectation.setText(f"Will be known: {known[0]} …" if known and told[1:] else "".join(told[:1]))
         self.expectation.setToolTip("\n".join(told))
 
     def _prediction_failed(self, error: BaseException) -> None:
