@@ -1,8 +1,10 @@
 """A second process that analyses each recording while the next one is measured."""
 
+import shlex
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
@@ -10,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import follow_parent
-from vibench.analysis import CampaignResults, analyse_files, merged_results
+from vibench.analysis import AnalysisError, CampaignResults, analyse_files, merged_results
 from vibench.sim import Accuracy, Harmonic, gong2025, steady_response
 from vibench.sim.shaker import Amplifier, DrivenTable, Shaker, follow_voltage
 
@@ -22,11 +24,18 @@ class Analyst:
         self._pool = pool
         self._draws = draws
         self._name = name
+        self._folder = Path()
         self._parts: list[Future[CampaignResults]] = []
 
     def take(self, recording: Path) -> None:
-        """Analyse this one next."""
-        self._parts.append(self._pool.submit(analyse_files, [recording], self._name, draws=self._draws))
+        """Analyse this one next; that this cannot be done is said by `results`: what is measured goes on."""
+        try:
+            part = self._pool.submit(analyse_files, [recording], self._name, draws=self._draws)
+        except BrokenProcessPool as error:
+            part = Future()
+            part.set_exception(error)
+        self._folder = recording.parent
+        self._parts.append(part)
 
     @property
     def asked(self) -> int:
@@ -34,9 +43,18 @@ class Analyst:
         return len(self._parts)
 
     def results(self) -> Iterator[CampaignResults]:
-        """Give the results one by one; waits for those that are not ready."""
-        for part in self._parts:
-            yield part.result()
+        """Give the results one by one; waits for those that are not ready.
+
+        Raises AnalysisError when the process ended before it was done.
+        """
+        try:
+            for part in self._parts:
+                yield part.result()
+        except BrokenProcessPool as error:
+            raise AnalysisError(
+                "the process that analyses has ended (somebody ended it, or memory was short); every "
+                f"recording is kept: vibench analyse {shlex.quote(str(self._folder))}"
+            ) from error
 
     def together(self) -> CampaignResults:
         """Give the results as one campaign's."""
