@@ -327,7 +327,7 @@ def test_a_recording_says_where_it_came_from(tmp_path):
     ("old", "new", "said"),
     [
         ("started_utc = 2026-03-01T12:00:00Z", "", "started_utc is missing"),
-        ("2026-03-01T12:00:00Z", "2026-03-01T12:00:00", "timezone"),
+        ("2026-03-01T12:00:00Z", "2026-03-01T12:00:00", "started_utc.*time zone"),
         ("frequency_hz = 260", "frequency = 260", "frequency is not a known key"),
         ('role = "m0_velocity"', 'role = "m0_velocity"\nunit = "mm s-1"', "convert it by scale"),
         ('role = "m0_velocity"', 'role = "other"', "needs a quantity and a unit"),
