@@ -202,6 +202,8 @@ def test_a_strongly_bent_resonance_is_followed_though_each_level_moves_it_by_hal
     bench.carry_out(Measurement(name="bent", excitation=plan, ramp_s=0.2))
     found = said(bench, "resonance")
     assert all(abs(each["phase_deg"] + 90) < 1 for each in found[1:9])
+    # Where the motion still grows, no resonance is told, nor that it was locked on to.
+    assert {each["lock"] for each in found if each["motion"] == "unsettled"} == {"not met within the tries"}
     assert all(abs(each["phase_deg"] + 90) < 3 for each in found)
     assert found[-1]["at_hz"] > 127
 

@@ -213,7 +213,10 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
 
 
 def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Tracked) -> None:
-    is_told = tracked.lock is LockResult.LOCKED and found.judgement.steadiness is not Steadiness.UNSETTLED
+    lock = tracked.lock
+    if lock is LockResult.LOCKED and found.judgement.steadiness is Steadiness.UNSETTLED:
+        lock = LockResult.LOST
+    is_told = lock is LockResult.LOCKED
     resonance, mode = (tracked.resonance, tracked.mode) if is_told else (None, None)
     loop.note(
         ResonanceNote(
@@ -230,7 +233,7 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
             motion=found.judgement.steadiness,
             tries=tracked.tries,
             periods=tracked.periods,
-            lock=tracked.lock,
+            lock=lock,
             mode_hz=None if mode is None else mode.frequency_hz,
             mode_u_hz=None if mode is None else mode.frequency_u_hz,
             damping_ratio=None if mode is None else mode.damping_ratio,
