@@ -110,10 +110,10 @@ def test_a_living_recording_can_be_read_by_h5py_alone(tmp_path, make_header, mak
 
 
 def test_nothing_to_recover_is_said(tmp_path):
-    with pytest.raises(RecordingError, match="nothing to recover; give the path of a .h5.part"):
+    with pytest.raises(RecordingError, match=r"nothing to recover; give the path of a \.h5\.part"):
         recover(tmp_path / "a.h5")
     (tmp_path / "a.h5").touch()
-    with pytest.raises(RecordingError, match="nothing to recover; analyse a.h5, which is there"):
+    with pytest.raises(RecordingError, match=r"nothing to recover; analyse a\.h5, which is there"):
         recover(tmp_path / "a.h5")
 
 
