@@ -1,6 +1,6 @@
 """All resonances of a transmission fitted together: the skirts of the others are modes too, no background."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from ._results import FrequencyResponse
 _BACKGROUND_TERMS = 3
 """Of modes outside of the band, and of what the channels' phases err: 1, i w and w^2, with real factors."""
 _FINE_POINTS = 401
+_STEP = 1e-6
 
 
 @dataclass(frozen=True)
@@ -61,13 +62,18 @@ def jointly_fitted(band: FrequencyResponse, found: Sequence[Resonance]) -> tuple
     curvature = jacobian.T @ jacobian
     if not result.success or chi_square > WELL_FITTED or np.linalg.cond(curvature) > 1e14:
         return tuple(found)
-    sd = np.sqrt(np.diag(np.linalg.inv(curvature)) * max(1.0, chi_square))
-    factors: Reals = np.linalg.lstsq(_basis(lines, result.x), lines.weighted, rcond=None)[0].astype(
-        np.float64
-    )
+    widened = max(1.0, chi_square)
+    sd = np.sqrt(np.diag(np.linalg.inv(curvature)) * widened)
+    basis = _basis(lines, result.x)
+    factors: Reals = np.linalg.lstsq(basis, lines.weighted, rcond=None)[0].astype(np.float64)
+    # How the lines follow poles and factors together, and with what covariance.
+    follows = np.hstack((_moved(lambda poles: _basis(lines, poles) @ factors, result.x), basis))
+    covariance: Reals = np.asarray(widened * np.linalg.pinv(follows.T @ follows), dtype=np.float64)
     pairs = zip(found, result.x.reshape(-1, 2), sd.reshape(-1, 2), strict=True)
     return tuple(
-        _updated(each, pole, spread, chi_square, _peak(each, result.x, factors), lines.spread.size)
+        _updated(
+            each, pole, spread, chi_square, _peak(each, result.x, factors, covariance), lines.spread.size
+        )
         for each, pole, spread in pairs
     )
 
@@ -99,19 +105,35 @@ def _basis(lines: _Lines, poles: Reals) -> Reals:
     return np.concatenate([shapes.real, shapes.imag])
 
 
-def _peak(found: Resonance, poles: Reals, factors: Reals) -> tuple[float, float]:
-    """Where the fitted magnitude is largest near a mode, and how large it is there."""
+def _moved(shape: Callable[[Reals], Reals], poles: Reals) -> Reals:
+    """Give how a shape follows each pole, by central differences."""
+    steps = _STEP * np.eye(poles.size)
+    return np.stack([(shape(poles + step) - shape(poles - step)) / (2 * _STEP) for step in steps], axis=-1)
+
+
+def _peak(found: Resonance, poles: Reals, factors: Reals, covariance: Reals) -> tuple[float, float, float]:
+    """Where the fitted magnitude is largest near a mode, how large it is, and its standard deviation."""
     width = max(found.half_power_bandwidth_hz, abs(found.peak_frequency_hz - found.frequency_hz))
     fine_hz: Reals = np.linspace(
         found.peak_frequency_hz - width, found.peak_frequency_hz + width, _FINE_POINTS, dtype=np.float64
     )
     curve = np.abs(_shapes(fine_hz, poles) @ factors)
     top = int(np.argmax(curve))
-    return float(fine_hz[top]), float(curve[top])
+    top_hz, value = fine_hz[top : top + 1], _shapes(fine_hz[top : top + 1], poles) @ factors
+    follows = np.hstack(
+        (_moved(lambda moved: _shapes(top_hz, moved) @ factors, poles), _shapes(top_hz, poles))
+    )
+    along = np.real(np.conj(value / np.abs(value))[:, None] * follows)[0]
+    return float(fine_hz[top]), float(curve[top]), float(np.sqrt(along @ covariance @ along))
 
 
 def _updated(
-    found: Resonance, pole: Reals, sd: Reals, chi_square: float, peak: tuple[float, float], lines: int
+    found: Resonance,
+    pole: Reals,
+    sd: Reals,
+    chi_square: float,
+    peak: tuple[float, float, float],
+    lines: int,
 ) -> Resonance:
     frequency_hz, damping = np.exp(pole).tolist()
     return replace(
@@ -124,4 +146,5 @@ def _updated(
         lines_used=lines,
         peak_frequency_hz=peak[0],
         peak_magnitude=peak[1],
+        sd_peak_magnitude=peak[2],
     )
