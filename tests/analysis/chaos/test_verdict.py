@@ -104,6 +104,17 @@ def test_a_motion_that_is_lost_late_is_undecided(chaos):
     assert "drive periods before the end" in found.why
 
 
+@pytest.mark.parametrize("count", [200, 202, 650, 1200])
+@pytest.mark.parametrize("lost", [1, 15, 40])
+def test_a_motion_that_is_lost_in_the_last_periods_is_undecided(count, lost):
+    rng = np.random.default_rng(lost)
+    points = section(rng, count=count, scatter=1e-5)
+    points[-lost:] += rng.standard_normal((lost, 2))
+    found = motion_verdict(Points(points, QUIET), DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED
+    assert "fewer than 200 drive periods before the end" in found.why
+
+
 def test_chaos_with_calm_stretches_is_one_motion(chaos):
     points = chaos.copy()
     points[600:900] = points[1800:2400] = 0.2

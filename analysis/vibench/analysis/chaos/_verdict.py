@@ -129,23 +129,22 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     last = Points(points.value[-MOST_POINTS:], points.noise)
     count = len(last.value)
     if count < FEWEST:
-        return _undecided(
+        return _too_few(
             f"{count} drive periods were recorded clear of the ends, and {FEWEST} are needed; dwell longer",
-            Evidence(drive_hz, count, np.nan, last.noise_level, is_settled=False),
+            last,
+            drive_hz,
         )
     before = begin_of_last_motion(last)
     if before == 0:
         return _of_one_motion(last, drive_hz, seed)
     rest = Points(last.value[before:], last.noise)
+    too_late = "before the end, too late to judge what it became; dwell longer"
+    if count - before < FEWEST:
+        return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
     found = _of_one_motion(rest, drive_hz, seed)
     # A settled end is seen to repeat, however long the transient; an irregular one may be a transient.
-    fewest = FEWEST if found.kind is MotionKind.PERIODIC else max(before, FEWEST)
-    if len(rest.value) < fewest:
-        return _undecided(
-            f"the motion changed {len(rest.value)} drive periods before the end, too late to judge what it "
-            "became; dwell longer",
-            found.evidence,
-        )
+    if found.kind is not MotionKind.PERIODIC and count - before < before:
+        return _undecided(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
     return replace(found, why=f"{found.why}; so for {len(rest.value)} drive periods, otherwise before")
 
 
@@ -168,6 +167,12 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
         why = f"the points repeat every {every} to within their noise"
         return MotionVerdict(MotionKind.PERIODIC, why, evidence, period)
     return _aperiodic(last, evidence, seed)
+
+
+def _too_few(why: str, points: Points, drive_hz: float) -> MotionVerdict:
+    return _undecided(
+        why, Evidence(drive_hz, len(points.value), np.nan, points.noise_level, is_settled=False)
+    )
 
 
 def _undecided(why: str, evidence: Evidence) -> MotionVerdict:
