@@ -27,6 +27,24 @@ def sweep(duration_s, start_hz=150.0, stop_hz=350.0, clock_ppm=0.0, rate_hz=RATE
     return time, 2 * np.pi * (start_hz * own + 0.5 * (stop_hz - start_hz) / duration_s * own**2)
 
 
+def test_the_first_and_last_intervals_know_what_was_before_and_after_them():
+    """A sine in displacement of one amplitude, recorded for longer than its sweep."""
+    time, phase = sweep(6.0)
+    rows = np.stack((np.cos(phase), -np.cos(phase) * np.gradient(phase, time) ** 2, np.zeros(time.size)))
+    rows[2] = -np.sin(phase) * np.gradient(phase, time)
+    sums = SweepSums(RATE, low_hz=160, high_hz=340)
+    reach = sums.neighbour_samples
+    sums.add_neighbour(rows[:, :reach])
+    sums.add(rows[:, reach : time.size - reach])
+    sums.add_neighbour(rows[:, time.size - reach :])
+    found = sums.response()
+    assert found.time_s.size == (time.size - 2 * reach) // round(found.interval_s * RATE)
+    np.testing.assert_allclose(found.peak_displacement_m, 1.0, atol=0.01)
+    # Without them the ends are wrong.
+    alone = sweep_response(*rows, RATE, low_hz=150, high_hz=350)
+    assert np.max(np.abs(alone.peak_displacement_m[[0, -1]] - 1)) > 0.02
+
+
 @pytest.mark.parametrize("factor", [1, 2, 5, 6])
 @pytest.mark.parametrize("blocks", [[5000], [1, 2, 3000, 1997], [70, 60, 4870]])
 def test_decimation_keeps_time_and_amplitude_however_the_blocks_fall(factor, blocks):

@@ -35,6 +35,7 @@ from ._quantity import (
     Quantity as Quantity,
     converted_signal as converted_signal,
     derivative_factor as derivative_factor,
+    disturbed_samples as disturbed_samples,
 )
 from ._window import (
     Window as Window,

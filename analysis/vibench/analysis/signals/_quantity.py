@@ -95,7 +95,7 @@ def converted_signal(
             f"the band is {low_hz:g} to {high_hz:g} Hz; it must lie above 0 and end at or below "
             f"{sample_rate_hz / 2:g} Hz, half the sample rate"
         )
-    edge = min(int(np.ceil(_EDGE_PERIODS * sample_rate_hz / low_hz)), samples.size // 2)
+    edge = min(disturbed_samples(sample_rate_hz, low_hz), samples.size // 2)
     padded = fft.next_fast_len(samples.size + edge, real=True)
     frequency_hz = fft.rfftfreq(padded, 1 / sample_rate_hz)
     factor = np.zeros(frequency_hz.size, dtype=np.complex128)
@@ -103,6 +103,11 @@ def converted_signal(
     spectrum = fft.rfft(scipy.signal.detrend(samples), padded)
     result = np.asarray(fft.irfft(spectrum * factor, padded)[: samples.size])
     return ConvertedSignal(result, sample_rate_hz, wanted, low_hz, high_hz, edge)
+
+
+def disturbed_samples(sample_rate_hz: float, low_hz: float) -> int:
+    """Count the samples at an end that `converted_signal` gets wrong for want of what is beyond."""
+    return int(np.ceil(_EDGE_PERIODS * sample_rate_hz / low_hz))
 
 
 def _band(frequency_hz: Reals, low_hz: float, high_hz: float) -> Reals:

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import fft
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
-from ..signals import Decimator, Quantity, Reals, converted_signal, decimation_factor
+from ..signals import Decimator, Quantity, Reals, converted_signal, decimation_factor, disturbed_samples
 from ..tables import Labelled
 from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_lift, tracked_orders
 
@@ -187,13 +187,32 @@ class SweepSums:
         self._rate_hz = sample_rate_hz / self._factor
         self._interval = max(1, round(interval_s * self._rate_hz))
         self._low_hz, self._high_hz = low_hz, high_hz
+        self._before = self._after = 0
         self._decimator = Decimator(3, self._factor)
         self._parts: list[Reals] = []
         self._carry = np.empty(0)
         self._extremes: list[Reals] = []
 
+    @property
+    def neighbour_samples(self) -> int:
+        """Samples, whole intervals, before and after the sweep that its displacement wants."""
+        disturbed = disturbed_samples(self._rate_hz, _BAND_BELOW * self._low_hz)
+        return self._factor * self._interval * ceil(disturbed / self._interval)
+
+    def add_neighbour(self, block: Reals) -> None:
+        """Take what was recorded right before the sweep, or right after it.
+
+        Velocity becomes displacement with what was before it and came after it: without them the largest |x|
+        of the first and of the last intervals is off by up to a third.
+        """
+        if self._extremes:
+            self._after += block.shape[1] // self._factor
+        else:
+            self._before += block.shape[1] // self._factor
+        self._parts.append(self._decimator.add(block))
+
     def add(self, block: Reals) -> None:
-        """Take the next samples: rows drive voltage, base acceleration, response velocity."""
+        """Take the next samples of the sweep: rows drive voltage, base acceleration, response velocity."""
         if block.shape[0] != 3:
             raise InvalidRequest(f"a block has {block.shape[0]} rows; a sweep takes drive, base and response")
         self._parts.append(self._decimator.add(block))
@@ -219,8 +238,11 @@ class SweepSums:
 
         """
         self._parts.append(self._decimator.finish())
-        data = np.concatenate(self._parts, axis=1)
-        upper, lower, noise = np.concatenate(self._extremes or [np.empty((3, 0))], axis=1)
+        whole = np.concatenate(self._parts, axis=1)
+        data = whole[:, self._before : whole.shape[1] - self._after]
+        count = data.shape[1] // self._interval
+        extremes = np.concatenate(self._extremes or [np.empty((3, 0))], axis=1)
+        upper, lower, noise = extremes[:, :count]
         if upper.size == 0:
             raise NotEnoughData("the sweep is shorter than one interval; use shorter intervals")
         phase = drive_phase(data[_DRIVE], self._rate_hz, low_hz=self._low_hz, high_hz=self._high_hz)
@@ -229,7 +251,7 @@ class SweepSums:
         frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
         noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
         return self._scaled(
-            data[_RESPONSE],
+            whole[_RESPONSE],
             velocity,
             base,
             (upper, lower),
@@ -275,7 +297,8 @@ class SweepSums:
             high_hz=high_hz,
         )
         count = frequency_hz.size
-        intervals = displacement.samples[: count * self._interval].reshape(count, self._interval)
+        swept = displacement.samples[self._before :][: count * self._interval]
+        intervals = swept.reshape(count, self._interval)
         peak_m = np.max(np.abs(intervals), axis=1)
         noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
         independent = 2 * np.sqrt(low_hz * high_hz) * self._interval / self._rate_hz

@@ -75,18 +75,24 @@ def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spe
     rate = channels.sample_rate_hz
     sums = SweepSums(rate, low_hz=ends[0], high_hz=ends[1])
     highest_hz = min(_SPECTROGRAM_ORDER * ends[1], 0.5 * rate)
-    picture = SpectrogramSums(rate, stretch.samples, highest_hz=highest_hz)
-    for first in range(stretch.start, stretch.stop, _BLOCK):
-        last = min(first + _BLOCK, stretch.stop)
+    # A recording that was cut short has nothing after its sweep: the sweep's own end stands for it.
+    reach = min(sums.neighbour_samples, stretch.samples // 4)
+    start = stretch.start if stretch.start >= reach else stretch.start + reach
+    stop = min(stretch.stop, channels.samples - reach)
+    picture = SpectrogramSums(rate, stop - start, highest_hz=highest_hz)
+    sums.add_neighbour(np.nan_to_num(channels.read(start - reach, start)))
+    for first in range(start, stop, _BLOCK):
+        last = min(first + _BLOCK, stop)
         block = channels.read(first, last)
         if np.isnan(block).any():
-            lost_s = (first - stretch.start) / channels.sample_rate_hz
+            lost_s = (first - start) / channels.sample_rate_hz
             raise NotEnoughData(
                 f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
                 "across a hole; measure again"
             )
         sums.add(block)
         picture.add(block[_RESPONSE])
+    sums.add_neighbour(np.nan_to_num(channels.read(stop, stop + reach)))
     found = sums.response(delay_s=channels.response_delay_s)
     sensors = channels.response_gain(found.frequency_hz)
     corrected = replace(
