@@ -95,6 +95,7 @@ def test_a_response_that_stays_has_no_jump_and_none_is_seen_across_the_turning_p
         direction=("up",) * 3 + ("down",) * 3,
         amplitude_vpp=np.array([0.1, 0.2, 0.3, 0.3, 0.2, 0.1]),
         drive_amplitude_m=np.ones(steps),
+        sd_drive_amplitude_m=np.zeros(steps),
         response_i=np.ones(steps),
         noise_bias_i=np.zeros(steps),
         noise_error_i=np.zeros(steps),

@@ -210,9 +210,16 @@ def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, 
 
 def test_a_colliding_sweep_has_chance_and_says_what_only_draws_tell(sweep_file):
     (sweep,) = analyse_files([sweep_file], "sweep", Simulation.LEFT_OUT).results
-    (calm,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))
-    assert calm.share(Cause.CHANCE) == 0.0  # the resonance just before collisions begin
     whole, collides = sweep.analysis.response, sweep.analysis.collisions.is_colliding
+    (largest,) = (each for each in budgets_of(sweep) if each.quantity.startswith("largest Response I,"))
+    assert collides[np.argmax(whole.response_i)]  # and not where the sweep begins
+    assert Cause.CHANCE in largest.not_stated
+    before = replace(
+        sweep.analysis, response=replace(whole, response_i=np.where(collides, 1e-3, whole.response_i))
+    )
+    calm = sweep_budgets(before, None)[1]
+    assert calm.share(Cause.CHANCE) == 0.0
+    assert calm.contributions[-1].source == "scatter of A0"
     found = replace(
         whole,
         response_i=np.where(collides, whole.response_i, 1e-3),

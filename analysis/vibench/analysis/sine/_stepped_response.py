@@ -43,6 +43,7 @@ class SteppedResponse(Labelled):
     amplitude_vpp: Reals
     """Setting of the generator [V]; NaN where it was not a plan's but feedback's."""
     drive_amplitude_m: Reals
+    sd_drive_amplitude_m: Reals
     response_i: Reals
     noise_bias_i: Reals
     noise_error_i: Reals
@@ -83,6 +84,7 @@ def stepped_response(
         direction=tuple(str(stretch.numbers.get("direction", "up")) for stretch, _ in pairs),
         amplitude_vpp=np.array([setting_vpp(plan, stretch) for stretch, _ in pairs]),
         drive_amplitude_m=np.array([each.drive.amplitude_m for each in steps]),
+        sd_drive_amplitude_m=np.array([each.drive.sd_amplitude_m for each in steps]),
         response_i=np.array([each.response_i for each in steps]),
         noise_bias_i=np.array([each.noise_bias_i for each in steps]),
         noise_error_i=np.array([each.noise_error_i for each in steps]),

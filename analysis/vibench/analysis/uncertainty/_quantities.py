@@ -26,6 +26,8 @@ _BLOCKS, _FEWEST_BLOCKS = 50, 10
 _ALIKE = 1e-12
 """Differences of maxima over their size that are roundings."""
 _FEWEST_DRAWS = 5
+_ENDS = 2
+"""Intervals at either end of a sweep in which the step from rest, or to it, still rings."""
 _PEAKED = 1.05
 """Response I over Response II above which a step is no sine."""
 _FEWEST_PERIODS = 20.0
@@ -98,7 +100,12 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
             RESPONSE_I,
             found.response_i,
             "",
-            (*_ratio(stated), noise, *(() if is_steady else _one_draw(analysis, laid))),
+            (
+                *_ratio(stated),
+                noise,
+                *((_of_base(drive.sd_amplitude_m, drive.amplitude_m),) if is_steady else ()),
+                *(() if is_steady else _one_draw(analysis, laid)),
+            ),
         ),
         Budget(
             RESPONSE_II,
@@ -120,6 +127,11 @@ def _ratio(stated: Stated) -> tuple[Contribution, ...]:
 def _amplitude(value_m: float, sd_m: float, stated: Stated, scatter: Cause, where: str = "") -> Budget:
     noise = scattered(scatter, sd_m, value_m, "parts of the window")
     return Budget(f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), noise))
+
+
+def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
+    """Give what the scatter of A0 adds to a maximum that is held against it."""
+    return scattered(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
 
 
 def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
@@ -197,14 +209,16 @@ def _largest(
     ):
         top = int(np.argmax(values))
         value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
-        own = scattered(Cause.NOISE, float(scatter[top]), value, source)
+        own = [scattered(Cause.NOISE, float(scatter[top]), value, source)]
         if collides[top]:
-            own = _drawn(laid, name, top) or (
-                Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
-                if name == RESPONSE_I
-                else replace(own, cause=Cause.CHANCE)
-            )
-        yield Budget(f"largest {name}, at {at}", value, "", (*_ratio(stated), own))
+            untold = Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
+            of_window = untold if name == RESPONSE_I else replace(own[0], cause=Cause.CHANCE)
+            own = [_drawn(laid, name, top) or of_window]
+        elif name == RESPONSE_I:
+            own.append(_of_base(float(found.sd_drive_amplitude_m[top]), float(found.drive_amplitude_m[top])))
+            if isinstance(found, SweepResponse) and not _ENDS <= top < values.size - _ENDS:
+                own.append(Contribution(Cause.CHANCE, None, "where intervals begin decides at a sweep's end"))
+        yield Budget(f"largest {name}, at {at}", value, "", (*_ratio(stated), *own))
 
 
 def _drawn(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
