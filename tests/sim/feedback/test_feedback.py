@@ -9,6 +9,7 @@ import pytest
 from vibench.sim import gong2025
 from vibench.sim.feedback import (
     Begin,
+    LawWeights,
     LinearLaw,
     LoopTiming,
     SampledPlant,
@@ -19,6 +20,7 @@ from vibench.sim.feedback import (
     loop_multipliers,
     loop_transfer,
     motion_slopes,
+    pd_law,
 )
 from vibench.sim.model import PowerLaw
 from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
@@ -93,6 +95,42 @@ def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_th
         slopes, periods = motion_slopes(HARDENING, found, index, RATE_HZ)
         for each in wrong:
             assert loop_multipliers(each, law, [slopes], periods)[0] < 0.99
+
+
+def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():
+    unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
+    of_m0, of_base = pd_law(plant(), 1), pd_law(plant(), 0)
+    assert of_m0.direct[0, 0] == of_base.direct[0, 1] == 0.0
+    assert branch_multipliers(plant(), of_m0, branch(), unstable).max() < 0.96
+    assert branch_multipliers(plant(gain=3.48), of_m0, branch(), unstable).max() < 0.99
+    assert branch_multipliers(plant(), of_base, branch(), unstable[:1] + 100).max() > 1.0
+
+
+def test_neither_no_gains_nor_twice_the_designed_ones_cost_less():
+    """All that is weighed, by simulation under its noises."""
+    weights, model, rng = LawWeights(), plant(specimen=LINEAR), np.random.default_rng(5)
+    step, volt = model.step
+    into, relative = model.spring
+    count = 20_000
+    pushes, unknown = rng.normal(0, weights.push_n, count), rng.normal(0, weights.volt, count)
+    heard = rng.normal(0, 1, (count, 2)) * (weights.acceleration, weights.velocity)
+
+    def cost(law):
+        state, memory, total = np.zeros(model.size), np.zeros(2), 0.0
+        omega = 2 * np.pi * LINEAR.natural_frequencies_hz[0]
+        for push, more, noise in zip(pushes, unknown, heard, strict=True):
+            seen = model.shown @ state + noise
+            answer = (law.output @ memory + law.direct @ seen)[0]
+            motion = (relative @ state) ** 2 + ((state[7] - state[8]) / omega) ** 2
+            total += motion * (0.1 / weights.relative_m) ** 2 + answer**2
+            memory = law.step @ memory + law.inlet @ seen
+            state = step @ (state + into * push * model.timing.step_s) + volt * (answer + more)
+        return total
+
+    best = pd_law(model, 1)
+    least = cost(best)
+    for factor in (0.0, 2.0):
+        assert cost(replace(best, output=factor * best.output, direct=factor * best.direct)) > least
 
 
 def test_a_late_law_loses_motions_that_need_none_and_that_is_told():

@@ -10,6 +10,7 @@ from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v, refuse
 from vibench.acquisition.instruments import (
     LoopBlock,
     LoopFeedback,
+    LoopInput,
     LoopProgram,
     LoopState,
     PlugInKind,
@@ -56,6 +57,10 @@ def complex_of(row: Sequence[tuple[float, float]]) -> list[complex]:
     return [complex(*pair) for pair in row]
 
 
+def answered(block: LoopBlock, of_base: bool) -> complex:  # noqa: FBT001 - which of two inputs
+    return complex_of(block.base if of_base else block.m0)[1]
+
+
 def test_it_says_who_it_is_and_what_its_configuration_says_of_it(bench: Bench) -> None:
     facts, told = controller_of(bench).facts, bench.rig.controller
     assert controller_of(bench).identity.reply
@@ -65,6 +70,7 @@ def test_it_says_who_it_is_and_what_its_configuration_says_of_it(bench: Bench) -
     assert facts.latency_s == pytest.approx(told.latency_s, abs=1 / facts.rate_hz)
     assert facts.limit_v <= 1.01 * told.limit_v
     assert facts.watchdog_s <= 1.01 * told.watchdog_s
+    assert facts.pd_of == told.pd_of
     assert controller_of(bench).report().state is LoopState.SILENT
 
 
@@ -98,14 +104,17 @@ def test_a_law_answers_what_is_sampled_beside_the_series(bench: Bench) -> None:
     bench.digitizer.start()
     controller_of(bench).play(series(bench))
     _, blocks = listened(bench, 0.8)
-    gain = LAW * level_v(bench) / abs(complex_of(blocks[-1].base)[1])
-    # The memory is the sample before, and the law the mean of both.
-    law = LoopFeedback(step=((0.0,),), inlet=((1.0, 0.0),), output=(0.5 * gain,), direct=(0.5 * gain, 0.0))
+    of_base = controller_of(bench).facts.pd_of in (None, LoopInput.BASE)
+    gain = LAW * level_v(bench) / abs(answered(blocks[-1], of_base))
+    # The memory is the sample before, and the law the mean of both: of proportional and derivative form.
+    into = (1.0, 0.0) if of_base else (0.0, 1.0)
+    direct = (0.5 * gain * into[0], 0.5 * gain * into[1])
+    law = LoopFeedback(step=((0.0,),), inlet=(into,), output=(0.5 * gain,), direct=direct)
     controller_of(bench).play(series(bench, law))
     _, blocks = listened(bench, 0.8)
     block = [each for each in blocks if each.steady][-1]
     late = np.exp(-2j * np.pi * TONE_HZ / controller_of(bench).facts.rate_hz)
-    wanted = level_v(bench) + 0.5 * gain * (1 + late) * complex_of(block.base)[1]
+    wanted = level_v(bench) + 0.5 * gain * (1 + late) * answered(block, of_base)
     assert abs(complex_of(block.output)[1] - wanted) < 0.1 * LAW * level_v(bench)
 
 

@@ -16,11 +16,12 @@ from vibench.sim.feedback import (
     branch_hold,
     designed_law,
     loop_transfer,
+    pd_law,
 )
 
 from ..errors import ConfigurationError, LimitExceeded
 from ..excitation import BranchContinuation
-from ..instruments import LoopBlock, LoopFeedback
+from ..instruments import LoopBlock, LoopFeedback, LoopInput
 from ..plan import Measurement, fast_loop_time_s
 from ..rig import ControllerConfig, Rig, amplifier_of, shaker_of, specimen_of
 
@@ -78,7 +79,8 @@ def fast_loop(rig: Rig) -> FastLoop:
     controller = controller_of(rig)
     timing = LoopTiming(controller.rate_hz, controller.latency_s)
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), timing)
-    return FastLoop(rig, plant, designed_law(plant))
+    sample = None if controller.pd_of is None else list(LoopInput).index(controller.pd_of)
+    return FastLoop(rig, plant, designed_law(plant) if sample is None else pd_law(plant, sample))
 
 
 def require_holdable(measurement: Measurement, rig: Rig) -> None:

@@ -40,13 +40,14 @@ class LineController:
         different = abs(facts.rate_hz / config.rate_hz - 1) > _PART or facts.limit_v > config.limit_v * (
             1 + _PART
         )
+        different = different or facts.pd_of != config.pd_of
         if different or facts.watchdog_s > config.watchdog_s * (1 + _PART):
             controller.close()
             raise ConfigurationError(
                 f"{facts.name} at {config.resource} takes {facts.rate_hz:g} samples a second, gives up to "
-                f"{facts.limit_v:g} V and waits {facts.watchdog_s:g} s for its host; the configuration says "
-                f"{config.rate_hz:g}, {config.limit_v:g} V and {config.watchdog_s:g} s. It is silent; make "
-                "them agree"
+                f"{facts.limit_v:g} V, waits {facts.watchdog_s:g} s for its host and takes {_laws(facts)}; "
+                f"the configuration says {config.rate_hz:g}, {config.limit_v:g} V, {config.watchdog_s:g} s "
+                f"and {_laws(config)}. It is silent; make them agree"
             )
         return controller
 
@@ -107,3 +108,7 @@ class LineController:
                 f"what answers at {where} is no controller of loop protocol {request.vibench_loop} "
                 f"({error}); correct controller.resource, or give the name of its driver"
             ) from error
+
+
+def _laws(told: LoopFacts | ControllerConfig) -> str:
+    return "any linear law" if told.pd_of is None else f"proportional and derivative laws of {told.pd_of}"

@@ -117,6 +117,8 @@ class LoopFacts(FrozenModel):
     """Largest output, peak [V]."""
     watchdog_s: PositiveFloat
     """Nothing asked for so long, and it ramps down [s]."""
+    pd_of: LoopInput | None = None
+    """Of which input alone it takes a law, proportional and derivative; None: any linear law."""
 
 
 class LoopRequest(FrozenModel):

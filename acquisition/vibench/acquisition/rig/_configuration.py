@@ -10,7 +10,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 from vibench.sim import SpecimenTable
 
 from ..host import FrozenModel
-from ..instruments import Knob
+from ..instruments import Knob, LoopInput
 from ._output import OutputConfig
 from ._virtual import VirtualConfig, fastest_sample_rate_hz
 
@@ -292,6 +292,8 @@ class ControllerConfig(FrozenModel):
     """Largest output, peak [V]."""
     watchdog_s: float = Field(default=1.0, ge=0.3, le=10.0)
     """Told nothing for so long, it ramps down by itself [s]."""
+    pd_of: LoopInput | None = None
+    """The input of which alone it takes a law, proportional and derivative; absent: any linear law."""
     source: str = Field(min_length=1)
     """Where rate, latency and limit come from."""
 

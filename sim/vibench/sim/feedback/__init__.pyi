@@ -10,6 +10,7 @@ from ._law import (
     LawWeights as LawWeights,
     LinearLaw as LinearLaw,
     designed_law as designed_law,
+    pd_law as pd_law,
 )
 from ._loop import (
     loop_multipliers as loop_multipliers,

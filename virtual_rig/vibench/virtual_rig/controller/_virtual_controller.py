@@ -178,6 +178,7 @@ def controller_of(rig: Rig, clock: Callable[[], float]) -> VirtualController | N
         latency_s=told.latency_s,
         limit_v=told.limit_v,
         watchdog_s=told.watchdog_s,
+        pd_of=told.pd_of,
     )
     return VirtualController(facts, clock, virtual.grid_rate_hz)
 
