@@ -1,0 +1,467 @@
+"""HELIC-DAQ as a real-time controller of vibench: an example of a driver for somebody else's board.
+
+HELIC-DAQ (D. A. W. Barton, MIT licence, https://github.com/dawbarton/helic-daq) is open firmware for RP2350
+boards: 1 to 8 kHz, a Fourier series and a control chosen when the firmware is built, both told over TCP;
+samples come back over UDP. Written from its documents (protocol 3, release 0.3.0), and never run on a board.
+
+The firmware must have the control `PidController`, which answers the source that is named `m0` in the
+options, and a rig with the safety gate. What it is told, and what it does:
+
+- A program's series goes to ``forcing_coeffs`` and ``freq``, which the board changes without a jump of the
+  phase; a glide is many small changes, since the board knows none.
+- A law goes to ``ctrl_kp``, ``ctrl_kd`` and ``ctrl_tau_d``: proportional and derivative, of m0 alone. Any
+  other is refused.
+- Coefficients are computed here, from every sample and the board's own phase, under a Hann window.
+- The gate is open while a program plays. It closes by itself when the connection ends: at once when the
+  host's program dies, within 10 s when a cable is pulled. A host that hangs with its connection open is
+  unknown to the board: a thread in here watches whether anybody talks to it, and nothing watches the thread.
+"""
+
+import re
+import threading
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from helic_link import HelicLink, Packet
+from numpy.typing import NDArray
+
+from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost
+from vibench.acquisition.instruments import (
+    Identity,
+    LoopBlock,
+    LoopFacts,
+    LoopFeedback,
+    LoopInput,
+    LoopProgram,
+    LoopReport,
+    LoopState,
+)
+from vibench.acquisition.rig import ControllerConfig
+
+Volts = NDArray[np.complex128]
+GAINS = ("ctrl_kp", "ctrl_kd", "ctrl_tau_d")
+READ = ("phase", "cmd_epoch", "out", "base", "m0")
+"""Sources, by their names in the options; those are their own names where nothing is given."""
+GATE_OPEN, GATE_TRIPPED = 1, 2
+ENDING_S = 0.05
+"""How fast it ramps down by itself [s]."""
+LONGEST_AT_LIMIT_S = 0.05
+LATEST_S = 0.02
+"""Samples may be so much older than what the board says of itself [s]."""
+PATIENCE_S = 2.0
+"""How long samples are waited for [s]."""
+LISTENING_S = 0.02
+MOST_BLOCKS = 2000
+_AT_LIMIT = 0.999
+_SAME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What the board is told to play."""
+
+    frequency_hz: float
+    volts: Volts
+
+    def towards(self, other: "Played", share: float) -> "Played":
+        """Give what lies between, along a half cosine."""
+        share = 0.5 - 0.5 * float(np.cos(np.pi * min(share, 1.0)))
+        frequency_hz = self.frequency_hz + share * (other.frequency_hz - self.frequency_hz)
+        return Played(frequency_hz, self.volts + share * (other.volts - self.volts))
+
+
+@dataclass(frozen=True, eq=False)
+class Glide:
+    """On the way to what is to be played."""
+
+    start: int
+    """Sample."""
+    samples: float
+    begin: Played
+    end: Played
+    is_last: bool
+    """Whether the gate closes at its end."""
+
+
+def pd_gains(feedback: LoopFeedback | None, step_s: float) -> tuple[float, float, float]:
+    """Give the gains kp, kd and the filter time tau that make the same law of m0.
+
+    ``u = -kp s - kd d``, ``d += a ((s - before) / step - d)``, ``a = step / (tau + step)``: answers to one
+    sample of 1 V are ``-kp - kd a / step``, and then ``kd a^2 / step (1 - a)^(n - 1)``.
+
+    Raises
+    ------
+    InstrumentError
+        When the law is another one.
+
+    """
+    if feedback is None:
+        return 0.0, 0.0, 0.0
+    memory, answers = np.array(feedback.inlet).reshape(-1, 2), [np.array(feedback.direct)]
+    for _ in range(2 * len(memory) + 2):
+        answers.append(np.array(feedback.output) @ memory)
+        memory = np.array(feedback.step).reshape(len(memory), len(memory)) @ memory
+    base, m0 = np.transpose(answers)
+    kept = m0[2] / m0[1] if m0[1] else 0.0
+    share = 1.0 - kept
+    expected = m0[1] * kept ** np.arange(len(m0) - 1)
+    largest = np.abs(answers).max()
+    if np.any(base) or not 0.0 <= kept < 1.0 or np.abs(m0[1:] - expected).max() > _SAME * largest:
+        raise InstrumentError(
+            f"a law that remembers {len(feedback.output)} numbers was asked for, and HELIC-DAQ's PID takes "
+            "proportional and derivative ones of m0's velocity alone. Nothing was changed; write "
+            'pd_of = "m0_velocity" into [controller], and one is designed'
+        )
+    kd = m0[1] * step_s / share**2
+    return float(-m0[0] - kd * share / step_s), float(kd), float(step_s * kept / share)
+
+
+class Coefficients:
+    """Fourier coefficients of output, base and m0 over blocks of periods, from samples as they come."""
+
+    def __init__(self, program: LoopProgram, rate_hz: float) -> None:
+        self._program = program
+        self._rate_hz = rate_hz
+        self.begin_anew()
+
+    def begin_anew(self) -> None:
+        """Drop the block that lasts: samples of it are missing."""
+        self._samples = np.empty((len(READ), 0))
+        self._is_changed = False
+
+    def take(self, samples: NDArray[np.float64], following: int, is_gliding: bool) -> list[LoopBlock]:  # noqa: FBT001
+        """Add samples, shape (read, samples), up to the one that follows; give the blocks that end."""
+        self._samples = np.hstack([self._samples, samples])
+        self._is_changed |= is_gliding
+        blocks: list[LoopBlock] = []
+        while True:
+            phase = self._samples[0]
+            turns = np.cumsum(np.diff(phase, prepend=phase[:1]) % 1.0)
+            end = int(np.searchsorted(turns, self._program.block_periods))
+            if end == turns.size:
+                return blocks
+            blocks.append(self._block(turns[:end], (following - turns.size + end) / self._rate_hz))
+            self._samples, self._is_changed = self._samples[:, end:], is_gliding
+
+    def _block(self, turns: NDArray[np.float64], end_s: float) -> LoopBlock:
+        phase, epoch, *voltages = self._samples[:, : turns.size]
+        weight = 1.0 - np.cos(2 * np.pi * turns / self._program.block_periods)
+        orders = np.arange(self._program.harmonics + 1)
+        found = (voltages * weight) @ np.exp(-2j * np.pi * np.outer(phase, orders)) / weight.sum()
+        found[:, 1:] *= 2.0
+        output, base, m0 = (tuple((float(each.real), float(each.imag)) for each in row) for row in found)
+        # Every change of what is played advances the board's count of commands.
+        steady = not self._is_changed and bool(np.all(epoch == epoch[0]))
+        return LoopBlock(end_s=end_s, steady=steady, output=output, base=base, m0=m0)
+
+
+class HelicController:
+    """The host's end of a connection to a HELIC-DAQ board."""
+
+    def __init__(self, link: HelicLink, config: ControllerConfig, read: tuple[str, ...]) -> None:
+        self._link = link
+        self._config = config
+        experiment, firmware = (
+            bytes(each).rstrip(b"\0").decode() for each in link.get("experiment", "firmware")
+        )
+        self._identity = Identity(
+            "", f"HELIC-DAQ {experiment}", "", firmware, f"{link.where} {experiment} {firmware}"
+        )
+        self._facts = LoopFacts(
+            name=self._identity.model,
+            serial=link.where,
+            rate_hz=link.rate_hz,
+            latency_s=config.latency_s,
+            limit_v=config.limit_v,
+            watchdog_s=config.watchdog_s,
+            pd_of=LoopInput.M0,
+        )
+        self._harmonics = (link.parameters["forcing_coeffs"].count - 1) // 2
+        self._turn = threading.Condition()
+        self._state, self._reason = LoopState.SILENT, ""
+        self._error: InstrumentError | None = None
+        """Why nothing can be asked any more."""
+        self._gains: tuple[float, ...] = ()
+        self._now = Played(0.0, np.zeros(self._harmonics, dtype=np.complex128))
+        self._glide: Glide | None = None
+        self._coefficients: Coefficients | None = None
+        self._blocks: list[LoopBlock] = []
+        self._following, self._number = -1, 0
+        """Sample and packet that come next; no sample has come yet."""
+        self._talked = self._at_limit = self._late = 0
+        """Sample at which its host last said anything, samples at the limit, and ticks that came late."""
+        (self._ticks,) = link.get("ticks")
+        """Ticks of the board less samples heard; its ticks until any was."""
+        self._close_gate()
+        link.stream(read)
+        self._leaving = threading.Event()
+        self._thread = threading.Thread(target=self._listen, name="helic", daemon=True)
+        self._thread.start()
+
+    @classmethod
+    def open(cls, config: ControllerConfig) -> Self:
+        """Connect, silence whatever plays, and compare the board with its configuration."""
+        host, port = session(config.resource)
+        link = HelicLink(host, port, int(config.options.get("stream_port", port + 1)))
+        try:
+            read = checked(link, config)
+            return cls(link, config, read)
+        except BaseException:
+            link.close()  # whatever has been opened of its gate closes
+            raise
+
+    @property
+    def identity(self) -> Identity:
+        """Who answered."""
+        return self._identity
+
+    @property
+    def facts(self) -> LoopFacts:
+        """Rate, latency, limit and watchdog."""
+        return self._facts
+
+    def play(self, program: LoopProgram) -> LoopReport:
+        """Go over to a program."""
+        if len(program.reference_v) > self._harmonics:
+            raise InstrumentError(
+                f"{len(program.reference_v)} harmonics were asked for, and the board at {self._link.where} "
+                f"plays {self._harmonics}. Nothing was changed; ask for fewer"
+            )
+        gains = pd_gains(program.feedback, 1 / self._facts.rate_hz)
+        wanted = np.zeros(self._harmonics, dtype=np.complex128)
+        wanted[: len(program.reference_v)] = [complex(*each) for each in program.reference_v]
+        with self._turn:
+            told = self._told()
+            try:
+                self._go_over(Played(program.frequency_hz, wanted), gains, program.glide_s)
+            except InstrumentError as error:
+                self._give_up(error)
+                raise
+            self._coefficients = Coefficients(program, self._facts.rate_hz)
+            self._state, self._reason = LoopState.PLAYING, ""
+            return told.model_copy(update={"state": self._state, "reason": ""})
+
+    def report(self) -> LoopReport:
+        """Hand over what has been measured since the last report."""
+        with self._turn:
+            self._require_there()
+            try:
+                self._look_at_board()
+            except InstrumentError as error:
+                self._give_up(error)
+                raise
+            return self._told()
+
+    def silence(self, ramp_s: float) -> LoopReport:
+        """Ramp down, and close the board's gate."""
+        with self._turn:
+            told = self._told()
+            if self._state is not LoopState.SILENT:
+                if ramp_s == 0.0:
+                    self._close_gate()
+                elif self._state is LoopState.PLAYING:
+                    self._end("", ramp_s)
+            return told.model_copy(update={"state": self._state})
+
+    def close(self) -> None:
+        """Silence, and end the connection."""
+        with self._turn:
+            if self._leaving.is_set():
+                return
+            try:
+                if self._error is None:
+                    self.silence(ENDING_S)
+                    self._turn.wait_for(lambda: self._state is LoopState.SILENT, 10 * ENDING_S)
+                    self._close_gate()
+            finally:
+                self._error = self._error or InstrumentError(
+                    f"the connection to the board at {self._link.where} was closed. It is silent; open the "
+                    "bench again"
+                )
+                self._leaving.set()
+                self._link.close()
+        self._thread.join()
+
+    def _require_there(self) -> None:
+        if self._error is not None:
+            raise self._error
+
+    def _told(self) -> LoopReport:
+        """Give what a report holds; its host has said something."""
+        self._require_there()
+        self._talked = self._following
+        blocks, self._blocks = tuple(self._blocks), []
+        time_s = max(self._following, 0) / self._facts.rate_hz
+        return LoopReport(state=self._state, reason=self._reason, time_s=time_s, blocks=blocks)
+
+    def _go_over(self, wanted: Played, gains: tuple[float, ...], glide_s: float) -> None:
+        if gains != self._gains:
+            for name, gain in zip(GAINS, gains, strict=True):
+                self._link.set(name, gain)
+            self._gains = gains
+        if self._state is LoopState.SILENT:
+            self._tell(Played(wanted.frequency_hz, np.zeros_like(wanted.volts)))
+            open_gate(self._link)
+            self._late, self._at_limit = self._ticks_late(), 0
+        samples = max(glide_s * self._facts.rate_hz, 1.0)
+        self._glide = Glide(self._following, samples, self._now, wanted, is_last=False)
+
+    def _tell(self, played: Played) -> None:
+        if played.frequency_hz != self._now.frequency_hz:
+            self._link.set("freq", played.frequency_hz)
+        if np.any(played.volts != self._now.volts):
+            # v = mean + sum a cos + b sin: the real part of (a - i b) exp(i k theta).
+            self._link.set("forcing_coeffs", 0.0, *played.volts.real, *-played.volts.imag)
+        self._now = played
+
+    def _end(self, reason: str, ramp_s: float) -> None:
+        self._state, self._reason = LoopState.ENDING, reason
+        nothing = replace(self._now, volts=np.zeros_like(self._now.volts))
+        samples = max(ramp_s * self._facts.rate_hz, 1.0)
+        self._glide = Glide(self._following, samples, self._now, nothing, is_last=True)
+
+    def _close_gate(self) -> None:
+        self._link.set("arm", 0)
+        self._state, self._glide, self._coefficients = LoopState.SILENT, None, None
+        self._tell(replace(self._now, volts=np.zeros_like(self._now.volts)))
+
+    def _give_up(self, error: InstrumentError) -> None:
+        """Be silent after an error: by command, or by the end of the connection."""
+        if self._state is not LoopState.SILENT:
+            self._reason = str(error)
+        self._state, self._glide = LoopState.SILENT, None
+        try:
+            self._link.set("arm", 0)
+        except InstrumentError as lost:
+            self._error = error if isinstance(error, InstrumentLost) else lost
+            self._link.close()
+
+    def _ticks_late(self) -> int:
+        return int(sum(self._link.get("overruns", "tick_timeouts")))
+
+    def _look_at_board(self) -> None:
+        ticks, safety, arm = self._link.get("ticks", "safety", "arm")
+        late = LATEST_S * self._facts.rate_hz
+        if not self._turn.wait_for(
+            lambda: self._error is not None or ticks - self._ticks - self._following <= late, PATIENCE_S
+        ):
+            raise InstrumentError(
+                f"the board at {self._link.where} answers, and its samples do not arrive any more. It was "
+                "silenced; let the datagrams of its stream through the firewall, and look at the network"
+            )
+        self._require_there()
+        if self._state is not LoopState.SILENT and not (safety & GATE_OPEN and arm):
+            self._state, self._glide = LoopState.SILENT, None
+            self._reason = (
+                "its safety gate tripped" if safety & GATE_TRIPPED else "its gate was closed by somebody else"
+            )
+        if self._state is LoopState.PLAYING and self._ticks_late() > self._late:
+            self._end(f"{self._ticks_late() - self._late} of its ticks came late", ENDING_S)
+
+    def _listen(self) -> None:
+        """Take samples as they come, and go on with what is under way; a thread of its own."""
+        while not self._leaving.is_set():
+            try:
+                packets = self._link.heard(LISTENING_S)
+                with self._turn:
+                    if packets and self._error is None:
+                        for each in packets:
+                            self._take(each)
+                        self._go_on()
+                        self._turn.notify_all()
+            except InstrumentError as error:
+                with self._turn:
+                    self._give_up(error)
+                    self._turn.notify_all()
+            except OSError:  # the connection was closed under it
+                return
+
+    def _take(self, packet: Packet) -> None:
+        if self._following < 0:
+            (ticks,) = self._link.get("ticks")
+            self._ticks, self._talked = ticks - packet.following, packet.first
+            if self._glide is not None:
+                self._glide = replace(self._glide, start=packet.first)
+        is_whole = (packet.number, packet.first) == (self._number, self._following)
+        self._number, self._following = packet.number + 1, packet.following
+        if self._coefficients is None:
+            return
+        if not is_whole:
+            self._coefficients.begin_anew()
+        self._blocks += self._coefficients.take(packet.values, self._following, self._glide is not None)
+        del self._blocks[:-MOST_BLOCKS]
+        below = np.abs(packet.values[READ.index("out")]) < _AT_LIMIT * self._facts.limit_v
+        run = int(np.argmax(below[::-1])) if below.any() else below.size + self._at_limit
+        self._at_limit = run
+
+    def _go_on(self) -> None:
+        rate_hz, limit_v, watchdog_s = self._facts.rate_hz, self._facts.limit_v, self._facts.watchdog_s
+        if self._state is LoopState.PLAYING and self._following - self._talked > watchdog_s * rate_hz:
+            self._end(f"its host said nothing for {watchdog_s:g} s", ENDING_S)
+        elif self._state is LoopState.PLAYING and self._at_limit > LONGEST_AT_LIMIT_S * rate_hz:
+            self._end(f"its output stayed at its limit of {limit_v:g} V", ENDING_S)
+        glide = self._glide
+        if glide is None:
+            return
+        share = (self._following - glide.start) / glide.samples
+        self._tell(glide.begin.towards(glide.end, share) if share < 1.0 else glide.end)
+        if share >= 1.0:
+            self._glide = None
+            if glide.is_last:
+                self._close_gate()
+
+
+def session(resource: str) -> tuple[str, int]:
+    """Take host and port out of ``TCPIP0::<host>::<port>::SOCKET``."""
+    found = re.fullmatch(r"TCPIP\d*::(.+)::(\d+)::SOCKET", resource)
+    if found is None:
+        raise ConfigurationError(
+            f"controller.resource = {resource!r} is no address of a board; give TCPIP0::<host>::2350::SOCKET"
+        )
+    return found[1], int(found[2])
+
+
+def checked(link: HelicLink, config: ControllerConfig) -> tuple[str, ...]:
+    """Compare a board with its configuration, make it play nothing, and give the sources that are read."""
+    missing = [each for each in (*GAINS, "ctrl_ki") if each not in link.parameters]
+    if missing:
+        raise ConfigurationError(
+            f"the firmware at {link.where} has no {', '.join(missing)}. Nothing was played; build it with "
+            "the standard programme and the control PidController"
+        )
+    options = config.options
+    read = tuple(str(options.get(name, name)) for name in READ)
+    wrong = [each for each in read if each not in link.sources]
+    wrong += [each for each in read[2:] if link.sources.get(each, "V") != "V"]
+    if wrong:
+        raise ConfigurationError(
+            f"{', '.join(wrong)} is no source in volts at {link.where}: {', '.join(link.sources)} are there. "
+            "Nothing was played; name base and m0 in controller.options"
+        )
+    if config.pd_of is not LoopInput.M0 or abs(link.rate_hz / config.rate_hz - 1) > 0.01:
+        raise ConfigurationError(
+            f"the board at {link.where} takes {link.rate_hz:g} samples a second and laws of m0's velocity "
+            f"alone; the configuration says {config.rate_hz:g} and pd_of = {config.pd_of or 'nothing'}. "
+            'Nothing was played; make them agree (pd_of = "m0_velocity")'
+        )
+    link.set("arm", 0)
+    for name in ("target_coeffs", "forcing_coeffs"):
+        link.set(name, *[0.0] * link.parameters[name].count)
+    for name in (*GAINS, "ctrl_ki", "table_mode", "freq"):
+        link.set(name, 0)
+    open_gate(link)  # nothing plays behind it
+    return read
+
+
+def open_gate(link: HelicLink) -> None:
+    """Let the board's output through; refused where no gate opens: nothing would silence it."""
+    link.set("arm", 1)
+    safety, _ = link.get("safety", "arm")
+    if safety & (GATE_OPEN | GATE_TRIPPED) != GATE_OPEN:
+        link.set("arm", 0)
+        why = "has tripped" if safety & GATE_TRIPPED else "does not open"
+        raise InstrumentError(
+            f"the safety gate of the board at {link.where} {why}. It is silent; look at its sensors, or "
+            "build its rig with SAFETY_GATED: without a gate nothing silences it when its host is gone"
+        )

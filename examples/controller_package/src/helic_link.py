@@ -1,0 +1,228 @@
+"""The wire protocol of HELIC-DAQ, version 3, by its docs/protocol.md: frames over TCP, samples over UDP."""
+
+import binascii
+import socket
+import struct
+import threading
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.acquisition import InstrumentError, InstrumentLost
+
+VERSION = 3
+MAGIC = 0x4C48
+ANSWER_S = 2.0
+"""How long a reply is waited for [s]."""
+_HEAD = struct.Struct("<HBBH")
+_PACKET = struct.Struct("<HBBIIIHH")
+_ERRORS = {
+    1: "bad frame",
+    2: "unknown type",
+    3: "bad index",
+    4: "bad length",
+    5: "read-only",
+    6: "bad value",
+    7: "busy",
+}
+
+
+class Ask(IntEnum):
+    """Types of message."""
+
+    PARAMETERS = 1
+    SOURCES = 2
+    GET = 3
+    SET = 4
+    STREAM_SETUP = 7
+    STREAM_START = 8
+    STREAM_STOP = 9
+    STATUS = 10
+    ERROR = 255
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What the board says of one of its parameters."""
+
+    index: int
+    layout: struct.Struct
+    count: int
+
+
+@dataclass(frozen=True, eq=False)
+class Packet:
+    """Samples of the sources that were asked for."""
+
+    number: int
+    first: int
+    """Index of the first sample."""
+    values: NDArray[np.float64]
+    """Shape (sources, samples)."""
+
+    @property
+    def following(self) -> int:
+        """Index of the sample after its last."""
+        return self.first + self.values.shape[1]
+
+
+def frame(ask: int, sequence: int, payload: bytes) -> bytes:
+    """Give what is sent for a message."""
+    body = struct.pack("<BBH", ask, sequence, len(payload)) + payload
+    return struct.pack("<H", MAGIC) + body + struct.pack("<H", binascii.crc_hqx(body, 0xFFFF))
+
+
+class HelicLink:
+    """One connection to a board; any thread may use it."""
+
+    def __init__(self, host: str, port: int, stream_port: int) -> None:
+        self.where = f"{host}:{port}"
+        self._turn = threading.RLock()
+        self._sequence = 0
+        self._host, self._stream_port = host, stream_port
+        try:
+            self._control = socket.create_connection((host, port), ANSWER_S)
+        except OSError as error:
+            raise InstrumentLost(
+                f"no HELIC-DAQ board answers at {self.where} ({error}). Nothing was played; look at its "
+                "power, its network, and whether another program holds its only connection"
+            ) from error
+        self._control.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._samples = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._samples.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+        try:
+            self._discover()
+        except BaseException:
+            self.close()
+            raise
+
+    def _discover(self) -> None:
+        told = self.asked(Ask.STATUS)
+        if told[0] != VERSION:
+            raise InstrumentError(
+                f"the board at {self.where} speaks version {told[0]} of HELIC-DAQ's protocol, and this "
+                f"driver version {VERSION}. Nothing was played; install firmware of that version"
+            )
+        _, count, _, self.rate_hz, _ = struct.unpack("<BHBfI", told)
+        self.parameters: dict[str, Parameter] = {}
+        while len(self.parameters) < count:
+            self._take_page(self.asked(Ask.PARAMETERS, struct.pack("<H", len(self.parameters))))
+        words = self.asked(Ask.SOURCES).decode("ascii").split("\0")
+        self.sources = dict(zip(words[0::2], words[1::2], strict=False))
+        """Units by name, in the order of their numbers."""
+
+    def _take_page(self, page: bytes) -> None:
+        first, following = struct.unpack_from("<HH", page)
+        place = 4
+        for index in range(first, following):
+            end = page.index(b"\0", place)
+            kind, number = struct.unpack_from("<cH", page, end + 1)
+            # A char array is one text; anything else so many numbers.
+            letter = kind.decode("ascii")
+            layout = struct.Struct(f"<{number}{'s' if letter == 'c' else letter}")
+            self.parameters[page[place:end].decode("ascii")] = Parameter(index, layout, number)
+            place = end + 5
+        if following != len(self.parameters) or following == first:
+            raise InstrumentError(
+                f"the board at {self.where} tells its parameters out of order ({first} to {following}). "
+                "Nothing was played; install firmware of version 3"
+            )
+
+    def asked(self, ask: Ask, payload: bytes = b"", what: str = "") -> bytes:
+        """Send one frame, and give the payload of its answer."""
+        with self._turn:
+            self._sequence = (self._sequence + 1) % 256
+            try:
+                self._control.sendall(frame(ask, self._sequence, payload))
+                head = self._received(_HEAD.size)
+                magic, kind, sequence, length = _HEAD.unpack(head)
+                rest = self._received(length + 2)
+            except OSError as error:
+                raise InstrumentLost(
+                    f"the board at {self.where} does not answer ({error or type(error).__name__}). Its gate "
+                    "closes by itself when it misses the connection, after 10 s at the latest; look at its "
+                    "power and its network"
+                ) from error
+            asked = self._sequence
+        told, (crc,) = rest[:-2], struct.unpack("<H", rest[-2:])
+        if magic != MAGIC or sequence != asked or crc != binascii.crc_hqx(head[2:] + told, 0xFFFF):
+            raise InstrumentError(
+                f"what answers at {self.where} is no HELIC-DAQ board: its frame is damaged. Nothing more was "
+                "sent; correct controller.resource"
+            )
+        if kind == Ask.ERROR:
+            raise InstrumentError(
+                f"the board at {self.where} refused {what or ask.name.lower()}: "
+                f"{_ERRORS.get(told[0], f'error {told[0]}')}. It was silenced; look at what its firmware "
+                "allows"
+            )
+        return told
+
+    def _received(self, count: int) -> bytes:
+        parts = b""
+        while len(parts) < count:
+            part = self._control.recv(count - len(parts))
+            if not part:
+                raise ConnectionError("it closed the connection")
+            parts += part
+        return parts
+
+    def get(self, *names: str) -> tuple[Any, ...]:
+        """Read scalars: numbers, and bytes of an array of characters."""
+        wanted = [self.parameters[name] for name in names]
+        told = self.asked(Ask.GET, struct.pack(f"<{len(wanted)}H", *(each.index for each in wanted)))
+        return tuple(
+            value
+            for each, place in zip(
+                wanted, np.cumsum([0, *(each.layout.size for each in wanted)]), strict=False
+            )
+            for value in each.layout.unpack_from(told, int(place))
+        )
+
+    def set(self, name: str, *values: float) -> None:
+        """Write a parameter, whole."""
+        parameter = self.parameters[name]
+        self.asked(
+            Ask.SET,
+            struct.pack("<H", parameter.index) + parameter.layout.pack(*values),
+            f"{values[:1]} as {name}",
+        )
+
+    def stream(self, sources: tuple[str, ...]) -> None:
+        """Have every sample of some sources sent from now on."""
+        names = list(self.sources)
+        numbers = bytes(names.index(each) for each in sources)
+        self._samples.bind(("", 0))
+        # A firewall then takes what comes back for an answer.
+        self._samples.sendto(b"\0", (self._host, self._stream_port))
+        self.asked(Ask.STREAM_STOP)
+        self.asked(Ask.STREAM_SETUP, struct.pack("<HIB", 1, 0, len(numbers)) + numbers)
+        self.asked(Ask.STREAM_START, struct.pack("<H", self._samples.getsockname()[1]))
+
+    def heard(self, timeout_s: float) -> list[Packet]:
+        """Wait for samples, and give all that have come."""
+        packets: list[Packet] = []
+        self._samples.settimeout(timeout_s)
+        try:
+            while True:
+                packets += self._packet(self._samples.recv(2048))
+                self._samples.settimeout(0.0)
+        except (TimeoutError, BlockingIOError):
+            return packets
+
+    def _packet(self, datagram: bytes) -> list[Packet]:
+        if len(datagram) < _PACKET.size:
+            return []
+        magic, version, width, number, first, _, _, count = _PACKET.unpack_from(datagram)
+        if magic != MAGIC or version != VERSION or len(datagram) != _PACKET.size + 4 * width * count:
+            return []
+        values = np.frombuffer(datagram, "<f4", offset=_PACKET.size).reshape(count, width)
+        return [Packet(number, first, values.T.astype(np.float64))]
+
+    def close(self) -> None:
+        """Leave; the board's gate closes at once."""
+        self._control.close()
+        self._samples.close()
