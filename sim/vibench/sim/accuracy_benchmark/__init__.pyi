@@ -17,3 +17,10 @@ from ._measuring import (
     Thoroughness as Thoroughness,
     measure_accuracy as measure_accuracy,
 )
+from ._textbook_methods import (
+    TextbookMethod as TextbookMethod,
+    ode45 as ode45,
+    runge_kutta as runge_kutta,
+    textbook_exponent as textbook_exponent,
+    textbook_state as textbook_state,
+)

@@ -100,17 +100,19 @@ def fitted_power_law(
 
 
 def _made(detail: str, reference: Reference) -> PowerLaw:
-    """Fit powers, ``3+5+7`` in equal parts or ``3@0.2+7@0.8``."""
-    terms = [term.partition("@") for term in detail.split("+")]
+    """Fit powers, ``3+5+7`` in equal parts or ``3@0.2+7@0.8``; behind a colon the indentation."""
+    powers, _, indentation = detail.partition(":")
+    terms = [term.partition("@") for term in powers.split("+")]
     try:
         exponents = [int(exponent) for exponent, _, _ in terms]
     except ValueError:
         raise UnreadableLawError(detail) from None
     is_equal = all(share == "" for _, _, share in terms)
     shares = None if is_equal else [number_in(share) for _, _, share in terms]
-    return fitted_power_law(exponents, reference.stiffness, reference.gap_m, shares=shares)
+    at_m = number_in(indentation) if indentation else PAPER_INDENTATION_M
+    return fitted_power_law(exponents, reference.stiffness, reference.gap_m, at_m, shares)
 
 
 POWER = LawWord(
-    "power:3+5+7 or power:3@0.2+7@0.8", "odd powers of p instead of stops, with shares", "power:5", _made
+    "power:3+5+7 or power:3@0.2+7@0.8[:M]", "odd powers of p instead of stops, with shares", "power:5", _made
 )
