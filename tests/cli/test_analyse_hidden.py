@@ -10,18 +10,26 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from vibench.sim import gong2025
+
 PLACE = Path(__file__).parents[1] / "analysis" / "hidden_motion" / "shaken_world.py"
 GAP_M = 45e-6
 
 
 @pytest.fixture(scope="module")
-def shaken(tmp_path_factory):
-    """A colliding dwell of the virtual world, recorded."""
+def world():
+    """The virtual world, and recordings of it."""
     spec = importlib.util.spec_from_file_location("shaken_world", PLACE)
     module = importlib.util.module_from_spec(spec)
     sys.modules.setdefault(spec.name, module)
     spec.loader.exec_module(module)
-    return module.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
+    return module
+
+
+@pytest.fixture(scope="module")
+def shaken(world, tmp_path_factory):
+    """A colliding dwell of the virtual world, recorded."""
+    return world.shaken(tmp_path_factory.mktemp("shaken"), 260.0, 1.5, seed=51)
 
 
 @pytest.mark.thorough
@@ -49,16 +57,25 @@ def test_json_has_bounds_and_says_what_is_not_determined(vibench_here, shaken, t
     assert told["without_contact_model"]["gaps_m"] == pytest.approx([GAP_M, GAP_M], abs=0.5e-6)
 
 
-def test_a_specimen_that_cannot_be_tracked_gets_a_sentence_and_the_rest_its_report(
-    vibench_here, shaken, tmp_path
+def test_a_recording_of_what_cannot_be_tracked_gets_a_sentence_and_the_rest_its_report(
+    vibench_here, world, tmp_path, monkeypatch
 ):
-    (tmp_path / "rigid.toml").write_text('model = "gong2025"\nname = "rigid"\ncontact = "rigid:0.8"\n')
-    done = vibench_here(
-        *("analyse", shaken.path, "--hidden", "--no-simulate", "--specimen", "rigid.toml", "--out", "told"),
-        cwd=tmp_path,
-    )
+    rigid = world.RIG.specimen.model_copy(update={"contact": "rigid:0.8"})
+    monkeypatch.setattr(world, "RIG", world.RIG.model_copy(update={"specimen": rigid}))
+    recorded = world.shaken(tmp_path, 260.0, 1.5, seed=51, specimen=gong2025())
+    done = vibench_here("analyse", recorded.path, "--hidden", "--no-simulate", "--out", "told", cwd=tmp_path)
     assert "shaken: no hidden motion: stops of the kind 'rigid' cannot be tracked" in done.stderr
     assert (tmp_path / "told" / "report.html").exists()
+
+
+def test_a_specimen_that_cannot_be_tracked_is_refused_before_anything_is_computed(
+    vibench_here, shaken, tmp_path
+):
+    options = ("--hidden", "--specimen", "rigid_stops", "--out", "told")
+    done = vibench_here("analyse", shaken.path, *options, cwd=tmp_path)
+    assert done.returncode == 1
+    assert "stops of the kind 'rigid' cannot be tracked" in done.stderr
+    assert not (tmp_path / "told").exists()
 
 
 def test_a_kept_motion_goes_out_with_the_recording(vibench_here, shaken, tmp_path):

@@ -1,6 +1,7 @@
 """`vibench branches` and `vibench spectrum`, as they are typed."""
 
 import json
+import re
 
 import h5py
 import pytest
@@ -90,10 +91,48 @@ def test_exponents_are_printed_as_json_and_written(tmp_path):
     assert (tmp_path / "s" / "spectrum.png").is_file()
 
 
+POINT = ("--amplitude", "5e-6", "--frequency", "260")
+LINE = ("--amplitude", "5e-6", "--frequency", "60:70")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        *(("spectrum", *POINT, option) for option in ("--duration", "--settle", "--confidence")),
+        *(
+            ("branches", *LINE, option)
+            for option in ("--places", "--starts", "--harmonics", "--most-periods")
+        ),
+        *(("chain", *POINT, option) for option in ("--duration", "--settle", "--exponent", "--cells")),
+        *((*each, "--gap") for each in (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))),
+        *(
+            (*each, "--damping-time")
+            for each in (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))
+        ),
+    ],
+)
+@pytest.mark.parametrize("value", ["-1", "nan"])
+def test_a_number_that_is_not_allowed_is_named_as_it_was_typed(command, value):
+    result = run(*command, value)
+    said = f"{result.exception} {result.output}"
+    assert result.exit_code != 0
+    assert command[-1] in said
+    assert not re.search(r"\w_(s|m|hz)\b|most_periods|lengths\b", said)
+
+
+@pytest.mark.parametrize("command", [("spectrum", *POINT, "--duration"), ("branches", *LINE, "--places")])
+def test_zero_is_named_as_it_was_typed(command):
+    assert f"{command[-1]} was given as 0" in refused(*command, "0")
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
         (("branches", "--amplitude", "5e-6"), "--amplitude or --frequency is missing"),
+        (
+            ("branches", "--like", "any.h5", "--amplitude", "1e-6:5e-6"),
+            "leave --amplitude out (--frequency START:STOP may stay",
+        ),
         (("branches", "--resonance", "92:97"), "give --amplitude START:STOP beside it"),
         (
             ("branches", "--resonance", "92", "--amplitude", "1e-8:1e-7"),

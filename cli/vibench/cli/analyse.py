@@ -33,7 +33,7 @@ from vibench.analysis import (
     update_model,
 )
 from vibench.analysis.dynamics import BranchDiagram, read_diagram
-from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion
+from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion, tracked_specimen
 from vibench.analysis.report import write_report
 from vibench.sim import Specimen
 from vibench.sim.maps import MapResults, open_map
@@ -220,6 +220,9 @@ def analyse(
         raise InvalidRequest(
             "--keep was given without --hidden, and only a hidden motion is kept; give both or neither"
         )
+    laid = None if specimen is None else described(specimen).specimen()
+    if hidden and laid is not None:
+        tracked_specimen(laid)
     overlays = [read_diagram(each) for each in branches or ()], [open_map(each) for each in maps or ()]
     simulation = driven_by.simulation if simulate else Simulation.LEFT_OUT
     with external_data(allow_external):
@@ -231,7 +234,7 @@ def analyse(
             (simulation, draws),
             fit=tuple(free or ()) if fit else None,
             hidden=_Hidden.KEPT if keep else _Hidden.TOLD if hidden else _Hidden.LEFT_OUT,
-            specimen=specimen,
+            laid=laid,
             as_json=as_json,
         )
 
@@ -245,7 +248,7 @@ def _analyse(
     *,
     fit: Sequence[Parameter] | None,
     hidden: _Hidden,
-    specimen: str | None,
+    laid: Specimen | None,
     as_json: bool,
 ) -> None:
     paths = recordings_in(recording) if recording.is_dir() else (recording,)
@@ -259,9 +262,7 @@ def _analyse(
     with reading_bar() as observer:
         simulation, draws = simulated
         updated = None if fit is None else fitted_to(paths, name, observer, fit)
-        laid = None if updated is None else updated.specimen
-        if specimen is not None:
-            laid = described(specimen).specimen()
+        laid = laid if updated is None else updated.specimen
         results = analyse_files(paths, name, simulation, request, observer, laid, draws)
         motions = list(hidden_motions(results, laid, observer, hidden))
     if updated is not None:

@@ -162,7 +162,10 @@ def _drive(
     """Read along what the branches go, and at what level."""
     if like is not None:
         if amplitude is not None:
-            raise InvalidRequest("--amplitude and --like were both given; the recording has its own level")
+            raise InvalidRequest(
+                f"--amplitude {amplitude} and --like were both given, and the recording has its own level; "
+                "leave --amplitude out (--frequency START:STOP may stay, within the recording's own range)"
+            )
         curves, level = _recorded(like)
         low, high = level[0][0], level[-1][0]
         if frequency is not None:

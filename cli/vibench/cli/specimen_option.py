@@ -1,5 +1,6 @@
 """Which specimen a command is about, and what of it is replaced: options that several commands share."""
 
+import re
 from typing import Annotated, Any, TypeVar
 
 import typer
@@ -34,6 +35,9 @@ DampingTime = Annotated[
 ]
 Gap = Annotated[float | None, typer.Option("--gap", metavar="M", help="Clearance at both stops.")]
 Asked = TypeVar("Asked", bound=SpecimenChoice)
+_UNIT = re.compile("_(s|m|hz)$")
+_OTHER_NAMES = {"lengths": "cells", "described": "specimen"}
+"""Options that are not called as their field."""
 
 
 def described(specimen: str | None) -> SpecimenTable:
@@ -52,6 +56,12 @@ def described(specimen: str | None) -> SpecimenTable:
 def given_options(**options: object) -> dict[str, object]:
     """Keep what was typed, each as an axis of one value; what was not is left to the specimen."""
     return {name: (value,) for name, value in options.items() if value is not None}
+
+
+def option_of(field: int | str = "", *_: int | str) -> str:
+    """Name the option that a field of a question was typed as: ``duration_s`` is ``--duration``."""
+    name = str(field)
+    return f"--{_OTHER_NAMES.get(name, _UNIT.sub('', name).replace('_', '-'))}" if name else ""
 
 
 def asked_of_specimen(
@@ -76,7 +86,7 @@ def asked_of_specimen(
     except ValidationError as error:
         first = error.errors()[0]
         said = first["msg"].removeprefix("Value error, ")
-        place = ".".join(str(each) for each in first["loc"])
+        place = option_of(*first["loc"])
         raise InvalidRequest(f"{place} was given as {first['input']!r}: {said}" if place else said) from error
     ends_m = () if amplitude is None else map(float, amplitude.split(":")[:2])
     print_warnings(plausibility_warnings(ends_m, made.shaken.gaps_m))
