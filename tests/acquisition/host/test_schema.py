@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -95,6 +96,29 @@ def test_every_shipped_file_names_its_schema_and_passes_it(kind):
         assert text.startswith(f"#:schema {up}schemas/{kind}-1.schema.json\n"), path
         assert (path.parent / text.split()[1]).is_file()
         assert faults(kind, text) == [], path
+
+
+@pytest.mark.parametrize("name", shipped_specimens())
+def test_every_shipped_specimen_names_its_schema_and_passes_it(name):
+    path = Path(str(files("vibench.sim") / "specimens" / f"{name}.toml"))
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("#:schema ../../../../schemas/specimen-1.schema.json\n")
+    assert (path.parent / text.split()[1]).is_file()
+    assert faults("specimen", text) == []
+
+
+def test_a_specimen_may_say_the_version_it_was_written_for(tmp_path):
+    path = tmp_path / "mine.toml"
+    text = 'format_version = 1\nmodel = "gong2025"\nname = "mine"\n'
+    path.write_text(text, encoding="utf-8")
+    assert load_specimen(path).name == "mine"
+    assert faults("specimen", text) == []
+    for wrong in ("2", "true", '"1"', "0"):
+        path.write_text(text.replace("= 1", f"= {wrong}"), encoding="utf-8")
+        with pytest.raises(ValueError, match="is not a version that this vibench reads") as refused:
+            load_specimen(path)
+        assert "\n" not in str(refused.value)
+        assert faults("specimen", path.read_text(encoding="utf-8")) != []
 
 
 @pytest.mark.parametrize(

@@ -73,11 +73,6 @@ def _starts_from_another(part: Json) -> None:
         side["type"], side["pattern"] = ["number", "string"], "^inf$"
 
 
-def _as_a_specimen(schema: Json) -> None:
-    _starts_from_another(schema)
-    del schema["properties"][FORMAT]
-
-
 def _with_ranges(schema: Json) -> None:
     """Let frequencies be ranges, numbers, and lists of both; a specimen's former key still stands for it."""
     _with_a_base(schema)
@@ -106,7 +101,7 @@ SCHEMAS: Mapping[str, _Kind] = MappingProxyType(
         "study": _Kind("vibench.sim.study", "Study", _with_ranges),
         "map": _Kind("vibench.sim.maps", "Map", _with_a_base),
         "mapping": _Kind("vibench.analysis.exchange", "ImportMapping", _with_a_base),
-        "specimen": _Kind("vibench.sim", "SpecimenDescription", _as_a_specimen),
+        "specimen": _Kind("vibench.sim", "SpecimenDescription", _starts_from_another),
     }
 )
 """Word of a kind of file: what it is. Loaded by name: the models stand in higher rooms."""

@@ -42,6 +42,8 @@ FOLDER = "folder"
 file. Without it only shipped specimens can be named, so that what stands in a recording opens no file."""
 SOURCES = "sources"
 SUFFIX = ".toml"
+FORMAT, VERSION = "format_version", 1
+"""Key by which a file may say which version it was written for, and the one that is read."""
 DEEPEST = 5
 """Files that a file may start from, one after the other."""
 USUAL_SPECIMEN = "gong2025"
@@ -323,7 +325,19 @@ def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dic
             f"no specimen is called {called}, and there is no such file; give the path of a TOML file, "
             f"or one of {names}"
         )
-    return _laid_over(_complete(toml_table(path), path.parent, depth + 1), table)
+    return _laid_over(_complete(_of_this_version(path), path.parent, depth + 1), table)
+
+
+def _of_this_version(path: Path) -> dict[str, Any]:
+    """Read a file, which may say the version that it was written for."""
+    said = toml_table(path)
+    written = said.pop(FORMAT, VERSION)
+    if isinstance(written, bool) or written != VERSION:
+        raise ValueError(
+            f"{path}: {FORMAT} = {reprlib.repr(written)} is not a version that this vibench reads, "
+            f"{VERSION}; a later vibench wrote it: install that one"
+        )
+    return said
 
 
 @cache
