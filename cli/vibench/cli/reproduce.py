@@ -10,12 +10,13 @@ from rich.table import Table
 
 from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind, levels_figure
 from vibench.analysis.reproduction import (
-    AS_CHOSEN,
+    OPTIONS,
     SECTIONS,
     Case,
     Evidence,
     Picture,
     Reproduction,
+    case_with,
     damping_score_figure,
     levels_asked,
     reproduction,
@@ -29,6 +30,7 @@ from .paths import room_for_folder, room_for_page
 from .study import KeptStudies, Workers
 
 PAGE = "reproduction.md"
+_FORMS = ", ".join(f"{name}={option.example} ({option.about})" for name, option in OPTIONS.items())
 IMAGES = "images"
 
 
@@ -47,30 +49,33 @@ def reproduce(
     grid: Annotated[
         FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
     ] = FigureOptions.grid,
+    said: Annotated[
+        list[str] | None,
+        typer.Option("--with", metavar="NAME=VALUE", help=f"What else the paper leaves open: {_FORMS}."),
+    ] = None,
     workers: Workers = None,
 ) -> None:
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
+    case = case_with(options, said or ())
     room_for_folder(out)
     page = out / PAGE if markdown is None else markdown
     room_for_page(page)
     studies = KeptStudies(out / "studies", workers)
     evidence = Evidence(studies)
-    found = reproduction(SECTIONS, evidence, options, lambda step: console.print(f"measuring {step}"))
+    found = reproduction(SECTIONS, evidence, case, lambda step: console.print(f"measuring {step}"))
     page.parent.mkdir(parents=True, exist_ok=True)
-    pictures = tuple(_pictures(found, evidence, options, page))
+    pictures = tuple(_pictures(found, evidence, case, page))
     page.write_text(reproduction_document(found, pictures), encoding="utf-8")
     _tell(found)
     console.print("The page:", bold(page.resolve()))
     studies.complain()
 
 
-def _pictures(
-    found: Reproduction, evidence: Evidence, options: FigureOptions, page: Path
-) -> Iterator[Picture]:
+def _pictures(found: Reproduction, evidence: Evidence, case: Case, page: Path) -> Iterator[Picture]:
     """Draw what the page shows into a folder beside it."""
-    curves = evidence.study(levels_asked(Case(AS_CHOSEN, options)))
-    for drawn in (damping_score_figure(found.scores), levels_figure(options, curves)):
+    curves = evidence.study(levels_asked(case))
+    for drawn in (damping_score_figure(found.scores), levels_figure(case.options, curves)):
         image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
         yield Picture(drawn.title, Path(os.path.relpath(image, page.parent)).as_posix())
 

@@ -84,7 +84,7 @@ def test_every_claim_is_measured_and_the_page_is_written(evidence):
         heading: tuple(replace(claim, alternatives=(), is_scored=False) for claim in section)
         for heading, section in SECTIONS.items()
     }
-    result = reproduction(kept, evidence, replace(SHORT, highest_hz=600.0), told.append)
-    assert told == [*(claim.key for claim in CLAIMS), "score by damping"]
+    result = reproduction(kept, evidence, Case(AS_CHOSEN, replace(SHORT, highest_hz=600.0)), told.append)
+    assert told == [*(claim.key for claim in CLAIMS), "score by damping", "claims by setting"]
     page = reproduction_document(result)
     assert all(f"**{claim.key}**" in page for claim in CLAIMS)

@@ -10,6 +10,7 @@ from ._fig11_clearance import (
 )
 from ._options import (
     AMPLITUDES_M as AMPLITUDES_M,
+    LOWEST_HZ as LOWEST_HZ,
     WITH_EXPONENT as WITH_EXPONENT,
     FigureOptions as FigureOptions,
     FrequencyGrid as FrequencyGrid,

@@ -5,7 +5,7 @@ from vibench.sim.study import Study, StudyResults
 from ..figures import MEASURED, SIMULATED, DrawnFigure, legend_above, new_figure, styled
 from ..tables import named, table
 from ._options import FigureOptions
-from ._responses import draw_linear, drive_at, finish, responses, specimen_of
+from ._responses import draw_linear, drive_at, finish, responses
 from ._time_signal import draw_outline, draw_spectrum, time_signal
 
 _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 200.0
@@ -19,7 +19,7 @@ def definitions_study(options: FigureOptions) -> Study:
 def definitions_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
     """Draw signal, spectrum and response curves at 5 um."""
     curve = responses(results)
-    specimen = specimen_of(results.study, "hertz", options)
+    specimen = options.specimen()
     signal = time_signal(specimen, drive_at(_SHOWN_HZ, _AMPLITUDE_M), options)
     with styled():
         figure = new_figure(5.4)

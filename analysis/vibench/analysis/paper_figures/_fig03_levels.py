@@ -20,7 +20,7 @@ from ..figures import (
 )
 from ..tables import Table, named, table
 from ._options import AMPLITUDES_M, CASES, FigureOptions
-from ._responses import Responses, draw_linear, finish, responses, shade, specimen_of
+from ._responses import Responses, draw_linear, finish, responses, shade
 
 _CONTINUOUS = "power:5"
 _PLACES = 60
@@ -39,7 +39,7 @@ def continuous_study(options: FigureOptions) -> Study:
 
 def levels_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
     """Draw Fig. 3: the piece-wise model, colliding frequencies shaded."""
-    specimen = specimen_of(results.study, "hertz", options)
+    specimen = options.specimen()
 
     def draw(axes: Axes, curve: Responses, _amplitude_m: float) -> None:
         shade(axes, curve.frequency_hz, curve.collides, "m1 and m2 collide")
@@ -61,7 +61,7 @@ def continuous_figure(options: FigureOptions, results: StudyResults) -> DrawnFig
         found = diagram_of(
             BranchRequest(
                 model=_CONTINUOUS,
-                damping_time_s=options.damping_time_s,
+                damping_time_s=options.only_damping_time_s,
                 gap_m=options.gap_m,
                 method=BranchMethod.FIRST_ORDER,
                 amplitude_m=amplitude_m,

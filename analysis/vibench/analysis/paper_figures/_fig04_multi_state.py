@@ -17,7 +17,7 @@ from ..figures import (
 )
 from ..tables import named, table
 from ._options import WITH_EXPONENT, FigureOptions
-from ._responses import draw_linear, drive_at, finish, responses, shade, specimen_of
+from ._responses import draw_linear, drive_at, finish, responses, shade
 from ._time_signal import draw_outline, draw_spectrum, time_signal
 
 _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 260.0
@@ -31,7 +31,7 @@ def multi_state_study(options: FigureOptions) -> Study:
 def multi_state_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
     """Draw response, relative displacement and exponent over frequency, and the motion at 260 Hz."""
     curve, linear = responses(results, model="hertz"), responses(results, model="linear")
-    specimen = specimen_of(results.study, "hertz", options)
+    specimen = options.specimen()
     signal = time_signal(specimen, drive_at(_SHOWN_HZ, _AMPLITUDE_M), options)
     f = curve.frequency_hz
     with styled():

@@ -15,7 +15,7 @@ _LOW_M, _HIGH_M = 5e-6, 7e-6
 
 def damping_study(options: FigureOptions) -> Study:
     """With and without damping, at 5 and 7 um."""
-    return options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, options.damping_time_s))
+    return options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, options.only_damping_time_s))
 
 
 def damping_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:

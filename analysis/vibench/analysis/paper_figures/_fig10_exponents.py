@@ -9,7 +9,7 @@ from ..figures import LEVEL_STYLES, LEVELS, DrawnFigure, legend_above, magnitude
 from ..signals import Reals
 from ..tables import table
 from ._options import AMPLITUDES_M, WITH_EXPONENT, FigureOptions
-from ._responses import drive_at, responses, specimen_of
+from ._responses import drive_at, responses
 from ._time_signal import time_signal
 
 _PIECE_WISE, _CONTINUOUS = "hertz", "power:5"
@@ -50,7 +50,7 @@ def exponents_figure(options: FigureOptions, levels: StudyResults, models: Study
             kinds.plot(f, values, color=colour, linestyle=line, linewidth=0.9, label=label)
         kinds.legend(fontsize=7)
         _finish(kinds, f, f"models at {1e6 * _MODERATE_M:g} µm")
-        _at_260(last, spectra, options, levels)
+        _at_260(last, spectra, options)
         legend_above(figure, [pie], columns=4)
     columns: dict[str, Reals] = {"frequency_hz": f}
     for model, curves in of.items():
@@ -87,8 +87,8 @@ def _finish(axes: Axes, f: Reals, title: str) -> None:
     axes.set_xlabel("drive frequency [Hz]")
 
 
-def _at_260(last: Axes, spectra: Axes, options: FigureOptions, results: StudyResults) -> None:
-    specimen = specimen_of(results.study, _PIECE_WISE, options)
+def _at_260(last: Axes, spectra: Axes, options: FigureOptions) -> None:
+    specimen = options.specimen(_PIECE_WISE)
     for amplitude_m, colour, line in zip(AMPLITUDES_M, LEVELS, LEVEL_STYLES, strict=False):
         signal = time_signal(specimen, drive_at(_SHOWN_HZ, amplitude_m), options)
         outline = signal.outline

@@ -5,7 +5,7 @@ from vibench.sim.study import Study, StudyResults
 from ..figures import LEVEL_STYLES, LEVELS, TERMINAL, DrawnFigure, legend_above, new_figure, styled
 from ..tables import table
 from ._options import FigureOptions
-from ._responses import finish, responses, specimen_of
+from ._responses import finish, responses
 
 GAPS_M = (5e-6, 15e-6, 30e-6, 45e-6, 60e-6)
 """The text copy of the paper does not name its gaps."""
@@ -19,7 +19,7 @@ def clearance_studies(options: FigureOptions) -> tuple[Study, ...]:
 def clearance_figure(options: FigureOptions, *results: StudyResults) -> DrawnFigure:
     """Draw both responses of every gap."""
     curves = [responses(each) for each in results]
-    bound_hz = specimen_of(results[0].study, "hertz", options).bound_frequencies_hz
+    bound_hz = options.specimen().bound_frequencies_hz
     with styled():
         figure = new_figure(4.6)
         panels = figure.subplots(2, 1, sharex=True)

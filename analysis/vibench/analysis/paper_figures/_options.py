@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
 
-from vibench.sim import Accuracy, Observable
+from vibench.sim import Accuracy, Observable, Specimen, SpecimenTable, usual_specimen
 from vibench.sim.study import Study, StudyObservable, frequency_range
 
 from ..errors import InvalidRequest
@@ -16,6 +16,7 @@ AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 """The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
 CASES = ("Case 1", "Case 2", "Case 3", "Case 4")
 LOWEST_HZ = 5.0
+_PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
 """What a figure of exponents observes."""
 
@@ -40,6 +41,8 @@ class FigureOptions:
 
     damping_time_s: float = 2e-5
     """c_i = damping time * k_i."""
+    damping_ratio: float | None = None
+    """c_i = 2 * damping ratio * m_i * w_i of each mass on its own spring, in place of the damping time."""
     gap_m: float = 45e-6
     accuracy: Accuracy = Accuracy.STANDARD
     grid: FrequencyGrid = FrequencyGrid.COARSE
@@ -59,6 +62,10 @@ class FigureOptions:
             raise InvalidRequest(
                 f"a damping time of {self.damping_time_s} s is not allowed; give zero or a positive one"
             )
+        if self.damping_ratio is not None and not 0.0 <= self.damping_ratio < math.inf:
+            raise InvalidRequest(
+                f"a damping ratio of {self.damping_ratio} is not allowed; give zero or a positive one"
+            )
         if not 0.0 < self.gap_m < math.inf:
             raise InvalidRequest(f"a gap of {self.gap_m} m is not allowed; give a positive one")
 
@@ -76,16 +83,47 @@ class FigureOptions:
         """Ask for models at amplitudes under these options; fields of the study may be replaced."""
         chosen: dict[str, Any] = {
             "gaps_m": (self.gap_m,),
-            "damping_times_s": (self.damping_time_s,),
+            "specimen": self._described,
+            "damping_times_s": (self.damping_time_s,) if self.damping_ratio is None else None,
             **named(self, "frequencies_hz", "accuracy", "duration_s", "window_s", "budget_s"),
         }
         return Study(models=models, amplitudes_m=amplitudes_m, **{**chosen, **replaced})
+
+    def specimen(self, contact: str = "hertz") -> Specimen:
+        """Build the paper's specimen under these options."""
+        own_s = self.damping_time_s if self.damping_ratio is None else None
+        return self._described.specimen(contact, own_s, self.gap_m)
+
+    @property
+    def only_damping_time_s(self) -> float:
+        """Damping time of a figure that can say no other damping.
+
+        Raises InvalidRequest under a damping ratio.
+        """
+        if self.damping_ratio is not None:
+            raise InvalidRequest("this figure takes no damping ratio; give a damping time")
+        return self.damping_time_s
+
+    @property
+    def _described(self) -> SpecimenTable:
+        if self.damping_ratio is None:
+            return _PAPER
+        masses_and_springs = zip(_PAPER.masses_kg, _PAPER.stiffnesses, strict=True)
+        dampings = [2.0 * self.damping_ratio * math.sqrt(m * k) for m, k in masses_and_springs]
+        return SpecimenTable.model_validate({"dampings_ns_per_m": dampings})
+
+    @property
+    def damping(self) -> str:
+        """Say the damping."""
+        if self.damping_ratio is None:
+            return f"c = {self.damping_time_s:.3g} s · k"
+        return f"c_i = 2 · {self.damping_ratio:g} · m_i ω_i"
 
     @property
     def sentence(self) -> str:
         """Say the options under a figure."""
         return (
-            f"Options: c = {self.damping_time_s:.3g} s · k, gap {1e6 * self.gap_m:g} µm, "
+            f"Options: {self.damping}, gap {1e6 * self.gap_m:g} µm, "
             f"{self.accuracy.value} accuracy, every {self.grid.step_hz:g} Hz, {self.duration_s:g} s from "
             f"rest, the last {self.window_s:g} s observed."
         )

@@ -6,13 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from vibench.sim import Harmonic, Specimen
-from vibench.sim.study import Study, StudyResults
+from vibench.sim.study import StudyResults
 
 from ..figures import COLLIDING, LINEAR, frequency_axis, magnitude_axis
 from ..model import linear_transmissibility
 from ..signals import Flags, Reals
 from ..tables import Labelled
-from ._options import FigureOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +41,6 @@ def responses(results: StudyResults, **fixed: float | str) -> Responses:
         exponent_per_s=results.values("lyapunov", **at),
         collides=np.asarray(np.nan_to_num(impacts) > 0),
     )
-
-
-def specimen_of(study: Study, model: str, options: FigureOptions) -> Specimen:
-    """Give the specimen of a study at the options' damping and gap."""
-    return study.specimen.specimen(model, options.damping_time_s, options.gap_m)
 
 
 def drive_at(frequency_hz: float, amplitude_m: float) -> Harmonic:

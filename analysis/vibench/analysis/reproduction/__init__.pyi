@@ -1,6 +1,8 @@
 from ._case import (
     AS_CHOSEN as AS_CHOSEN,
+    OPTIONS as OPTIONS,
     Case as Case,
+    case_with as case_with,
 )
 from ._catalogue import (
     SECTIONS as SECTIONS,

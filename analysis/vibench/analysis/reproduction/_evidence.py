@@ -4,14 +4,18 @@ The studies that claims are measured on: each model at the paper's amplitudes, o
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from vibench.sim import Observable, Specimen, gong2025
+import numpy as np
+
+from vibench.sim import Observable, Specimen
+from vibench.sim.accuracy_benchmark import ode45, textbook_exponent
 from vibench.sim.study import GivenStart, Start, Study, StudyObservable, StudyResults
 
-from ..paper_figures import AMPLITUDES_M, WITH_EXPONENT, Responses, responses
-from ._case import Case
+from ..paper_figures import AMPLITUDES_M, WITH_EXPONENT, Responses, drive_at, responses
+from ..signals import Reals
+from ._case import Case, ExponentsBy
 
 Computed = TypeVar("Computed")
 Solve = Callable[[Study], StudyResults]
@@ -43,18 +47,47 @@ class Evidence:
 
 PIECE_WISE, CONTINUOUS = "hertz", "power:5"
 WEAK_M, MODERATE_M, HIGHER_M, STRONG_M = AMPLITUDES_M
+SECOND_REGION_HZ = (220.0, 320.0)
+"""Around the second linear resonance, between the two terminal ones."""
 WITH_EXPONENTS = (PIECE_WISE, CONTINUOUS)
 """Models whose exponents the paper shows at all four amplitudes (Fig. 10)."""
 
 
-def specimen_under(case: Case) -> Specimen:
-    """Give the paper's specimen at a case's damping and gap."""
-    return gong2025(case.options.damping_time_s, case.options.gap_m)
+def specimen_under(case: Case, model: str = PIECE_WISE) -> Specimen:
+    """Give the paper's specimen as a case has it."""
+    return case.options.specimen(case.fitted(model))
 
 
 def level(evidence: Evidence, case: Case, amplitude_m: float, model: str = PIECE_WISE) -> Responses:
     """Give the curves of a model at one of the paper's amplitudes."""
-    return responses(evidence.study(levels_asked(case, model)), amplitude=amplitude_m)
+    curve = responses(evidence.study(levels_asked(case, model)), amplitude=amplitude_m)
+    return replace(curve, exponent_per_s=exponents_of(evidence, case, curve, amplitude_m, model))
+
+
+def exponents_of(
+    evidence: Evidence, case: Case, curve: Responses, amplitude_m: float, model: str = PIECE_WISE
+) -> Reals:
+    """Give the exponents of a curve as the case has them; where nothing collides, the exact ones."""
+    if case.exponents_by is ExponentsBy.EXACT or np.isnan(curve.exponent_per_s).all():
+        return curve.exponent_per_s
+    specimen, options = specimen_under(case, model), case.options
+    settle_s = options.window_s
+
+    def follow() -> Reals:
+        return np.array(
+            [
+                textbook_exponent(
+                    specimen, drive_at(f, amplitude_m), ode45(), options.duration_s - settle_s, settle_s
+                )
+                if collides or model != PIECE_WISE
+                else exact
+                for f, collides, exact in zip(
+                    curve.frequency_hz, curve.collides, curve.exponent_per_s, strict=True
+                )
+            ]
+        )
+
+    return evidence.remembered(("ode45", specimen, amplitude_m, options.frequencies_hz), follow)
 
 
 def levels_asked(case: Case, model: str = PIECE_WISE) -> Study:
@@ -77,9 +110,9 @@ def model_study(
     """One model over the case's grid, at the case's damping unless another is given."""
     options = case.options
     return options.study(
-        (model,),
+        (case.fitted(model),),
         tuple(amplitudes_m),
-        damping_times_s=(options.damping_time_s if damping_time_s is None else damping_time_s,),
         observe=observe,
         starts=(Start.REST if case.draw == 0 else GivenStart(label=f"draw {case.draw}", state=case.start),),
+        **({} if damping_time_s is None else {"damping_times_s": (damping_time_s,)}),
     )

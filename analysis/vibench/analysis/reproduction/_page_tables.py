@@ -12,7 +12,7 @@ from ..signals import Flags, Reals
 from ._case import Case
 from ._evidence import PIECE_WISE, Evidence, level
 from ._score import DampingScore
-from ._similarity_claims import EXTREME_ORDERS, FIRST, ORDERS, SECOND, rates
+from ._similarity_claims import EXTREME_ORDERS, FIRST, SECOND, orders, rates
 
 SI_READING_S = 0.01
 """c_i = 0.01 k_i, as the paper prints it, in SI units."""
@@ -69,7 +69,7 @@ def rates_table(evidence: Evidence, case: Case) -> PageTable:
             model.removeprefix("power:"),
             *(f"{each:.0%}" for what in (FIRST, SECOND) for each in rates(evidence, case, model, what)),
         )
-        for model in (*ORDERS, *EXTREME_ORDERS)
+        for model in (*orders(case), *EXTREME_ORDERS)
     )
     options = case.options
     named = [f"{title}, {1e6 * each:g} µm" for title in ("I", "II") for each in AMPLITUDES_M]

@@ -7,13 +7,13 @@ import numpy as np
 
 from vibench.sim.study import PACKAGES, software
 
-from ..paper_figures import FigureOptions
-from ._case import AS_CHOSEN, Case
+from ._case import Case
 from ._claim import Claim, judged
 from ._document import Reproduction
 from ._evidence import Evidence
 from ._page_tables import rates_table, regions_table
 from ._score import scores
+from ._settings import claims_by_setting, exponents_table, methods_table, reach_table
 
 _MINUTE_S = 60.0
 Told = Callable[[str], None]
@@ -27,11 +27,10 @@ def ignore_steps(step: str) -> None:
 def reproduction(
     sections: Mapping[str, tuple[Claim, ...]],
     evidence: Evidence,
-    options: FigureOptions,
+    case: Case,
     on_step: Told = ignore_steps,
 ) -> Reproduction:
-    """Judge every claim under the options given, under its alternatives where it fails, and by damping."""
-    case = Case(AS_CHOSEN, options)
+    """Judge every claim under a case, under its alternatives where it fails, by damping and by setting."""
     judgements = {}
     for heading, claims in sections.items():
         found = []
@@ -40,12 +39,22 @@ def reproduction(
             found.append(judged(claim, evidence, case))
         judgements[heading] = tuple(found)
     on_step("score by damping")
-    by_damping = scores([claim for claims in sections.values() for claim in claims], evidence, case)
+    every = [claim for each in sections.values() for claim in each]
+    by_damping = scores(every, evidence, case)
+    on_step("claims by setting")
+    tables = (
+        claims_by_setting(every, evidence, case),
+        reach_table(case),
+        exponents_table(evidence, case),
+        methods_table(evidence, case),
+        regions_table(evidence, case),
+        rates_table(evidence, case),
+    )
     return Reproduction(
         sections=judgements,
         scores=by_damping,
-        tables=(regions_table(evidence, case), rates_table(evidence, case)),
-        options=options.sentence.replace("Options:", "Defaults:"),
+        tables=tables,
+        options=case.sentence,
         made_with=_made_with(evidence),
     )
 

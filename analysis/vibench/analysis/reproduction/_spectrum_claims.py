@@ -22,7 +22,7 @@ _NEAR_HZ = 20.0
 def signal_at(evidence: Evidence, case: Case, amplitude_m: float) -> TimeSignal:
     """Give the motion of m0 at 260 Hz."""
     options = case.options
-    key = ("signal", amplitude_m, options.damping_time_s, options.gap_m, options.accuracy)
+    key = ("signal", amplitude_m, specimen_under(case), options.accuracy)
     return evidence.remembered(
         key, lambda: time_signal(specimen_under(case), drive_at(SHOWN_HZ, amplitude_m), options)
     )
