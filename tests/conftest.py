@@ -20,7 +20,7 @@ hypothesis.settings.load_profile("busy")
 
 # Tests keep their bench checks apart from those of whoever runs them; processes they start inherit it.
 _state_folder = tempfile.TemporaryDirectory(prefix="vibench_state_")
-os.environ["VIBENCH_STATE_DIR"] = _state_folder.name
+os.environ["VIBENCH_STATE_DIR"] = os.environ["VIBENCH_LOCK_DIR"] = _state_folder.name
 
 # pytest-qt ends the whole run where Qt's system libraries are missing, so it is loaded here, after a look.
 QT_MISSING = ""

@@ -14,7 +14,7 @@ from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
 from vibench.acquisition.recording import KEY_VARIABLE
 from vibench.acquisition.rig import TOKEN_VARIABLE
 from vibench.sim.kernels import advance_clock
-from vibench.sim.operating_system import VARIABLE as STATE_VARIABLE, state_folder
+from vibench.sim.operating_system import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_folder
 
 from .output import console, print_json
 from .paths import AsJson
@@ -26,6 +26,7 @@ USB_DEVICES = Path("/dev/bus/usb")
 VARIABLES: Mapping[str, str] = MappingProxyType(
     {
         STATE_VARIABLE: "folder for locks, bench checks and learnt costs; the user's own if absent",
+        LOCK_VARIABLE: "folder where all users of a computer see which bench is in use; /tmp if absent",
         TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
         KEY_VARIABLE: "file with the key that seals of recordings are signed with",
         "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",

@@ -4,8 +4,11 @@ import errno
 import fcntl
 import os
 import resource
+import stat
 import subprocess
 import sys
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 assert sys.platform != "win32"  # told to a type checker
@@ -14,6 +17,32 @@ assert sys.platform != "win32"  # told to a type checker
 def open_to_write(path: Path) -> int:
     """Open an existing file; the descriptor comes back."""
     return os.open(path, os.O_RDWR)
+
+
+def open_for_all(path: Path) -> int:
+    """Open a file that programs of all users lock, made if need be; the descriptor comes back.
+
+    Raises OSError where somebody has put something else in its place: a link, a second name, a pipe.
+    """
+    flags = os.O_NOFOLLOW | os.O_NONBLOCK
+    try:
+        descriptor = os.open(path, os.O_RDWR | flags)
+    except PermissionError:  # what may be read can be locked
+        descriptor = os.open(path, os.O_RDONLY | flags)
+    except FileNotFoundError:
+        try:
+            descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | flags, 0o666)
+        except FileExistsError:  # by now
+            return open_for_all(path)
+        # The sticky bit of a file keeps it from those who tidy up (systemd-tmpfiles, XDG base directories).
+        for mode in (0o666, 0o1666):
+            with suppress(OSError):
+                os.fchmod(descriptor, mode)
+    found = os.fstat(descriptor)
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink != 1:
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "it is no file of its own", str(path))
+    return descriptor
 
 
 def write_at(descriptor: int, data: bytes | memoryview, offset: int) -> int:
@@ -93,11 +122,16 @@ def usual_state_folder() -> Path:
     return (home / "Library" / "Application Support" if sys.platform == "darwin" else linux) / "vibench"
 
 
+def usual_shared_folder() -> Path:
+    """Give a place where every user may make files and nobody removes those of others."""
+    return Path("/tmp")  # noqa: S108 - TMPDIR may be each user's own
+
+
 def process_start(pid: int) -> str | None:
     """Say when a process began, in a form of the system's own; None when there is no such process.
 
     A process that has ended, and whose end nobody has taken note of yet, is none. Empty where it lives and
-    nobody tells since when.
+    nobody tells since when. On Linux the computer's start and the container come first (`Place`).
     """
     try:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
@@ -107,7 +141,14 @@ def process_start(pid: int) -> str | None:
         return None
     # The name before the last bracket may hold anything; proc(5) counts the state as 3 and the start as 22.
     state, *others = text.rpartition(")")[2].split()
-    return None if state in "ZX" else others[18]
+    return None if state in "ZX" else f"{_here()}_{others[18]}"
+
+
+@cache
+def _here() -> str:
+    """Say within what a process's number is its own: this start of this computer, and the container."""
+    boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")[:8]
+    return f"{boot}_{Path('/proc/self/ns/pid').stat().st_ino}"
 
 
 def _told_by_ps(pid: int) -> str | None:

@@ -1,11 +1,12 @@
-"""Where this computer keeps what a user's runs leave behind: locks, checks, costs."""
+"""Where this computer keeps what a user's runs leave behind (locks, checks, costs), and what all see."""
 
 import os
 from pathlib import Path
 
-from ._this import usual_state_folder
+from ._this import usual_shared_folder, usual_state_folder
 
 VARIABLE = "VIBENCH_STATE_DIR"
+LOCK_VARIABLE = "VIBENCH_LOCK_DIR"
 
 
 def state_folder() -> Path:
@@ -14,3 +15,8 @@ def state_folder() -> Path:
     folder = Path(given) if given else usual_state_folder()
     folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     return folder
+
+
+def shared_folder() -> Path:
+    """Give the folder where every user may make files; ``VIBENCH_LOCK_DIR`` names another."""
+    return Path(os.environ.get(LOCK_VARIABLE) or usual_shared_folder())

@@ -21,6 +21,14 @@ def open_to_write(path: Path) -> int:
     return os.open(path, os.O_RDWR | os.O_BINARY)
 
 
+def open_for_all(path: Path) -> int:
+    """Open a file that programs of all users lock, made if need be; the descriptor comes back."""
+    try:
+        return os.open(path, os.O_RDWR | os.O_CREAT | os.O_BINARY, 0o666)
+    except PermissionError:  # another user's: what may be read can be locked
+        return os.open(path, os.O_RDONLY | os.O_BINARY)
+
+
 def write_at(descriptor: int, data: bytes | memoryview, offset: int) -> int:
     """Write bytes at a place; tells how many were written."""
     os.lseek(descriptor, offset, os.SEEK_SET)
@@ -79,6 +87,11 @@ def bound_memory(most_bytes: int) -> None:
 def usual_state_folder() -> Path:
     """Give the place for what a user's programs leave behind."""
     return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "vibench"
+
+
+def usual_shared_folder() -> Path:
+    """Give a place where every user may make files and nobody removes those of others."""
+    return Path(os.environ.get("PROGRAMDATA", "C:\\ProgramData"))
 
 
 def process_start(pid: int) -> str | None:

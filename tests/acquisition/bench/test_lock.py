@@ -1,0 +1,145 @@
+"""One program at a bench, whoever its user is and however their configuration writes its instruments."""
+
+import os
+import sys
+from contextlib import closing, contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+
+from vibench.acquisition import open_bench
+from vibench.acquisition.bench import BenchLock
+from vibench.acquisition.errors import InstrumentBusy
+from vibench.acquisition.rig import load_rig
+
+RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "lab_rig.toml")
+NOBODY = 65534
+posix = pytest.mark.skipif(not hasattr(os, "fork"), reason="modes and links as POSIX has them")
+
+
+@pytest.fixture(autouse=True)
+def shared(monkeypatch):
+    """What /tmp is to the users of a computer: all may make files, each removes his own only."""
+    with TemporaryDirectory() as folder:
+        Path(folder).chmod(0o1777)
+        monkeypatch.setenv("VIBENCH_LOCK_DIR", folder)
+        yield Path(folder)
+
+
+@pytest.fixture
+def user(tmp_path_factory, monkeypatch):
+    """Be somebody with a state folder of his own, of this number where there are such."""
+
+    @contextmanager
+    def somebody(number=None):
+        with TemporaryDirectory() as state:
+            if number is not None:
+                os.chown(state, number, number)
+                os.seteuid(number)
+            monkeypatch.setenv("VIBENCH_STATE_DIR", state)
+            try:
+                yield
+            finally:
+                if number is not None:
+                    os.seteuid(0)
+
+    return somebody
+
+
+def generator(**changed):
+    return RIG.model_copy(update={"generator": RIG.generator.model_copy(update=changed)})
+
+
+def test_a_bench_that_another_user_drives_is_refused(user):
+    with (
+        user(),
+        closing(BenchLock.of(RIG)),
+        user(),
+        pytest.raises(InstrumentBusy, match=rf"in use by process {os.getpid()} of [\w.-]+\. Nothing was"),
+    ):
+        open_bench(RIG, calibration="waived")
+    with user(), closing(BenchLock.of(RIG)):
+        pass
+
+
+@posix
+@pytest.mark.parametrize(("first", "second"), [(None, NOBODY), (NOBODY, None), (NOBODY, NOBODY - 1)])
+def test_whoever_comes_second_is_refused_and_the_next_day_comes_first(user, first, second):
+    if os.geteuid() != 0:
+        pytest.skip("only root can be another user")
+    for one, other in ((first, second), (second, first)):
+        with user(one):
+            held = BenchLock.of(RIG)
+        with user(other), pytest.raises(InstrumentBusy, match=f"in use by process {os.getpid()} of"):
+            BenchLock.of(RIG)
+        held.close()
+
+
+@pytest.mark.parametrize(
+    "resource",
+    [
+        "USB0::1689::851::{}::INSTR",
+        "usb::0x699::0x0353::{}::0::instr",
+    ],
+)
+def test_a_generator_is_one_however_it_is_written_and_whatever_reads_beside_it(user, resource):
+    serial = "C012345"
+    first = generator(resource=f"USB0::0x0699::0x0353::{serial}::INSTR")
+    daq = first.daq.model_copy(update={"server": "another:31763"})
+    second = generator(resource=resource.format(serial)).model_copy(update={"daq": daq})
+    with closing(BenchLock.of(first)), pytest.raises(InstrumentBusy, match="in use by process"):
+        BenchLock.of(second)
+
+
+def test_two_benches_of_one_computer_are_two():
+    other = generator(resource="USB0::0x0699::0x0353::C999999::INSTR")
+    other = other.model_copy(update={"daq": other.daq.model_copy(update={"device": "Dev2"})})
+    with closing(BenchLock.of(RIG)), closing(BenchLock.of(other)):
+        pass
+
+
+def a_link(path, aim):
+    path.symlink_to(aim)
+
+
+def a_second_name(path, aim):
+    path.hardlink_to(aim)
+
+
+def a_pipe(path, aim):
+    os.mkfifo(path)
+
+
+def a_folder(path, aim):
+    path.mkdir()
+
+
+@posix
+@pytest.mark.timeout(10)
+@pytest.mark.parametrize("trap", [a_link, a_second_name, a_pipe, a_folder])
+def test_what_lies_in_a_locks_place_is_refused_and_nothing_is_written_through_it(shared, tmp_path, trap):
+    BenchLock.of(RIG).close()
+    aim = tmp_path / "precious"
+    aim.write_text("kept")
+    for path in list(shared.iterdir()):
+        path.unlink()
+        trap(path, aim)
+    with pytest.raises(InstrumentBusy, match=r"cannot be marked as in use: .*\.lock is not to be locked"):
+        BenchLock.of(RIG)
+    assert aim.read_text() == "kept"
+
+
+def test_what_is_written_into_a_lock_is_not_shown_unless_it_is_a_process(shared, monkeypatch):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(shared))
+    with closing(BenchLock.of(RIG)):
+        for path in shared.iterdir():
+            path.write_bytes(b"\x1b[2J of everything")
+        with pytest.raises(InstrumentBusy, match="in use by process unknown"):
+            BenchLock.of(RIG)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="systemd's")
+def test_who_tidies_up_a_shared_folder_leaves_a_lock_alone(shared):
+    with closing(BenchLock.of(RIG)):
+        assert all(path.stat().st_mode & 0o1777 == 0o1666 for path in shared.iterdir())
