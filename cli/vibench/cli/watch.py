@@ -1,11 +1,12 @@
 """`vibench watch`, `stop` and `release`: look at an engine on this computer, end its run, or let it go on."""
 
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import Annotated
 
 import typer
 
-from vibench.acquisition import StopLevel
+from vibench.acquisition import AcquisitionError, StopLevel
 from vibench.acquisition.engine import (
     DRIVING,
     Announcement,
@@ -14,11 +15,13 @@ from vibench.acquisition.engine import (
     EngineSilent,
     StopDelivery,
     announced_engines,
+    out_of_reach,
+    programs_to_stop,
     programs_without_engine,
     stop_engine,
     the_engine,
-    the_program,
 )
+from vibench.acquisition.stopping import Program
 
 from .engine_bars import INTERVAL_S, EngineBars
 from .output import console, print_json
@@ -59,7 +62,12 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
 
 
 def stop(
-    pid: Pid = None,
+    pid: Annotated[
+        int | None,
+        typer.Option(
+            "--pid", metavar="N", help="Process that is meant; all if absent, and held: the only one."
+        ),
+    ] = None,
     level: Annotated[
         StopLevel,
         typer.Option(
@@ -69,10 +77,28 @@ def stop(
     ] = StopLevel.RAMP,
     reason: Annotated[str, typer.Option("--reason", help="Stands in the recording.")] = "vibench stop",
 ) -> None:
-    """Stop what an engine, a script or a check drives, campaign and all; the recording says why."""
-    engine = the_program(pid)
-    name = f"{engine.what}, process {engine.pid}"
-    match stop_engine(engine, level, reason):
+    """Stop all that engines, scripts and checks drive on this computer, campaigns and all."""
+    programs = programs_to_stop(pid)
+    if level is StopLevel.HOLD and len(programs) > 1:
+        programs = (the_engine(pid),)
+    failures = []
+    with ThreadPoolExecutor(len(programs)) as pool:  # one that hangs must not keep a stop from the others
+        for each in [pool.submit(_stopped, program, level, reason) for program in programs]:
+            try:
+                console.print(each.result())
+            except AcquisitionError as error:
+                failures.append(error)
+    if elsewhere := out_of_reach():
+        console.print(f"{elsewhere}.")
+    if len(failures) == 1:
+        raise failures[0]
+    if failures:
+        raise EngineSilent(". ".join(map(str, failures)))
+
+
+def _stopped(program: Program, level: StopLevel, reason: str) -> str:
+    name = f"{program.what}, process {program.pid}"
+    match stop_engine(program, level, reason):
         case StopDelivery.KEPT:
             raise EngineSilent(
                 f"{name} lives and does not answer: it hangs, or was stopped. The stop ({level.value}) is "
@@ -85,11 +111,11 @@ def stop(
                 "computer does. It stops when that ends; in an emergency switch the amplifier off by hand"
             )
         case StopDelivery.TAKEN:
-            console.print(f"{name}: has taken the stop ({level.value}) that was left for it.")
+            return f"{name}: has taken the stop ({level.value}) that was left for it."
         case StopDelivery.TOLD if level is StopLevel.HOLD:
-            console.print(f"{name}: told to hold; 'vibench release' lets it go on.")
+            return f"{name}: told to hold; 'vibench release' lets it go on."
         case StopDelivery.TOLD:
-            console.print(f"{name}: told to stop ({level.value}).")
+            return f"{name}: told to stop ({level.value})."
 
 
 def release(pid: Pid = None) -> None:

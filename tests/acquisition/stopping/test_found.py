@@ -10,7 +10,7 @@ from time import monotonic
 import pytest
 
 from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on_signal
-from vibench.acquisition.engine import StopDelivery, stop_engine, the_program
+from vibench.acquisition.engine import StopDelivery, programs_to_stop, stop_engine
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._announcement import announced
 from vibench.acquisition.stopping import Program, announced_programs
@@ -67,7 +67,7 @@ def test_litter_beside_an_announcement_hides_nobody(litter):
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         litter(engines_folder())
-        assert stop_engine(the_program(None), StopLevel.ABORT, "smoke") is StopDelivery.TAKEN
+        assert stop_engine(programs_to_stop(None)[0], StopLevel.ABORT, "smoke") is StopDelivery.TAKEN
     assert switch.request.reason == "smoke"
 
 
@@ -84,7 +84,7 @@ def test_a_stop_that_is_a_pipe_is_obeyed_without_a_reason():
 def test_a_reason_that_is_no_text_stops_as_well():
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
-        assert stop_engine(the_program(None), "abort", "smoke \udcff") is StopDelivery.TAKEN
+        assert stop_engine(programs_to_stop(None)[0], "abort", "smoke \udcff") is StopDelivery.TAKEN
     assert switch.request.reason == "smoke ?"
 
 
@@ -93,7 +93,7 @@ def test_who_is_announced_stays_so_when_the_state_folder_is_emptied(own_state):
     with stop_on_signal(switch, "dwell"):
         engines_folder().rename(own_state / "moved away")
         until(lambda: announced_programs(Program))
-        assert stop_engine(the_program(None), "abort", "smoke") is StopDelivery.TAKEN
+        assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
 
 
 def test_a_computer_that_gets_another_name_finds_its_own(monkeypatch):
@@ -107,7 +107,7 @@ def test_who_lives_and_refuses_a_connection_is_stopped_all_the_same():
     with announced(
         EngineAddress(host="127.0.0.1", port=1, token="t"), "night", lambda *told: pressed.append(told)
     ):
-        assert stop_engine(the_program(None), "abort", "smoke") is StopDelivery.TAKEN
+        assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
     assert pressed == [(StopLevel.ABORT, "smoke")]
 
 
@@ -128,7 +128,7 @@ def test_what_root_has_announced_in_a_users_folder_is_stopped_by_that_user(of_no
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
         os.seteuid(NOBODY)
-        assert stop_engine(the_program(None), "abort", "smoke") is StopDelivery.TAKEN
+        assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
         os.seteuid(0)
     assert switch.request.reason == "smoke"
 
@@ -137,11 +137,11 @@ def test_a_folder_that_may_not_be_read_is_no_empty_one(of_nobody):
     os.chown(engines_folder(), 0, 0)
     os.seteuid(NOBODY)
     with pytest.raises(AcquisitionError, match="cannot be looked for in the state folder"):
-        the_program(None)
+        programs_to_stop(None)[0]
 
 
 def test_a_folder_with_foreign_modes_gets_its_own(of_nobody):
     engines_folder().chmod(0o300)
     os.seteuid(NOBODY)
     with stop_on_signal(StopSwitch(), "dwell"):
-        assert the_program(None).what == "dwell"
+        assert programs_to_stop(None)[0].what == "dwell"

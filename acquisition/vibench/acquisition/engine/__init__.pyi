@@ -1,9 +1,10 @@
 from ._announcement import (
     Announcement as Announcement,
     announced_engines as announced_engines,
+    out_of_reach as out_of_reach,
+    programs_to_stop as programs_to_stop,
     programs_without_engine as programs_without_engine,
     the_engine as the_engine,
-    the_program as the_program,
 )
 from ._attendant import (
     Attendant as Attendant,

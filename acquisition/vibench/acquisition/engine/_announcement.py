@@ -4,7 +4,7 @@ import socket
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from vibench.sim.operating_system import state_folder
+from vibench.sim.operating_system import Place, state_folder
 
 from ..stopping import (
     AnyProgram,
@@ -12,6 +12,7 @@ from ..stopping import (
     StopLevel,
     announced_programs,
     facts_of_this_process,
+    programs_of_other_places,
     reached,
     withdraw,
 )
@@ -53,7 +54,7 @@ def announced_engines() -> tuple[Announcement, ...]:
         if not _refuses(told.address):
             found.append(told)
         elif not told.process_start:
-            withdraw(told.pid)
+            withdraw(told)
     return tuple(found)
 
 
@@ -89,26 +90,36 @@ def the_engine(pid: int | None) -> Announcement:
     raise EngineError(
         f"{wanted}; 'vibench measure' and 'vibench gui' start one. It was looked for in {state_folder()}: "
         "one of another user, or with another VIBENCH_STATE_DIR, is stopped from there"
+        + "".join(f". {each}" for each in [out_of_reach()] if each)
     )
 
 
-def the_program(pid: int | None) -> Program:
-    """Choose the program that is to be stopped: an engine, or a script or check that drives a bench itself.
+def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
+    """Give what a stop is meant for: engines, and scripts and checks that drive a bench themselves.
+
+    Those of other containers on this computer are among them; what is left in the state folder reaches them.
 
     Parameters
     ----------
     pid
-        Number of its process; None: the only one.
+        Number of a process; None: all of this computer.
 
     Raises
     ------
     EngineError
-        When there is none, or more than one and none was named.
+        When there is none.
 
     """
-    programs = (*announced_engines(), *programs_without_engine())
-    chosen = [each for each in programs if pid in (None, each.pid)]
-    return _only(chosen) if chosen else the_engine(pid)
+    contained = (each for each in programs_of_other_places() if each.place is Place.CONTAINER)
+    programs = (*announced_engines(), *programs_without_engine(), *contained)
+    return tuple(each for each in programs if pid in (None, each.pid)) or (the_engine(pid),)
+
+
+def out_of_reach() -> str:
+    """Say what drives on other computers that share the state folder; empty if nothing does."""
+    others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
+    named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
+    return f"Not reached, since it is of another computer: {named}; run 'vibench stop' there" if named else ""
 
 
 def _only(chosen: list[AnyProgram]) -> AnyProgram:

@@ -6,6 +6,7 @@ from ._program import (
     Program as Program,
     announced_programs as announced_programs,
     facts_of_this_process as facts_of_this_process,
+    programs_of_other_places as programs_of_other_places,
     reached as reached,
     withdraw as withdraw,
 )

@@ -3,7 +3,7 @@
 import os
 import platform
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from threading import Lock
@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from pydantic import BaseModel, ConfigDict
 
-from vibench.sim.operating_system import is_process, process_start
+from vibench.sim.operating_system import OpenFile, Place, is_process, place_of, process_start
 
 from ..errors import AcquisitionError
 from ._kept_stops import KeptStops, engines_folder
@@ -36,9 +36,16 @@ class Program(BaseModel):
     """A state folder may lie in a home that several computers share."""
 
     @property
+    def place(self) -> Place:
+        """Where it runs: containers and computers may share a state folder."""
+        return place_of(self.process_start)
+
+    @property
     def is_alive(self) -> bool:
         """Whether its process lives, answering or not."""
-        return is_process(self.pid, self.process_start)
+        if self.place is Place.HERE:
+            return is_process(self.pid, self.process_start)
+        return _is_marked(_path(self))
 
 
 AnyProgram = TypeVar("AnyProgram", bound=Program)
@@ -57,7 +64,7 @@ def facts_of_this_process(what: str) -> dict[str, object]:
 
 
 def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
-    """Every living program of this computer that says of itself what ``model`` asks, oldest first.
+    """Every living program that is known here by its number and says what ``model`` asks, oldest first.
 
     What is left of processes that have ended is swept away; nothing else is.
 
@@ -67,6 +74,31 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
         When there is no state folder and none can be made.
 
     """
+    found = []
+    for path, told in _announcements(model):
+        is_here = told.computer in ("", platform.node())
+        if told.place is not Place.HERE:
+            continue
+        # A computer may be given another name while a program runs; number and start together are no other's.
+        if told.is_alive and (is_here or told.process_start):
+            found.append(told)
+        elif is_here:
+            with suppress(OSError):
+                path.unlink()
+    _sweep()
+    return tuple(sorted(found, key=lambda each: each.started_utc))
+
+
+def programs_of_other_places() -> tuple[Program, ...]:
+    """Every living program that shares the state folder, in another container or on another computer.
+
+    Raises AcquisitionError as `announced_programs` does.
+    """
+    others = (each for _, each in _announcements(Program) if each.place is not Place.HERE)
+    return tuple(sorted((each for each in others if each.is_alive), key=lambda each: each.started_utc))
+
+
+def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]:
     try:
         paths = sorted(engines_folder().iterdir())  # glob would find nothing in a folder that it may not read
     except OSError as error:
@@ -74,38 +106,28 @@ def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
             f"what drives a bench cannot be looked for in the state folder ({error}); name the program's own "
             "with VIBENCH_STATE_DIR. In an emergency switch the amplifier off by hand"
         ) from error
-    found = []
     for path in paths:
         if path.suffix != ".json" or not path.is_file():  # a pipe would be waited for
             continue
         try:
-            told = model.model_validate_json(_told(path))
+            yield path, model.model_validate_json(_told(path))
         except (ValueError, OSError):  # another version's, of another kind, or ended in between
             continue
-        is_here = told.computer in ("", platform.node())
-        # A computer may be given another name while a program runs; number and start together are no other's.
-        if told.is_alive and (is_here or told.process_start):
-            found.append(told)
-        elif is_here:
-            withdraw(told.pid)
-    _sweep()
-    return tuple(sorted(found, key=lambda each: each.started_utc))
 
 
 def _told(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except PermissionError:  # started as root, say: who may write in this folder may stop it all the same
-        pid = int(path.stem)
-        start = process_start(pid) or ""
-        facts = Program(pid=pid, what="a program of another user", started_utc="", process_start=start)
+        pid, start, _ = path.name.split(".")
+        facts = Program(pid=int(pid), what="a program of another user", started_utc="", process_start=start)
         return facts.model_dump_json().encode()
 
 
-def withdraw(pid: int) -> None:
+def withdraw(program: Program) -> None:
     """Take away what a program said of itself; legal where nothing is, or can be taken away."""
     with suppress(OSError):
-        _path(pid).unlink()
+        _path(program).unlink()
 
 
 class _Reached:
@@ -117,6 +139,8 @@ class _Reached:
     def __init__(self) -> None:
         self._inside: list[tuple[Press, Program]] = []
         self._kept: KeptStops | None = None
+        self._mark: OpenFile | None = None
+        """A lock by which those who do not know this process by its number see that it lives."""
         self._watchdog: Watchdog | None = None
         self._changing = Lock()
 
@@ -126,7 +150,7 @@ class _Reached:
             if not self._inside:
                 kept = KeptStops.of_this_process(self._press)
                 try:
-                    _write(entry[1])
+                    self._announce(entry[1])
                 except OSError:
                     kept.close()
                     raise
@@ -140,14 +164,15 @@ class _Reached:
             self._inside = [each for each in self._inside if each is not entry]
             if self._inside and spoke:
                 with suppress(OSError):
-                    _write(self._inside[0][1])
+                    self._announce(self._inside[0][1])
             if self._inside:
                 return
+            self._unmark()
             watchdog, kept, self._watchdog, self._kept = self._watchdog, self._kept, None, None
         if watchdog is not None and kept is not None:
             watchdog.close()
             kept.close()
-        withdraw(entry[1].pid)
+        withdraw(entry[1])
 
     def _look(self) -> None:
         """Obey what was put down, and be found: somebody may have emptied the state folder."""
@@ -156,10 +181,23 @@ class _Reached:
             return
         kept.obey()
         with suppress(OSError):
-            if not _path(inside[0][1].pid).exists():
+            if not _path(inside[0][1]).exists():
                 with self._changing:
                     if self._inside:
-                        _write(self._inside[0][1])
+                        self._announce(self._inside[0][1])
+            elif self._mark is None:
+                with self._changing:
+                    if self._inside:
+                        self._mark = _marked(_path(self._inside[0][1]))
+
+    def _announce(self, program: Program) -> None:
+        self._unmark()  # Windows replaces no file that is open
+        self._mark = _marked(_write(program))
+
+    def _unmark(self) -> None:
+        mark, self._mark = self._mark, None
+        if mark is not None:
+            mark.close()
 
     def _press(self, level: StopLevel, reason: str) -> None:
         for press, _ in tuple(self._inside):
@@ -193,12 +231,35 @@ def reached(press: Press, program: Program) -> Iterator[None]:
         _REACHED.leave(entry)
 
 
-def _path(pid: int) -> Path:
-    return engines_folder() / f"{pid}.json"
+def _path(program: Program) -> Path:
+    return engines_folder() / f"{program.pid}.{program.process_start}.json"
+
+
+def _marked(path: Path) -> OpenFile | None:
+    """Lock a file for as long as this process lives; None where it is not to be had, now or at all."""
+    try:
+        file = OpenFile(path)
+    except OSError:
+        return None
+    try:
+        if file.is_locked_alone():
+            return file
+    except OSError:  # a disk without locks
+        pass
+    file.close()
+    return None
+
+
+def _is_marked(path: Path) -> bool:
+    try:
+        with closing(OpenFile(path)) as file:
+            return not file.is_locked_alone()
+    except OSError:  # gone by now, or on a disk without locks
+        return False
 
 
 def _write(program: Program) -> Path:
-    path = _path(program.pid)
+    path = _path(program)
     coming = path.with_suffix(".coming")
     coming.unlink(missing_ok=True)  # left by a process of the same number that was killed
     # Nobody else may read a token, not even for the moment before the mode is set.
@@ -213,8 +274,9 @@ def _sweep() -> None:
     folder = engines_folder()
     for path in folder.iterdir():
         pid, _, rest = path.name.partition(".")
-        start = rest.partition(".")[0] if ".stop-" in rest else ""
-        is_announced = (folder / f"{pid}.json").exists()  # perhaps of another computer
-        if not is_announced and pid.isdecimal() and not is_process(int(pid), start):
+        start, _, rest = rest.rpartition(".")
+        is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps of another computer
+        is_here = place_of(start) is Place.HERE
+        if is_here and not is_announced and pid.isdecimal() and not is_process(int(pid), start):
             with suppress(OSError):
                 path.unlink()

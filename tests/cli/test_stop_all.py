@@ -1,0 +1,136 @@
+"""`vibench stop` in danger: nobody has to find out first which of several programs it is that drives."""
+
+import os
+import signal
+import subprocess
+import sys
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.windows_here import sees_locks
+from vibench.acquisition.stopping import Program, announced_programs, facts_of_this_process
+from vibench.acquisition.stopping._kept_stops import engines_folder
+from vibench.sim.operating_system import OpenFile
+
+ROOT = Path(__file__).resolve().parents[2]
+DRIVING = """
+import sys
+from threading import Event
+from vibench.acquisition import StopSwitch, stop_on_signal
+
+switch, clock = StopSwitch(), Event()
+with stop_on_signal(switch, sys.argv[1]):
+    print("driving", flush=True)
+    while switch.request is None:
+        clock.wait(0.01)
+print(switch.request.level, switch.request.reason)
+"""
+CONTAINER = ("unshare", "--user", "--map-root-user", "--pid", "--fork", "--mount-proc")
+"""Own numbers of processes, as in a container; the state folder is shared."""
+
+pytestmark = sees_locks
+
+
+@pytest.fixture(autouse=True)
+def own_state(tmp_path_factory, monkeypatch):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path_factory.mktemp("state")))
+
+
+@contextmanager
+def driving(what, *within):
+    with subprocess.Popen(
+        [*within, sys.executable, "-c", DRIVING, what],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as program:
+        try:
+            if program.stdout.readline() != "driving\n":
+                pytest.skip(f"this user may make no container: {program.stderr.read()}")
+            yield program
+        finally:
+            program.kill()
+
+
+def test_all_that_drive_are_stopped_when_none_is_named(vibench_here, tmp_path):
+    with driving("north") as north, driving("south") as south:
+        told = vibench_here("stop", "--level", "off", "--reason", "smoke", cwd=tmp_path)
+        assert told.returncode == 0, told.stderr
+        for what, program in (("north", north), ("south", south)):
+            assert f"{what}, process {program.pid}: has taken the stop (off)" in told.stdout
+            assert program.communicate(timeout=20)[0] == "off smoke\n"
+
+
+def test_one_that_is_named_is_stopped_alone(vibench_here, tmp_path):
+    with driving("north") as north, driving("south") as south:
+        assert vibench_here("stop", "--pid", north.pid, cwd=tmp_path).returncode == 0
+        north.wait(20)
+        assert [each.what for each in announced_programs(Program)] == ["south"]
+        assert south.poll() is None
+
+
+def test_which_is_held_must_be_said(vibench_here, tmp_path):
+    with driving("north"), driving("south"):
+        told = vibench_here("stop", "--level", "hold", cwd=tmp_path)
+        assert told.returncode == 1
+        assert len(announced_programs(Program)) == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
+def test_one_that_hangs_is_named_and_keeps_no_stop_from_the_others(vibench_here, tmp_path):
+    with driving("hangs") as hangs, driving("south") as south:
+        os.kill(hangs.pid, signal.SIGSTOP)
+        told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
+        assert south.communicate(timeout=20)[0] == "abort vibench stop\n"
+        assert told.returncode == 1
+        assert f"south, process {south.pid}: has taken the stop (abort)" in told.stdout
+        assert f"hangs, process {hangs.pid} lives and does not answer" in told.stderr
+        os.kill(hangs.pid, signal.SIGCONT)
+        assert hangs.communicate(timeout=20)[0] == "abort vibench stop\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="containers as Linux has them")
+def test_containers_that_share_a_state_folder_hide_one_another_from_no_stop(vibench_here, tmp_path):
+    """Both are process 1 in their container; the second wrote over what the first had said of itself."""
+    with ExitStack() as running:
+        programs = [running.enter_context(driving(what, *CONTAINER)) for what in ("north", "south")]
+        told = vibench_here("stop", "--level", "abort", "--reason", "smoke", cwd=tmp_path)
+        assert told.returncode == 0, told.stderr
+        assert "north, process 1: has taken the stop (abort)" in told.stdout
+        assert "south, process 1: has taken the stop (abort)" in told.stdout
+        assert [each.communicate(timeout=20)[0] for each in programs] == ["abort smoke\n"] * 2
+    assert list(engines_folder().iterdir()) == []
+
+
+@contextmanager
+def on_another_computer(what):
+    """What a program there says of itself in a home that both share; its lock is held while it lives."""
+    facts = facts_of_this_process(what)
+    boot, *others = facts["process_start"].split("_")
+    assert others
+    there = facts | {"process_start": "_".join([boot[::-1], *others]), "computer": "lab2"}
+    path = engines_folder() / f"{facts['pid']}.{there['process_start']}.json"
+    path.write_text(Program.model_validate(there).model_dump_json())
+    lock = OpenFile(path)
+    assert lock.is_locked_alone()
+    yield path
+    lock.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
+def test_what_drives_on_another_computer_is_said_not_to_be_reached(vibench_here, tmp_path):
+    there = "Not reached, since it is of another computer: night (process"
+    with on_another_computer("night") as path:
+        alone = vibench_here("stop", cwd=tmp_path)
+        assert alone.returncode == 1
+        assert "no engine is running" in alone.stderr
+        assert there in alone.stderr
+        with driving("here"):
+            told = vibench_here("stop", cwd=tmp_path)
+        assert told.returncode == 0
+        assert there in told.stdout
+        assert "run 'vibench stop' there" in told.stdout
+    assert "Not reached" not in vibench_here("stop", cwd=tmp_path).stderr
+    assert path.exists()
