@@ -346,3 +346,52 @@ def test_what_is_no_group_of_results_is_refused_in_a_sentence(recorded, what):
         assert recording.check_seal("whole").state is SealState.INTACT
         with pytest.raises(RecordingError, match="the results cannot be read"):
             recording.check_result_seals()
+
+
+class TestChangedAfterTheCheck:
+    """Between a check and the analysis a file can be changed: what is read must be what was checked."""
+
+    @pytest.fixture
+    def long(self, tmp_path, make_header, make_block):
+        with create_recording(tmp_path / "long.h5", make_header()) as writer:
+            writer.append(make_block(0, 2 * _seal.PIECE_ITEMS + 17)[1])
+        return tmp_path / "long.h5"
+
+    @staticmethod
+    def written_over(path, change):
+        """As another program does it that asks nobody, while this one has the file open."""
+        code = f"import h5py\nwith h5py.File({str(path)!r}, 'r+', locking=False) as file:\n    {change}"
+        subprocess.run([sys.executable, "-c", code], check=True)
+
+    def test_samples_are_refused_and_others_are_as_before(self, long):
+        with open_recording(long) as recording:
+            role, at = recording.roles[-1], _seal.PIECE_ITEMS + 5
+            before = recording.read_counts(role)
+            assert recording.check_seal("whole").state is SealState.INTACT
+            assert np.array_equal(recording.read_counts(role), before)
+            for start, stop in (
+                (0, 0),
+                (at - 3, at + 3),
+                (_seal.PIECE_ITEMS - 1, 2 * _seal.PIECE_ITEMS + 17),
+            ):
+                assert np.array_equal(recording.read_counts(role, start, stop), before[start:stop])
+        with open_recording(long) as recording:
+            self.written_over(long, f"file[{role!r}][{at}] += 1")
+            assert np.array_equal(recording.read_counts(role, 0, at - 1000), before[: at - 1000])
+            with pytest.raises(RecordingError, match="no longer what they were when the seal was checked"):
+                recording.read_counts(role, at - 5, at - 4)
+
+    def test_a_file_that_is_opened_again_is_held_against_the_check(self, long):
+        with open_recording(long) as recording:
+            recording.check_seal("whole")
+        self.written_over(long, f"file[{recording.roles[0]!r}].attrs['delay_s'] = 0.001")
+        with pytest.raises(RecordingError, match="no longer what it was when its seal was checked"):
+            open_recording(long)
+
+    def test_what_was_read_before_the_check_is_what_is_checked(self, long):
+        sound = long.read_bytes()
+        self.written_over(long, "file.attrs['expected_samples'] = 5")
+        with open_recording(long) as recording:
+            assert recording.expected_samples == 5
+            long.write_bytes(sound)
+            assert recording.check_seal("quick").state is SealState.DAMAGED

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from pathlib import Path
 from types import TracebackType
@@ -15,6 +15,7 @@ from ..errors import RecordingError
 from ..instruments import Identity, Overload, Samples
 from . import _layout as layout, _tables as tables
 from ._attributes import json_text, read_attributes
+from ._checked_counts import CheckedCounts, remember, was_checked
 from ._contents import channel_header, configuration_facts, file_facts
 from ._counts import Counts
 from ._disk import is_being_recorded
@@ -24,7 +25,17 @@ from ._opening import LONGEST, name_now, open_hdf5
 from ._overview import CountOverview, read_overview
 from ._replacing import replace_with_change
 from ._results import ResultArray, SavedResult, Setting, read_results, result_groups, write_result
-from ._seal import SealCheck, SealDepth, SealKey, SealState, check_result, check_seal, seal_key, seal_of
+from ._seal import (
+    ChannelStates,
+    SealCheck,
+    SealDepth,
+    SealKey,
+    SealState,
+    check_result,
+    check_seal,
+    seal_key,
+    seal_of,
+)
 from ._tables import Event, EventKind, Gap, Segment
 
 RESULT_HEAD_BYTES = 100_000
@@ -62,6 +73,7 @@ class _OpenFile:
                 raise
             self.path = name_now(self.path)
             self.file = open_hdf5(self.path)
+        self.counts = CheckedCounts()
 
     def reopen(self) -> None:
         self.file.close()
@@ -159,7 +171,7 @@ class Recording(RecordingDescription):
         self.channel(role)
         begin, end = self._range(start, stop)
         try:
-            return np.asarray(self._open.file[role][begin:end], dtype=np.int32)
+            return self._open.counts.read(self.seal, self._open.file[role], begin, end)
         except DAMAGE as error:
             raise RecordingError(
                 f"Samples {begin} to {end} of {role!r} in {self.path} cannot be read: {error}."
@@ -217,7 +229,15 @@ class Recording(RecordingDescription):
         """
         if self.path.suffix == layout.PART_SUFFIX:
             return SealCheck(SealState.UNFINISHED, "it is sealed when it is finished or recovered", "")
-        return check_seal(self._open.file, SealDepth(depth), seal_key() if key is None else key)
+        states: ChannelStates = {}
+        found = check_seal(self._open.file, SealDepth(depth), seal_key() if key is None else key, states)
+        if found.state not in (SealState.INTACT, SealState.OTHER_KEY) or not found.seal:
+            return found
+        if repr(replace(_read(self._open), _open=None)) != repr(replace(self, _open=None)):
+            return SealCheck(SealState.DAMAGED, "it was changed after it had been opened", found.seal)
+        if SealDepth(depth) is SealDepth.WHOLE:
+            remember(found.seal, {f"/{role}": states[f"/{role}"] for role in self.roles})
+        return found
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
         """Hold every saved result against its own seal; the key is that of `check_seal`."""
@@ -314,13 +334,20 @@ def open_recording(path: Path | str) -> Recording:
     """
     handle = _OpenFile(Path(path))
     try:
-        return _read(handle)
+        return _as_it_was_checked(_read(handle))
     except (RecordingError, *DAMAGE) as error:
         handle.file.close()
         raise RecordingError(
             f"{path} is damaged, or no recording of vibench: {str(error)[:LONGEST]}."
             " Copy it again from where it was recorded."
         ) from error
+
+
+def _as_it_was_checked(recording: Recording) -> Recording:
+    """Refuse what carries a seal that was checked in this process, and differs from what it was then."""
+    if was_checked(recording.seal) and recording.check_seal(SealDepth.QUICK).state is SealState.DAMAGED:
+        raise RecordingError("it is no longer what it was when its seal was checked")
+    return recording
 
 
 def _read(handle: _OpenFile) -> Recording:

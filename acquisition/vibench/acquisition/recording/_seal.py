@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
@@ -41,7 +41,12 @@ KEY_VARIABLE = "VIBENCH_SEAL_KEY"
 """Names the file with the key, for every command and program."""
 SHORTEST_KEY = 16
 
+if TYPE_CHECKING:
+    from hashlib import _Hash as Hash
+
 Manifest = dict[str, dict[str, str]]
+ChannelStates = dict[str, list["Hash"]]
+"""By a dataset's path: its checksum as it stood before each piece, and at the end."""
 
 
 class SealDepth(StrEnum):
@@ -134,8 +139,10 @@ def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -
     write_attributes(group, _marks(text, key, (SHA256, HMAC, KEY_ID)))
 
 
-def check_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> SealCheck:
-    """Hold a finished recording against its seal."""
+def check_seal(
+    file: h5py.File, depth: SealDepth, key: SealKey | None, states: ChannelStates | None = None
+) -> SealCheck:
+    """Hold a finished recording against its seal; ``states`` is filled with those of rows of numbers."""
     if layout.SEAL not in file:
         return _unsealed("it was made before recordings had one", key)
     try:
@@ -145,7 +152,7 @@ def check_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> SealCh
         seal = _sha256(text.encode())
         if marks.get(SHA256) != seal:
             return SealCheck(SealState.DAMAGED, "the seal itself was changed", "")
-        differing = list(_differing(file, manifest, depth))
+        differing = list(_differing(file, manifest, depth, states))
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
         return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
     if differing:
@@ -197,7 +204,9 @@ def _sealed_objects(file: h5py.File) -> Iterator[tuple[str, h5py.HLObject]]:
             yield path, item
 
 
-def _differing(file: h5py.File, manifest: Manifest, depth: SealDepth) -> Iterator[str]:
+def _differing(
+    file: h5py.File, manifest: Manifest, depth: SealDepth, states: ChannelStates | None
+) -> Iterator[str]:
     found = dict(_sealed_objects(file))
     yield from (f"{path} is new" for path in found if path not in manifest)
     for path, said in manifest.items():
@@ -208,7 +217,7 @@ def _differing(file: h5py.File, manifest: Manifest, depth: SealDepth) -> Iterato
             yield f"attributes, type or length of {path}"
         elif isinstance(item, h5py.Group) or (depth is SealDepth.QUICK and item.nbytes > QUICK_BYTES):
             continue
-        elif said["data"] != _data_or_nothing(item):
+        elif said["data"] != _data_or_nothing(item, [] if states is None else states.setdefault(path, [])):
             yield f"data of {path}"
 
 
@@ -228,21 +237,25 @@ def _described(item: h5py.HLObject) -> str:
     return _sha256(json.dumps(described, sort_keys=True).encode())
 
 
-def _data_sha256(item: h5py.HLObject) -> str:
+def _data_sha256(item: h5py.HLObject, states: list["Hash"] | None = None) -> str:
     if not isinstance(item, h5py.Dataset):
         return ""
     if item.dtype.kind not in READ_KINDS:
         raise ValueError(f"{item.name} holds neither numbers nor text")
     digest = hashlib.sha256()
     for piece in _pieces(item):
+        if states is not None:
+            states.append(digest.copy())
         digest.update(piece.tobytes() if piece.dtype.kind == "S" else piece.data)
+    if states is not None:
+        states.append(digest)
     return digest.hexdigest()
 
 
-def _data_or_nothing(item: h5py.Dataset) -> str:
+def _data_or_nothing(item: h5py.Dataset, states: list["Hash"]) -> str:
     """Give a word that is no checksum where data cannot be read."""
     try:
-        return _data_sha256(item)
+        return _data_sha256(item, states)
     except OSError:
         return "unreadable"
 
