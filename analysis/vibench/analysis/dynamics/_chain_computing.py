@@ -24,7 +24,7 @@ from vibench.sim.chain import (
 from ..errors import InvalidRequest
 from ..frequency_response import transmissibility
 from ..model import recorded_base_motion
-from ..recordings import plan_of
+from ..recordings import plan_of, require_intact, require_measured_size
 from ..signals import Reals
 from ._chain_answer import ChainAnswer, ChainRun
 from ._chain_request import ChainDrive, ChainRequest
@@ -246,6 +246,8 @@ def _base_of(request: ChainRequest) -> Sampled:
     """Take the base's motion from a recording."""
     path = Path(request.recording)
     with open_recording(path) as recording:
+        require_measured_size(recording)
+        require_intact(recording)
         base = recorded_base_motion(recording, plan_of(recording))
     return Sampled(base.displacement_m, base.sample_rate_hz)
 

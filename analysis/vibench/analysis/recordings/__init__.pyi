@@ -30,6 +30,7 @@ from ._facts import (
 )
 from ._intact import (
     require_intact as require_intact,
+    require_measured_size as require_measured_size,
 )
 from ._sensor_gain import (
     coupled_gain as coupled_gain,

@@ -21,7 +21,7 @@ from vibench.sim import Specimen, SpecimenTable
 from ..errors import UnusableData
 from ..tables import named
 from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
-from ._intact import require_intact
+from ._intact import require_intact, require_measured_size
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -64,6 +64,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     Raises UnusableData when it is not as it was sealed, or says of plan or bench what this version does not
     know, and NotEnoughData when it holds no samples.
     """
+    require_measured_size(recording)
     seal = require_intact(recording)
     measurement = plan_of(recording)
     _require_bench(recording)

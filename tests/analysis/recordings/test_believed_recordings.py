@@ -1,0 +1,61 @@
+"""What must be so before a recording is read: its size can have been measured, and its seal is right."""
+
+import zlib
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_recording
+from vibench.analysis import analyse
+from vibench.analysis.dynamics import ChainRequest
+from vibench.analysis.dynamics._chain_computing import _base_of
+from vibench.analysis.errors import UnusableData
+
+CHUNK, CHUNKS = 51_200, 300
+WAVE = np.round(3e5 * np.sin(2 * np.pi * np.arange(CHUNK) / 32)).astype("<i4")
+
+
+def packed_wave(path):
+    """Let every channel be a sine that packs into nothing: 190 kB a channel declare 15 million samples."""
+    packed = zlib.compress(WAVE.view(np.uint8).reshape(CHUNK, 4).T.tobytes(), 9)
+    with h5py.File(path, "r+") as file:
+        for name in ("seal", "overview", "view"):
+            del file[name]
+        for role in file.attrs["roles"].decode().split():
+            kept = {name: file[role].attrs[name] for name in file[role].attrs if name != "DIMENSION_LIST"}
+            del file[role]
+            channel = file.create_dataset(
+                role, (CHUNK * CHUNKS,), "<i4", chunks=(CHUNK,), compression="gzip", shuffle=True
+            )
+            for first in range(0, CHUNK * CHUNKS, CHUNK):
+                channel.id.write_direct_chunk((first,), packed)
+            for name, value in kept.items():
+                channel.attrs.create(name, value)
+        file.attrs.modify("samples", np.int64(CHUNK * CHUNKS))
+
+
+def test_a_small_file_that_declares_more_than_the_memory_is_refused(dwell_file, tmp_path):
+    path = tmp_path / "packed.h5"
+    path.write_bytes(Path(dwell_file("weak")).read_bytes())
+    packed_wave(path)
+    with (
+        open_recording(path) as recording,
+        pytest.raises(UnusableData, match="no converter gives what can be"),
+    ):
+        analyse(recording)
+
+
+def test_even_a_sine_without_noise_does_not_pack_like_that(dwell_file):
+    with open_recording(dwell_file("weak")) as recording:
+        assert 1 < recording.packing < 8
+
+
+def test_a_chain_is_not_shaken_by_a_damaged_recording(dwell_file, tmp_path):
+    path = tmp_path / "damaged.h5"
+    path.write_bytes(Path(dwell_file("weak")).read_bytes())
+    with h5py.File(path, "r+") as file:
+        file["base_acceleration"][5000] += 1
+    with pytest.raises(UnusableData, match="is damaged"):
+        _base_of(ChainRequest.model_construct(recording=str(path)))
