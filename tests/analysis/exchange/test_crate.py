@@ -43,6 +43,15 @@ def test_every_byte_is_packed_and_described(folder, crate):
     assert not (folder / "ro-crate-metadata.json").exists()
 
 
+def test_what_a_link_leads_to_outside_the_folder_is_not_published(folder, tmp_path):
+    """In a folder that was received, it may be a private key of whoever packs it."""
+    (tmp_path / "private").write_text("a key")
+    (folder / "notes.txt").symlink_to(tmp_path / "private")
+    with pytest.raises(InvalidRequest, match="leads out of the folder"):
+        pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE), {})
+    assert not (tmp_path / "crate.zip").exists()
+
+
 def test_a_crate_is_never_overwritten(folder, crate):
     with pytest.raises(InvalidRequest, match="exists"):
         pack_folder(folder, crate, CrateFacts(LICENCE), {})

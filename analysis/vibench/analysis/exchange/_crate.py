@@ -68,7 +68,7 @@ def pack_folder(
     NotEnoughData
         When the folder holds no recording.
     InvalidRequest
-        When the licence is no address, or the zip exists or cannot be written.
+        When the licence is no address, a link leads out of the folder, or the zip exists or is refused.
 
     """
     if not facts.licence.startswith(("https://", "http://")):
@@ -77,6 +77,12 @@ def pack_folder(
             "https://creativecommons.org/licenses/by/4.0/"
         )
     paths = tuple(path for path in sorted(folder.rglob("*")) if _belongs(path) and path != crate)
+    outside = [each for each in paths if not each.resolve().is_relative_to(folder.resolve())]
+    if outside:
+        raise InvalidRequest(
+            f"{outside[0]} leads out of the folder, to {outside[0].resolve()}, which would be published "
+            "with it; nothing was packed. Put a copy in its place if it belongs here, or take it away"
+        )
     entities = [_file_entity(path, folder, untrusted) for path in paths]
     if not any(each.get("encodingFormat") == HDF5_TYPE for each in entities):
         raise NotEnoughData(f"{folder} holds no recording; give the folder of a campaign")

@@ -147,8 +147,11 @@ def process_start(pid: int) -> str | None:
 @cache
 def _here() -> str:
     """Say within what a process's number is its own: this start of this computer, and the container."""
-    boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")[:8]
-    return f"{boot}_{Path('/proc/self/ns/pid').stat().st_ino}"
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii")[:8]
+        return f"{boot}_{Path('/proc/self/ns/pid').stat().st_ino}"
+    except OSError:  # a system call that a sandbox does not give
+        return "unknown"
 
 
 def _told_by_ps(pid: int) -> str | None:

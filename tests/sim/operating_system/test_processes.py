@@ -1,0 +1,41 @@
+"""A process is told by more than its number, wherever its start was written down."""
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from vibench.sim.operating_system import Place, is_process, place_of, process_start
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
+
+
+def test_a_start_tells_containers_and_computers_apart():
+    own = process_start(os.getpid())
+    boot, container, ticks = own.split("_")
+    assert place_of(own) is Place.HERE
+    assert place_of(f"{boot}_{container}_1") is Place.HERE
+    assert place_of(f"{boot}_1_{ticks}") is Place.CONTAINER
+    assert place_of(f"another_{container}_{ticks}") is Place.ELSEWHERE
+    assert not is_process(os.getpid(), f"{boot}_1_{ticks}")
+
+
+def test_a_sandbox_that_hides_the_start_of_the_computer_hides_no_process(monkeypatch):
+    from vibench.sim.operating_system import _posix
+
+    read = Path.read_text
+
+    def hidden(path, *arguments, **named):
+        if path.name == "boot_id":
+            raise PermissionError(13, "hidden", str(path))
+        return read(path, *arguments, **named)
+
+    monkeypatch.setattr(Path, "read_text", hidden)
+    _posix._here.cache_clear()
+    try:
+        start = process_start(os.getpid())
+        assert is_process(os.getpid(), start)
+        assert place_of(start) is Place.HERE
+    finally:
+        _posix._here.cache_clear()
