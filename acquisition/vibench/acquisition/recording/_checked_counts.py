@@ -15,7 +15,7 @@ from ._counts import Counts
 from ._seal import PIECE_ITEMS, ChannelStates
 
 if TYPE_CHECKING:
-    from ._seal import Hash
+    from hashlib import _Hash as Hash
 
 _KNOWN: dict[str, ChannelStates] = {}
 """By seal. About 20 kB for a recording of a minute."""

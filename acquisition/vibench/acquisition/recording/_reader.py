@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
 from types import TracebackType
@@ -132,7 +132,7 @@ class Recording(RecordingDescription):
     def packing(self) -> float:
         """Bytes of the samples over those that the file takes for them: about 1.3 for noise of 20 bits."""
         stored = sum(self._open.file[role].id.get_storage_size() for role in self.roles)
-        return 4.0 * len(self.roles) * self.samples / max(stored, 1)
+        return float(4 * len(self.roles) * self.samples / max(stored, 1))
 
     @property
     def check_text(self) -> str:
@@ -239,7 +239,7 @@ class Recording(RecordingDescription):
         found = check_seal(self._open.file, SealDepth(depth), seal_key() if key is None else key, states)
         if found.state not in (SealState.INTACT, SealState.OTHER_KEY) or not found.seal:
             return found
-        if repr(replace(_read(self._open), _open=None)) != repr(replace(self, _open=None)):
+        if repr(_read(self._open)) != repr(self):
             return SealCheck(SealState.DAMAGED, "it was changed after it had been opened", found.seal)
         if SealDepth(depth) is SealDepth.WHOLE:
             remember(found.seal, {f"/{role}": states[f"/{role}"] for role in self.roles})
