@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import vibench.analysis
-from vibench.acquisition import AcquisitionError, CheckRule, ConfigurationError, load_campaign, load_toml
+from vibench.acquisition import (
+    AcquisitionError,
+    CheckRule,
+    ConfigurationError,
+    load_campaign,
+    load_toml,
+    stop_on_signal,
+)
 from vibench.acquisition.campaign import (
     AfterFailure,
     CampaignEstimate,
@@ -198,7 +205,7 @@ def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[E
     handler = RequestHandler(engine, JobQueue(engine))
     try:
         engine.open(rig, confirm)
-        with serving(handler, what), Watching(handler.status):
+        with serving(handler, what), stop_on_signal(engine.switch, what), Watching(handler.status):
             yield engine
     except BaseException as error:
         try:
