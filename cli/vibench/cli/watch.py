@@ -21,7 +21,6 @@ from vibench.acquisition.engine import (
     stop_engine,
     the_engine,
 )
-from vibench.acquisition.stopping import Program
 
 from .engine_bars import INTERVAL_S, EngineBars
 from .output import console, print_json
@@ -83,9 +82,10 @@ def stop(
         programs = (the_engine(pid),)
     failures = []
     with ThreadPoolExecutor(len(programs)) as pool:  # one that hangs must not keep a stop from the others
-        for each in [pool.submit(_stopped, program, level, reason) for program in programs]:
+        deliveries = [pool.submit(stop_engine, each, level, reason) for each in programs]
+        for program, delivery in zip(programs, deliveries, strict=True):
             try:
-                console.print(each.result())
+                console.print(_said(f"{program.what}, process {program.pid}", delivery.result(), level))
             except AcquisitionError as error:
                 failures.append(error)
     if elsewhere := out_of_reach():
@@ -96,9 +96,8 @@ def stop(
         raise EngineSilent(". ".join(map(str, failures)))
 
 
-def _stopped(program: Program, level: StopLevel, reason: str) -> str:
-    name = f"{program.what}, process {program.pid}"
-    match stop_engine(program, level, reason):
+def _said(name: str, delivery: StopDelivery, level: StopLevel) -> str:
+    match delivery:
         case StopDelivery.KEPT:
             raise EngineSilent(
                 f"{name} lives and does not answer: it hangs, or was stopped. The stop ({level.value}) is "
