@@ -74,6 +74,8 @@ class _OpenFile:
             self.path = name_now(self.path)
             self.file = open_hdf5(self.path)
         self.counts = CheckedCounts()
+        self.described = ""
+        """What was read of it when it was opened, samples apart."""
 
     def reopen(self) -> None:
         self.file.close()
@@ -239,7 +241,7 @@ class Recording(RecordingDescription):
         found = check_seal(self._open.file, SealDepth(depth), seal_key() if key is None else key, states)
         if found.state not in (SealState.INTACT, SealState.OTHER_KEY) or not found.seal:
             return found
-        if repr(_read(self._open)) != repr(self):
+        if repr(_read(self._open)) != self._open.described:
             return SealCheck(SealState.DAMAGED, "it was changed after it had been opened", found.seal)
         if SealDepth(depth) is SealDepth.WHOLE:
             remember(found.seal, {f"/{role}": states[f"/{role}"] for role in self.roles})
@@ -340,7 +342,9 @@ def open_recording(path: Path | str) -> Recording:
     """
     handle = _OpenFile(Path(path))
     try:
-        return _as_it_was_checked(_read(handle))
+        recording = _read(handle)
+        handle.described = repr(recording)
+        return _as_it_was_checked(recording)
     except (RecordingError, *DAMAGE) as error:
         handle.file.close()
         raise RecordingError(
