@@ -18,7 +18,15 @@ from scipy.linalg import solve_discrete_are
 
 from vibench.acquisition.rig import amplifier_of, load_rig, shaker_of, specimen_of
 from vibench.sim import Harmonic
-from vibench.sim.feedback import Begin, LawWeights, LoopTiming, SampledPlant, designed_law, impact_branch
+from vibench.sim.feedback import (
+    Begin,
+    LawWeights,
+    LoopTiming,
+    SampledPlant,
+    branch_multipliers,
+    designed_law,
+    impact_branch,
+)
 from vibench.sim.periodic import PeriodMap, spring_of
 
 SUBSTEPS = 40
@@ -33,27 +41,20 @@ LEVEL_M, START_HZ, RANGE_HZ = 1e-6, 97.5, (95.0, 100.0)
 def struck(plant: SampledPlant, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Give what each sample of a period makes of a deviation, and what its new volt adds.
 
-    Shapes (samples, n, n) and (samples, n); ``slopes`` of the stops' force, shape (samples, SUBSTEPS).
+    Shapes (samples, n, n) and (samples, n); ``slopes`` of the stops' force, shape (samples, parts).
     """
     into, relative = plant.spring
-    short_s = plant.timing.step_s / SUBSTEPS
-    parts = [plant._stretch(n * short_s, (n + 1) * short_s) for n in range(SUBSTEPS)]  # noqa: SLF001
-    sampled = np.eye(plant.size)
-    sampled[9:11] = np.eye(plant.size)[[1, 3]]
-    # Volts on their way move on at the end of a sample, as they do without stops.
-    shift, newest = np.eye(plant.size), np.zeros(plant.size)
-    if plant.waiting:
-        shift[11:] = np.eye(plant.size)[10 : plant.size - 1]
-        shift[11], newest[11] = 0.0, 1.0
+    parts = slopes.shape[1]
+    stretches = plant.stretches(parts)
     moved, volts = [], []
-    for row in slopes:
-        state, volt = sampled, np.zeros(plant.size)
-        for (matrix, gain), slope in zip(parts, row * short_s, strict=True):
+    for row in slopes * plant.timing.step_s / parts:
+        state, volt = np.eye(plant.size), np.zeros(plant.size)
+        for (matrix, gain), slope in zip(stretches, [*row, 0.0], strict=True):
             state, volt = matrix @ state, matrix @ volt + gain
             state = state + np.outer(into, relative @ state) * slope
             volt = volt + into * (relative @ volt) * slope
-        moved.append(shift @ state)
-        volts.append(shift @ volt + newest)
+        moved.append(state)
+        volts.append(volt)
     return np.array(moved), np.array(volts)
 
 
@@ -75,9 +76,9 @@ def gains_along(plant: SampledPlant, moved: np.ndarray) -> np.ndarray:
 
 
 def multipliers(plant: SampledPlant, slopes: np.ndarray, believed: np.ndarray) -> list[float]:
-    """Give the largest multiplier of a period with each of the three observers."""
+    """Give the largest multiplier of a period with both observers that know the stops."""
     scale, law = plant.scales, designed_law(plant)
-    shown, step, volt = plant.shown * scale, plant.step[0] * scale / scale[:, None], plant.step[1] / scale
+    shown, step = plant.shown * scale, plant.step[0] * scale / scale[:, None]
     true, volts = struck(plant, slopes)
     seen, seen_volts = struck(plant, believed)
     true, seen = (each * scale / scale[:, None] for each in (true, seen))
@@ -88,7 +89,6 @@ def multipliers(plant: SampledPlant, slopes: np.ndarray, believed: np.ndarray) -
     kept = np.eye(plant.size) - plain[0] @ shown
     feedback = -np.linalg.lstsq(kept.T, law.output.T, rcond=None)[0].T
     observers = (
-        (step[None].repeat(count, axis=0), volt[None].repeat(count, axis=0), plain),
         (seen, seen_volts, plain),
         (seen, seen_volts, gains_along(plant, seen)),
     )
@@ -131,6 +131,7 @@ def main() -> None:
         count = round(rig.controller.rate_hz / hertz)
         timing = LoopTiming(count * hertz, given.latency)
         plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen, timing)
+        usual = branch_multipliers(plant, designed_law(plant), branch, [point])
         states = PeriodMap(specimen).orbit(
             branch.states[point], Harmonic(hertz, LEVEL_M), 2 * count * SUBSTEPS
         )
@@ -138,7 +139,7 @@ def main() -> None:
         slopes, believed = (
             spring.stiffness(each, np.zeros_like(each)) for each in (p, p + np.sign(p) * given.shifted)
         )
-        found = " | ".join(f"{each:.3g}" for each in multipliers(plant, slopes, believed))
+        found = " | ".join(f"{each:.3g}" for each in (*usual, *multipliers(plant, slopes, believed)))
         print(f"| {hertz:.3f} | {sizes[point]:.3g} | {found} |", flush=True)
 
 

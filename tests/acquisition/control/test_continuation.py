@@ -226,24 +226,47 @@ def test_a_latency_at_which_the_loop_fails_is_refused_with_the_number_before_any
     assert not (tmp_path / "late.h5").exists()
 
 
-def test_motions_near_grazing_are_refused_with_their_growth_time(rig):
+def among_stops(**more):
+    """The paper's specimen on a rig with a controller, and a plan from above under 1 µm."""
+    stops = load_rig(Path("virtual_rig_controller"))
+    stops = stops.model_copy(update={"specimen": load_rig(Path("virtual_rig")).specimen})
+    usual = {"start_hz": 97.5, "low_hz": 96.85, "high_hz": 100, "begin_from": "above", "step_hz": 0.25}
+    plan = continuation(**(usual | {"harmonics": 7} | more))
+    return stops, plan.model_copy(update={"base_level": BaseLevel(displacement_m=1e-6)})
+
+
+@pytest.mark.thorough
+def test_motions_near_grazing_are_refused_with_the_loops_multiplier(rig):
     fast = fast_loop(hardening(rig).model_copy(update={"specimen": rig.specimen}))
-    plan = continuation(start_hz=250, low_hz=249, high_hz=256)
-    plan = plan.model_copy(update={"base_level": BaseLevel(displacement_m=3e-6)})
-    with pytest.raises(LimitExceeded, match=r"grows by e in .* ms, and a loop with 0.3 ms of latency"):
+    plan = continuation(start_hz=254, low_hz=253.9, high_hz=254.3)
+    with pytest.raises(LimitExceeded, match=r"multiplier is 1\d\d at .* hold it from 254 to 254\.2\d? Hz\."):
         require_held(fast, plan)
+
+
+@pytest.mark.thorough
+def test_a_branch_among_stops_is_refused_from_where_the_loop_with_its_contacts_has_a_multiplier_of_one():
+    stops, plan = among_stops(low_hz=96.4, high_hz=98.7)
+    with pytest.raises(LimitExceeded, match=r"hold it from 97\.5 to 96\.[78]\d* Hz, behind 1 fold\."):
+        require_held(fast_loop(stops), plan)
+    require_held(fast_loop(stops), plan.model_copy(update={"low_hz": 96.85}))
+
+
+def test_a_branch_of_which_the_model_knows_no_beginning_or_no_force_is_refused():
+    stops, plan = among_stops(start_hz=95, low_hz=94, high_hz=96, begin_from="rest")
+    with pytest.raises(LimitExceeded, match="finds no motion that repeats every period at start_hz = 95"):
+        require_held(fast_loop(stops), plan)
+    rigid = stops.specimen.model_copy(update={"contact": "rigid:0.8"})
+    with pytest.raises(LimitExceeded, match="rigid stops push with no finite force"):
+        require_held(fast_loop(stops.model_copy(update={"specimen": rigid})), plan)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.parametrize("rate_hz", [10_240.0, 5120.0])
-def test_motions_with_impacts_are_held_behind_their_fold(rig, tmp_path, rate_hz):
+def test_motions_with_impacts_are_held_behind_their_fold(tmp_path, rate_hz):
     """The paper's specimen: begun from above, at least 10 unstable motions, up to a multiplier of 2."""
-    stops = load_rig(Path("virtual_rig_controller")).model_copy(update={"specimen": rig.specimen})
+    stops, plan = among_stops()
     stops = stops.model_copy(update={"daq": stops.daq.model_copy(update={"sample_rate_hz": rate_hz})})
-    plan = continuation(
-        start_hz=97.5, low_hz=96.7, high_hz=100, begin_from="above", step_hz=0.25, harmonics=7
-    ).model_copy(update={"base_level": BaseLevel(displacement_m=1e-6)})
     points, notes = followed(stops, plan, tmp_path / "stops.h5")
     # Where the model's multiplier is 2 and more, how far it is held depends on the noise.
     assert notes[-1].end in (BranchEnd.RANGE, BranchEnd.LOST), notes

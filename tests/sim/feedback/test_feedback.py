@@ -17,7 +17,7 @@ from vibench.sim.feedback import (
     branch_multipliers,
     designed_law,
     impact_branch,
-    loop_multipliers,
+    loop_multiplier,
     loop_transfer,
     motion_slopes,
     pd_law,
@@ -84,6 +84,17 @@ def test_under_a_table_too_heavy_to_move_the_multipliers_are_those_of_the_branch
     assert seen == pytest.approx(exact, rel=0.01)
 
 
+@pytest.mark.thorough
+def test_so_they_are_among_stops_whose_contacts_are_shorter_than_a_sample():
+    stops = gong2025()
+    found = impact_branch(stops, 1e-6, 97.5, (97.2, 98.7), Begin.ABOVE)
+    points = np.argsort(np.abs(found.multipliers[:, 0]))[[-1, -10]]
+    exact = np.abs(found.multipliers[points, 0])
+    assert exact.min() > 1.2
+    seen = branch_multipliers(plant(mass_kg=1e7, specimen=stops), NO_LAW, found, points)
+    assert seen == pytest.approx(exact, rel=0.02)
+
+
 def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_the_model_is_wrong():
     found = branch()
     unstable = np.flatnonzero(~found.is_stable)
@@ -92,9 +103,9 @@ def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_th
     softer = replace(HARDENING, stiffnesses=tuple(0.9 * each for each in HARDENING.stiffnesses))
     wrong = (plant(), plant(gain=3.48), plant(gain=2.84), plant(specimen=softer))
     for index in (*unstable[[0, 70, -1]], 10, len(found.frequencies_hz) - 1):
-        slopes, periods = motion_slopes(HARDENING, found, index, RATE_HZ)
+        slopes = motion_slopes(HARDENING, found, index, RATE_HZ)
         for each in wrong:
-            assert loop_multipliers(each, law, [slopes], periods)[0] < 0.99
+            assert loop_multiplier(each, law, *slopes) < 0.99
 
 
 def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():

@@ -34,14 +34,14 @@ def modulations(rng, draws, per_period, count):
 
 def held(index, draws, rng):
     """Answers of base and m0 to changes of a volt, and to noise: shape (samples, 2, draws) each."""
-    table, (wave, periods) = plant(), motion_slopes(HARDENING, branch(), index, RATE_HZ)
+    table, (wave, _, periods, _) = plant(), motion_slopes(HARDENING, branch(), index, RATE_HZ)
     law, per_period = designed_law(table), len(wave) / periods
     count = round((LEAD + 2 * CHANGES + 1) * HOLD * per_period)
     volts = np.hstack([modulations(rng, draws, per_period, count), np.zeros((count, draws))])
     noise = np.dstack(
         [np.zeros((count, 2, draws)), rng.standard_normal((count, 2, draws)) * np.reshape(NOISE, (2, 1))]
     )
-    (first, of_first, second, of_second), (into, relative) = table.halves, table.spring
+    ((first, of_first), (second, of_second)), (into, relative) = table.stretches(), table.spring
     state, memory = np.zeros((table.size, 2 * draws)), np.zeros((len(law.step), 2 * draws))
     shown = np.empty((count, 2, 2 * draws))
     for n in range(count):

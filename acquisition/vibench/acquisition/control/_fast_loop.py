@@ -7,7 +7,6 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.branches import least_growth_time_s
 from vibench.sim.feedback import (
     Begin,
     LinearLaw,
@@ -18,11 +17,13 @@ from vibench.sim.feedback import (
     loop_transfer,
     pd_law,
 )
+from vibench.sim.model import RigidStops
+from vibench.sim.periodic import ArcEnd
 
 from ..errors import ConfigurationError, LimitExceeded
 from ..excitation import BranchContinuation
 from ..instruments import LoopBlock, LoopFeedback, LoopInput
-from ..plan import Measurement, fast_loop_time_s
+from ..plan import Measurement
 from ..rig import ControllerConfig, Rig, amplifier_of, shaker_of, specimen_of
 
 Coefficients = NDArray[np.complex128]
@@ -93,32 +94,42 @@ def require_holdable(measurement: Measurement, rig: Rig) -> None:
 def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
     """Refuse a branch that the loop does not hold, by the model.
 
-    Smooth springs are judged by the multipliers of the loop; stops, whose contacts are shorter than a sample,
-    by how fast the motion grows without it.
-
     Raises
     ------
     LimitExceeded
-        With the number. Nothing was played.
+        With the largest multiplier of the loop and how far it would hold, or with why that is not known.
+        Nothing was played.
 
     """
-    level_m = level_at(plan, plan.start_hz)
-    begin = Begin(plan.begin_from)
-    hold = branch_hold(fast.plant, fast.law, level_m, plan.start_hz, plan.band_hz, begin)
-    timing = fast.plant.timing
-    loop = f"{1e3 * timing.latency_s:.3g} ms of latency at {timing.rate_hz:g} samples a second"
-    if hold.multiplier is not None and hold.multiplier > LARGEST_MULTIPLIER:
+    level_m, timing = level_at(plan, plan.start_hz), fast.plant.timing
+    unknown = "whether the fast loop holds the branch is not known: "
+    if isinstance(fast.plant.specimen.contact, RigidStops):
+        raise LimitExceeded(
+            f"{unknown}rigid stops push with no finite force. Nothing was played; give the specimen of "
+            "the hardware configuration another contact law, such as hertz"
+        )
+    begin = Begin(plan.begin_from), plan.begin
+    hold = branch_hold(fast.plant, fast.law, level_m, plan.start_hz, plan.band_hz, *begin, LARGEST_MULTIPLIER)
+    if hold is None:
+        raise LimitExceeded(
+            f"{unknown}the model finds no motion that repeats every period at start_hz = {plan.start_hz:g} "
+            f"under {level_m:.3g} m. Nothing was played; begin at another frequency, level, or begin_from"
+        )
+    held = "not even its first motion"
+    if hold.held_hz is not None:
+        behind = f", behind {hold.folds} fold{'s' * (hold.folds > 1)}" if hold.folds else ""
+        held = f"it from {plan.start_hz:.5g} to {hold.held_hz:.5g} Hz{behind}"
+    if hold.multiplier > LARGEST_MULTIPLIER:
         raise LimitExceeded(
             f"the fast loop would not hold the branch: by the model its largest multiplier is "
-            f"{hold.multiplier:.3g} at {hold.at_hz:.5g} Hz with {loop}, allowed is at most "
-            f"{LARGEST_MULTIPLIER:g}. Nothing was played; shorten the latency, or lower the level"
+            f"{hold.multiplier:.3g} at {hold.at_hz:.5g} Hz with {1e3 * timing.latency_s:.3g} ms of latency "
+            f"at {timing.rate_hz:g} samples a second, allowed is at most {LARGEST_MULTIPLIER:g}; it would "
+            f"hold {held}. Nothing was played; narrow the range, shorten the latency, or lower the level"
         )
-    least_s = least_growth_time_s(fast_loop_time_s(controller_of(fast.rig)))
-    if hold.multiplier is None and hold.growth_s < least_s:
+    if hold.end not in (ArcEnd.REACHED_BOUND, ArcEnd.CLOSED):
         raise LimitExceeded(
-            f"the branch cannot be held: by the model a motion at {hold.at_hz:.5g} Hz grows by e in "
-            f"{1e3 * hold.growth_s:.3g} ms, and a loop with {loop} holds what takes {1e3 * least_s:.3g} ms "
-            "or longer. Nothing was played; narrow the range to gentler motions, or shorten the latency"
+            f"{unknown}the model follows {held} only ({hold.end}). Nothing was played; narrow the range, or "
+            "change the level"
         )
 
 

@@ -2,13 +2,13 @@
 
 A controller samples base and m0, and sets the voltage at the amplifier some latency later. `SampledPlant`
 says what a step of it makes of table, specimen and volts on their way; `designed_law` gives the linear law
-(a Kalman filter and the feedback of its estimate) that damps the specimen; `loop_multipliers` says whether
+(a Kalman filter and the feedback of its estimate) that damps the specimen; `loop_multiplier` says whether
 a periodic motion is stable under it; `open_loop_multiplier` tells from samples of a perturbed motion
 whether it would be stable without. The harmonic content of the drive is no part of the law: where the base
 moves as a sine, the motion held is one of the specimen alone, whatever the law is. SI units.
 
 >>> from vibench.sim import gong2025
->>> from vibench.sim.feedback import LoopTiming, SampledPlant, designed_law, loop_multipliers
+>>> from vibench.sim.feedback import LoopTiming, SampledPlant, designed_law, loop_multiplier
 >>> from vibench.sim.shaker import Amplifier, Shaker
 >>> table = Shaker(
 ...     moving_mass_kg=0.127, suspension_stiffness_n_per_m=9932.0, suspension_damping_ns_per_m=21.51,
@@ -16,7 +16,7 @@ moves as a sine, the motion held is one of the specimen alone, whatever the law 
 ... )
 >>> plant = SampledPlant(Amplifier(gain=3.16), table, gong2025(), LoopTiming(10_240.0, 3e-4))
 >>> law = designed_law(plant)
->>> bool(loop_multipliers(plant, law, [[0.0] * 102])[0] < 1.0)
+>>> loop_multiplier(plant, law, [0.0] * 102) < 1.0
 True
 """
 

@@ -13,7 +13,7 @@ from ._law import (
     pd_law as pd_law,
 )
 from ._loop import (
-    loop_multipliers as loop_multipliers,
+    loop_multiplier as loop_multiplier,
     loop_transfer as loop_transfer,
 )
 from ._plant import (

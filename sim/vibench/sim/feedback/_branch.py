@@ -3,14 +3,18 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from math import inf
+from math import ceil
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..kernels import Floats
-from ..model import Harmonic, Specimen, Y, Z
+from ..model import VY, VZ, Harmonic, Specimen, Y, Z
 from ..periodic import (
+    ArcEnd,
     BalanceEnd,
+    BifurcationKind,
     Branch,
     FrequencyPath,
     PeriodMap,
@@ -24,29 +28,45 @@ from ..periodic import (
     structure_of,
 )
 from ._law import LinearLaw
-from ._loop import loop_multipliers
+from ._loop import loop_multiplier
 from ._plant import SampledPlant
 
+Points = NDArray[np.int64]
 _POINTS = 25
 """Motions of a branch that are looked at, stable ones too: a late law may lose what needs none."""
-_PERIODS = range(10, 41)
-"""Of a motion that are gone through: so many that they take a whole number of samples, or nearly so."""
-_WAVE = 512
+_PERIODS, _WHOLE = range(1, 41), 2e-5
+"""Of a motion that are gone through: as few as take a whole number of samples within this part of it."""
+_WAVE, _WAVE_OF_STOPS = 512, 8192
 """Samples of a period by which the slope of the spring is known along it."""
+_PART_S = 2.5e-6
+"""Part of a sample for which the slope of stops is taken: a contact lasts some tens of them."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Levels, over the one that is asked for, along which motions among stops are led down to it."""
 
 
 @dataclass(frozen=True)
 class BranchHold:
-    """What a law makes of the motions of a branch."""
+    """What a law makes of the motions of a branch, from its start on."""
 
-    multiplier: float | None
-    """The largest over a period with the law acting; None where stops, or no branch, leave it unknown."""
+    multiplier: float
+    """The largest over a period with the law acting."""
     at_hz: float
-    """Where that is, or where the growth is fastest [Hz]."""
-    growth_s: float
-    """In which the least stable motion grows by e where the base moves as a sine; infinite for none [s]."""
+    """Where that is [Hz]."""
+    held_hz: float | None
+    """Up to where every motion is held; None where not even the first is [Hz]."""
+    folds: int
+    """That lie before."""
+    end: ArcEnd | None
+    """Why the model left the branch."""
+
+
+class MotionSlopes(NamedTuple):
+    """Slopes of the spring's force along a motion, as `loop_multiplier` takes them."""
+
+    stiffness: Floats
+    damping: Floats
+    periods: int
+    parts: int
 
 
 class Begin(StrEnum):
@@ -64,46 +84,52 @@ def branch_hold(
     start_hz: float,
     range_hz: tuple[float, float],
     begin: Begin = Begin.REST,
-) -> BranchHold:
+    way: Literal["up", "down"] = "up",
+    allowed: float = 1.0,
+) -> BranchHold | None:
     """Follow the model's branch under one level of the base, and see how a law holds it.
 
     Parameters
     ----------
     plant, law
-        As the host knows them.
+        As the host knows them; of a specimen without rigid stops.
     level_m
         Amplitude of the base's displacement [m].
     start_hz, range_hz
         Where the branch begins, and where it is left [Hz].
     begin
         From which side the level is met there; where there are no stops, from rest.
+    way
+        Which way the branch is begun.
+    allowed
+        Multiplier up to which a motion counts as held.
+
+    Returns
+    -------
+    None where the model has no motion to begin with.
 
     """
-    smooth = _smooth_spring(plant)
-    if smooth is None:
+    spring = spring_of(plant.specimen)
+    if spring.kinks:
         branch = impact_branch(plant.specimen, level_m, start_hz, range_hz, begin)
     else:
-        branch = _smooth_branch(plant.specimen, smooth, level_m, start_hz, range_hz)
+        branch = _smooth_branch(plant.specimen, spring, level_m, start_hz, range_hz)
     if branch is None:
-        return BranchHold(None, start_hz, inf)
-    sizes = np.abs(branch.multipliers[:, 0])
-    rates = np.log(sizes) * branch.frequencies_hz
-    fastest = int(np.argmax(rates))
-    growth_s = float(1 / rates[fastest]) if sizes[fastest] > 1.0 else inf
-    if smooth is None:
-        return BranchHold(None, float(branch.frequencies_hz[fastest]), growth_s)
-    points = np.unique(np.linspace(0, sizes.size - 1, _POINTS).astype(int))
+        return None
+    start = int(np.argmin(np.abs(branch.frequencies_hz - start_hz)))
+    ahead = np.arange(start, len(branch.frequencies_hz)) if way == "up" else np.arange(start, -1, -1)
+    points = ahead[np.unique(np.linspace(0, ahead.size - 1, _POINTS).astype(int))]
     held = branch_multipliers(plant, law, branch, points)
     worst = int(np.argmax(held))
-    return BranchHold(float(held[worst]), float(branch.frequencies_hz[points[worst]]), growth_s)
-
-
-def _smooth_spring(plant: SampledPlant) -> RestoringForce | None:
-    """Give a spring without stops; None for stops, whose contacts are shorter than a sample."""
-    if plant.specimen.contact.stops.restitution is not None:
-        return None
-    spring = spring_of(plant.specimen)
-    return None if spring.kinks else spring
+    last = _last_held(plant, law, branch, points, held, allowed)
+    low, high = sorted((start, start if last is None else last))
+    return BranchHold(
+        multiplier=float(held[worst]),
+        at_hz=float(branch.frequencies_hz[points[worst]]),
+        held_hz=None if last is None else float(branch.frequencies_hz[last]),
+        folds=sum(each.kind is BifurcationKind.FOLD and low <= each.index < high for each in branch.events),
+        end=branch.end if way == "up" else branch.begin,
+    )
 
 
 def _smooth_branch(
@@ -133,15 +159,34 @@ def impact_branch(
     return periodic_branch_within(orbit, FrequencyPath((level_m,)), *range_hz)
 
 
+def _last_held(
+    plant: SampledPlant, law: LinearLaw, branch: Branch, points: Points, held: Floats, allowed: float
+) -> int | None:
+    """Give the last motion of a branch up to which a law holds every one; None where it loses the first."""
+    first = int(np.argmax(held > allowed))
+    if held[first] <= allowed:
+        return int(points[-1])
+    if first == 0:
+        return None
+    last, lost = int(points[first - 1]), int(points[first])
+    while abs(lost - last) > 1:
+        middle = (last + lost) // 2
+        if branch_multipliers(plant, law, branch, [middle])[0] <= allowed:
+            last = middle
+        else:
+            lost = middle
+    return last
+
+
 def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, points: Iterable[int]) -> Floats:
     """Give the largest multiplier over a period of motions of a branch, with the law acting.
 
     Parameters
     ----------
     plant, law
-        Of a specimen with a smooth spring; `loop_multipliers`.
+        `loop_multiplier`.
     branch
-        Of that specimen.
+        Of the plant's specimen.
     points
         Which of its motions.
 
@@ -150,12 +195,13 @@ def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, poin
     Magnitudes, shape (points,).
 
     """
-    courses = [motion_slopes(plant.specimen, branch, point, plant.timing.rate_hz) for point in points]
-    return np.array([loop_multipliers(plant, law, [each], periods)[0] for each, periods in courses])
+    rate_hz = plant.timing.rate_hz
+    courses = [motion_slopes(plant.specimen, branch, point, rate_hz) for point in points]
+    return np.array([loop_multiplier(plant, law, *each) for each in courses])
 
 
-def motion_slopes(specimen: Specimen, branch: Branch, point: int, rate_hz: float) -> tuple[Floats, int]:
-    """Give the slope of a smooth spring along one motion of a branch, with all its harmonics.
+def motion_slopes(specimen: Specimen, branch: Branch, point: int, rate_hz: float) -> MotionSlopes:
+    """Give the slopes of the spring's force along one motion of a branch, with all its harmonics.
 
     Parameters
     ----------
@@ -166,18 +212,17 @@ def motion_slopes(specimen: Specimen, branch: Branch, point: int, rate_hz: float
     rate_hz
         Samples a second.
 
-    Returns
-    -------
-    dF/dp in the middle between samples, shape (samples,) [N/m], and over how many periods they go.
-
     """
     spring = spring_of(specimen)
     drive = Harmonic(float(branch.frequencies_hz[point]), float(branch.amplitudes_m[point]))
     samples = rate_hz / drive.frequency_hz * np.array(_PERIODS)
-    best = int(np.argmin(np.abs(samples - np.round(samples)) / samples))
+    best = int(np.argmin(np.maximum(np.abs(np.round(samples) / samples - 1.0), _WHOLE)))
     periods, count = _PERIODS[best], round(samples[best])
-    states = PeriodMap(specimen).orbit(branch.states[point], drive, _WAVE).states
-    p = states[:_WAVE, Y] - states[:_WAVE, Z]
-    turns = (np.arange(count) + 0.5) * periods / count
-    wave = np.interp(turns, np.arange(_WAVE) / _WAVE, p, period=1.0)
-    return spring.stiffness(wave, np.zeros_like(wave)), periods
+    parts, wave = (ceil(1.0 / (rate_hz * _PART_S)), _WAVE_OF_STOPS) if spring.kinks else (1, _WAVE)
+    states = PeriodMap(specimen).orbit(branch.states[point], drive, wave).states[:wave]
+    turns = (np.arange(count * parts) + 0.5) * periods / (count * parts)
+    p, rate = (
+        np.interp(turns, np.arange(wave) / wave, states[:, y] - states[:, z], period=1.0)
+        for y, z in ((Y, Z), (VY, VZ))
+    )
+    return MotionSlopes(spring.stiffness(p, rate), spring.damping(p, rate), periods, parts)

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from math import ceil
 
 import numpy as np
@@ -98,11 +99,11 @@ class SampledPlant:
         specimen = [1e-6] * 3 + [1e-3] * 3
         return np.array([1e-6, 1e-3, 1e-2, *specimen, 1e-3, 1e-6, *[1e-2] * self.waiting])
 
-    @cached_property
-    def halves(self) -> tuple[Table, Vector, Table, Vector]:
-        """Both halves of a step: state before to state after, (n, n), and what the new volt adds, (n,), each.
+    def stretches(self, parts: int = 1) -> tuple[tuple[Table, Vector], ...]:
+        """Give the stretches of a step between the middles of its parts, ends included, one more than parts.
 
-        The spring between m1 and m2 acts between them (Strang splitting).
+        Each is state before to state after, (n, n), and what the new volt adds, (n,). The spring between m1
+        and m2 acts between them (Strang splitting).
         """
         step, size = self.timing.step_s, self.size
         sampled = np.eye(size)
@@ -112,14 +113,16 @@ class SampledPlant:
         if self.waiting:
             moved_on[11] = 0.0
             newest[11] = 1.0
-        first, of_first = self._stretch(0.0, 0.5 * step)
-        second, of_second = self._stretch(0.5 * step, step)
-        return first @ sampled, of_first, moved_on @ second, moved_on @ of_second + newest
+        edges = step / parts * np.array([0.0, *(np.arange(parts) + 0.5), parts])
+        found = [self._stretch(*each) for each in pairwise(edges)]
+        found[0] = found[0][0] @ sampled, found[0][1]
+        found[-1] = moved_on @ found[-1][0], moved_on @ found[-1][1] + newest
+        return tuple(found)
 
     @cached_property
     def step(self) -> tuple[Table, Vector]:
         """State and new volt before to the state after a whole step, shapes (n, n) and (n,)."""
-        first, volt, second, more = self.halves
+        (first, volt), (second, more) = self.stretches()
         return second @ first, second @ volt + more
 
     @cached_property

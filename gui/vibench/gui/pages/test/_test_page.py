@@ -54,8 +54,11 @@ _SHOWN = {
 }
 
 
-def summary_text(seen: MeasurementPreview) -> str:
-    """Say what is played; then peak stroke, acceleration, force and volts beside their limits, time, size."""
+def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
+    """Say what is played; then peak stroke, acceleration, force and volts beside their limits, time, size.
+
+    ``refusal`` is why a fast loop would not hold it.
+    """
     parts = [excitation_text(seen.measurement.excitation)]
     parts += [
         _load(check, name) for load, name in _SHOWN.items() for check in seen.checks if check.load is load
@@ -68,6 +71,8 @@ def summary_text(seen: MeasurementPreview) -> str:
     passed = [check for check in seen.checks if not check.is_kept]
     broken = sorted(passed, key=lambda check: not check.forbids)
     said = "   ·   ".join(parts)
+    if refusal:
+        return f"✖ {refusal}   ·   {said}"
     if not broken:
         return f"✔ within all limits   ·   {said}"
     sign = "✖" if broken[0].forbids else "⚠"
@@ -91,6 +96,7 @@ class TestPage(Page):
         super().__init__(context)
         self._actions = UserActions(context, self)
         self._preview: MeasurementPreview | None = None
+        self._refusal = ""
         self._history: History[Measurement] = History()
         self._of: Asked = None
         self._summary_of: Asked = self._of
@@ -124,8 +130,8 @@ class TestPage(Page):
 
     @property
     def is_done(self) -> bool:
-        """The test is complete and keeps every limit."""
-        return self._preview is not None and self._preview.is_allowed
+        """The test is complete, keeps every limit, and no fast loop is known to lose it."""
+        return self._preview is not None and self._preview.is_allowed and not self._refusal
 
     @property
     def is_busy(self) -> bool:
@@ -174,7 +180,7 @@ class TestPage(Page):
     def _changed(self) -> None:
         measurement, rig = self.form.value, self.context.selection.rig
         self.context.selection.choose_measurement(measurement)
-        self._preview = None
+        self._preview, self._refusal = None, ""
         if measurement is not None:
             self._history.note(measurement)
         # What stands there belongs to another test until its own has come.
@@ -198,7 +204,7 @@ class TestPage(Page):
     def _looked(self, seen: MeasurementPreview) -> None:
         self._preview = seen
         self._of = self._summary_of = (seen.measurement, self.context.selection.rig)
-        self.summary.setText(summary_text(seen))
+        self.summary.setText(summary_text(seen, self._refusal))
         for each in (self.limits, self.plots):
             each.setEnabled(True)
         self.plots.show_preview(seen)
@@ -211,6 +217,9 @@ class TestPage(Page):
         seen = prediction.motion
         self.context.selection.keep_prediction(seen)
         self._predicted_of = (seen.measurement, self.context.selection.rig)
+        self._refusal = prediction.refusal
+        if self._preview is not None:
+            self.summary.setText(summary_text(self._preview, self._refusal))
         self.prediction.setEnabled(True)
         self.prediction_note.setEnabled(True)
         self.prediction.show_prediction(seen)

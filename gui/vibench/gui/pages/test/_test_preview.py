@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import vibench.analysis
+from vibench.acquisition import AcquisitionError
+from vibench.acquisition.control import require_holdable
 from vibench.acquisition.plan import Measurement, MeasurementPreview, preview_measurement
 from vibench.acquisition.rig import Rig
 
@@ -30,11 +32,19 @@ class TestPrediction:
 
     motion: "MeasurementPrediction"
     expected: tuple["Expected", ...]
+    refusal: str
+    """Why the rig's fast loop would not hold it; empty where nothing speaks against it."""
 
 
 def predict_test(test: TestPreview) -> TestPrediction:
     """Simulate what the specimen will do."""
+    refusal = ""
+    try:
+        require_holdable(test.measurement, test.rig)
+    except AcquisitionError as error:
+        refusal = f"{error}"
     return TestPrediction(
         vibench.analysis.predict_measurement(test.measurement, test.rig),
         vibench.analysis.expected_uncertainty(test.measurement, test.rig),
+        refusal,
     )
