@@ -1,8 +1,10 @@
 """What feedback noted in a recording comes back as numbers and sentences."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
@@ -10,7 +12,12 @@ from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
 from vibench.acquisition.recording import Held, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, analyse, result_summary
-from vibench.analysis.figures import STEPPED_FREQUENCIES, TRACKED_RESONANCE, stepped_sine_figure
+from vibench.analysis.figures import (
+    STEPPED_FREQUENCIES,
+    TRACKED_RESONANCE,
+    backbone_figure,
+    stepped_sine_figure,
+)
 from vibench.analysis.kinds import Result
 from vibench.analysis.report import result_figures
 from vibench.analysis.report._drawings import findings
@@ -108,6 +115,13 @@ def test_a_tracked_resonance_is_analysed_and_said(analysed):
     document = json.loads(json.dumps(result_summary(Result(analysis, None))))
     kinds = [each["kind"] for each in document["recording"]["feedback"]]
     assert kinds.count("resonance") == 1
+    (note,) = (each for each in analysis.facts.feedback if each.kind == "resonance")
+    above = note.model_copy(update={"level": 2, "base_m_per_s2": 3 * note.base_m_per_s2})
+    unmet = {"level": 1, "asked_m_per_s2": 1.0, "frequency_hz": None, "frequency_u_hz": None}
+    facts = replace(analysis.facts, feedback=(note, note.model_copy(update=unmet), above))
+    drawn = backbone_figure(replace(analysis, facts=facts))
+    lines = [next(each for each in axes.lines if len(each.get_xdata()) == 3) for axes in drawn.figure.axes]
+    assert [np.isnan(each.get_xydata()[:, 1]).tolist() for each in lines] == [[False, True, False]] * 3
 
 
 def test_settled_steps_are_analysed_like_any_stepped_sine(analysed):

@@ -1,6 +1,7 @@
 """A tracked resonance: frequency and amplitude over the level of the base, and the backbone they make."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -39,13 +40,14 @@ def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | No
     base = np.array([each.base_m_per_s2 for each in levels])
     amplitude_m = np.array([each.amplitude_m for each in levels])
     simulated_m = _simulated_m(levels, analysis, laid)
+    lost = lost_levels(analysis.facts.feedback)
     with styled():
         figure = new_figure(_HEIGHT_IN)
         places = figure.subplot_mosaic([["frequency", "backbone"], ["amplitude", "backbone"]])
-        _frequencies(places["frequency"], base, levels)
-        _amplitudes(places["amplitude"], base, amplitude_m, simulated_m)
-        _backbone(places["backbone"], levels, amplitude_m)
-        lost = lost_levels(analysis.facts.feedback)
+        broken = _broken(levels, lost)
+        _frequencies(places["frequency"], broken)
+        _amplitudes(places["amplitude"], broken, base, simulated_m)
+        _backbone(places["backbone"], broken)
         for each in ("frequency", "amplitude"):
             _mark_lost(places[each], lost)
             places[each].set_xlim(0.0, (1 + _MARGIN) * max((*base, *lost)))
@@ -73,28 +75,44 @@ def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | No
     )
 
 
-def _frequencies(axes: Axes, base: Reals, levels: Sequence[TrackedResonance]) -> None:
-    _with_bars(axes, base, levels)
+def _broken(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
+    """Put a gap, which no line crosses, where a level was not met."""
+    nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
+    gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
+    return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
+
+
+def _base(levels: Sequence[TrackedResonance]) -> list[float]:
+    return [each.base_m_per_s2 for each in levels]
+
+
+def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
+    """Give amplitudes in the unit to draw them in, with its scale and name."""
+    amplitude_m = np.array([each.amplitude_m for each in levels])
+    scale, unit = prefixed(float(np.nanmax(amplitude_m)), "m")
+    return scale * amplitude_m, scale, unit
+
+
+def _frequencies(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
+    axes.errorbar(
+        _base(levels), [each.frequency_hz for each in levels], [2 * each.u_frequency_hz for each in levels],
+        color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8, label=_PHASE,
+    )  # fmt: skip
     mode_hz, u_hz = _or_nan([each.mode_hz for each in levels]), _or_nan([each.u_mode_hz for each in levels])
     if np.isfinite(mode_hz).any():
         axes.errorbar(
-            base, mode_hz, 2 * u_hz, color=PREDICTED, marker="D", markerfacecolor="none",
+            _base(levels), mode_hz, 2 * u_hz, color=PREDICTED, marker="D", markerfacecolor="none",
             markersize=4, linestyle="none", capsize=2, linewidth=0.8, label=_MODE,
         )  # fmt: skip
     axes.set_ylabel("frequency [Hz]")
     axes.margins(_MARGIN)
 
 
-def _with_bars(axes: Axes, base: Reals, levels: Sequence[TrackedResonance]) -> None:
-    axes.errorbar(
-        base, [each.frequency_hz for each in levels], [2 * each.u_frequency_hz for each in levels],
-        color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8, label=_PHASE,
-    )  # fmt: skip
-
-
-def _amplitudes(axes: Axes, base: Reals, amplitude_m: Reals, simulated_m: Reals | None) -> None:
-    scale, unit = prefixed(float(np.max(amplitude_m)), "m")
-    axes.plot(base, scale * amplitude_m, color=MEASURED, marker="o", markersize=4, linewidth=0.8)
+def _amplitudes(
+    axes: Axes, levels: Sequence[TrackedResonance], base: Reals, simulated_m: Reals | None
+) -> None:
+    amplitude, scale, unit = _amplitude(levels)
+    axes.plot(_base(levels), amplitude, color=MEASURED, marker="o", markersize=4, linewidth=0.8)
     if simulated_m is not None:
         axes.plot(
             base, scale * simulated_m, color=SIMULATED, marker="s", markerfacecolor="none",
@@ -106,10 +124,10 @@ def _amplitudes(axes: Axes, base: Reals, amplitude_m: Reals, simulated_m: Reals 
     axes.set_ylim(bottom=0.0)
 
 
-def _backbone(axes: Axes, levels: Sequence[TrackedResonance], amplitude_m: Reals) -> None:
-    scale, unit = prefixed(float(np.max(amplitude_m)), "m")
+def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
+    amplitude, _, unit = _amplitude(levels)
     axes.errorbar(
-        [each.frequency_hz for each in levels], scale * amplitude_m,
+        [each.frequency_hz for each in levels], amplitude,
         xerr=[2 * each.u_frequency_hz for each in levels],
         color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8,
     )  # fmt: skip
