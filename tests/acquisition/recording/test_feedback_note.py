@@ -87,6 +87,8 @@ def test_words_of_a_note_come_back_as_values():
     assert read("jump", JUMP).how is JumpSearchEnd.STEEP
     assert read("jump", JUMP).pass_number == 2
     assert read("resonance", LOST).lock is LockResult.AT_THE_EDGE
+    older = LOST.replace("outside the range", "not met within the tries")
+    assert read("resonance", older).lock is LockResult.LOST
     assert read("resonance", LOST).mode_hz is None
 
 

@@ -57,14 +57,14 @@ def test_a_level_at_which_the_resonance_was_lost_is_no_point_of_the_backbone():
 
 
 def test_a_level_that_was_not_met_says_in_how_many_periods_and_what_was_there_instead():
-    missed = note(1, 0.3, None, frequency_u_hz=None, lock="not met within the tries", periods=150)
+    missed = note(1, 0.3, None, frequency_u_hz=None, lock="not met", periods=150)
     moved = missed.model_copy(update={"phase_deg": -86.4, "at_hz": 96.351, "motion": Steadiness.UNSETTLED})
     met = note(2, 0.4, 98.6, periods=120)
     found, not_found = feedback_sentences([met, moved])
     assert found == "Phase resonance at 98.600 ± 0.060 Hz (0.4 m/s², 120 periods)."
     assert not_found == (
-        "No phase resonance at 0.3 m/s²: not met within the tries; after 150 periods the phase was -86.4° at "
-        "96.351 Hz, the level within tolerance, the motion unsettled."
+        "No phase resonance at 0.3 m/s²: not met; after 150 periods the phase was -86.4° at 96.351 Hz, "
+        "the level within tolerance, the motion unsettled."
     )
 
 

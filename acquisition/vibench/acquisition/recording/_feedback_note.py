@@ -55,8 +55,13 @@ class LockResult(StrEnum):
     """How a search for a resonance ended."""
 
     LOCKED = "locked"
-    LOST = "not met within the tries"
+    LOST = "not met"
     AT_THE_EDGE = "outside the range"
+
+    @classmethod
+    def _missing_(cls, value: object) -> "LockResult | None":
+        """Read what recordings said before periods were counted."""
+        return cls.LOST if value == "not met within the tries" else None
 
 
 SixFigures = Annotated[float, AfterValidator(lambda value: float(f"{value:.6g}"))]
