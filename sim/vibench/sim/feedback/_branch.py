@@ -38,8 +38,8 @@ _PERIODS, _WHOLE = range(1, 41), 2e-5
 """Of a motion that are gone through: as few as take a whole number of samples within this part of it."""
 _WAVE, _WAVE_OF_STOPS = 512, 8192
 """Samples of a period by which the slope of the spring is known along it."""
-_PART_S = 2.5e-6
-"""Part of a sample for which the slope of stops is taken: a contact lasts some tens of them."""
+_PART_S = 1e-6
+"""Part of a sample for which the slope of stops is taken: a contact lasts a hundred of them."""
 _FROM_ABOVE = (3.0, 2.5, 2.0, 1.7, 1.4, 1.2, 1.0)
 """Levels, over the one that is asked for, along which motions among stops are led down to it."""
 
