@@ -8,6 +8,10 @@ model has there (`phase_resonance_branch`): frequency, and largest Floquet multi
 resonance was met, where the loop was, and whether that motion repeats. With
 ``--spring hardening`` p^3 stands in the place of the stops (0.1 k1 p at 100 um). The weaker levels are
 played with the amplifier 30 dB lower: the generator's setting has steps of a millivolt.
+
+``--superharmonic`` tracks the first mode's 3:1 superharmonic resonance instead, from 6 to 20 m/s2. The model
+beside it is harmonic balance of specimen, table and coil together, since the table moves at three times the
+drive as well; its phase is taken as the converter's coupling capacitor (0.5 Hz) turns the base's channel.
 """
 
 import argparse
@@ -16,13 +20,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import root
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.excitation import Settling
 from vibench.acquisition.plan import Measurement, ResonanceTracking
 from vibench.acquisition.recording import ResonanceNote, feedback_note
-from vibench.acquisition.rig import Rig, confirm_simulated, load_rig, specimen_of
+from vibench.acquisition.rig import Rig, amplifier_of, confirm_simulated, load_rig, shaker_of, specimen_of
 from vibench.sim import Branch, PhaseReference, Specimen, phase_resonance_branch
+from vibench.sim.feedback import LoopTiming, SampledPlant
+from vibench.sim.periodic import spring_of
 
 GAINS_DB = -20.0, 10.0
 K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
@@ -43,6 +50,7 @@ class Tracked:
     """From here on the amplifier is turned up; the motion has no contacts yet [m/s2]."""
     band_hz: tuple[float, float]
     """Where the model's linear motion meets the phase once."""
+    harmonic: int = 1
 
 
 MODES = {
@@ -50,6 +58,10 @@ MODES = {
     2: Tracked(264, 250, 330, 3, PhaseReference.RELATIVE, 0.04, 1.0, (255, 275)),
     3: Tracked(496, 470, 530, 5, PhaseReference.ABSOLUTE, 0.05, 1.5, (490, 510)),
 }
+
+
+SUPERHARMONIC = Tracked(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), 3)
+ORDERS, WAVE, COUPLING_HZ = np.array([1, 3, 5, 7, 9]), 128, 0.5
 
 
 def rig_of(spring: str, seed: int) -> Rig:
@@ -73,6 +85,8 @@ def tracked(
     notes = []
     halves = np.split(levels, [np.searchsorted(levels, mode.turned_up)])
     for gain_db, part in zip(GAINS_DB, halves, strict=True):
+        if not part.size:
+            continue
         plan = ResonanceTracking(
             amplitude_vpp=9.0,
             start_hz=mode.start_hz,
@@ -80,12 +94,13 @@ def tracked(
             high_hz=mode.high_hz,
             widest_step_hz=mode.widest_step_hz,
             phase_of=mode.of,
+            harmonic=mode.harmonic,
             accelerations_m_per_s2=tuple(part),
             settling=Settling(tolerance=0.02, longest_wait_s=6.0),
-            most_tries=8,
+            most_tries=8 if mode.harmonic == 1 else 12,
             most_periods=most_periods,
             flank_pairs=1,
-            record_s=0.3,
+            record_s=0.3 * mode.harmonic,
         )
         used = rig.model_copy(update={"amplifier": rig.amplifier.model_copy(update={"gain_db": gain_db})})
         measurement = Measurement(name="mode", excitation=plan, ramp_s=0.4)
@@ -114,6 +129,63 @@ def motions_at(model: Branch, level: float) -> list[tuple[float, float]]:
         hertz, sizes = model.frequencies_hz[k : k + 2], np.abs(model.multipliers[k : k + 2, 0])
         found.append((float(hertz @ (1 - share, share)), float(sizes @ (1 - share, share))))
     return found
+
+
+def superharmonic(rig: Rig, level: float, near_hz: float) -> tuple[float, float]:
+    """Find the 3:1 phase resonance under a level by harmonic balance: frequency [Hz], third harmonic [m]."""
+    plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), LoopTiming(1e4, 0.0))
+    (rates, volt), spring = plant.equations, spring_of(specimen_of(rig))
+    into, relative = (each[:9] for each in plant.spring)
+    turns = np.exp(2j * np.pi * np.outer(ORDERS, np.arange(WAVE)) / WAVE)
+    micro, moved = 1e-6, {}
+
+    def wrong(unknown: np.ndarray, at_hz: float | None) -> np.ndarray:
+        """Give what is left: p [um] at each order, the base, and at no given frequency the phase."""
+        p, volts = unknown[:5] + 1j * unknown[5:10], complex(*unknown[10:12])
+        hertz = unknown[12] if at_hz is None else at_hz
+        wave = micro * (p @ turns).real
+        force = 2 / WAVE * turns.conj() @ spring.force(wave, 0 * wave)
+        pushes = np.outer(force, into)
+        pushes[0] += volts * volt
+        states = [
+            np.linalg.solve(2j * np.pi * k * hertz * np.eye(9) - rates, each)
+            for k, each in zip(ORDERS, pushes, strict=True)
+        ]
+        base_m = level / (2 * np.pi * hertz) ** 2
+        # A sine of the base has the phasor -i.
+        base, third = states[0][0] * 1j / base_m - 1.0, states[1][3] * 1j
+        seen = np.angle(third) - 3 * np.arctan(COUPLING_HZ / hertz) + 0.5 * np.pi
+        moved["m"] = abs(third)
+        left = np.concatenate([np.array(states) @ relative / micro - p, [base]])
+        return np.concatenate([left.real, left.imag, [np.sin(seen)] if at_hz is None else []])
+
+    guess = np.array([2.8 * level, *np.zeros(9), 0.06 * level, 0.0])
+    forced = root(wrong, guess, args=(near_hz,)).x
+    found = root(wrong, np.append(forced, near_hz), args=(None,))
+    return (float(found.x[12]), moved["m"]) if found.success else (np.nan, np.nan)
+
+
+def compare_superharmonic(rig: Rig, spring: str, count: int, periods: int) -> None:
+    """Print what was tracked at three times the drive, beside the model where the spring is smooth."""
+    with tempfile.TemporaryDirectory() as folder:
+        levels = np.geomspace(SUPERHARMONIC.lowest, 20.0, count)
+        notes = tracked(rig, SUPERHARMONIC, levels, periods, Path(folder))
+    away = []
+    for each in notes:
+        hertz, third_m = np.nan, np.nan
+        if spring == "hardening":
+            hertz, third_m = superharmonic(rig, each.base_m_per_s2, each.at_hz)
+        if each.frequency_hz is not None:
+            away.append(abs(each.frequency_hz - hertz))
+        found = each.frequency_hz or np.nan
+        print(
+            f"{each.base_m_per_s2:8.4g} m/s2: {found:.3f} +- {each.frequency_u_hz or np.nan:.3f} Hz, "
+            f"{1e6 * each.harmonic_m:.3f} um ({each.lock.value}, {each.phase_deg:.1f} degrees, "
+            f"{each.motion.value}); {each.periods} periods; model {hertz:.3f} Hz, {1e6 * third_m:.3f} um"
+        )
+    print(
+        f"{len(away)} of {len(notes)} levels met; from the model {max(away, default=np.nan):.3f} Hz at most"
+    )
 
 
 def row(note: ResonanceNote, model: Branch) -> str:
@@ -153,8 +225,12 @@ def main() -> None:
     parser.add_argument("--levels", type=int, default=49)
     parser.add_argument("--periods", type=int, default=150)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--superharmonic", action="store_true")
     given = parser.parse_args()
     rig = rig_of(given.spring, given.seed)
+    if given.superharmonic:
+        compare_superharmonic(rig, given.spring, given.levels, given.periods)
+        return
     specimen = specimen_of(rig)
     for number in [given.mode] if given.mode else MODES:
         mode = MODES[number]

@@ -30,12 +30,14 @@ def carried_out(rig, tmp_path):
     """Carry out an excitation on the virtual rig, and open its recording."""
     opened = []
 
-    def carry_out(excitation, fixture_kg=HEAVY_KG):
+    def carry_out(excitation, fixture_kg=HEAVY_KG, **spring):
+        specimen = rig.specimen.model_copy(update=spring)
         shaker = rig.shaker.model_copy(update={"fixture_mass_kg": fixture_kg})
         daq = rig.daq.model_copy(update={"sample_rate_hz": SAMPLE_RATE_HZ})
         plan = Measurement(name="run", excitation=excitation, ramp_s=0.4, ramp_step_s=0.02)
         path = tmp_path / f"run{len(opened)}.h5"
-        with open_bench(rig.model_copy(update={"shaker": shaker, "daq": daq})) as bench:
+        used = rig.model_copy(update={"shaker": shaker, "daq": daq, "specimen": specimen})
+        with open_bench(used) as bench:
             outcome = run_measurement(bench, plan, path)
         assert outcome.state is RunState.FINISHED
         opened.append(open_recording(outcome.path))
@@ -223,3 +225,40 @@ def test_a_resonance_is_followed_among_impacts_as_far_as_the_model_has_a_steady_
         assert each["periods"] <= 150
         assert abs(each["phase_deg"] + 90) < 1
         assert each["motion"] == "periodic"
+
+
+def superharmonic(*levels):
+    return ResonanceTracking(
+        amplitude_vpp=9.0,
+        start_hz=31.6,
+        low_hz=29,
+        high_hz=36,
+        widest_step_hz=0.3,
+        harmonic=3,
+        accelerations_m_per_s2=levels,
+        settling=Settling(tolerance=0.02, longest_wait_s=6.0),
+        most_tries=12,
+    )
+
+
+@pytest.mark.thorough
+def test_a_superharmonic_resonance_is_met_where_table_and_specimen_have_it(carried_out):
+    """Beside harmonic balance of both together, and the coupling capacitor (`benchmarks/backbones.py`)."""
+    k1 = 2.1e-3 * (2 * np.pi * 100) ** 2
+    cubic = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * k1 * 1e-4 / 1e-9}
+    found = said(carried_out(superharmonic(10.92, 12.07), **cubic), "resonance")
+    assert [each["lock"] for each in found] == ["locked"] * 2
+    levels, hertz, third_m = (9.88, 10.92, 12.07), (31.755, 31.793, 31.840), (1.54e-7, 2.07e-7, 2.79e-7)
+    for each in found:
+        model_hz, model_m = (np.interp(each["base_m_per_s2"], levels, model) for model in (hertz, third_m))
+        assert each["frequency_hz"] == pytest.approx(model_hz, abs=2 * each["frequency_u_hz"])
+        assert each["frequency_u_hz"] < 0.006
+        assert each["harmonic_m"] == pytest.approx(model_m, rel=0.03)
+    assert found[1]["periods"] <= 150
+
+
+@pytest.mark.thorough
+def test_among_stops_that_are_not_reached_there_is_no_superharmonic_resonance(carried_out):
+    found = said(carried_out(superharmonic(5.0, 8.0)), "resonance")
+    assert [each.get("frequency_hz") for each in found] == [None, None]
+    assert "locked" not in [each["lock"] for each in found]

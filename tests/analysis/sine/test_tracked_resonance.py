@@ -68,6 +68,15 @@ def test_a_level_that_was_not_met_says_in_how_many_periods_and_what_was_there_in
     )
 
 
+def test_a_superharmonic_resonance_is_called_so_and_drawn_by_the_harmonic_that_resonates():
+    met, unmet = note(0, 8.0, 31.7, harmonic=3, harmonic_m=8e-8), lost(1, 9.0)
+    found, not_found = feedback_sentences([met, unmet.model_copy(update={"harmonic": 3})])
+    assert found == "Superharmonic 3:1 phase resonance at 31.700 ± 0.060 Hz (8 m/s²)."
+    assert not_found.startswith("No superharmonic 3:1 phase resonance at 9 m/s²: outside the range;")
+    (drawn,) = tracked_resonances([met])
+    assert (drawn.amplitude_m, drawn.harmonic) == (8e-8, 3)
+
+
 @pytest.mark.parametrize(
     ("strong_hz", "said"),
     [

@@ -42,15 +42,21 @@ class FeedbackChannels:
         """Begin to look once a period."""
         return Stroboscope(near_hz, self.sample_rate_hz)
 
-    def transmissibility(self, base: Phasors, response: Phasors, frequency_hz: float) -> complex:
-        """Displacement of m0 over that of the base, from fundamentals of velocity and acceleration.
+    def transmissibility(
+        self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: int = 1
+    ) -> complex:
+        """Displacement of m0 over that of the base, from velocity and the fundamental of the acceleration.
 
-        Zero where the base shows nothing at all.
+        Of a harmonic of m0, over the size of the base's fundamental and its phase times as much. Zero where
+        the base shows nothing at all.
         """
         if not np.any(base):
             return 0j
-        turned = np.exp(2j * pi * frequency_hz * self.response_delay_s)
-        return complex(2j * pi * frequency_hz * turned * np.mean(response) / np.mean(base))
+        acceleration = complex(np.mean(base))
+        # The displacement of the base is opposite to its acceleration.
+        turned = 2 * pi * frequency_hz * self.response_delay_s - np.angle(-acceleration)
+        moved = -2j * pi * frequency_hz * np.exp(1j * harmonic * turned) / harmonic
+        return complex(moved * np.mean(response) / abs(acceleration))
 
 
 def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> FeedbackChannels:

@@ -52,7 +52,8 @@ class PhaseLaw:
     The phase of a motion over its drive drifts by ``2 pi L (r - f) - h e`` in a look of the time L: f the
     frequency, r that of the resonance, e the error of the phase in radians, and h = 2 pi L w what the mode
     forgets in it, w its half-width. The frequency moves by g times what this says of r - f: the error falls
-    by the share g at every look. Where it does not, its own part in that, ``g w e``, grows.
+    by the share g at every look. Where it does not, its own part in that, ``g w e``, grows. Of the n-th
+    harmonic r and w are taken at the drive, and L is n times as long.
 
     A bent resonance moves while the motion grows to its new level. The level that the motion has grown to
     follows the base as fast as the mode forgets; r moves with its logarithm, as the levels before tell, and
@@ -61,6 +62,8 @@ class PhaseLaw:
 
     def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
         self._plan = plan
+        self._turns = plan.harmonic * LOOK_PERIODS
+        """Periods of the motion whose phase counts, in a look."""
         self._last = last
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz
@@ -73,7 +76,7 @@ class PhaseLaw:
 
     def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
         """Take in a look; gives the error of the phase [rad] and what the motion has still to go, a share."""
-        moved = self._plan.phase_of.motion(seen.transmissibility)
+        moved = self._plan.motion(seen.harmonics)
         off = float(np.angle(moved)) - radians(self._plan.phase_deg)
         error_rad = (off + pi) % (2 * pi) - pi
         self._looks.append((frequency_hz, error_rad, seen.base.amplitude))
@@ -101,7 +104,7 @@ class PhaseLaw:
         if abs(grown) > self._plan.level_tolerance:
             bend_hz = (found.frequency_hz - self._last.frequency_hz) / grown
         frequency_hz, error, base = np.array(self._looks).T
-        turned = 2 * pi * LOOK_PERIODS / frequency_hz.mean()
+        turned = 2 * pi * self._turns / frequency_hz.mean()
 
         def unexplained(width_hz: float) -> float:
             """Mean square of the drift that is left [rad2]."""
@@ -132,9 +135,9 @@ class PhaseLaw:
         before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
         is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
         self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
-        drifted_hz = (error_rad - before_rad) * frequency_hz / (2 * pi * LOOK_PERIODS)
+        drifted_hz = (error_rad - before_rad) * frequency_hz / (2 * pi * self._turns)
         return self._gain * error_rad * self._mode.half_width_hz + _GAIN * drifted_hz
 
     def _kept(self, frequency_hz: float) -> float:
         """Give the share of a motion that the mode has not forgotten after a look."""
-        return exp(-2 * pi * self._mode.half_width_hz * LOOK_PERIODS / frequency_hz)
+        return exp(-2 * pi * self._mode.half_width_hz * self._turns / frequency_hz)

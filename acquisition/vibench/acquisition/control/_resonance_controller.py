@@ -19,7 +19,7 @@ from ._record import recorded, recorded_and_judged
 from ._settling_controller import SettledState, SettlingController
 from ._sine_loop import SineLoop
 from ._start import moved, started
-from ._stroboscope import Periods
+from ._stroboscope import ORDERS, Periods
 
 _LOST_RAD = pi / 4
 """An error of the phase beyond which the loop is no longer on the resonance."""
@@ -124,7 +124,9 @@ def _searched(
         states.append((yield from settling_controller.settled()))
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
-        if abs(error.error_deg) <= plan.phase_tolerance_deg and len(search.tries) > 1:
+        # Where a harmonic is noise, its phase is any: it must be known as well.
+        is_known = error.uncertainty_deg <= plan.phase_tolerance_deg
+        if abs(error.error_deg) <= plan.phase_tolerance_deg and is_known and len(search.tries) > 1:
             lock = LockResult.LOCKED
             break
         next_hz = search.next_hz()
@@ -135,7 +137,7 @@ def _searched(
     found = states[-1]
     resonance = search.resonance(_sensor_phase_deg(plan, found))
     mode = None
-    if lock is LockResult.LOCKED:
+    if lock is LockResult.LOCKED and plan.harmonic == 1:
         flanks = yield from _flanks(settling_controller, plan, resonance)
         mode = _mode([*states, *flanks], resonance)
         # Back from the flanks before the recording: the next level begins where this one ends.
@@ -188,9 +190,11 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
 
 def _sensor_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
     """Give what both sensors' phases and sensitivities leave open of the phase [degrees]."""
+    if plan.harmonic > 1:
+        return plan.harmonic * plan.sensor_phase_deg
     # Of a difference of motions the phase also turns with their ratio; of a single one it does not.
-    turned = plan.phase_of.motion(found.transmissibility) - found.transmissibility
-    size = max(abs(plan.phase_of.motion(found.transmissibility)), plan.sensor_gain)
+    turned = plan.motion(found.harmonics) - found.transmissibility
+    size = max(abs(plan.motion(found.harmonics)), plan.sensor_gain)
     return hypot(plan.sensor_phase_deg, degrees(plan.sensor_gain * abs(turned) / size))
 
 
@@ -198,16 +202,17 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     """Compare the phase of m0 against the base with the wanted one; batches tell its uncertainty."""
     newer = periods.last(periods.count // 2)
     length = len(newer.base) // _BATCHES
-    angle = float(np.angle(plan.phase_of.motion(found.transmissibility)))
+    angle = float(np.angle(plan.motion(found.harmonics)))
     error_deg = (degrees(angle) - plan.phase_deg + 180) % 360 - 180
     if length == 0:
         return PhaseError(found.drive_hz, error_deg, 180.0)
     used = slice(len(newer.base) - length * _BATCHES, None)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
-    response = newer.response[used, 1].reshape(_BATCHES, length).mean(axis=1)
-    ratios = response / base
-    turn = found.transmissibility / ratios.mean()
-    ratios = np.array([plan.phase_of.motion(complex(each * turn)) for each in ratios])
+    response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
+    # Each harmonic over the phase of the base times as much; turned and scaled as all together are.
+    ratios = response / np.exp(1j * np.outer(np.angle(base), np.arange(1, ORDERS))) / np.abs(base)[:, None]
+    ratios *= np.array(found.harmonics) / ratios.mean(axis=0)
+    ratios = np.array([plan.motion(each) for each in ratios])
     spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 
@@ -218,6 +223,7 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
         lock = LockResult.LOST
     is_told = lock is LockResult.LOCKED
     resonance, mode = (tracked.resonance, tracked.mode) if is_told else (None, None)
+    base_m = found.base.amplitude / (2 * pi * found.drive_hz) ** 2
     loop.note(
         ResonanceNote(
             level=number,
@@ -225,7 +231,7 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
             frequency_hz=None if resonance is None else resonance.frequency_hz,
             frequency_u_hz=None if resonance is None else resonance.uncertainty_hz,
             at_hz=found.drive_hz,
-            phase_deg=degrees(float(np.angle(plan.phase_of.motion(found.transmissibility)))),
+            phase_deg=degrees(float(np.angle(plan.motion(found.harmonics)))),
             response_ii=found.response,
             base_m_per_s2=found.base.amplitude,
             base_u=found.base.uncertainty,
@@ -237,5 +243,7 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
             mode_hz=None if mode is None else mode.frequency_hz,
             mode_u_hz=None if mode is None else mode.frequency_u_hz,
             damping_ratio=None if mode is None else mode.damping_ratio,
+            harmonic=plan.harmonic,
+            harmonic_m=None if plan.harmonic == 1 else abs(plan.motion(found.harmonics)) * base_m,
         )
     )

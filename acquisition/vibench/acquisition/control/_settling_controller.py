@@ -12,6 +12,7 @@ from ._jump_search import SettledPoint
 from ._level_control import LevelControl, MeasuredLevel, measured_level
 from ._sine_loop import SineLoop
 from ._steadiness import Judgement, judged
+from ._stroboscope import ORDERS
 
 _SURE = 2.0
 _PROMPT = 0.7
@@ -32,8 +33,13 @@ class SettledState:
     base: MeasuredLevel
     """Acceleration of the base's fundamental [m/s2]."""
     held: Held
-    transmissibility: complex
-    """Displacement of m0 over that of the base, fundamentals."""
+    harmonics: tuple[complex, ...]
+    """Displacement of m0, fundamental and harmonics, over that of the base's fundamental."""
+
+    @property
+    def transmissibility(self) -> complex:
+        """Displacement of m0 over that of the base, fundamentals."""
+        return self.harmonics[0]
 
     @property
     def response(self) -> float:
@@ -142,8 +148,9 @@ class SettlingController:
             judgement=judged(periods.response, self.rule, loop.noise),
             base=measured,
             held=self.held(measured),
-            transmissibility=loop.channels.transmissibility(
-                newest.base, newest.response[:, 1], loop.drive_hz
+            harmonics=tuple(
+                loop.channels.transmissibility(newest.base, newest.response[:, order], loop.drive_hz, order)
+                for order in range(1, ORDERS)
             ),
         )
 

@@ -1,6 +1,6 @@
 """A sine that seeks the phase resonance of a mode and stays on it, level after level."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, PositiveFloat, model_validator
@@ -24,6 +24,11 @@ class ResonanceTracking(AbstractFeedback):
     periods, follows the resonance from level to level, and where it loses it, the search begins anew. Other
     modes shift the phase a little; the flanks tell the natural frequency and the damping apart from them, as
     long as the motion is linear.
+
+    With ``harmonic = 3`` a superharmonic resonance is tracked: the drive lies at a third of the mode's
+    frequency, and the third harmonic of m0 lags three times the phase of the base by a quarter of its own
+    period (Volvert and Kerschen, J. Sound Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and
+    Kerschen, arXiv 2401.01151). Natural frequency and damping are not told there.
     """
 
     family: ClassVar[Family] = Family.STEPPED
@@ -39,6 +44,8 @@ class ResonanceTracking(AbstractFeedback):
     """Phase of m0 over the base at the resonance, both as displacements [degrees]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
     """Which motion of m0 has it: the one against the base, or the absolute one."""
+    harmonic: Literal[1, 3] = 1
+    """Of m0, whose phase counts; above 1 that of m0 in space, against as many times the base's phase."""
     phase_tolerance_deg: float = Field(default=1.0, gt=0, le=30)
     """How closely the phase must be met [degrees]."""
     sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
@@ -70,6 +77,10 @@ class ResonanceTracking(AbstractFeedback):
                 f"{self.high_hz:g}; give the three in this order: low, start, high"
             )
         return self
+
+    def motion(self, harmonics: Sequence[complex]) -> complex:
+        """Give the motion whose phase counts, from harmonics of m0 over the base, the first one first."""
+        return self.phase_of.motion(harmonics[0]) if self.harmonic == 1 else harmonics[self.harmonic - 1]
 
     @property
     def band_hz(self) -> tuple[float, float]:

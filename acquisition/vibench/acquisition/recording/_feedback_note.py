@@ -204,6 +204,10 @@ class ResonanceNote(AbstractNote):
     """Natural frequency; left out where the flanks do not tell it."""
     mode_u_hz: SixFigures | None = None
     damping_ratio: SixFigures | None = None
+    harmonic: int = 1
+    """Of m0, whose phase counts: above 1 the resonance is a superharmonic one."""
+    harmonic_m: SixFigures | None = None
+    """Amplitude of that harmonic [m]."""
 
 
 class NoiseNote(AbstractNote):

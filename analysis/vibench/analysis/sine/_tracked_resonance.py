@@ -90,14 +90,16 @@ def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
 
 def _resonance(note: ResonanceNote) -> str:
     level = f"{note.asked_m_per_s2:g} m/s²"
+    of = "phase resonance" if note.harmonic == 1 else f"superharmonic {note.harmonic}:1 phase resonance"
     if note.frequency_hz is None or note.frequency_u_hz is None:
         after = f"after {note.periods} periods " if note.periods else ""
         return (
-            f"No phase resonance at {level}: {note.lock.value}; {after}the phase was {note.phase_deg:.1f}° "
+            f"No {of} at {level}: {note.lock.value}; {after}the phase was {note.phase_deg:.1f}° "
             f"at {note.at_hz:.5g} Hz, the level {note.held.value}, the motion {note.motion.value}."
         )
     took = f", {note.periods} periods" if note.periods else ""
-    text = f"Phase resonance at {plus_minus(note.frequency_hz, 2 * note.frequency_u_hz)} Hz ({level}{took})"
+    hertz = plus_minus(note.frequency_hz, 2 * note.frequency_u_hz)
+    text = f"{of[0].upper()}{of[1:]} at {hertz} Hz ({level}{took})"
     if note.mode_hz is None or note.mode_u_hz is None:
         return f"{text}."
     return (
@@ -119,7 +121,9 @@ class TrackedResonance:
     u_frequency_hz: float
     """Standard uncertainty, with that of the sensors' phase, which all levels share."""
     amplitude_m: float
-    """Of m0 at the drive frequency."""
+    """Of m0 at the drive frequency, or at its harmonic that resonates."""
+    harmonic: int
+    """1 for the drive frequency."""
     mode_hz: float | None
     """Natural frequency, fitted to both flanks; None where they do not tell it."""
     u_mode_hz: float | None
@@ -146,7 +150,9 @@ def _found(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
             base_m_per_s2=each.base_m_per_s2,
             frequency_hz=each.frequency_hz,
             u_frequency_hz=each.frequency_u_hz,
-            amplitude_m=each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2,
+            amplitude_m=each.harmonic_m
+            or each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2,
+            harmonic=each.harmonic,
             mode_hz=each.mode_hz,
             u_mode_hz=each.mode_u_hz,
             damping_ratio=each.damping_ratio,

@@ -1,0 +1,25 @@
+"""What feedback makes of base and m0: their ratio, whatever the moment from which phases are counted."""
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.control._feedback_channels import FeedbackChannels
+
+HERTZ, DELAY_S = 31.0, 2e-4
+CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 10_240.0)
+
+
+@pytest.mark.parametrize("harmonic", [1, 2, 3, 4])
+@pytest.mark.parametrize("shift_rad", [0.0, 1.0, 2.5, -3.0])
+def test_a_harmonic_of_m0_is_that_of_a_base_which_moves_as_a_sine(harmonic, shift_rad):
+    """Base U sin(w t), m0 X sin(n w t - 1.2), the vibrometer late: X/U exp(-1.2 i) from any moment on."""
+    omega, order = 2 * np.pi * HERTZ, harmonic * 2 * np.pi * HERTZ
+    base = np.full(8, -(omega**2) * 2e-4 * np.exp(1j * shift_rad))
+    late = harmonic * shift_rad - 1.2 - order * DELAY_S
+    response = np.full(8, 1j * order * 3e-6 * np.exp(1j * late))
+    seen = CHANNELS.transmissibility(base, response, HERTZ, harmonic)
+    assert seen == pytest.approx(3e-6 / 2e-4 * np.exp(-1.2j))
+
+
+def test_a_base_that_shows_nothing_has_no_ratio():
+    assert CHANNELS.transmissibility(np.zeros(3, complex), np.ones(3, complex), HERTZ, 3) == 0
