@@ -33,6 +33,7 @@ FOR_PEOPLE = (
     "vibench.analysis.exchange",
 )
 FOR_OUR_PROGRAMS = (
+    "vibench.acquisition.control",
     "vibench.acquisition.first_day",
     "vibench.sim.feedback",
     "vibench.sim.kernels",

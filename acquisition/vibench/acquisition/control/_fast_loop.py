@@ -7,6 +7,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from vibench.sim import ArcEnd, RigidStops
 from vibench.sim.feedback import (
     Begin,
     LinearLaw,
@@ -17,8 +18,6 @@ from vibench.sim.feedback import (
     loop_transfer,
     pd_law,
 )
-from vibench.sim.model import RigidStops
-from vibench.sim.periodic import ArcEnd
 
 from ..errors import ConfigurationError, LimitExceeded
 from ..excitation import BranchContinuation
