@@ -1,0 +1,261 @@
+"""How often the bounds of a report hold, on short measurements of every kind with random rigs.
+
+    python benchmarks/report_coverage.py --rigs 125 --seed 1                # 1000 measurements of each kind
+    python benchmarks/report_coverage.py --rigs 125 --seed 1 --shard 1/10   # a tenth of them
+
+Each rig has another specimen and shaker, and measures one plan `REPEATS` times: with other noise, with a
+converter whose clock is off by another error within what the configuration states, and, where the drive is
+random, with other phases. A quarter of the rigs measures so weakly that motion is linear, whose truth is a
+closed form: modes, transmissibility, both Responses of a dwell. Elsewhere a value is held against the median
+of the other repeats, and its bound is as much wider as that median scatters. Each kind of bound has a row:
+how many held, and how probable so few are where each holds in 95 of 100 cases.
+"""
+
+import argparse
+import json
+import re
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from scipy.stats import binom
+from twin_agreement import random_rig
+
+import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+from vibench.acquisition import open_bench, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine
+from vibench.acquisition.rig import Rig, specimen_of
+from vibench.analysis import AnalysisError, Simulation, analyse_files, budgets_of
+from vibench.sim import Specimen, base_transmissibility
+
+REPEATS = 8
+CLOCK_PPM = 50.0
+WEAK_VPP = 0.03
+"""At which nothing collides: p stays below half of the smallest gap drawn, and that is looked at."""
+KINDS = ("noise", "dwell", "sweep", "steps")
+LINES = "transmissibility, line by line"
+FARTHEST_HZ = 5.0
+"""Between a mode and the resonance that is taken for it."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """One bound of one measurement against what is true."""
+
+    kind: str
+    quantity: str
+    is_weak: bool
+    off: float
+    """Error over the expanded uncertainty (k = 2), or the share of lines that their bounds miss."""
+    scene: str
+
+    @property
+    def row(self) -> tuple[str, str]:
+        """What is counted together."""
+        return f"{self.kind}, {'linear' if self.is_weak else 'any motion'}", self.quantity
+
+
+def drawn(
+    rng: np.random.Generator, kind: str, *, is_weak: bool
+) -> MultisineNoise | Dwell | SineSweep | SteppedSine:
+    """Draw a short plan of a kind."""
+    level_vpp = WEAK_VPP if is_weak else float(10 ** rng.uniform(-1, 0.9))
+    at_hz = float(np.round(rng.uniform(90, 480), 1))
+    match kind:
+        case "noise":
+            return MultisineNoise(
+                amplitude_vpp=level_vpp, band_start_hz=50, band_stop_hz=600, repetition_hz=2,
+                realisations=int(rng.integers(2, 7)), periods=2, settle_s=1.5,
+            )  # fmt: skip
+        case "dwell":
+            return Dwell(
+                amplitude_vpp=level_vpp, frequency_hz=at_hz, settle_s=1.5, duration_s=float(rng.uniform(2, 6))
+            )
+        case "sweep":
+            return SineSweep(
+                amplitude_vpp=level_vpp, start_hz=at_hz, stop_hz=at_hz + float(rng.choice((-40, 40))),
+                duration_s=6.0, settle_s=1.0,
+            )  # fmt: skip
+        case _:
+            steps_hz = tuple(at_hz + float(step) for step in range(0, 40, 10))
+            return SteppedSine(amplitude_vpp=level_vpp, frequencies_hz=steps_hz, settle_s=1.0, record_s=0.6)
+
+
+def repeated(rig: Rig, rng: np.random.Generator) -> Rig:
+    """Give the same rig with other noise, and with another converter's clock, as wrong as it may be."""
+    other = {
+        "seed": int(rng.integers(1, 1 << 30)),
+        "converter_clock_ppm": float(rng.uniform(-CLOCK_PPM, CLOCK_PPM)),
+    }
+    return rig.model_copy(update={"virtual": rig.virtual.model_copy(update=other)})
+
+
+def with_stated_clock(rig: Rig) -> Rig:
+    """Let the configuration say how wrong the converter's clock may be."""
+    document = rig.model_dump(mode="json")
+    document["daq"]["clock_ppm"] = {"value": CLOCK_PPM, "source": "drawn within it"}
+    return Rig.model_validate(document)
+
+
+def modes(specimen: Specimen) -> tuple[np.ndarray, np.ndarray]:
+    """Natural frequencies [Hz] and damping ratios, by the poles."""
+    motion = -np.linalg.solve(
+        specimen.mass_matrix, np.hstack((specimen.stiffness_matrix, specimen.damping_matrix))
+    )
+    poles = np.linalg.eigvals(np.vstack((np.eye(3, 6, 3), motion)))
+    poles = poles[poles.imag > 0]
+    poles = poles[np.argsort(np.abs(poles))]
+    return np.abs(poles) / (2 * np.pi), -poles.real / np.abs(poles)
+
+
+def peak(specimen: Specimen, near_hz: float) -> float:
+    """Give the largest transmissibility to m0 at a mode."""
+    return float(np.max(np.abs(base_transmissibility(specimen, near_hz + np.arange(-3, 3, 0.002))[:, 0])))
+
+
+def true_values(rig: Rig, plan: object) -> dict[str, float]:
+    """Give what linear motion has in closed form, by the names of the table."""
+    specimen = specimen_of(rig)
+    if isinstance(plan, Dwell):
+        played_hz = plan.frequency_hz * (1 + 1e-6 * rig.virtual.generator_clock_ppm)
+        ratio = float(np.abs(base_transmissibility(specimen, [played_hz])[0, 0]))
+        return {"Response I": ratio, "Response II": ratio}
+    if not isinstance(plan, MultisineNoise):
+        return {}
+    found = {}
+    for number, (natural_hz, ratio) in enumerate(zip(*modes(specimen), strict=True), start=1):
+        found[f"mode {number}, frequency"] = float(natural_hz)
+        found[f"mode {number}, damping ratio"] = 100 * float(ratio)
+        found[f"mode {number}, transmissibility"] = peak(specimen, float(natural_hz))
+    return found
+
+
+def named(quantity: str, specimen: Specimen) -> str | None:
+    """Give the name that repeats share: modes by their number, and without where a largest value was."""
+    found = re.search(r"([\d.]+) Hz", quantity)
+    if found is None or "largest" in quantity or "A0" in quantity:
+        return re.sub(r",? at [\d.]+ Hz", "", quantity)
+    distance = np.abs(modes(specimen)[0] - float(found[1]))
+    mode = int(np.argmin(distance))
+    what = quantity.rsplit(", ", maxsplit=1)[-1] if ", " in quantity else "transmissibility"
+    return f"mode {mode + 1}, {what}" if distance[mode] < FARTHEST_HZ else None
+
+
+def measured(rig: Rig, plan: object, path: Path) -> tuple[dict[str, tuple[float, float]], object]:
+    """Measure once: value and expanded uncertainty of each quantity whose scatter is told; the analysis."""
+    with open_bench(rig) as bench:
+        run_measurement(bench, Measurement(name="measured", excitation=plan, ramp_s=0.3), path)
+    done = analyse_files([path], "measured", Simulation.LEFT_OUT)
+    if not done.results:
+        raise AnalysisError(str(done.failures))
+    (result,) = done.results
+    found = {}
+    for each in budgets_of(result):
+        name = named(each.quantity, specimen_of(rig))
+        told = {one.cause.value: one.relative for one in each.contributions}
+        missing = {"noise", "chance"} & {cause for cause, relative in told.items() if relative is None}
+        if name is not None and not missing and name not in found:
+            found[name] = each.value, each.expanded
+    return found, result.analysis
+
+
+def scenes(rigs: int, seed: int, shard: tuple[int, int], kinds: list[str]) -> Iterator[Held]:
+    """Measure every kind on every rig of a shard."""
+    first, of = shard
+    for number in range(first - 1, rigs, of):
+        rng = np.random.default_rng((seed, number))
+        rig, words = random_rig(rng)
+        rig, is_weak = with_stated_clock(rig), number % 4 == 0
+        for kind in KINDS:
+            plan = drawn(rng, kind, is_weak=is_weak)
+            own = np.random.default_rng((seed, number, KINDS.index(kind)))
+            scene = f"rig {number}: {words}, {plan.amplitude_vpp:.2g} Vpp"
+            if kind in kinds:
+                yield from repeats(rig, plan, own, kind, is_weak=is_weak, scene=scene)
+
+
+def repeats(
+    rig: Rig, plan: object, rng: np.random.Generator, kind: str, *, is_weak: bool, scene: str
+) -> Iterator[Held]:
+    """Measure a plan again and again, and hold every bound."""
+    told = defaultdict(list)
+    true = true_values(rig, plan) if is_weak else {}
+    for _ in range(REPEATS):
+        again = plan.model_copy(update={"seed": int(rng.integers(1, 1 << 30))}) if kind == "noise" else plan
+        with TemporaryDirectory() as folder:
+            found, analysis = measured(repeated(rig, rng), again, Path(folder) / "measured.h5")
+        for name, value in found.items():
+            told[name].append(value)
+        if is_weak and kind == "noise":
+            lines = analysis.response.frequency_response
+            exact = np.abs(base_transmissibility(specimen_of(rig), lines.frequency_hz)[:, 0])
+            misses = (lines.magnitude_lower > exact) | (lines.magnitude_upper < exact)
+            yield Held(kind, LINES, is_weak, float(np.mean(misses)), scene)
+    for name, values in told.items():
+        value, expanded = np.transpose(values)
+        if name in true:
+            off = (value - true[name]) / expanded
+        elif value.size == REPEATS:
+            # Against the median of the others, which scatters too.
+            others = np.array([np.median(np.delete(value, place)) for place in range(REPEATS)])
+            off = (value - others) / (expanded * np.sqrt(1 + np.pi / 2 / (REPEATS - 1)))
+        else:
+            continue
+        for each in off:
+            yield Held(kind, name, is_weak, float(each), scene)
+
+
+def table(found: list[Held]) -> Iterator[str]:
+    """Count, a row for each kind of bound."""
+    rows = defaultdict(list)
+    for each in found:
+        rows[each.row].append(abs(each.off))
+    yield "| measured | bound | bounds | held | error over bound, median, largest | probable |"
+    yield "|---|---|---|---|---|---|"
+    for (kind, quantity), off in sorted(rows.items()):
+        size = np.array(off)
+        held = int(np.sum(size <= 1))
+        share, chance = (
+            (1 - np.mean(size), "")
+            if quantity == LINES
+            else (held / size.size, f"{binom.cdf(held, size.size, 0.95):.2g}")
+        )
+        yield (
+            f"| {kind} | {quantity} | {size.size} | {100 * share:.1f} % | "
+            f"{np.median(size):.2f}, {np.max(size):.2f} | {chance} |"
+        )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--rigs", type=int, default=4)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--shard", default="1/1", help="which part of the rigs: 3/10 is the third of ten")
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--save", type=Path, metavar="FILE.json", help="keep every bound, as it comes")
+    parser.add_argument("--add", type=Path, nargs="+", metavar="FILE.json", help="count what shards kept")
+    asked = parser.parse_args()
+    if asked.add is not None:
+        kept = (json.loads(line) for path in asked.add for line in path.read_text("utf-8").splitlines())
+        print("\n".join(table([Held(**each) for each in kept])))
+        return
+    part, of = (int(each) for each in asked.shard.split("/"))
+    found = []
+    for each in scenes(asked.rigs, asked.seed, (part, of), asked.kinds):
+        found.append(each)
+        if asked.save is not None:
+            with asked.save.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(each)) + "\n")
+        if abs(each.off) > 1:
+            missed = f"{each.off:+.2f} of its bound"
+            print(f"{each.scene}: {each.kind}, {each.quantity}: {missed}", file=sys.stderr, flush=True)
+    print("\n".join(table(found)))
+
+
+if __name__ == "__main__":
+    main()
