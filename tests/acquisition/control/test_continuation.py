@@ -218,6 +218,7 @@ def test_a_bench_without_a_controller_says_so(rig, tmp_path):
 
 
 @pytest.mark.thorough
+@pytest.mark.timeout(400)
 def test_a_latency_at_which_the_loop_fails_is_refused_with_the_number_before_anything_plays(rig, tmp_path):
     with open_bench(hardening(rig, latency_s=1.5e-3)) as bench:
         with pytest.raises(LimitExceeded, match=r"largest multiplier is 1\.\d+ at .* with 1.5 ms of latency"):
@@ -236,6 +237,7 @@ def among_stops(**more):
 
 
 @pytest.mark.thorough
+@pytest.mark.timeout(400)
 def test_motions_near_grazing_are_refused_with_the_loops_multiplier(rig):
     fast = fast_loop(hardening(rig).model_copy(update={"specimen": rig.specimen}))
     plan = continuation(start_hz=254, low_hz=253.9, high_hz=254.3)
