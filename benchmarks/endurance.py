@@ -26,6 +26,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.engine import (
+    DRIVING,
     CampaignRequest,
     EngineClient,
     EngineState,
@@ -196,6 +197,10 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
     try:
         yield wait
     finally:
+        # A window that closes while something plays asks first, and nobody is there to answer.
+        bridge.order(lambda client: client.stop("off"))
+        while bridge.state in DRIVING:
+            wait(0.1)
         window.close()
         app.processEvents()
 
