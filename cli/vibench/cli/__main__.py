@@ -141,7 +141,7 @@ COMMANDS = {
     "stop": Place(
         "watch",
         "stop",
-        "Stop what an engine, a script or a check drives, campaign and all; the recording says why.",
+        "Stop all that engines, scripts and checks drive on this computer, campaigns and all.",
     ),
     "release": Place(
         "watch", "release", "Let a run go on that was held with vibench stop --level hold, or in the window."

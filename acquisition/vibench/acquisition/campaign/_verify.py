@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import RecordingError
-from ..recording import SUFFIX, SealDepth, SealKey, SealState, open_recording
+from ..recording import SUFFIX, SealDepth, SealKey, SealState, forget_checks, open_recording
 from ._catalogue import recordings_below
 from ._catalogue_entry import UNREADABLE, place_below
 from ._journal import JOURNAL_SUFFIX
@@ -57,6 +57,7 @@ def verify_recordings(
         When there is no such place, or the key cannot be read.
 
     """
+    forget_checks()
     if not place.exists():
         raise RecordingError(f"{place} does not exist; give a recording, or a folder of recordings.")
     is_folder = place.is_dir() and not place.name.endswith(SUFFIX)

@@ -1,3 +1,6 @@
+from ._checked_counts import (
+    forget_checks as forget_checks,
+)
 from ._disk import (
     sole_use as sole_use,
 )

@@ -26,6 +26,11 @@ def remember(seal: str, states: ChannelStates) -> None:
     _KNOWN[seal] = states
 
 
+def forget_checks() -> None:
+    """Hold nothing against what was read before: all is looked at anew."""
+    _KNOWN.clear()
+
+
 def was_checked(seal: str) -> bool:
     """Whether a file with this seal was found intact as a whole by this process."""
     return seal in _KNOWN
