@@ -1,6 +1,7 @@
 """Sweeps: the recorded drive is the clock, orders come apart, envelopes and responses are what was put in."""
 
 import re
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -11,9 +12,9 @@ from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.acquisition.plan import SineSweep
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.recordings import Verdict
+from vibench.analysis.recordings import Stretch, Verdict
 from vibench.analysis.signals import Decimator
-from vibench.analysis.sine import SweepSums, played_check
+from vibench.analysis.sine import SweepSums, measured_sweep, played_check
 from vibench.analysis.sine._sweep import drive_phase
 from vibench.analysis.tones import tracked_orders
 
@@ -25,6 +26,50 @@ def sweep(duration_s, start_hz=150.0, stop_hz=350.0, clock_ppm=0.0, rate_hz=RATE
     time = np.arange(int(duration_s * rate_hz)) / rate_hz
     own = time * (1 + clock_ppm * 1e-6)
     return time, 2 * np.pi * (start_hz * own + 0.5 * (stop_hz - start_hz) / duration_s * own**2)
+
+
+@dataclass
+class Recorded:
+    """A sweep somewhere in a recording, as an estimator sees it."""
+
+    data: np.ndarray
+    start: int
+    stop: int
+    sample_rate_hz: float = RATE
+    response_delay_s: float = 0.0
+
+    @property
+    def samples(self):
+        """Of each channel."""
+        return self.data.shape[1]
+
+    def response_gain(self, frequency_hz):
+        """Nothing that a sensor adds."""
+        return np.ones(frequency_hz.size, dtype=complex)
+
+    def stretches(self, label):
+        """Give the sweep."""
+        assert label == "sweep"
+        return (Stretch(self.start, self.stop, {}, is_complete=True),)
+
+    def read(self, start, stop):
+        """Give drive, base and response."""
+        return self.data[:, start:stop]
+
+
+@pytest.mark.parametrize("lost", [(), (8000,), (57_500,), (8000, 57_500)], ids=str)
+def test_samples_that_were_lost_beside_a_sweep_spoil_none_of_it(lost):
+    time, phase = sweep(8.0, 140, 360)
+    speed = np.gradient(phase, time)
+    data = np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
+    data[:, list(lost)] = np.nan
+    start, stop = round(1.0 * RATE), round(7.0 * RATE)
+    plan = SineSweep(amplitude_vpp=1, start_hz=167.5, stop_hz=332.5, duration_s=6.0)
+    found, _ = measured_sweep(Recorded(data, start, stop), plan)
+    np.testing.assert_allclose(found.peak_displacement_m, 1.0, atol=0.012)
+    np.testing.assert_allclose(found.time_s, (found.frequency_hz - 167.5) / 27.5, atol=0.01)
+    assert found.time_s.size == 60 if not lost else 54 < found.time_s.size < 60
+    assert played_check(found, plan).verdict is Verdict.PASSED
 
 
 def test_the_first_and_last_intervals_know_what_was_before_and_after_them():

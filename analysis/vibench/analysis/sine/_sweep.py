@@ -188,6 +188,7 @@ class SweepSums:
         self._interval = max(1, round(interval_s * self._rate_hz))
         self._low_hz, self._high_hz = low_hz, high_hz
         self._before = self._after = 0
+        """Samples that were added beside the sweep."""
         self._decimator = Decimator(3, self._factor)
         self._parts: list[Reals] = []
         self._carry = np.empty(0)
@@ -206,9 +207,9 @@ class SweepSums:
         of the first and of the last intervals is off by up to a third.
         """
         if self._extremes:
-            self._after += block.shape[1] // self._factor
+            self._after += block.shape[1]
         else:
-            self._before += block.shape[1] // self._factor
+            self._before += block.shape[1]
         self._parts.append(self._decimator.add(block))
 
     def add(self, block: Reals) -> None:
@@ -239,7 +240,7 @@ class SweepSums:
         """
         self._parts.append(self._decimator.finish())
         whole = np.concatenate(self._parts, axis=1)
-        data = whole[:, self._before : whole.shape[1] - self._after]
+        data = whole[:, self._before // self._factor : whole.shape[1] - self._after // self._factor]
         count = data.shape[1] // self._interval
         extremes = np.concatenate(self._extremes or [np.empty((3, 0))], axis=1)
         upper, lower, noise = extremes[:, :count]
@@ -297,7 +298,7 @@ class SweepSums:
             high_hz=high_hz,
         )
         count = frequency_hz.size
-        swept = displacement.samples[self._before :][: count * self._interval]
+        swept = displacement.samples[self._before // self._factor :][: count * self._interval]
         intervals = swept.reshape(count, self._interval)
         peak_m = np.max(np.abs(intervals), axis=1)
         noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)

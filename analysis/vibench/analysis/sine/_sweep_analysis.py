@@ -68,6 +68,11 @@ def played_check(response: SweepResponse, sweep: Sweep) -> Check:
     return Check("Sweep as planned", Verdict.WARNING, text)
 
 
+def _is_whole(channels: Channels, first: int, last: int) -> bool:
+    """Whether samples were recorded there, none of them lost."""
+    return first >= 0 and last <= channels.samples and not np.isnan(channels.read(first, last)).any()
+
+
 def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spectrogram]:
     """Analyse what there is of a sweep, whichever way it ran, and picture its velocity."""
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
@@ -75,28 +80,31 @@ def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spe
     rate = channels.sample_rate_hz
     sums = SweepSums(rate, low_hz=ends[0], high_hz=ends[1])
     highest_hz = min(_SPECTROGRAM_ORDER * ends[1], 0.5 * rate)
-    # A recording that was cut short has nothing after its sweep: the sweep's own end stands for it.
+    # Where nothing whole was recorded beside the sweep, its own end stands for it.
     reach = min(sums.neighbour_samples, stretch.samples // 4)
-    start = stretch.start if stretch.start >= reach else stretch.start + reach
-    stop = min(stretch.stop, channels.samples - reach)
-    picture = SpectrogramSums(rate, stop - start, highest_hz=highest_hz)
-    sums.add_neighbour(np.nan_to_num(channels.read(start - reach, start)))
-    for first in range(start, stop, _BLOCK):
-        last = min(first + _BLOCK, stop)
-        block = channels.read(first, last)
-        if np.isnan(block).any():
-            lost_s = (first - start) / channels.sample_rate_hz
-            raise NotEnoughData(
-                f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
-                "across a hole; measure again"
-            )
-        sums.add(block)
-        picture.add(block[_RESPONSE])
-    sums.add_neighbour(np.nan_to_num(channels.read(stop, stop + reach)))
+    start = stretch.start + (0 if _is_whole(channels, stretch.start - reach, stretch.start) else reach)
+    stop = stretch.stop - (0 if _is_whole(channels, stretch.stop, stretch.stop + reach) else reach)
+    picture = SpectrogramSums(rate, stretch.samples, highest_hz=highest_hz)
+    for begin, end, add in (
+        (start - reach, start, sums.add_neighbour),
+        (start, stop, sums.add),
+        (stop, stop + reach, sums.add_neighbour),
+    ):
+        for first in range(begin, end, _BLOCK):
+            block = channels.read(first, min(first + _BLOCK, end))
+            if np.isnan(block).any():
+                lost_s = (first - stretch.start) / rate
+                raise NotEnoughData(
+                    f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
+                    "across a hole; measure again"
+                )
+            add(block)
+            picture.add(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
     found = sums.response(delay_s=channels.response_delay_s)
     sensors = channels.response_gain(found.frequency_hz)
     corrected = replace(
         found,
+        time_s=found.time_s + (start - stretch.start) / rate,
         response_ii=found.response_ii / np.abs(sensors),
         sd_response_ii=found.sd_response_ii / np.abs(sensors),
         phase_rad=np.angle(np.exp(1j * found.phase_rad) / sensors),

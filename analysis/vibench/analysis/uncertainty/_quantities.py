@@ -27,7 +27,7 @@ _ALIKE = 1e-12
 """Differences of maxima over their size that are roundings."""
 _FEWEST_DRAWS = 5
 _ENDS = 2
-"""Intervals at either end of a sweep in which the step from rest, or to it, still rings."""
+"""Intervals at either end of a sweep, where the largest value is no peak: it depends on where they begin."""
 _PEAKED = 1.05
 """Response I over Response II above which a step is no sine."""
 _FEWEST_PERIODS = 20.0
