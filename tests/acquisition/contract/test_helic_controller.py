@@ -98,7 +98,7 @@ def test_a_frame_is_the_one_of_the_documents(installed):
 
 
 def test_a_law_of_two_gains_is_told_exactly_and_any_other_is_refused_with_what_to_do(installed):
-    from helic_controller import pd_gains
+    from helic_signals import pd_gains
 
     rng = np.random.default_rng(22)
     for step_s in (1 / 1000, 1 / 8000):
