@@ -9,6 +9,7 @@ from vibench.sim import hdf5_files
 from ..errors import RecordingError
 from . import _layout as layout
 from ._attributes import read_attributes
+from ._checked_counts import CheckedCounts
 
 LONGEST = 300
 """Letters that are shown of what is wrong: names and texts in a broken file may be of any length."""
@@ -89,3 +90,26 @@ def _require_ours(path: Path, file: h5py.File) -> None:
             f"{path} has format version {str(version)[:LONGEST]}; this vibench reads version"
             f" {layout.FORMAT_VERSION}. Update vibench to read it."
         )
+
+
+class OpenRecording:
+    """The one thing about a recording that changes: its HDF5 handle."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = name_now(path)
+        try:
+            self.file: h5py.File = open_hdf5(self.path)
+        except RecordingError:
+            # It may have been finished, and got its final name, between the two lines above.
+            if name_now(self.path) == self.path:
+                raise
+            self.path = name_now(self.path)
+            self.file = open_hdf5(self.path)
+        self.counts = CheckedCounts()
+        self.described = ""
+        """What was read of it when it was opened, samples apart."""
+
+    def reopen(self) -> None:
+        """Look at it as it is now."""
+        self.file.close()
+        self.file = open_hdf5(self.path)

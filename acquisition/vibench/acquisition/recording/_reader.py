@@ -15,13 +15,13 @@ from ..errors import RecordingError
 from ..instruments import Identity, Overload, Samples
 from . import _layout as layout, _tables as tables
 from ._attributes import json_text, read_attributes
-from ._checked_counts import CheckedCounts, remember, was_checked
+from ._checked_counts import remember, was_checked
 from ._contents import channel_header, configuration_facts, file_facts
 from ._counts import Counts
 from ._disk import is_being_recorded
 from ._header import ChannelHeader, require_different
 from ._layout import Origin, RecordingState
-from ._opening import LONGEST, name_now, open_hdf5
+from ._opening import LONGEST, OpenRecording
 from ._overview import CountOverview, read_overview
 from ._replacing import replace_with_change
 from ._results import ResultArray, SavedResult, Setting, read_results, result_groups, write_result
@@ -60,28 +60,6 @@ class Growth(Enum):
     GROWING = auto()
 
 
-class _OpenFile:
-    """The one thing about a recording that changes: its HDF5 handle."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = name_now(path)
-        try:
-            self.file: h5py.File = open_hdf5(self.path)
-        except RecordingError:
-            # It may have been finished, and got its final name, between the two lines above.
-            if name_now(self.path) == self.path:
-                raise
-            self.path = name_now(self.path)
-            self.file = open_hdf5(self.path)
-        self.counts = CheckedCounts()
-        self.described = ""
-        """What was read of it when it was opened, samples apart."""
-
-    def reopen(self) -> None:
-        self.file.close()
-        self.file = open_hdf5(self.path)
-
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RecordingDescription:
     """What a recording says of itself, of its bench and of how it ended."""
@@ -118,7 +96,7 @@ class Recording(RecordingDescription):
     events: tuple[Event, ...]
     overloads: tuple[Overload, ...]
     gaps: tuple[Gap, ...]
-    _open: _OpenFile
+    _open: OpenRecording
 
     @property
     def is_growing(self) -> bool:
@@ -340,7 +318,7 @@ def open_recording(path: Path | str) -> Recording:
         When the file is missing, empty, cut short, damaged, no recording, or from a newer version.
 
     """
-    handle = _OpenFile(Path(path))
+    handle = OpenRecording(Path(path))
     try:
         recording = _read(handle)
         handle.described = repr(recording)
@@ -360,7 +338,7 @@ def _as_it_was_checked(recording: Recording) -> Recording:
     return recording
 
 
-def _read(handle: _OpenFile) -> Recording:
+def _read(handle: OpenRecording) -> Recording:
     """Read everything but samples and results, and believe none of it unseen."""
     file = handle.file
     is_part = layout.N_VALID in file
@@ -418,7 +396,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
         raise RecordingError(f"the channel {role!r} lacks some of its samples")
 
 
-def _growing(handle: _OpenFile) -> dict[str, object]:
+def _growing(handle: OpenRecording) -> dict[str, object]:
     """Say how a ``.part`` stands: it says "recording" until its end, which a dead program never wrote."""
     file = handle.file
     state, reason = tables.ending(file)
