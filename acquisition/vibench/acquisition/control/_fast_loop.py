@@ -107,8 +107,16 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
             f"{unknown}rigid stops push with no finite force. Nothing was played; give the specimen of "
             "the hardware configuration another contact law, such as hertz"
         )
-    begin = Begin(plan.begin_from), plan.begin
-    hold = branch_hold(fast.plant, fast.law, level_m, plan.start_hz, plan.band_hz, *begin, LARGEST_MULTIPLIER)
+    hold = branch_hold(
+        fast.plant,
+        fast.law,
+        level_m,
+        plan.start_hz,
+        plan.band_hz,
+        Begin(plan.begin_from),
+        plan.begin,
+        LARGEST_MULTIPLIER,
+    )
     if hold is None:
         raise LimitExceeded(
             f"{unknown}the model finds no motion that repeats every period at start_hz = {plan.start_hz:g} "

@@ -44,12 +44,13 @@ class CheckedCounts:
 
     def read(self, seal: str, dataset: h5py.Dataset, begin: int, end: int) -> Counts:
         """Give a range of a channel; raises ValueError where it is not what was checked."""
-        if seal not in _KNOWN:
+        known = _KNOWN.get(seal)
+        if known is None:
             return np.asarray(dataset[begin:end], dtype=np.int32)
         counts = np.empty(end - begin, dtype=np.int32)
         for number in range(begin // PIECE_ITEMS, -(-end // PIECE_ITEMS)):
             first = number * PIECE_ITEMS
-            piece = self._piece(_KNOWN[seal][dataset.name], dataset, number)
+            piece = self._piece(known[dataset.name], dataset, number)
             low, high = max(begin, first), min(end, first + len(piece))
             counts[low - begin : high - begin] = piece[low - first : high - first]
         return counts
