@@ -2,11 +2,13 @@
 
 import inspect
 import json
+from time import monotonic
 
 import pytest
 
-from vibench.acquisition import ConfigurationError, StopLevel
+from vibench.acquisition import CheckRule, ConfigurationError, StopLevel
 from vibench.acquisition.engine import (
+    CampaignRequest,
     Engine,
     EngineClient,
     EngineError,
@@ -18,6 +20,8 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.engine._server import answered
 from vibench.acquisition.engine._verbs import VERBS
 from vibench.acquisition.engine._wire import Message
+
+from .conftest import PATIENCE_S, campaign
 
 WORDS = {
     *("open", "close", "check", "arm", "disarm", "start", "stop"),
@@ -75,6 +79,31 @@ def test_a_bench_that_is_being_closed_takes_nothing_on(shipped_rig):
     with pytest.raises(EngineError, match="is being closed"):
         handler.carry_out(VERBS["close"], {})
     jobs.run()
+
+
+def looked_after_until(handler, is_over):
+    """Let an engine's round go by again and again, as its server does; nobody attends it."""
+    give_up_s = monotonic() + PATIENCE_S
+    while not is_over():
+        assert monotonic() < give_up_s
+        handler.enforce_deadlines()
+
+
+def test_whoever_arms_has_the_time_to_start(shipped_rig, tmp_path):
+    """What was armed before the attendant's first beat was taken back at once, and nobody said why."""
+    engine = Engine(Supervision.ATTENDED)
+    handler = RequestHandler(engine, JobQueue(engine))
+    engine.open(shipped_rig)
+    deserted_s = monotonic() + 2.0
+    looked_after_until(handler, lambda: monotonic() > deserted_s)
+    request = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.WAIVED)
+    handler.carry_out(VERBS["arm"], {"campaign_request": request})
+    handler.enforce_deadlines()
+    assert engine.published.state is EngineState.ARMED
+    looked_after_until(handler, lambda: engine.published.state is not EngineState.ARMED)
+    last = engine.published.status().messages[-1]
+    assert (last.what.partition(":")[0], last.done) == ("The viewer is gone", "Disarmed.")
+    engine.close()
 
 
 class MetByAnother(Engine):

@@ -158,7 +158,7 @@ class RequestHandler:
             return method(**arguments)
 
     def note_presence(self) -> None:
-        """Note that somebody is there."""
+        """Note that somebody is there; whoever checks, arms or starts is, though no attendant beats yet."""
         self._last_request_s = monotonic()
 
     def beat(self, still_s: float = 0.0) -> None:
@@ -194,6 +194,7 @@ class RequestHandler:
 
     def check(self, folder: Path = Path(), *, new_reference: bool = False) -> None:
         """Check the bench with a small sine; ``folder`` is where recordings will go."""
+        self.note_presence()
         self._engine.switch = StopSwitch()
         self._attendance, self._patience_s = self._engine.supervision, VIEWER_PATIENCE_S
         self._engine.published.enter(EngineState.CHECKING)
@@ -204,6 +205,7 @@ class RequestHandler:
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)
         self._attendance, self._patience_s = plan.attendance, plan.patience_s
         self._request = campaign_request
+        self.note_presence()
         self._armed_s = monotonic()
         self._engine.published.arm(plan, campaign_request.campaign)
         return plan
@@ -216,6 +218,7 @@ class RequestHandler:
     def start(self) -> None:
         """Carry out what is armed."""
         assert self._request is not None
+        self.note_presence()
         request, self._request = self._request, None
         self._carried = request
         self._engine.switch = StopSwitch()
@@ -325,6 +328,7 @@ class RequestHandler:
         engine = self._engine
         if engine.published.state is EngineState.ARMED:
             self.disarm()
+            engine.published.messages.warn(f"The viewer is gone: {reason}.", "Disarmed.", "Arm again.")
         elif engine.published.state in SOUNDING and engine.switch.request is None:
             engine.switch.ask(StopRequest.by(Cause.VIEWER_GONE, reason))
             kept = "; the recording is kept" if engine.published.state in DRIVING else ""
