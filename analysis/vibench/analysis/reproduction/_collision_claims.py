@@ -203,7 +203,7 @@ COLLISION_CLAIMS = (
         key="sweep",
         place="section 5, Fig. 13(d)",
         says="In a sweep from 150 to 350 Hz within 200 s they collide at about 240 to 290 Hz.",
-        measured_by="Drive frequency at the first and last impact of that sweep, at A0 = 5 µm.",
+        measured_by="Lowest and highest drive frequency at an impact of that sweep, at A0 = 5 µm.",
         wanted=tuple(
             about(name, "Hz", each, _ABOUT_HZ)
             for name, each in zip(("first impact", "last impact"), SWEEP_COLLIDES_HZ, strict=True)

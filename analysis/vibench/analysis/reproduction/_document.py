@@ -105,12 +105,21 @@ def _difference(judgement: Judgement) -> str:
     )
     under = judgement.met_under
     meets = (
-        f" None of {len(judgement.findings) - 1} options tried would make us meet."
+        f" None of {len(judgement.findings) - 1} options tried would make us meet{_except(judgement)}."
         if under is None
         else f" We meet under {under.case.name}: {_values(judgement.claim, under)}."
     )
     remark = f" {judgement.claim.remark}" if judgement.claim.remark else ""
     return ours + (meets if len(judgement.findings) > 1 else "") + remark
+
+
+def _except(judgement: Judgement) -> str:
+    """Say under which options some starts uphold a claim that all of none does."""
+    return "".join(
+        f", except {each.case.name} for {each.met} of {len(each.draws)} starts"
+        for each in judgement.findings
+        if each.is_met_in_part
+    )
 
 
 def _table(table: PageTable) -> Iterator[str]:
@@ -144,7 +153,9 @@ def verdict_text(judgement: Judgement) -> str:
         )
     if judgement.verdict is Verdict.HOLDS_UNDER and under is not None:
         return f"holds under {under.case.name}"
-    return judgement.verdict.value if judgement.verdict is Verdict.HOLDS else f"**{judgement.verdict.value}**"
+    if judgement.verdict is Verdict.HOLDS:
+        return judgement.verdict.value
+    return f"**{judgement.verdict.value}**{_except(judgement)}"
 
 
 def _values(claim: Claim, finding: Finding) -> str:
@@ -171,5 +182,10 @@ def _differing(judgements: Sequence[Judgement]) -> Iterator[str]:
         if len(each.findings) > 1:
             yield from ("", f"Tried for **{each.claim.key}**:", "")
             for finding in each.findings:
-                mark = "holds" if finding.is_met else "does not hold"
-                yield f"- {finding.case.name}: {_values(each.claim, finding)} ({mark})"
+                yield f"- {finding.case.name}: {_values(each.claim, finding)} ({_mark(finding)})"
+
+
+def _mark(finding: Finding) -> str:
+    if finding.is_met_in_part:
+        return f"holds for {finding.met} of {len(finding.draws)} starts"
+    return "holds" if finding.is_met else "does not hold"

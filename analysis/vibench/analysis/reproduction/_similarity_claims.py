@@ -69,6 +69,11 @@ def _cubic_first(evidence: Evidence, case: Case) -> tuple[float, ...]:
 
 def _cubic_second(evidence: Evidence, case: Case) -> tuple[float, ...]:
     found = rates(evidence, case, CUBIC, SECOND)
+    return float(found[0]), float(found[2]), float(found[-1])
+
+
+def _cubic_second_lowest(evidence: Evidence, case: Case) -> tuple[float, ...]:
+    found = rates(evidence, case, CUBIC, SECOND)
     return float(found[0]), float(np.min(found[1:-1])), float(found[-1])
 
 
@@ -161,9 +166,19 @@ SIMILARITY_CLAIMS = (
         key="cubic-ii",
         place="section 4, Fig. 7(e-h)",
         says="For Response II it falls from 83 % to about 68 % and rises to 78 %.",
+        measured_by="Eqs. 6 and 7 at 1, 10 and 50 µm; the paper does not say which amplitude has the 68 %.",
+        wanted=_fall_and_rise("10 µm"),
+        measure=_cubic_second,
+        draws=RATE_DRAWS,
+        alternatives=(*FITTED, *DAMPINGS),
+    ),
+    Claim(
+        key="cubic-ii-lowest",
+        place="section 4, Fig. 7(e-h)",
+        says="Read strictly: 68 % is the lowest of them.",
         measured_by="Eqs. 6 and 7 at 1 µm, the smaller of 5 and 10 µm, and 50 µm.",
         wanted=_fall_and_rise("5 or 10 µm"),
-        measure=_cubic_second,
+        measure=_cubic_second_lowest,
         draws=RATE_DRAWS,
         alternatives=(*FITTED, *DAMPINGS),
     ),
