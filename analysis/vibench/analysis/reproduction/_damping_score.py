@@ -24,13 +24,13 @@ def damping_score_figure(scores: tuple[DampingScore, ...]) -> DrawnFigure:
         top.plot(1e6 * damping, held, color=MEASURED, marker="o")
         top.set_ylim(0, asked)
         top.set_ylabel(f"claims that hold, of {asked}")
+        bottom.set_yscale("symlog", linthresh=_LINEAR_PER_S)  # first: margins are those of the scale
         bottom.plot(1e6 * damping, weak, color=LEVELS[0], marker="o", label="1 µm: near zero in the paper")
         bottom.plot(
             1e6 * damping, moderate, color=SIMULATED, marker="s", label="5 µm: above 100 in the paper"
         )
         for bound in (NEAR_ZERO_PER_S, SEVERE_PER_S):
             bottom.axhline(bound, color=TERMINAL, linestyle=":", linewidth=1.0)
-        bottom.set_yscale("symlog", linthresh=_LINEAR_PER_S)
         bottom.set_ylabel("largest exponent [1/s]")
         bottom.set_xlabel("c / k [µs]")
         bottom.legend()
