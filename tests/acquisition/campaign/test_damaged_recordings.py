@@ -12,6 +12,7 @@ from vibench.acquisition import open_recording, run_campaign
 from vibench.acquisition.campaign import (
     CampaignEventKind,
     ExistingRecordings,
+    JournalPointState,
     PointOutcome,
     list_recordings,
     planned_recordings,
@@ -20,6 +21,7 @@ from vibench.acquisition.campaign import (
 )
 from vibench.acquisition.errors import CheckFailed, RecordingError
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
+from vibench.acquisition.stopping import Cause, StopRequest, StopSwitch
 
 
 def dwell(name, frequency_hz):
@@ -120,6 +122,22 @@ def test_without_its_journal_a_campaign_does_not_count_on_a_damaged_recording_ei
     made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
     assert outcomes(made)["one"] == (PointOutcome.KEPT, "one.h5")
+
+
+@pytest.mark.parametrize("has_journal", [True, False])
+def test_a_stop_ends_the_look_through_the_folder_and_the_next_resume_looks_again(bench, folder, has_journal):
+    """A resumed campaign read every sample of hundreds of recordings before it saw that it was stopped."""
+    with_another_sample(folder)
+    journal = folder / "c.campaign.sqlite"
+    if not has_journal:
+        journal.unlink()
+    switch = StopSwitch()
+    switch.ask(StopRequest.by(Cause.OPERATOR, "not today"))
+    assert run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, switch=switch) == ()
+    if has_journal:
+        assert [each.state for each in read_journal(journal)] == [JournalPointState.DONE] * 3
+    made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
 
 
 @pytest.mark.parametrize("damage", [truncated, with_another_scale, exchanged, replaced_by_a_folder])

@@ -107,9 +107,14 @@ def test_whoever_arms_has_the_time_to_start(shipped_rig, tmp_path):
 
 
 class MetByAnother(Engine):
-    """An engine of which somebody else asks something just when its switch has been looked up."""
+    """An engine of which somebody else asks something just when its switch or its bench is looked up."""
 
-    met_by = staticmethod(lambda: None)
+    met_by = arming_met_by = staticmethod(lambda: None)
+
+    @property
+    def bench(self):
+        self.arming_met_by()
+        return super().bench
 
     @property
     def switch(self):
@@ -130,6 +135,21 @@ def test_a_stop_that_meets_a_start_stops_what_begins(tmp_path):
     handler.carry_out(VERBS["stop"], {"level": StopLevel.OFF, "reason": "smoke"})
     assert engine.published.state is EngineState.CHECKING
     assert engine.switch.request.reason == "smoke"
+
+
+def test_a_stop_that_meets_an_arming_is_not_forgotten(shipped_rig, tmp_path):
+    """A long campaign was armed after the stop, and started."""
+    engine = MetByAnother(Supervision.UNATTENDED)
+    handler = RequestHandler(engine, JobQueue(engine))
+    engine.open(shipped_rig)
+    engine.arming_met_by = lambda: handler.carry_out(
+        VERBS["stop"], {"level": StopLevel.RAMP, "reason": "smoke"}
+    )
+    request = CampaignRequest(campaign=campaign("run"), folder=tmp_path, check=CheckRule.WAIVED)
+    with pytest.raises(EngineError, match="a stop was asked for while the campaign was being armed"):
+        handler.carry_out(VERBS["arm"], {"campaign_request": request})
+    assert engine.published.state is EngineState.READY
+    engine.close()
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from ..errors import CheckFailed, LimitExceeded, RecordingError
 from ..plan import Campaign, Measurement, Point, played_alike, require_within_limits
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run import drive_for
+from ..stopping import StopSwitch
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity, differences
 from ._journal import JOURNAL_SUFFIX, Journal, journal_path
@@ -25,15 +26,18 @@ from ._point_outcome import ChangedBench, ExistingRecordings, ReasonCode
 PROGRAM_ENDED = "its program ended in the middle of it"
 
 
-def reconcile(journal: Journal, folder: Path) -> None:
+def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
     """Bring a journal that is gone on with up to date with the files beside it.
 
     A point that was running is done when its recording is complete (only the word in the journal was
     missing), and interrupted otherwise; what was left of its recording becomes a readable file. A
     done point is queued again when its recording has been taken away, or is not as it was sealed: that
-    one stays where it is, and the next attempt is made beside it.
+    one stays where it is, and the next attempt is made beside it. To read a folder may take minutes: after a
+    stop the rest is left for the next resume, since no other point will be made.
     """
     for point in journal.points():
+        if stop.request is not None:
+            return
         match point.state:
             case JournalPointState.RUNNING:
                 journal.end(point.name, *_ended(point, folder))
@@ -45,20 +49,25 @@ def reconcile(journal: Journal, folder: Path) -> None:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
 
 
-def found_recordings(points: Sequence[Point], folder: Path, depth: SealDepth) -> dict[str, KeptRecording]:
+def found_recordings(
+    points: Sequence[Point], folder: Path, depth: SealDepth, stop: StopSwitch | None = None
+) -> dict[str, KeptRecording]:
     """Find what lies in the folder already, for a campaign whose journal is lost, or older than journals.
 
-    Damaged recordings are among them, and those whose seal is not what any journal of the folder has: the
-    campaign may have got another name. Raises RecordingError when a recording is complete, but was made by
-    another plan.
+    After a stop no more samples are read; the next resume, which has a journal, reads them. Damaged ones are
+    found too, and those whose seal is not what any journal of the folder has: the campaign may have got
+    another name. Raises RecordingError when a recording is complete, but was made by another plan.
     """
     seals: dict[str, str] = {}
     for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
         with suppress(RecordingError):
             seals |= {each.file: each.seal for each in read_journal(journal) if each.seal}
-    found = {
-        each.name: complete_attempt(folder, each.name, each.measurement, depth, seals) for each in points
-    }
+
+    def looked_for(point: Point) -> KeptRecording | None:
+        now = depth if stop is None or stop.request is None else SealDepth.QUICK
+        return complete_attempt(folder, point.name, point.measurement, now, seals)
+
+    found = {each.name: looked_for(each) for each in points}
     return {name: kept for name, kept in found.items() if kept is not None}
 
 
@@ -152,7 +161,12 @@ def planned_recordings(
 
 
 def opened_journal(
-    bench: RunBench, campaign: Campaign, folder: Path, existing: ExistingRecordings, changed: ChangedBench
+    bench: RunBench,
+    campaign: Campaign,
+    folder: Path,
+    existing: ExistingRecordings,
+    changed: ChangedBench,
+    stop: StopSwitch,
 ) -> Journal:
     """Begin a journal, or open the one that the campaign was begun with and bring it up to date.
 
@@ -167,9 +181,9 @@ def opened_journal(
             require_new(campaign, campaign.points(), folder)
             return Journal.begin(path, campaign, identity)
         case ExistingRecordings.RESUME if is_begun(path):
-            return _gone_on_with(path, campaign, identity, folder, changed)
+            return _gone_on_with(path, campaign, identity, folder, changed, stop)
         case ExistingRecordings.RESUME:
-            found = found_recordings(campaign.points(), folder, SealDepth.WHOLE)
+            found = found_recordings(campaign.points(), folder, SealDepth.WHOLE, stop)
             if changed is ChangedBench.REFUSE:
                 for kept in (each for each in found.values() if not each.damage):
                     _require_no_differences(differences(kept.rig, bench.rig.model_dump(mode="json")))
@@ -211,7 +225,12 @@ def make_folder(folder: Path) -> None:
 
 
 def _gone_on_with(
-    path: Path, campaign: Campaign, now: BenchIdentity, folder: Path, changed: ChangedBench
+    path: Path,
+    campaign: Campaign,
+    now: BenchIdentity,
+    folder: Path,
+    changed: ChangedBench,
+    stop: StopSwitch,
 ) -> Journal:
     journal = Journal.open(path)
     try:
@@ -222,7 +241,7 @@ def _gone_on_with(
                 require_same_bench(begun_on, now)
             case ChangedBench.ACCEPT if begun_on.differences(now):
                 journal.accept_bench(now)
-        reconcile(journal, folder)
+        reconcile(journal, folder, stop)
     except BaseException:
         journal.close()
         raise

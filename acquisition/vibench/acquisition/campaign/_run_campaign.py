@@ -99,11 +99,13 @@ def run_campaign(
     stop = StopSwitch() if switch is None else switch
     with ExitStack() as session:
         log = session.enter_context(_log_alone(folder, campaign))
-        journal = session.enter_context(opened_journal(bench, campaign, folder, existing, changed_bench))
+        session.enter_context(stop_on_signal(stop, campaign.name))
+        journal = session.enter_context(
+            opened_journal(bench, campaign, folder, existing, changed_bench, stop)
+        )
         where = folder / f"{campaign.name}{STATUS_SUFFIX}"
         status = session.enter_context(StatusLine(where, campaign.name, journal.points(), campaign.rest_s))
         notifier = Notifier(campaign.name, folder, messengers, log)
-        session.enter_context(stop_on_signal(stop, campaign.name))
 
         def say(event: CampaignEvent) -> None:
             for listener in (log, status, notifier, on_event):

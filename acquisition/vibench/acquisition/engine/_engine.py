@@ -231,4 +231,5 @@ def _told(point_results: tuple[PointResult, ...]) -> str:
         result: sum(point_result.outcome is result for point_result in point_results)
         for result in PointOutcome
     }
-    return "Campaign ended: " + ", ".join(f"{count} {each.value}" for each, count in counts.items() if count)
+    told = ", ".join(f"{count} {each.value}" for each, count in counts.items() if count)
+    return f"Campaign ended: {told or 'stopped before its first point'}"

@@ -133,6 +133,7 @@ class RequestHandler:
         self._carried: CampaignRequest | None = None
         self._is_orphan = self._is_closing = False
         self._armed_s = 0.0
+        self._stops = 0
         self._last_request_s = self._last_round_s = monotonic()
         self._late_s = self._still_s = 0.0
         self._attendance, self._patience_s = engine.supervision, VIEWER_PATIENCE_S
@@ -201,8 +202,17 @@ class RequestHandler:
         self._jobs.put(lambda: self._engine.check(folder, new_reference=new_reference))
 
     def arm_request(self, campaign_request: CampaignRequest) -> ArmedPlan:
-        """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be."""
+        """Get ready to carry out a campaign; raises AcquisitionError with the reasons when it cannot be.
+
+        To hold a long campaign against the limits takes seconds, in which nothing is armed that a stop could
+        disarm: it would be armed afterwards, and started.
+        """
+        stops = self._stops
         plan = armed_plan(self._engine.bench, campaign_request, self._engine.supervision)
+        if stops != self._stops:
+            raise EngineError(
+                "a stop was asked for while the campaign was being armed. Nothing was armed; arm it again"
+            )
         self._attendance, self._patience_s = plan.attendance, plan.patience_s
         self._request = campaign_request
         self.note_presence()
@@ -346,6 +356,7 @@ class RequestHandler:
             self._is_closing = False
 
     def _stop(self, request: StopRequest) -> None:
+        self._stops += 1
         switch = None
         while switch is not self._engine.switch:  # else a start has come in between, with a switch of its own
             switch = self._engine.switch
