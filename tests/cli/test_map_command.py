@@ -100,6 +100,14 @@ def test_fewer_kicks_than_none_are_refused_before_anything_is_computed(vibench_h
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="this system has no /proc")
+@pytest.mark.parametrize("workers", ["-1", "0"])
+def test_an_estimate_for_fewer_threads_than_one_is_refused(vibench_here, tmp_path, workers):
+    asked = ("map", "map", "--estimate", "--out", "a", "--workers", workers)
+    found = vibench_here(*asked, cwd=tmp_path)
+    assert found.returncode == 2
+    assert f"'--workers': '{workers}' was given; it should be greater than or equal to 1" in found.stderr
+
+
 def test_a_folder_that_cannot_be_made_is_refused_before_anything_is_computed(vibench_here, tmp_path):
     found = vibench_here("map", plan(tmp_path, MAP), "--out", "/proc/map", cwd=tmp_path)
     assert found.returncode == 1

@@ -21,7 +21,7 @@ from vibench.sim import Accuracy
 from .analyse import complain_about
 from .output import bold, console
 from .paths import room_for_folder
-from .study import KeptStudies
+from .study import KeptStudies, Workers
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
@@ -49,9 +49,7 @@ def figure(
     grid: Annotated[
         FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
     ] = FigureOptions.grid,
-    workers: Annotated[
-        int | None, typer.Option("--workers", metavar="N", help="Threads; one for each processor if absent.")
-    ] = None,
+    workers: Workers = None,
     kinds: Annotated[
         list[ImageKind], typer.Option("--format", help="Image formats; give it several times for several.")
     ] = [ImageKind.PNG, ImageKind.SVG],  # noqa: B006 - typer copies it

@@ -28,7 +28,8 @@ from .progress_bars import study_bar
 SHOWN_FAILURES = 5
 
 Workers = Annotated[
-    int | None, typer.Option("--workers", metavar="N", help="Threads; one for each processor if absent.")
+    int | None,
+    typer.Option("--workers", min=1, metavar="N", help="Threads; one for each processor if absent."),
 ]
 Cluster = Annotated[
     str | None,

@@ -78,6 +78,7 @@ def test_differences_name_what_differs():
         ("gaps_m", [0.0], "greater than 0"),
         ("duration_s", "forever", "duration_s"),
         ("observe", ["spectrum"], "response"),
+        ("duration_s", 1e300, "it must be 1e\\+12 drive periods at most, 1e\\+10 s"),
         ("window_s", 0.005, "it must hold one drive period, 0.01 s"),
         ("window_s", 31.0, "within the run of 30.0 s"),
         ("frequencys", [1.0], "frequencys"),

@@ -84,11 +84,8 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
         _length(scene.duration),
         *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
     )
-    match scene.duration:
-        case FixedDuration(duration_s=length_s):
-            longest_s = length_s
-        case AutomaticDuration(longest_s=longest_s):
-            length_s = min(SETTLING_S, longest_s)
+    longest_s = scene.duration.longest_s
+    length_s = longest_s if isinstance(scene.duration, FixedDuration) else min(SETTLING_S, longest_s)
     per_s = _planned_per_s(scene, motion, method)
     return ScenePlan(
         method,

@@ -33,6 +33,10 @@ class Observable(StrEnum):
     """How much Response I differs between starts that hardly do; the scene is run several times more."""
 
 
+MOST_PERIODS = 1e12
+"""After so many drive periods a double tells times apart to a ten-thousandth of one."""
+
+
 @dataclass(frozen=True)
 class FixedDuration:
     """Follow the motion for this long, and observe the end of it."""
@@ -42,6 +46,11 @@ class FixedDuration:
     duration_s: float = PAPER_DURATION_S
     window_s: float = PAPER_WINDOW_S
     kind: Literal["fixed"] = "fixed"
+
+    @property
+    def longest_s(self) -> float:
+        """As long as the motion is followed."""
+        return self.duration_s
 
     def __post_init__(self) -> None:
         if not 0.0 < self.duration_s < math.inf:
@@ -139,6 +148,13 @@ class Scene:
         if self.drive.amplitude_m == 0.0:
             msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
             raise ValueError(msg)
+        for length_s in (self.duration.longest_s, self.duration.window_s):
+            if length_s * self.drive.frequency_hz > MOST_PERIODS:
+                msg = (
+                    f"Duration {length_s:g} s is not allowed at {self.drive.frequency_hz} Hz: it must be "
+                    f"{MOST_PERIODS:g} drive periods at most, {MOST_PERIODS / self.drive.frequency_hz:g} s."
+                )
+                raise ValueError(msg)
         if self.duration.window_s * self.drive.frequency_hz < 1.0 - WHOLE:
             msg = (
                 f"Window {self.duration.window_s} s is not allowed at {self.drive.frequency_hz} Hz: "

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ._pace import FEWEST_TIMES
 from ._prediction import ScenePrediction
-from ._scene import AutomaticDuration, FixedDuration, Scene
+from ._scene import Scene
 from ._several_starts import FEWEST
 from ._solve import settling_scene, solving_scene
 from ._states_alone import REMEMBERED, Asking, Following, follow_all
@@ -59,9 +59,7 @@ def _side_by_side(
 
 def _held_states(scene: Scene) -> float:
     """Say how many states of a scene are held at a time, of all its starts, at most."""
-    match scene.duration:
-        case FixedDuration(duration_s=longest_s) | AutomaticDuration(longest_s=longest_s):
-            per_start = REMEMBERED * longest_s / FEWEST_TIMES * scene.drive.frequency_hz
+    per_start = REMEMBERED * scene.duration.longest_s / FEWEST_TIMES * scene.drive.frequency_hz
     return per_start * (FEWEST if scene.budget_s > 0.0 else 1.0)
 
 

@@ -273,11 +273,7 @@ def _watching(
 ) -> Asking[tuple[SceneRun, Pace]]:
     """Do the same, chaos alone for so long, and hand out what may be followed beside others."""
     drive = scene.drive
-    match scene.duration:
-        case FixedDuration(duration_s=longest_s):
-            pass
-        case AutomaticDuration(longest_s=longest_s):
-            pass
+    longest_s = scene.duration.longest_s
     pace = pace_of(scene.specimen, drive.frequency_hz, scene.accuracy, motion.slowest_rate, longest_s)
     match scene.duration:
         case FixedDuration(duration_s=duration_s, window_s=window_s):
