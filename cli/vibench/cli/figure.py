@@ -57,11 +57,16 @@ def figure(
     """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
+    # Whoever asks for all of them learns before the first what one of them cannot be drawn with.
+    asked = {each: PAPER_FIGURES[each].studies(options) for each in numbers if each in PAPER_FIGURES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     studies = KeptStudies(out / "studies", workers)
     for each in numbers:
-        drawn = experiment(each) if each in EXPERIMENT else _simulated(each, options, studies)
+        if each in EXPERIMENT:
+            drawn = list(experiment(each))
+        else:
+            drawn = [PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))]
         for one in drawn:
             paths = one.save(out, kinds)
             console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")
@@ -75,11 +80,6 @@ def _numbers(asked: str) -> tuple[int, ...]:
     if asked.isdigit() and int(asked) in known:
         return (int(asked),)
     raise InvalidRequest(f"figure {asked!r} was asked for; the paper has 1 to {known[-1]}, or say all")
-
-
-def _simulated(number: int, options: FigureOptions, studies: KeptStudies) -> Iterator[DrawnFigure]:
-    chosen = PAPER_FIGURES[number]
-    yield chosen.draw(options, tuple(studies(each) for each in chosen.studies(options)))
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> Callable[[int], Iterator[DrawnFigure]]:

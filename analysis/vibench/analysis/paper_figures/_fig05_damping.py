@@ -5,6 +5,7 @@ from matplotlib.axes import Axes
 
 from vibench.sim.study import Study, StudyResults
 
+from ..errors import InvalidRequest
 from ..figures import LEVELS, MEASURED, DrawnFigure, new_figure, styled
 from ..tables import table
 from ._options import FigureOptions
@@ -14,8 +15,14 @@ _LOW_M, _HIGH_M = 5e-6, 7e-6
 
 
 def damping_study(options: FigureOptions) -> Study:
-    """With and without damping, at 5 and 7 um."""
-    return options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, options.only_damping_time_s))
+    """With and without damping, at 5 and 7 um.
+
+    Raises InvalidRequest where there is no damping to compare with none.
+    """
+    damped_s = options.only_damping_time_s
+    if damped_s == 0.0:
+        raise InvalidRequest("figure 5 compares damping with none; give a damping time above 0 s")
+    return options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, damped_s))
 
 
 def damping_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:

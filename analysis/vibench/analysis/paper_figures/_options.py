@@ -16,6 +16,10 @@ AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 """The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
 CASES = ("Case 1", "Case 2", "Case 3", "Case 4")
 LOWEST_HZ = 5.0
+_LONGEST_DAMPING_TIME_S = 0.01
+"""More than fifteen times critical in the paper's third mode."""
+_LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
+"""From a thousandth of the weakest drive to two hundred times the strongest."""
 _PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
 """What a figure of exponents observes."""
@@ -58,16 +62,19 @@ class FigureOptions:
     """For other starts: a point of the paper is one run."""
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.damping_time_s < math.inf:
+        if not 0.0 <= self.damping_time_s <= _LONGEST_DAMPING_TIME_S:
             raise InvalidRequest(
-                f"a damping time of {self.damping_time_s} s is not allowed; give zero or a positive one"
+                f"a damping time of {self.damping_time_s:g} s is not allowed; give 0 to "
+                f"{_LONGEST_DAMPING_TIME_S:g}"
             )
         if self.damping_ratio is not None and not 0.0 <= self.damping_ratio < math.inf:
             raise InvalidRequest(
                 f"a damping ratio of {self.damping_ratio} is not allowed; give zero or a positive one"
             )
-        if not 0.0 < self.gap_m < math.inf:
-            raise InvalidRequest(f"a gap of {self.gap_m} m is not allowed; give a positive one")
+        if not _LEAST_GAP_M <= self.gap_m <= _LARGEST_GAP_M:
+            raise InvalidRequest(
+                f"a gap of {self.gap_m:g} m is not allowed; give {_LEAST_GAP_M:g} to {_LARGEST_GAP_M:g}"
+            )
 
     @property
     def frequencies_hz(self) -> tuple[float, ...]:

@@ -1,0 +1,36 @@
+"""`vibench figure`: options that its figures cannot be drawn with are refused before anything is computed."""
+
+import pytest
+from typer.testing import CliRunner
+
+from vibench.analysis import InvalidRequest
+from vibench.cli.__main__ import app
+
+
+def refused(*arguments):
+    """The sentence with which `vibench figure` refuses."""
+    result = CliRunner().invoke(app, ["figure", *(str(each) for each in arguments)])
+    assert isinstance(result.exception, InvalidRequest), result.output
+    return str(result.exception)
+
+
+@pytest.mark.parametrize("number", ["5", "all"])
+@pytest.mark.parametrize("none", ["0", "-0.0"])
+def test_a_comparison_of_damping_with_none_needs_some(tmp_path, number, none):
+    said = refused(number, "--out", tmp_path / "f", "--damping-time", none)
+    assert said == "figure 5 compares damping with none; give a damping time above 0 s"
+    assert not (tmp_path / "f").exists()
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [
+        ("--gap", "1e300", "a gap of 1e+300 m is not allowed; give 1e-09 to 0.01"),
+        ("--gap", "1e-300", "a gap of 1e-300 m is not allowed; give 1e-09 to 0.01"),
+        ("--damping-time", "1e300", "a damping time of 1e+300 s is not allowed; give 0 to 0.01"),
+        ("--damping-time", "nan", "a damping time of nan s is not allowed; give 0 to 0.01"),
+    ],
+)
+def test_sizes_that_no_specimen_has_are_refused(tmp_path, option, value, told):
+    assert refused("1", "--out", tmp_path / "f", option, value) == told
+    assert not (tmp_path / "f").exists()
