@@ -67,3 +67,9 @@ def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_said_
     assert prompt == pytest.approx(2.0)
     slow = rig.model_copy(update={"generator": rig.generator.model_copy(update={"settle_s": 0.1})})
     assert preview_measurement(dwell, slow).least_growth_time_s == pytest.approx(2.0 + 10 * 2 * 0.1)
+
+
+def test_of_a_branch_that_a_fast_loop_follows_no_growth_time_is_told_for_it_decides_nothing():
+    fast = load_rig(ROOT / "hardware_configs" / "virtual_rig_controller.toml")
+    (branch,) = load_campaign(ROOT / "campaigns" / "branch.toml").measurements
+    assert preview_measurement(branch, fast).least_growth_time_s is None

@@ -11,7 +11,7 @@ from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._drive_source import DriveSource, drive_source_of
 from ._limits import LimitCheck, limit_checks
-from ._loop_time import fast_loop_time_s, loop_time_s
+from ._loop_time import loop_time_s
 from ._measurement import Measurement
 from ._schedule import duration_s
 
@@ -83,9 +83,9 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
     excitation = measurement.excitation
     if not EXCITATION_KINDS[excitation.kind].is_feedback:
         return None
-    is_fast = drive_source_of(measurement, rig) is DriveSource.CONTROLLER
-    if is_fast and rig.controller is not None:
-        return least_growth_time_s(fast_loop_time_s(rig.controller))
+    if drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
+        # What a fast loop holds follows from its gains and the plant, see `control.require_holdable`.
+        return None
     return least_growth_time_s(loop_time_s(rig, excitation.band_hz[0]))
 
 
