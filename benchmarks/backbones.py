@@ -11,7 +11,7 @@ played with the amplifier 30 dB lower: the generator's setting has steps of a mi
 
 ``--superharmonic`` tracks the first mode's 3:1 superharmonic resonance instead, from 6 to 20 m/s2. The model
 beside it is harmonic balance of specimen, table and coil together, since the table moves at three times the
-drive as well; its phase is taken as the converter's coupling capacitor (0.5 Hz) turns the base's channel.
+drive as well.
 """
 
 import argparse
@@ -61,7 +61,7 @@ MODES = {
 
 
 SUPERHARMONIC = Tracked(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), 3)
-ORDERS, WAVE, COUPLING_HZ = np.array([1, 3, 5, 7, 9]), 128, 0.5
+ORDERS, WAVE = np.array([1, 3, 5, 7, 9]), 128
 
 
 def rig_of(spring: str, seed: int) -> Rig:
@@ -154,7 +154,7 @@ def superharmonic(rig: Rig, level: float, near_hz: float) -> tuple[float, float]
         base_m = level / (2 * np.pi * hertz) ** 2
         # A sine of the base has the phasor -i.
         base, third = states[0][0] * 1j / base_m - 1.0, states[1][3] * 1j
-        seen = np.angle(third) - 3 * np.arctan(COUPLING_HZ / hertz) + 0.5 * np.pi
+        seen = np.angle(third) + 0.5 * np.pi
         moved["m"] = abs(third)
         left = np.concatenate([np.array(states) @ relative / micro - p, [base]])
         return np.concatenate([left.real, left.imag, [np.sin(seen)] if at_hz is None else []])

@@ -1,12 +1,14 @@
 """What feedback makes of base and m0: their ratio, whatever the moment from which phases are counted."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vibench.acquisition.control._feedback_channels import FeedbackChannels
 
 HERTZ, DELAY_S = 31.0, 2e-4
-CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 10_240.0)
+CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 0.0, 0.0, 10_240.0)
 
 
 @pytest.mark.parametrize("harmonic", [1, 2, 3, 4])
@@ -19,6 +21,17 @@ def test_a_harmonic_of_m0_is_that_of_a_base_which_moves_as_a_sine(harmonic, shif
     response = np.full(8, 1j * order * 3e-6 * np.exp(1j * late))
     seen = CHANNELS.transmissibility(base, response, HERTZ, harmonic)
     assert seen == pytest.approx(3e-6 / 2e-4 * np.exp(-1.2j))
+
+
+@pytest.mark.parametrize("harmonic", [1, 3])
+def test_capacitors_before_the_converter_turn_no_phase(harmonic):
+    """A first-order high-pass turns the base by 0.9 degrees at 31 Hz: three times that at 3:1."""
+    channels = replace(CHANNELS, base_cut_hz=0.5, response_cut_hz=0.5, response_delay_s=0.0)
+    order = harmonic * 2 * np.pi * HERTZ
+    base = np.full(8, -2e-4 * (2 * np.pi * HERTZ) ** 2) / (1 + 0.5 / (1j * HERTZ))
+    response = np.full(8, 1j * order * 3e-6 * np.exp(-1.2j)) / (1 + 0.5 / (1j * harmonic * HERTZ))
+    seen = channels.transmissibility(base, response, HERTZ, harmonic)
+    assert seen == pytest.approx(3e-6 / 2e-4 * np.exp(-1.2j), rel=1e-12)
 
 
 def test_a_base_that_shows_nothing_has_no_ratio():

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..errors import ConfigurationError
 from ..instruments import Samples
+from ..recording import coupling_cut_hz
 from ..rig import Channel, Role
 from ._control_action import PhaseSamples
 from ._stroboscope import Phasors, Stroboscope
@@ -28,6 +29,9 @@ class FeedbackChannels:
     """[m/s per V]"""
     response_delay_s: float
     """Of the vibrometer; taken out of every phase [s]."""
+    base_cut_hz: float
+    """-3 dB of the channel's coupling, taken out of every phase too; 0 where direct voltage passes [Hz]."""
+    response_cut_hz: float
     sample_rate_hz: float
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
@@ -52,11 +56,12 @@ class FeedbackChannels:
         """
         if not np.any(base):
             return 0j
-        acceleration = complex(np.mean(base))
+        acceleration = complex(np.mean(base)) * (1.0 - 1j * self.base_cut_hz / frequency_hz)
+        velocity = complex(np.mean(response)) * (1.0 - 1j * self.response_cut_hz / (harmonic * frequency_hz))
         # The displacement of the base is opposite to its acceleration.
         turned = 2 * pi * frequency_hz * self.response_delay_s - np.angle(-acceleration)
         moved = -2j * pi * frequency_hz * np.exp(1j * harmonic * turned) / harmonic
-        return complex(moved * np.mean(response) / abs(acceleration))
+        return complex(moved * velocity / abs(acceleration))
 
 
 def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -> FeedbackChannels:
@@ -72,6 +77,8 @@ def feedback_channels_of(channels: tuple[Channel, ...], sample_rate_hz: float) -
         base_units_per_volt=channels[base].units_per_volt,
         response_units_per_volt=channels[response].units_per_volt,
         response_delay_s=channels[response].delay_s,
+        base_cut_hz=coupling_cut_hz(channels[base].coupling),
+        response_cut_hz=coupling_cut_hz(channels[response].coupling),
         sample_rate_hz=sample_rate_hz,
     )
 

@@ -36,6 +36,7 @@ from ._header import (
     ROLE_PATTERN as ROLE_PATTERN,
     ChannelHeader as ChannelHeader,
     RecordingHeader as RecordingHeader,
+    coupling_cut_hz as coupling_cut_hz,
 )
 from ._layout import (
     CHUNK_SAMPLES as CHUNK_SAMPLES,

@@ -15,6 +15,8 @@ from ._provenance import Provenance, collect_provenance
 
 ROLE_PATTERN = re.compile(r"[a-z][a-z0-9_]*")
 COUPLINGS = ("AC", "DC")
+_AC_CUT_HZ = 0.5
+"""Of NI 9234, 4431 and their kind; first order."""
 OPTIONAL = ("sensitivity", "volts_per_count")
 """Numbers that may be unknown: NaN in the file, None here."""
 UNPLANNED = -1
@@ -221,3 +223,8 @@ def _require_json_object(name: str, text: str) -> None:
         ) from error
     if not isinstance(parsed, dict):
         raise RecordingError(f"{name} holds a JSON {type(parsed).__name__}; it must be an object.")
+
+
+def coupling_cut_hz(coupling: str) -> float:
+    """Give the -3 dB of a converter's coupling [Hz]; 0 where direct voltage passes ("DC")."""
+    return _AC_CUT_HZ if coupling == "AC" else 0.0

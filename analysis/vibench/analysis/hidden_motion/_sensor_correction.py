@@ -7,6 +7,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vibench.acquisition.recording import coupling_cut_hz
+
 from ..signals import Complexes, Reals
 
 HALF_LENGTH = 16
@@ -16,8 +18,6 @@ _EXACT_BAND = 0.42
 _FIT_POINTS = 400
 _REST_WEIGHT = 1e-3
 """Above the band the filter is only kept from growing."""
-COUPLING_CUT_HZ = 0.5
-"""-3 dB of the coupling capacitor of NI 9234 and USB-4431, first order."""
 _ASSUMED_DAMPING_RATIO = 0.02
 """Of an accelerometer's mounted resonance; a certificate rarely says it, and far below it does not matter."""
 
@@ -74,7 +74,7 @@ def sensor_correction(
     return SensorCorrection(
         acceleration=_inverse(accelerometer, sample_rate_hz),
         velocity=_inverse(vibrometer, sample_rate_hz),
-        coupling_rad_per_s=2.0 * np.pi * COUPLING_CUT_HZ if base.coupling == "AC" else 0.0,
+        coupling_rad_per_s=2.0 * np.pi * coupling_cut_hz(base.coupling),
     )
 
 

@@ -7,13 +7,13 @@ from functools import partial
 import numpy as np
 from pydantic import ValidationError
 
-from vibench.acquisition.recording import Recording
+from vibench.acquisition.recording import Recording, coupling_cut_hz
 from vibench.acquisition.rig import Rig, amplifier_of, shaker_of
 from vibench.sim import Specimen
 from vibench.sim.shaker import Amplifier, DrivenTable, Shaker
 
 from ..errors import UnusableData
-from ..recordings import BASE, DRIVE, RESPONSE, coupling_cut_hz, sensor_gain
+from ..recordings import BASE, DRIVE, RESPONSE, sensor_gain
 from ..signals import Reals
 
 AMPLIFIER = "amplifier_voltage"
@@ -78,7 +78,7 @@ def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None =
         specimen,
         partial(sensor_gain, recording.bench, base),
         partial(sensor_gain, recording.bench, m0),
-        coupling_cut_hz(base),
+        coupling_cut_hz(base.coupling),
     )
     return DrivenRig(table, driven, role)
 

@@ -34,6 +34,5 @@ from ._intact import (
 )
 from ._sensor_gain import (
     coupled_gain as coupled_gain,
-    coupling_cut_hz as coupling_cut_hz,
     sensor_gain as sensor_gain,
 )

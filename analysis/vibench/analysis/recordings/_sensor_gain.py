@@ -5,14 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from vibench.acquisition.recording import ChannelHeader
+from vibench.acquisition.recording import ChannelHeader, coupling_cut_hz
 
 from ..signals import Complexes, Reals
 
 ACCELEROMETER_DAMPING_RATIO = 0.02
 """Of a piezoelectric accelerometer's mounted resonance; usual for the kind."""
-AC_CUT_HZ = 0.5
-"""-3 dB of a converter's AC coupling: NI 9234, 4431 and their kind; first order."""
 
 
 def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
@@ -36,13 +34,8 @@ def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: 
 
 def coupled_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
     """Give the same with the channel's coupling, above 0 Hz."""
-    coupling = 1j * frequency_hz / (1j * frequency_hz + coupling_cut_hz(channel))
+    coupling = 1j * frequency_hz / (1j * frequency_hz + coupling_cut_hz(channel.coupling))
     return np.asarray(sensor_gain(bench, channel, frequency_hz) * coupling)
-
-
-def coupling_cut_hz(channel: ChannelHeader) -> float:
-    """-3 dB of the channel's coupling [Hz]; 0 where direct voltage passes."""
-    return AC_CUT_HZ if channel.coupling == "AC" else 0.0
 
 
 def _number(bench: Mapping[str, Any], section: str, key: str) -> float | None:
