@@ -141,3 +141,18 @@ def test_what_cannot_be_mapped_is_one_sentence_and_no_folder(vibench_here, tmp_p
     assert "Traceback" not in found.stderr
     assert "valid number" not in found.stderr
     assert not (tmp_path / "a").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("--branches", "none.h5"), "none.h5"),
+        (("--kicks", "5"), "--kicks needs a map in which only the start varies"),
+        (("--show", "lyapunov"), "--show lyapunov needs a map that finds exponents"),
+    ],
+)
+def test_an_estimate_is_refused_what_the_map_itself_would_be(vibench_here, tmp_path, options, told):
+    asked = ("map", plan(tmp_path, MAP), "--estimate", "--out", "a", *options)
+    found = vibench_here(*asked, cwd=tmp_path)
+    assert found.returncode == 1, found
+    assert told in " ".join(found.stderr.split())

@@ -81,10 +81,6 @@ def map_motions(
     print_warnings(plausibility_warnings(_ends(asked.amplitude_m), gaps_m))
     if show not in (None, *SHOWN):
         raise InvalidRequest(f"--show was given as {show!r}; there are {', '.join(SHOWN)}")
-    if only_estimate:
-        told = estimate_map(asked, workers)
-        print_json(told.to_dict()) if as_json else console.print(told.sentence)
-        return
     if kicks and not asked.is_basin:
         raise InvalidRequest(
             "--kicks needs a map in which only the start varies; give ranges for two coordinates"
@@ -100,6 +96,10 @@ def map_motions(
         )
     diagram = None if branches is None else read_diagram(branches)
     levels = [recorded_response(path) for path in like or ()]
+    if only_estimate:
+        told = estimate_map(asked, workers)
+        print_json(told.to_dict()) if as_json else console.print(told.sentence)
+        return
     room_for_folder(out)
     out.mkdir(parents=True, exist_ok=True)
     existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
