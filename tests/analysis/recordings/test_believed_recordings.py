@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
+from vibench.acquisition.recording._checked_counts import forget_checks
 from vibench.analysis import analyse
 from vibench.analysis.dynamics import ChainRequest
 from vibench.analysis.dynamics._chain_computing import _base_of
 from vibench.analysis.errors import UnusableData
+from vibench.analysis.exchange import xarray_dataset
+from vibench.analysis.hidden_motion import HiddenViewRequest, hidden_motion, hidden_view
 
 CHUNK, CHUNKS = 51_200, 300
 WAVE = np.round(3e5 * np.sin(2 * np.pi * np.arange(CHUNK) / 32)).astype("<i4")
@@ -52,10 +55,28 @@ def test_even_a_sine_without_noise_does_not_pack_like_that(dwell_file):
         assert 1 < recording.packing < 8
 
 
-def test_a_chain_is_not_shaken_by_a_damaged_recording(dwell_file, tmp_path):
+@pytest.fixture
+def damaged(dwell_file, tmp_path):
+    """A recording with one sample other than it was sealed with."""
     path = tmp_path / "damaged.h5"
     path.write_bytes(Path(dwell_file("weak")).read_bytes())
     with h5py.File(path, "r+") as file:
         file["base_acceleration"][5000] += 1
+    forget_checks()
+    return path
+
+
+def test_a_chain_is_not_shaken_by_a_damaged_recording(damaged):
     with pytest.raises(UnusableData, match="is damaged"):
-        _base_of(ChainRequest.model_construct(recording=str(path)))
+        _base_of(ChainRequest.model_construct(recording=str(damaged)))
+
+
+@pytest.mark.parametrize("number_from", [analyse, hidden_motion, xarray_dataset])
+def test_no_number_is_taken_from_a_damaged_recording(damaged, number_from):
+    with open_recording(damaged) as recording, pytest.raises(UnusableData, match="is damaged"):
+        number_from(recording)
+
+
+def test_nor_is_hidden_motion_shown_of_it(damaged):
+    with pytest.raises(UnusableData, match="is damaged"):
+        hidden_view(HiddenViewRequest(damaged, 0.0, 0.5))

@@ -225,6 +225,11 @@ class Recording(RecordingDescription):
             remember(found.seal, {f"/{role}": states[f"/{role}"] for role in self.roles})
         return found
 
+    @property
+    def is_checked(self) -> bool:
+        """Whether this process found it intact as a whole: what is read of it is held against that since."""
+        return was_checked(self.seal)
+
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
         """Hold every saved result against its own seal; the key is that of `check_seal`."""
         used = seal_key() if key is None else key

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vibench.acquisition.recording import ChannelHeader, Recording
 
 from ..errors import InvalidRequest
+from ..recordings import require_checked
 from ._excerpt import excerpt
 
 if TYPE_CHECKING:
@@ -45,12 +46,15 @@ def xarray_dataset(
     ------
     InvalidRequest
         When xarray is not installed, or the stretch lies outside the recording.
+    UnusableData
+        When the recording is not as it was sealed.
 
     """
     try:
         import xarray  # noqa: PLC0415 - an optional extra
     except ImportError as error:
         raise InvalidRequest("xarray is not installed; pip install 'vibench[exchange]'") from error
+    require_checked(recording)
     chosen = excerpt(recording, roles, from_s, to_s)
     time_s = recording.time_s(chosen.start, chosen.stop)
     return xarray.Dataset(

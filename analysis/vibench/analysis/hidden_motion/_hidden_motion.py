@@ -11,7 +11,7 @@ from vibench.acquisition.recording import Recording
 from vibench.sim import Specimen
 
 from ..errors import InvalidRequest
-from ..recordings import ProgressObserver, Unobserved, specimen_of
+from ..recordings import ProgressObserver, Unobserved, require_checked, specimen_of
 from ..signals import Reals, Samples
 from ..tables import Labelled
 from ._collisions import Collisions, collisions_of, joined_collisions
@@ -161,12 +161,14 @@ def hidden_motion(
     InvalidRequest
         When the stretch is none, or the contact law has no stops that yield.
     UnusableData
-        When samples were lost, a channel is missing, or the rate is too low.
+        When samples were lost, a channel is missing, the rate is too low, or the recording is not as it was
+        sealed.
     NotEnoughData
         When the stretch is too short.
 
     """
     watcher = Unobserved() if observer is None else observer
+    require_checked(recording)
     described = tracked_specimen(specimen_of(recording.bench) if specimen is None else specimen)
     motion = prepared_motion(recording, *_stretch(recording, start_s, stop_s))
     name = recording.path.name.removesuffix(".part").removesuffix(".h5")

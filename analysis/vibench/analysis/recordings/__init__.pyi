@@ -29,6 +29,7 @@ from ._facts import (
     specimen_of as specimen_of,
 )
 from ._intact import (
+    require_checked as require_checked,
     require_intact as require_intact,
     require_measured_size as require_measured_size,
 )

@@ -25,6 +25,12 @@ def require_measured_size(recording: Recording) -> None:
         )
 
 
+def require_checked(recording: Recording) -> None:
+    """Hold a recording against its seal, where this process has not done so; raises as `require_intact`."""
+    if not recording.is_checked:
+        require_intact(recording)
+
+
 def require_intact(recording: Recording) -> SealCheck:
     """Hold every sample, attribute and table against the seal; gives what was found.
 
