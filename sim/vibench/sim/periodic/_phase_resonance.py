@@ -33,6 +33,9 @@ FREQUENCY_SHARE = 0.1
 """A change of the frequency by this share counts as one unit of length."""
 FARTHEST = 20.0
 """Units of length from the start, in frequency or level, beyond which an iteration has gone astray."""
+STRAYED = 1e3
+"""A state so many gaps away is none: an iteration that tries it has gone astray. On a hard spring it would swing
+many millions of times a period, and its run take minutes."""
 SAMPLES = 256
 DIFFERENCE = 1e-6
 """Step of the differences by which the phase's slopes are taken, over each unknown's scale."""
@@ -75,7 +78,7 @@ class PhaseResonanceFamily:
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
         """How far the motion goes in a period and the phase is off, with the derivatives, shape (7, 8)."""
-        if not bool(np.all(np.abs(point[6:]) < FARTHEST)):
+        if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
             return np.full(7, math.nan), np.full((7, 8), math.nan)
         drive, state, own = self.drive_at(point), point[:6] * self.scales, self.scales
         ratio = state_scales(self.mapping.specimen, drive) / own
