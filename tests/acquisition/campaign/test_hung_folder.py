@@ -20,7 +20,7 @@ PLAN = Campaign(
 @pytest.mark.skipif(sys.platform == "win32", reason="a pipe that nobody reads hangs as POSIX has it")
 def test_a_status_that_hangs_while_the_drive_is_on_leaves_a_stop_its_way(rig, tmp_path, monkeypatch):
     monkeypatch.setattr(_log, "LINE_EVERY_S", 0.0)
-    switch, status = StopSwitch(), tmp_path / "c.status"
+    switch, status, fifo = StopSwitch(), tmp_path / "c.status", tmp_path / "fifo"
 
     def progress(stand):
         if stand.run.state is not RunState.RECORDING:
@@ -28,8 +28,9 @@ def test_a_status_that_hangs_while_the_drive_is_on_leaves_a_stop_its_way(rig, tm
         if status.is_fifo():
             switch.ask(StopRequest.by(Cause.OPERATOR, "enough"))
         else:
-            status.unlink(missing_ok=True)
-            os.mkfifo(status)
+            # At once: what writes the status may do so between an unlink and a mkfifo.
+            os.mkfifo(fifo)
+            fifo.replace(status)
 
     with ReconnectingBench(rig) as kept:
         (point_result,) = run_campaign(kept.bench, PLAN, tmp_path, on_progress=progress, switch=switch)

@@ -226,5 +226,12 @@ def _require_json_object(name: str, text: str) -> None:
 
 
 def coupling_cut_hz(coupling: str) -> float:
-    """Give the -3 dB of a converter's coupling [Hz]; 0 where direct voltage passes ("DC")."""
+    """Give the -3 dB of a converter's coupling, first order [Hz].
+
+    Parameters
+    ----------
+    coupling
+        ``"AC"``, or ``"DC"``: direct voltage passes, and 0 is given.
+
+    """
     return _AC_CUT_HZ if coupling == "AC" else 0.0
