@@ -61,6 +61,25 @@ def test_a_recording_goes_out_and_comes_back(run, recorded):
         assert [each.label for each in second.segments] == ["dwell"]
 
 
+@pytest.mark.parametrize("folder", [".", "made", "..", "made/"])
+def test_a_folder_takes_a_file_of_the_usual_name(run, recorded, folder):
+    """Of "." the export was a traceback, of any other folder a name that is taken."""
+    recorded.with_name("made").mkdir()
+    place = recorded.parent / folder
+    out = run("export", "run.h5", "--to", "csv", "--out", folder)
+    assert out.exit_code == 0, out.output
+    assert (place / "run.csv").is_file()
+    run("export", "run.h5", "--to", "uff", "--out", "other.uff")
+    recorded.with_name("map.toml").write_text(MAPPING)
+    back = run("import", "other.uff", "--mapping", "map.toml", "--out", folder)
+    assert back.exit_code == 0, back.output
+    assert (place / "other.h5").is_file()
+    licence = "https://creativecommons.org/licenses/by/4.0/"
+    packed = run("pack", str(recorded.parent), "--license", licence, "--out", folder)
+    assert packed.exit_code == 0, packed.output
+    assert (place / f"{recorded.parent.name}.zip").is_file()
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

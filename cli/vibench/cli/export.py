@@ -17,6 +17,7 @@ from vibench.analysis.exchange import Format, Results, excerpt, export_functions
 
 from .external_data import AllowExternal, external_data
 from .output import console
+from .paths import file_at
 from .progress_bars import transfer_bar
 
 
@@ -25,7 +26,9 @@ def export(
     to: Annotated[Format, typer.Option("--to", help="What to make of it.")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="PATH", help="The new file; beside the recording if absent."),
+        typer.Option(
+            "--out", metavar="PATH", help="The new file, or a folder for it; beside the recording if absent."
+        ),
     ] = None,
     channels: Annotated[
         str,
@@ -66,7 +69,7 @@ def export(
         chosen = excerpt(
             opened, tuple(each.strip() for each in channels.split(",")) if channels else (), from_s, to_s
         )
-        path = recording.with_name(f"{chosen.name}.{to.value}") if out is None else out
+        path = file_at(out, recording.with_name(f"{chosen.name}.{to.value}"))
         if spectra:
             view = quantities_named(quantity or "displacement", MagnitudeScale.LOG)
             functions = spectral_functions(chosen, FrequencyResponseRequest(view=view))

@@ -13,7 +13,7 @@ from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recor
 
 from .external_data import AllowExternal, external_data
 from .output import console, print_json
-from .paths import AsJson
+from .paths import AsJson, file_at
 from .progress_bars import transfer_bar
 
 
@@ -25,7 +25,9 @@ def import_file(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="NAME.h5", help="The new recording; beside FILE if absent."),
+        typer.Option(
+            "--out", metavar="NAME.h5", help="The new recording, or a folder for it; beside FILE if absent."
+        ),
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
@@ -42,7 +44,7 @@ def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool
         _tell(file, as_json)
         return
     meaning = load_toml(mapping, ImportMapping)
-    target = file.with_suffix(".h5") if out is None else out
+    target = file_at(out, file.with_suffix(".h5"))
     with opened_source(file) as source:
         longest = max(each.samples for each in source.channels)
     with transfer_bar("import", longest * len(meaning.channels)) as observer:

@@ -11,6 +11,7 @@ from vibench.analysis.exchange import CrateFacts, pack_folder
 
 from .exit_code import ExitCode
 from .output import console
+from .paths import file_at
 from .progress_bars import transfer_bar
 
 
@@ -20,7 +21,8 @@ def pack(
         str, typer.Option("--license", metavar="URL", help="https://creativecommons.org/licenses/by/4.0/")
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="CRATE.zip", help="DIR.zip beside it if absent.")
+        Path | None,
+        typer.Option("--out", metavar="CRATE.zip", help="Or a folder for it; DIR.zip beside it if absent."),
     ] = None,
     author: Annotated[
         list[str] | None, typer.Option("--author", metavar="NAME", help="May be given several times.")
@@ -31,7 +33,7 @@ def pack(
     """Pack a folder of recordings as a Research Object Crate, described for a repository."""
     here = folder.resolve()
     # Not with_suffix: a folder may be called after a level, "0.5Vpp".
-    crate = here.with_name(f"{here.name}.zip") if out is None else out
+    crate = file_at(out, here.parent / f"{here.name}.zip")
     facts = CrateFacts(licence, tuple(author or ()), title, description)
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     found = verify_recordings(folder, key=seal_key())

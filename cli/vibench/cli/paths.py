@@ -67,6 +67,13 @@ def room_for_page(path: Path) -> None:
     room_for_folder(path.parent)
 
 
+def file_at(out: Path | None, usual: Path) -> Path:
+    """Say where a new file goes: to what was named, by its usual name into a folder, or to its usual place."""
+    if out is None:
+        return usual
+    return out / usual.name if out.is_dir() else out
+
+
 def unused(path: Path) -> Path:
     """Give a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
     candidate, number = path, 1
