@@ -68,7 +68,7 @@ def room_for_page(path: Path) -> None:
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
-    """Say where a new file goes: to what was named, by its usual name into a folder, or to its usual place."""
+    """Give a new file its place: what was named, a folder that was (by its usual name), or the usual one."""
     if out is None:
         return usual
     return out / usual.name if out.is_dir() else out
