@@ -172,3 +172,22 @@ def test_zero_is_named_as_it_was_typed(command):
 )
 def test_what_cannot_be_asked_is_refused_in_one_sentence(arguments, said):
     assert said in refused(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("branches", *LINE, "--amplitude", "1e300"), "Drive amplitude 1e+300 m is not allowed"),
+        (("branches", "--frequency", 60, "--amplitude", "1e299:1e300"), "Drive amplitude 1e+299 m is not"),
+        (("chain", *POINT, "--amplitude", "1e300"), "Drive amplitude 1e+300 m is not allowed"),
+        *(
+            ((*each, "--damping-time", value), f"--damping-time was given as {float(value)!r}")
+            for each in (("spectrum", *POINT), ("branches", *LINE), ("chain", *POINT))
+            for value in ("1e300", "1e3")
+        ),
+    ],
+)
+@pytest.mark.timeout(30)
+def test_numbers_that_no_specimen_has_are_refused_at_once(arguments, told):
+    """They were tracebacks, warnings of numpy, or took minutes."""
+    assert told in refused(*arguments, *(("--starts", 0) if arguments[0] == "branches" else ()))

@@ -4,7 +4,7 @@
 def test_an_impossible_damping_is_one_sentence_and_computes_nothing(vibench_here, tmp_path):
     result = vibench_here("reproduce", "--out", "kept", "--damping-time", "-1e-5", cwd=tmp_path)
     assert result.returncode == 1
-    assert "a damping time of -1e-05 s is not allowed; give zero or a positive one" in result.stderr
+    assert "a damping time of -1e-05 s is not allowed; give 0 to 0.01" in result.stderr
     assert not (tmp_path / "kept").exists()
 
 

@@ -13,6 +13,7 @@ from .model import (
     AccuracyWord as AccuracyWord,
     BaseResponse as BaseResponse,
     ContactLaw as ContactLaw,
+    DampingTime as DampingTime,
     Drive as Drive,
     Elasticity as Elasticity,
     Harmonic as Harmonic,

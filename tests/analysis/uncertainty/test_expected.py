@@ -9,6 +9,8 @@ from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSwe
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse_files, budgets_of, expected_uncertainty
 from vibench.analysis.uncertainty import Cause
+from vibench.analysis.uncertainty._expected import _simulated_scatter
+from vibench.sim import gong2025
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 NOISE = MultisineNoise(
@@ -95,3 +97,7 @@ def test_a_rig_that_states_no_noise_is_told_so_and_a_sweep_promises_nothing():
 def test_a_dwell_of_hours_a_period_promises_nothing():
     slow = Dwell(amplitude_vpp=1.5, frequency_hz=1e-4, settle_s=0.1, duration_s=1)
     assert expected_uncertainty(Measurement(name="slow", excitation=slow), RIG) == ()
+
+
+def test_a_motion_that_cannot_be_computed_has_no_scatter():
+    assert _simulated_scatter(gong2025(), 1e99, 260.0) is None

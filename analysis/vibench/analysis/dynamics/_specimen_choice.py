@@ -3,12 +3,13 @@
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import PositiveFloat, model_validator
 
 from vibench.acquisition import ChosenFrom, FrozenModel
 from vibench.sim import (
     CONTACT_LAWS,
     USUAL_SPECIMEN,
+    DampingTime,
     Specimen,
     SpecimenTable,
     load_specimen,
@@ -28,7 +29,7 @@ class SpecimenChoice(FrozenModel):
     model: ContactWord = ""
     """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...; empty for
     the specimen's own."""
-    damping_time_s: NonNegativeFloat | None = None
+    damping_time_s: DampingTime | None = None
     """Damping over stiffness of every link: c = damping time times k; empty for the specimen's own."""
     gap_m: PositiveFloat | None = None
     """Clearance at both stops; empty for the specimen's own."""

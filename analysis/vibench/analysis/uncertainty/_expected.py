@@ -15,7 +15,7 @@ from vibench.acquisition.plan import (
     preview_measurement,
 )
 from vibench.acquisition.rig import BaseQuantity, Rig, RigModel
-from vibench.sim import Harmonic, Specimen, base_transmissibility, integrate
+from vibench.sim import Harmonic, Outcome, Specimen, base_transmissibility, integrate
 
 from ..model import RESPONSE_I, RESPONSE_II
 from ..signals import Reals
@@ -197,12 +197,17 @@ def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_h
 
 
 def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -> Iterator[Expected]:
-    """Say what is to be expected of a sine; nothing where a window has no period for each of its tenths."""
+    """Say what is to be expected of a sine.
+
+    Nothing where a window has no period for each of its tenths, or the motion cannot be simulated.
+    """
     if at_hz * _WINDOW_S < _TENTHS:
         return
     specimen = rig.specimen.specimen()
     amplitude_m = float(base_motion(measurement.excitation, rig, np.array([at_hz])).amplitude_m[0])
     chance = _simulated_scatter(specimen, amplitude_m, at_hz)
+    if chance is None:
+        return
     noise = _densities(rig)
     omega = 2 * np.pi * at_hz
     size_m = float(abs(base_transmissibility(specimen, [at_hz])[0, 0])) * amplitude_m
@@ -224,12 +229,14 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
             yield Expected(name, _WINDOW_S, told, Cause.NOISE, lasting, missing)
 
 
-def _simulated_scatter(specimen: Specimen, amplitude_m: float, at_hz: float) -> tuple[float, float]:
-    """Relative scatter of both Responses over windows of 5 s, from one simulated run."""
+def _simulated_scatter(specimen: Specimen, amplitude_m: float, at_hz: float) -> tuple[float, float] | None:
+    """Relative scatter of both Responses over windows of 5 s, from one simulated run; None if it was lost."""
     rate = _RATE_PER_HZ * at_hz
     path = integrate(
         specimen, Harmonic(frequency_hz=at_hz, amplitude_m=amplitude_m), _SIMULATED_S, sample_rate_hz=rate
     )
+    if path.outcome is not Outcome.REACHED_END:
+        return None
     kept = round(_WINDOW_S * rate)
     x: Reals = np.asarray(path.states[-kept:, 0], dtype=np.float64)
     turn = np.exp(-2j * np.pi * at_hz * np.arange(kept) / rate)

@@ -70,6 +70,7 @@ from ._specimen import (
 from ._specimen_description import (
     USUAL_SPECIMEN as USUAL_SPECIMEN,
     ContactWord as ContactWord,
+    DampingTime as DampingTime,
     SpecimenDescription as SpecimenDescription,
     SpecimenTable as SpecimenTable,
     UnknownSpecimenError as UnknownSpecimenError,

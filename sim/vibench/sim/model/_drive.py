@@ -11,8 +11,8 @@ from pydantic import ConfigDict
 _STRICT = ConfigDict(extra="forbid")
 FEWEST_SAMPLES = 4
 """A cubic spline without end conditions of its own needs four points."""
-SMALLEST_AMPLITUDE_M = 1e-100
-"""Below, squares of displacements are no numbers any more: errors of steps and scatters would be zero."""
+SMALLEST_AMPLITUDE_M, LARGEST_AMPLITUDE_M = 1e-100, 1e100
+"""Beyond, squares of displacements are no numbers any more: errors of steps and scatters would be zero."""
 LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_HZ = 1e-12, 1e12
 """Far beyond, powers of a frequency overflow, and lengths in drive periods have no end."""
 
@@ -142,10 +142,10 @@ def _require_frequency(name: str, frequency_hz: float) -> None:
 
 
 def _require_amplitude(amplitude_m: float) -> None:
-    if amplitude_m != 0.0 and not SMALLEST_AMPLITUDE_M <= amplitude_m < math.inf:
+    if amplitude_m != 0.0 and not SMALLEST_AMPLITUDE_M <= amplitude_m <= LARGEST_AMPLITUDE_M:
         msg = (
             f"Drive amplitude {amplitude_m} m is not allowed: "
-            f"it must be zero, or {SMALLEST_AMPLITUDE_M:g} m or more, and finite."
+            f"it must be zero, or lie between {SMALLEST_AMPLITUDE_M:g} and {LARGEST_AMPLITUDE_M:g} m."
         )
         raise ValueError(msg)
 

@@ -105,6 +105,9 @@ def _known_law(word: str) -> str:
 ContactWord = Annotated[str, AfterValidator(_known_law)]
 """A contact law as `CONTACT_LAWS` spells it: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
 Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True)]
+DampingTime = Annotated[float, Field(ge=0.0, le=1.0)]
+"""Damping over stiffness [s]; the longest is 300 times critical in the paper's first mode. Far beyond, runs
+take minutes, or their numbers leave those of a computer."""
 
 
 class SpecimenDescription(_Described):
@@ -124,7 +127,7 @@ class SpecimenDescription(_Described):
     """f0, f1, f2 of each mass on its own spring: k_i = m_i (2 pi f_i)^2; instead of the stiffnesses."""
     stiffnesses_n_per_m: PositiveTriple | None = None
     """k0 (base to m0), k1 (m2 to m1), k2 (m0 to m2)."""
-    damping_time_s: NonNegativeFloat | None = None
+    damping_time_s: DampingTime | None = None
     """c_i = damping time * k_i; instead of the dampings."""
     dampings_ns_per_m: NonNegativeTriple | None = None
     """c0, c1, c2, beside k0, k1, k2."""
