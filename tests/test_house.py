@@ -12,6 +12,7 @@ TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 
 
+@pytest.mark.timeout(300)  # mypy without a cache, beside another test, on two cores
 @pytest.mark.parametrize(
     "command",
     [
