@@ -3,6 +3,7 @@
 import itertools
 import json
 import random
+import threading
 
 import h5py
 import numpy as np
@@ -223,6 +224,17 @@ def test_two_runs_cannot_write_one_file_and_anybody_may_read_it_meanwhile(small,
             assert file[STATE].shape == small.grid.shape
             assert not open_study(path).is_complete
     FileStore(path, small).close()
+
+
+def test_whoever_looks_at_a_study_for_a_moment_does_not_end_it(small, tmp_path):
+    """A reader holds HDF5's lock while it looks: a study that began just then was refused its own file."""
+    path = tmp_path / "a.h5"
+    make_file(path, small)
+    reader = h5py.File(path, "r")
+    leaving = threading.Timer(0.3, reader.close)
+    leaving.start()
+    FileStore(path, small).close()
+    leaving.join()
 
 
 @pytest.mark.parametrize(
