@@ -76,9 +76,8 @@ def posterior(
         narrower = np.clip(np.stack([middle - reach, middle + reach], axis=1), box[:, :1], box[:, 1:])
         found = np.clip(middle + errors, box[:, 0], box[:, 1])
         guessed = np.vstack([parameters - errors, middle])
-        distance = _distance(guessed, statistics, observed)
         box = narrower
-    return Posterior(found, distance)
+    return Posterior(found, _distance(guessed, statistics, observed))
 
 
 def _regressed(statistics: Reals, parameters: Reals, observed: Reals) -> tuple[Reals, Reals]:
@@ -109,7 +108,8 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
     """Say how far observed statistics lie from what parameters give, over the furthest run's own.
 
     Without what the parameters that a regression finds explain, along the largest components of the rest and
-    beyond them. Parameters of runs are found as those of the observed are.
+    beyond them. Each run is held against the others, as the observed statistics are against all: a run that
+    had a part in what it is held against would seem nearer than it is, the more so the fewer there are.
 
     Parameters
     ----------
@@ -124,10 +124,20 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
     size = (parameters - parameters[:-1].mean(axis=0)) / (parameters[:-1].std(axis=0) + 1e-12)
     terms = np.column_stack([np.ones(len(size)), size, size**2])
     values = np.vstack([statistics, observed]) / (statistics.std(axis=0) + 1e-12)
-    known, *_ = np.linalg.lstsq(terms[:-1], values[:-1], rcond=None)
-    rest = values - terms @ known
-    _, spread, axes = np.linalg.svd(rest[:-1], full_matrices=False)
-    along = rest @ axes[:_COMPONENTS].T
+    seen = _far(terms[:-1], values[:-1], terms[-1], values[-1])
+    furthest = np.zeros(2)
+    for number in range(len(statistics)):
+        others = np.arange(len(statistics)) != number
+        own = _far(terms[:-1][others], values[:-1][others], terms[number], values[number])
+        furthest = np.maximum(furthest, own)
+    return float(np.sqrt(np.max(seen / furthest)))
+
+
+def _far(terms: Reals, values: Reals, own_terms: Reals, own_values: Reals) -> Reals:
+    """Square distances of a run from others, shapes (terms,), (statistics,): along components and beyond."""
+    known, *_ = np.linalg.lstsq(terms, values, rcond=None)
+    _, spread, axes = np.linalg.svd(values - terms @ known, full_matrices=False)
+    rest = own_values - own_terms @ known
+    along = axes[:_COMPONENTS] @ rest
     beyond = rest - along @ axes[:_COMPONENTS]
-    far = np.stack([np.sum((along / spread[:_COMPONENTS]) ** 2, axis=1), np.sum(beyond**2, axis=1)])
-    return float(np.sqrt(np.max(far[:, -1] / far[:, :-1].max(axis=1))))
+    return np.array([np.sum((along / spread[:_COMPONENTS]) ** 2), np.sum(beyond**2)])
