@@ -29,7 +29,6 @@ LAWS = {
     "p5": ("gong2025", "power:5"),
 }
 """Specimen and contact law of each."""
-MOST_BRANCHES = 20
 SAMPLES = 128
 LEAST_M = 1e-8
 """A smaller subharmonic is none: the motion repeats sooner."""
@@ -90,9 +89,7 @@ def main() -> None:
     parser.add_argument("--laws", nargs="+", choices=LAWS, default=list(LAWS))
     parser.add_argument("--levels", nargs="+", type=float, default=LEVELS_M, help="of the base [m]")
     options = parser.parse_args()
-    search = MotionSearch(
-        places=9, starts=options.starts, most_periods=3, most_branches=MOST_BRANCHES, seed=options.seed
-    )
+    search = MotionSearch(places=9, starts=options.starts, most_periods=3, seed=options.seed)
     for name in options.laws:
         described, law = LAWS[name]
         specimen = load_specimen(described).specimen(law)

@@ -63,10 +63,9 @@ def figure(
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     studies = KeptStudies(out / "studies", workers)
     for each in numbers:
-        if each in EXPERIMENT:
-            drawn = list(experiment(each))
-        else:
-            drawn = [PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))]
+        drawn = experiment(each)
+        if each in asked:
+            drawn = iter([PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))])
         for one in drawn:
             paths = one.save(out, kinds)
             console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")

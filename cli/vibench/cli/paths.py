@@ -68,7 +68,7 @@ def room_for_page(path: Path) -> None:
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
-    """Give a new file its place: what was named, a folder that was (by its usual name), or the usual one."""
+    """Give the path of a new file: the one that was named, or in a folder that was, by its usual name."""
     if out is None:
         return usual
     return out / usual.name if out.is_dir() else out
