@@ -80,7 +80,7 @@ def test_a_run_that_is_lost_says_how_it_ended_and_nothing_else_is_claimed(freque
         "--cells",
         2,
         "--amplitude",
-        1e160,
+        1e100,
         "--frequency",
         frequency,
         "--duration",
