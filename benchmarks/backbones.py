@@ -1,17 +1,19 @@
 """Backbones of three modes over three decades of level on the virtual rig, beside the simulated ones.
 
     python benchmarks/backbones.py [--mode 1] [--spring hardening] [--levels 49] [--periods 150] [--seed 1]
+    python benchmarks/backbones.py --superharmonic 2 --spring bumpers [--levels 13]
 
 Tracks the phase resonance of each mode of the paper's specimen with a fixture of 0.6 kg, and prints, level by
 level, frequency with its standard uncertainty and the drive periods it took, beside the motions that the
 model has there (`phase_resonance_branch`): frequency, and largest Floquet multiplier in brackets. Where no
 resonance was met, where the loop was, and whether that motion repeats. With
-``--spring hardening`` p^3 stands in the place of the stops (0.1 k1 p at 100 um). The weaker levels are
+``--spring hardening`` p^3 stands in the place of the stops (0.1 k1 p at 100 um), with ``--spring bumpers``
+soft springs behind uneven gaps (100 N/m, 0.12 k1, below at 60 and above at 30 um). The weaker levels are
 played with the amplifier 30 dB lower: the generator's setting has steps of a millivolt.
 
-``--superharmonic`` tracks the first mode's 3:1 superharmonic resonance instead, from 6 to 20 m/s2. The model
-beside it is harmonic balance of specimen, table and coil together, since the table moves at three times the
-drive as well.
+``--superharmonic 3`` tracks the first mode's 3:1 superharmonic resonance instead, from 6 to 20 m/s2, and
+``--superharmonic 2`` the 2:1 one, from 10 to 25 m/s2. The model beside it is harmonic balance of specimen,
+table and coil together, since the table moves at so many times the drive as well.
 """
 
 import argparse
@@ -60,8 +62,12 @@ MODES = {
 }
 
 
-SUPERHARMONIC = Tracked(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), 3)
-ORDERS, WAVE = np.array([1, 3, 5, 7, 9]), 128
+SUPERHARMONICS = {
+    2: (Tracked(47.5, 44, 53, 0.4, PhaseReference.RELATIVE, 10.0, 0.0, (44, 53), 2), 25.0),
+    3: (Tracked(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), 3), 20.0),
+}
+"""By the order, where it is tracked, and up to which level [m/s2]."""
+ORDERS, WAVE = np.arange(20), 512
 
 
 def rig_of(spring: str, seed: int) -> Rig:
@@ -75,6 +81,9 @@ def rig_of(spring: str, seed: int) -> Rig:
     if spring == "hardening":
         cubic = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * K1 * 1e-4 / 1e-9}
         changed["specimen"] = rig.specimen.model_copy(update=cubic)
+    if spring == "bumpers":
+        uneven = {"contact": "linear_gap:100", "gap_m": (60e-6, 30e-6)}
+        changed["specimen"] = rig.specimen.model_copy(update=uneven)
     return rig.model_copy(update=changed)
 
 
@@ -131,57 +140,70 @@ def motions_at(model: Branch, level: float) -> list[tuple[float, float]]:
     return found
 
 
-def superharmonic(rig: Rig, level: float, near_hz: float) -> tuple[float, float]:
-    """Find the 3:1 phase resonance under a level by harmonic balance: frequency [Hz], third harmonic [m]."""
+def superharmonic(rig: Rig, level: float, near_hz: float, order: int) -> tuple[float, float]:
+    """Find the phase resonance under a level by harmonic balance: frequency [Hz], and that harmonic [m]."""
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), LoopTiming(1e4, 0.0))
     (rates, volt), spring = plant.equations, spring_of(specimen_of(rig))
     into, relative = (each[:9] for each in plant.spring)
     turns = np.exp(2j * np.pi * np.outer(ORDERS, np.arange(WAVE)) / WAVE)
+    parts = np.where(ORDERS, 2.0, 1.0)[:, None] / WAVE
     micro, moved = 1e-6, {}
+
+    def states_at(hertz: float, pushes: np.ndarray) -> np.ndarray:
+        return np.array(
+            [
+                np.linalg.solve(2j * np.pi * k * hertz * np.eye(9) - rates, each)
+                for k, each in zip(ORDERS, pushes, strict=True)
+            ]
+        )
 
     def wrong(unknown: np.ndarray, at_hz: float | None) -> np.ndarray:
         """Give what is left: p [um] at each order, the base, and at no given frequency the phase."""
-        p, volts = unknown[:5] + 1j * unknown[5:10], complex(*unknown[10:12])
-        hertz = unknown[12] if at_hz is None else at_hz
+        p, volts = unknown[:20] + 1j * unknown[20:40], complex(*unknown[40:42])
+        hertz = unknown[42] if at_hz is None else at_hz
         wave = micro * (p @ turns).real
-        force = 2 / WAVE * turns.conj() @ spring.force(wave, 0 * wave)
+        force = (parts * turns.conj()) @ spring.force(wave, 0 * wave)
         pushes = np.outer(force, into)
-        pushes[0] += volts * volt
-        states = [
-            np.linalg.solve(2j * np.pi * k * hertz * np.eye(9) - rates, each)
-            for k, each in zip(ORDERS, pushes, strict=True)
-        ]
-        base_m = level / (2 * np.pi * hertz) ** 2
+        pushes[1] += volts * volt
+        states = states_at(hertz, pushes)
         # A sine of the base has the phasor -i.
-        base, third = states[0][0] * 1j / base_m - 1.0, states[1][3] * 1j
-        seen = np.angle(third) + 0.5 * np.pi
-        moved["m"] = abs(third)
-        left = np.concatenate([np.array(states) @ relative / micro - p, [base]])
+        base, of_m0 = states[1][0] * 1j / base_m(hertz) - 1.0, states[order][3] / (-1j) ** order
+        seen = np.angle(of_m0) + 0.5 * np.pi
+        moved["m"] = abs(of_m0)
+        left = np.concatenate([states @ relative / micro - p, [base]])
         return np.concatenate([left.real, left.imag, [np.sin(seen)] if at_hz is None else []])
 
-    guess = np.array([2.8 * level, *np.zeros(9), 0.06 * level, 0.0])
+    def base_m(hertz: float) -> float:
+        return level / (2 * np.pi * hertz) ** 2
+
+    # From the motion without the spring between the masses.
+    alone = states_at(near_hz, np.outer(ORDERS == 1, volt))
+    volts = -1j * base_m(near_hz) / alone[1][0]
+    p = alone @ relative * volts / micro
+    guess = np.array([*p.real, *p.imag, volts.real, volts.imag])
     forced = root(wrong, guess, args=(near_hz,)).x
     found = root(wrong, np.append(forced, near_hz), args=(None,))
-    return (float(found.x[12]), moved["m"]) if found.success else (np.nan, np.nan)
+    return (float(found.x[42]), moved["m"]) if found.success else (np.nan, np.nan)
 
 
-def compare_superharmonic(rig: Rig, spring: str, count: int, periods: int) -> None:
-    """Print what was tracked at three times the drive, beside the model where the spring is smooth."""
+def compare_superharmonic(rig: Rig, spring: str, order: int, count: int, periods: int) -> None:
+    """Print what was tracked at so many times the drive, beside the model of a softer spring."""
+    mode, highest = SUPERHARMONICS[order]
     with tempfile.TemporaryDirectory() as folder:
-        levels = np.geomspace(SUPERHARMONIC.lowest, 20.0, count)
-        notes = tracked(rig, SUPERHARMONIC, levels, periods, Path(folder))
+        levels = np.geomspace(mode.lowest, highest, count)
+        notes = tracked(rig, mode, levels, periods, Path(folder))
     away = []
     for each in notes:
-        hertz, third_m = np.nan, np.nan
-        if spring == "hardening":
-            hertz, third_m = superharmonic(rig, each.base_m_per_s2, each.at_hz)
+        hertz, harmonic_m = np.nan, np.nan
+        if spring != "stops":
+            hertz, harmonic_m = superharmonic(rig, each.base_m_per_s2, each.at_hz, order)
         if each.frequency_hz is not None:
             away.append(abs(each.frequency_hz - hertz))
         found = each.frequency_hz or np.nan
         print(
             f"{each.base_m_per_s2:8.4g} m/s2: {found:.3f} +- {each.frequency_u_hz or np.nan:.3f} Hz, "
             f"{1e6 * each.harmonic_m:.3f} um ({each.lock.value}, {each.phase_deg:.1f} degrees, "
-            f"{each.motion.value}); {each.periods} periods; model {hertz:.3f} Hz, {1e6 * third_m:.3f} um"
+            f"{each.motion.value}); {each.periods} periods; model {hertz:.3f} Hz, {1e6 * harmonic_m:.3f} um"
         )
     print(
         f"{len(away)} of {len(notes)} levels met; from the model {max(away, default=np.nan):.3f} Hz at most"
@@ -221,15 +243,15 @@ def main() -> None:
     """Print one row for each level."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--mode", type=int, choices=MODES)
-    parser.add_argument("--spring", choices=("stops", "hardening"), default="stops")
+    parser.add_argument("--spring", choices=("stops", "hardening", "bumpers"), default="stops")
     parser.add_argument("--levels", type=int, default=49)
     parser.add_argument("--periods", type=int, default=150)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--superharmonic", action="store_true")
+    parser.add_argument("--superharmonic", type=int, choices=SUPERHARMONICS)
     given = parser.parse_args()
     rig = rig_of(given.spring, given.seed)
     if given.superharmonic:
-        compare_superharmonic(rig, given.spring, given.levels, given.periods)
+        compare_superharmonic(rig, given.spring, given.superharmonic, given.levels, given.periods)
         return
     specimen = specimen_of(rig)
     for number in [given.mode] if given.mode else MODES:

@@ -257,6 +257,45 @@ def test_a_superharmonic_resonance_is_met_where_table_and_specimen_have_it(carri
     assert found[1]["periods"] <= 150
 
 
+def second_superharmonic(*levels, **options):
+    return ResonanceTracking(
+        amplitude_vpp=9.0,
+        start_hz=47.5,
+        low_hz=46.5,
+        high_hz=50,
+        widest_step_hz=0.4,
+        harmonic=2,
+        accelerations_m_per_s2=levels,
+        settling=Settling(tolerance=0.02, longest_wait_s=6.0),
+        most_tries=12,
+        **options,
+    )
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), ((30e-6, 60e-6), 90)])
+def test_a_second_superharmonic_leads_or_lags_by_which_bumper_is_nearer(carried_out, gap_m, phase_deg):
+    """Beside harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
+    bumpers = {"contact": "linear_gap:100", "gap_m": gap_m}
+    plan = second_superharmonic(10.38, 10.78, phase_deg=phase_deg)
+    found = said(carried_out(plan, **bumpers), "resonance")
+    assert [each["lock"] for each in found] == ["locked"] * 2
+    levels, hertz, second_m = (10, 10.5, 11), (47.756, 47.830, 47.881), (5.14e-7, 6.78e-7, 8.17e-7)
+    for each in found:
+        model_hz, model_m = (np.interp(each["base_m_per_s2"], levels, model) for model in (hertz, second_m))
+        assert each["frequency_hz"] == pytest.approx(model_hz, abs=2 * each["frequency_u_hz"])
+        assert each["frequency_u_hz"] < 0.01
+        assert each["harmonic_m"] == pytest.approx(model_m, rel=0.03)
+    assert found[1]["periods"] <= 150
+
+
+@pytest.mark.thorough
+def test_a_second_superharmonic_is_not_met_with_the_phase_of_the_other_side(carried_out):
+    bumpers = {"contact": "linear_gap:100", "gap_m": (60e-6, 30e-6)}
+    found = said(carried_out(second_superharmonic(10.38, phase_deg=90), **bumpers), "resonance")
+    assert [each.get("frequency_hz") for each in found] == [None]
+
+
 @pytest.mark.thorough
 def test_among_stops_that_are_not_reached_there_is_no_superharmonic_resonance(carried_out):
     found = said(carried_out(superharmonic(5.0, 8.0)), "resonance")

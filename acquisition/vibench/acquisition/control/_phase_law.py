@@ -28,7 +28,8 @@ class LearntMode:
     """What the phase-locked loop knows of a mode."""
 
     narrowest_hz: float
-    """Half-width of the resonance as it was searched for; contacts and hard springs only widen it."""
+    """Half-width of the resonance as it was searched for; contacts and hard springs only widen it. Zero for a
+    superharmonic one."""
     half_width_hz: float
     bend_hz: float = 0.0
     """What the resonance moved by while the level grew by e; zero where that is not known."""

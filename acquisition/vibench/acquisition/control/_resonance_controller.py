@@ -149,8 +149,11 @@ def _searched(
     if lock is not LockResult.LOCKED:
         return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
-    # Contacts bend the flanks: the first width, found without them, is kept.
-    return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode or LearntMode(width_hz, width_hz))
+    # Contacts bend the flanks: the first width, found without them, is kept. What drives a superharmonic
+    # hangs on the frequency too, the more the nearer contacts are to their first: that width is no bound.
+    narrowest_hz = width_hz if plan.harmonic == 1 else 0.0
+    learnt = last.mode or LearntMode(narrowest_hz, width_hz)
+    return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,13 @@ class ResonanceTracking(AbstractFeedback):
     modes shift the phase a little; the flanks tell the natural frequency and the damping apart from them, as
     long as the motion is linear.
 
-    With ``harmonic = 3`` a superharmonic resonance is tracked: the drive lies at a third of the mode's
-    frequency, and the third harmonic of m0 lags three times the phase of the base by a quarter of its own
-    period (Volvert and Kerschen, J. Sound Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and
-    Kerschen, arXiv 2401.01151). Natural frequency and damping are not told there.
+    With ``harmonic = 3`` or 2 a superharmonic resonance is tracked: the drive lies at a third or at half of
+    the mode's frequency, and that harmonic of m0 lags so many times the phase of the base by a quarter of
+    its own period (Volvert and Kerschen, J. Sound Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and
+    Kerschen, arXiv 2401.01151). The phase of the second one counts from the cosine of twice the base's,
+    as its square does. It lags where the spring between the masses is the stiffer at positive p and the
+    mode's p goes with m0 (the paper's first and third), and leads by as much (``phase_deg = 90``) where one
+    of both is the other way round. Natural frequency and damping are not told there.
     """
 
     family: ClassVar[Family] = Family.STEPPED
@@ -44,7 +47,7 @@ class ResonanceTracking(AbstractFeedback):
     """Phase of m0 over the base at the resonance, both as displacements [degrees]."""
     phase_of: PhaseReference = PhaseReference.RELATIVE
     """Which motion of m0 has it: the one against the base, or the absolute one."""
-    harmonic: Literal[1, 3] = 1
+    harmonic: Literal[1, 2, 3] = 1
     """Of m0, whose phase counts; above 1 that of m0 in space, against as many times the base's phase."""
     phase_tolerance_deg: float = Field(default=1.0, gt=0, le=30)
     """How closely the phase must be met [degrees]."""
@@ -80,7 +83,10 @@ class ResonanceTracking(AbstractFeedback):
 
     def motion(self, harmonics: Sequence[complex]) -> complex:
         """Give the motion whose phase counts, from harmonics of m0 over the base, the first one first."""
-        return self.phase_of.motion(harmonics[0]) if self.harmonic == 1 else harmonics[self.harmonic - 1]
+        if self.harmonic == 1:
+            return self.phase_of.motion(harmonics[0])
+        # The cube of a sine has a sine at three times its phase, its square a cosine at twice.
+        return harmonics[self.harmonic - 1] * (-1j if self.harmonic == 2 else 1.0)
 
     @property
     def band_hz(self) -> tuple[float, float]:
