@@ -2,6 +2,7 @@
 
     python benchmarks/backbones.py [--mode 1] [--spring hardening] [--levels 49] [--periods 150] [--seed 1]
     python benchmarks/backbones.py --superharmonic 2 --spring bumpers [--levels 13]
+    python benchmarks/backbones.py --subharmonic 2 --spring bumpers [--levels 13]
 
 Tracks the phase resonance of each mode of the paper's specimen with a fixture of 0.6 kg, and prints, level by
 level, frequency with its standard uncertainty and the drive periods it took, beside the motions that the
@@ -12,8 +13,9 @@ soft springs behind uneven gaps (100 N/m, 0.12 k1, below at 60 and above at 30 u
 played with the amplifier 30 dB lower: the generator's setting has steps of a millivolt.
 
 ``--superharmonic 3`` tracks the first mode's 3:1 superharmonic resonance instead, from 6 to 20 m/s2, and
-``--superharmonic 2`` the 2:1 one, from 10 to 25 m/s2. The model beside it is harmonic balance of specimen,
-table and coil together, since the table moves at so many times the drive as well.
+``--superharmonic 2`` the 2:1 one, from 10 to 25 m/s2; ``--subharmonic 2`` the one at which m0 repeats every
+two drives, from 22 to 34 m/s2. The model beside them is harmonic balance of specimen, table and coil
+together, since the table moves at those frequencies as well.
 """
 
 import argparse
@@ -53,6 +55,7 @@ class Tracked:
     band_hz: tuple[float, float]
     """Where the model's linear motion meets the phase once."""
     harmonic: int = 1
+    subharmonic: int = 1
 
 
 MODES = {
@@ -62,12 +65,19 @@ MODES = {
 }
 
 
-SUPERHARMONICS = {
-    2: (Tracked(47.5, 44, 53, 0.4, PhaseReference.RELATIVE, 10.0, 0.0, (44, 53), 2), 25.0),
-    3: (Tracked(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), 3), 20.0),
+OTHERS = {
+    "superharmonic": {
+        2: (Tracked(47.5, 44, 53, 0.4, PhaseReference.RELATIVE, 10.0, 0.0, (44, 53), harmonic=2), 25.0),
+        3: (Tracked(31.6, 29, 36, 0.3, PhaseReference.RELATIVE, 6.0, 0.0, (29, 36), harmonic=3), 20.0),
+    },
+    "subharmonic": {
+        2: (Tracked(192, 187, 199, 0.5, PhaseReference.RELATIVE, 22.0, 0.0, (187, 199), subharmonic=2), 34.0)
+    },
 }
-"""By the order, where it is tracked, and up to which level [m/s2]."""
+"""Where they are tracked, and up to which level [m/s2]."""
 ORDERS, WAVE = np.arange(20), 512
+P_OVER_M0 = 24.0
+"""In the first mode."""
 
 
 def rig_of(spring: str, seed: int) -> Rig:
@@ -104,9 +114,13 @@ def tracked(
             widest_step_hz=mode.widest_step_hz,
             phase_of=mode.of,
             harmonic=mode.harmonic,
+            subharmonic=mode.subharmonic,
             accelerations_m_per_s2=tuple(part),
-            settling=Settling(tolerance=0.02, longest_wait_s=6.0),
-            most_tries=8 if mode.harmonic == 1 else 12,
+            settling=Settling(
+                tolerance=0.02 if mode.subharmonic == 1 else 0.05,
+                longest_wait_s=6.0 if mode.subharmonic == 1 else 15.0,
+            ),
+            most_tries=8 if mode.harmonic == mode.subharmonic == 1 else 12,
             most_periods=most_periods,
             flank_pairs=1,
             record_s=0.3 * mode.harmonic,
@@ -140,70 +154,76 @@ def motions_at(model: Branch, level: float) -> list[tuple[float, float]]:
     return found
 
 
-def superharmonic(rig: Rig, level: float, near_hz: float, order: int) -> tuple[float, float]:
-    """Find the phase resonance under a level by harmonic balance: frequency [Hz], and that harmonic [m]."""
+def balanced(rig: Rig, mode: Tracked, note: ResonanceNote) -> tuple[float, float]:
+    """Find the phase resonance under a level by harmonic balance: frequency [Hz], and what resonates [m]."""
     plant = SampledPlant(amplifier_of(rig), shaker_of(rig), specimen_of(rig), LoopTiming(1e4, 0.0))
     (rates, volt), spring = plant.equations, spring_of(specimen_of(rig))
     into, relative = (each[:9] for each in plant.spring)
     turns = np.exp(2j * np.pi * np.outer(ORDERS, np.arange(WAVE)) / WAVE)
     parts = np.where(ORDERS, 2.0, 1.0)[:, None] / WAVE
+    drives, count = mode.subharmonic, len(ORDERS)
+    quarter = -0.5 * np.pi if 2 in (mode.harmonic, drives) else 0.0
     micro, moved = 1e-6, {}
 
     def states_at(hertz: float, pushes: np.ndarray) -> np.ndarray:
         return np.array(
             [
-                np.linalg.solve(2j * np.pi * k * hertz * np.eye(9) - rates, each)
+                np.linalg.solve(2j * np.pi * k / drives * hertz * np.eye(9) - rates, each)
                 for k, each in zip(ORDERS, pushes, strict=True)
             ]
         )
 
+    def base_m(hertz: float) -> float:
+        return note.base_m_per_s2 / (2 * np.pi * hertz) ** 2
+
     def wrong(unknown: np.ndarray, at_hz: float | None) -> np.ndarray:
         """Give what is left: p [um] at each order, the base, and at no given frequency the phase."""
-        p, volts = unknown[:20] + 1j * unknown[20:40], complex(*unknown[40:42])
-        hertz = unknown[42] if at_hz is None else at_hz
+        p, volts = unknown[:count] + 1j * unknown[count : 2 * count], complex(*unknown[-3:-1])
+        hertz = unknown[-1] if at_hz is None else at_hz
         wave = micro * (p @ turns).real
         force = (parts * turns.conj()) @ spring.force(wave, 0 * wave)
         pushes = np.outer(force, into)
-        pushes[1] += volts * volt
+        pushes[drives] += volts * volt
         states = states_at(hertz, pushes)
-        # A sine of the base has the phasor -i.
-        base, of_m0 = states[1][0] * 1j / base_m(hertz) - 1.0, states[order][3] / (-1j) ** order
-        seen = np.angle(of_m0) + 0.5 * np.pi
+        # A sine has the phasor -i.
+        base, of_m0 = states[drives][0] * 1j / base_m(hertz) - 1.0, states[mode.harmonic][3] * 1j
         moved["m"] = abs(of_m0)
+        seen = np.sin(drives * np.angle(of_m0) + quarter + 0.5 * np.pi)
         left = np.concatenate([states @ relative / micro - p, [base]])
-        return np.concatenate([left.real, left.imag, [np.sin(seen)] if at_hz is None else []])
+        return np.concatenate([left.real, left.imag, [seen if at_hz is None else unknown[-1] - at_hz]])
 
-    def base_m(hertz: float) -> float:
-        return level / (2 * np.pi * hertz) ** 2
-
-    # From the motion without the spring between the masses.
-    alone = states_at(near_hz, np.outer(ORDERS == 1, volt))
-    volts = -1j * base_m(near_hz) / alone[1][0]
+    # From the motion without the spring between the masses, and half or a third of the drive as it was seen.
+    alone = states_at(note.at_hz, np.outer(drives == ORDERS, volt))
+    volts = -1j * base_m(note.at_hz) / alone[drives][0]
     p = alone @ relative * volts / micro
-    guess = np.array([*p.real, *p.imag, volts.real, volts.imag])
-    forced = root(wrong, guess, args=(near_hz,)).x
-    found = root(wrong, np.append(forced, near_hz), args=(None,))
-    return (float(found.x[42]), moved["m"]) if found.success else (np.nan, np.nan)
+    if drives > 1:
+        p[1] = (
+            P_OVER_M0
+            * note.harmonic_m
+            / micro
+            * np.exp(-1j * (quarter + 0.5 * np.pi) / drives - 0.5j * np.pi)
+        )
+    guess = np.array([*p.real, *p.imag, volts.real, volts.imag, note.at_hz])
+    if drives == 1:
+        guess = root(wrong, guess, args=(note.at_hz,)).x
+    found = root(wrong, guess, args=(None,))
+    return (float(found.x[-1]), moved["m"]) if found.success else (np.nan, np.nan)
 
 
-def compare_superharmonic(rig: Rig, spring: str, order: int, count: int, periods: int) -> None:
-    """Print what was tracked at so many times the drive, beside the model of a softer spring."""
-    mode, highest = SUPERHARMONICS[order]
+def compare_others(rig: Rig, spring: str, mode: Tracked, levels: np.ndarray, periods: int) -> None:
+    """Print what was tracked of a super- or subharmonic, beside the model of a softer spring."""
     with tempfile.TemporaryDirectory() as folder:
-        levels = np.geomspace(mode.lowest, highest, count)
         notes = tracked(rig, mode, levels, periods, Path(folder))
     away = []
     for each in notes:
-        hertz, harmonic_m = np.nan, np.nan
-        if spring != "stops":
-            hertz, harmonic_m = superharmonic(rig, each.base_m_per_s2, each.at_hz, order)
+        hertz, moved_m = (np.nan, np.nan) if spring == "stops" else balanced(rig, mode, each)
         if each.frequency_hz is not None:
             away.append(abs(each.frequency_hz - hertz))
         found = each.frequency_hz or np.nan
         print(
             f"{each.base_m_per_s2:8.4g} m/s2: {found:.3f} +- {each.frequency_u_hz or np.nan:.3f} Hz, "
             f"{1e6 * each.harmonic_m:.3f} um ({each.lock.value}, {each.phase_deg:.1f} degrees, "
-            f"{each.motion.value}); {each.periods} periods; model {hertz:.3f} Hz, {1e6 * harmonic_m:.3f} um"
+            f"{each.motion.value}); {each.periods} periods; model {hertz:.3f} Hz, {1e6 * moved_m:.3f} um"
         )
     print(
         f"{len(away)} of {len(notes)} levels met; from the model {max(away, default=np.nan):.3f} Hz at most"
@@ -247,12 +267,16 @@ def main() -> None:
     parser.add_argument("--levels", type=int, default=49)
     parser.add_argument("--periods", type=int, default=150)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--superharmonic", type=int, choices=SUPERHARMONICS)
+    for kind, orders in OTHERS.items():
+        parser.add_argument(f"--{kind}", type=int, choices=orders)
     given = parser.parse_args()
     rig = rig_of(given.spring, given.seed)
-    if given.superharmonic:
-        compare_superharmonic(rig, given.spring, given.superharmonic, given.levels, given.periods)
-        return
+    for kind, orders in OTHERS.items():
+        if order := getattr(given, kind):
+            mode, highest = orders[order]
+            levels = np.geomspace(mode.lowest, highest, given.levels)
+            compare_others(rig, given.spring, mode, levels, given.periods)
+            return
     specimen = specimen_of(rig)
     for number in [given.mode] if given.mode else MODES:
         mode = MODES[number]

@@ -27,6 +27,7 @@ LAWS = {
     "uneven-stops": ("asymmetric", "hertz"),
     "p3": ("gong2025", "power:3"),
     "p5": ("gong2025", "power:5"),
+    "bumpers": ("asymmetric", "linear_gap:100"),
 }
 """Specimen and contact law of each."""
 SAMPLES = 128

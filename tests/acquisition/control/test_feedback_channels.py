@@ -23,6 +23,17 @@ def test_a_harmonic_of_m0_is_that_of_a_base_which_moves_as_a_sine(harmonic, shif
     assert seen == pytest.approx(3e-6 / 2e-4 * np.exp(-1.2j))
 
 
+@pytest.mark.parametrize("drives", [2, 3])
+@pytest.mark.parametrize("shift_rad", [0.0, 1.0, 2.5, -3.0])
+def test_a_subharmonic_is_known_but_for_the_drive_it_began_with(drives, shift_rad):
+    omega = 2 * np.pi * HERTZ
+    base = np.full(8, -(omega**2) * 2e-4 * np.exp(1j * shift_rad))
+    late = shift_rad / drives - 1.2 - omega / drives * DELAY_S
+    response = np.full(8, 1j * omega / drives * 3e-6 * np.exp(1j * late))
+    seen = CHANNELS.transmissibility(base, response, HERTZ, 1 / drives)
+    assert seen**drives == pytest.approx((3e-6 / 2e-4 * np.exp(-1.2j)) ** drives)
+
+
 @pytest.mark.parametrize("harmonic", [1, 3])
 def test_capacitors_before_the_converter_turn_no_phase(harmonic):
     """A first-order high-pass turns the base by 0.9 degrees at 31 Hz: three times that at 3:1."""

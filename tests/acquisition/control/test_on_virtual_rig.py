@@ -297,6 +297,41 @@ def test_a_second_superharmonic_is_not_met_with_the_phase_of_the_other_side(carr
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("gap_m", "phase_deg", "model_hz", "model_m"),
+    [
+        ((60e-6, 30e-6), -90, 193.175, 2.075e-6),
+        ((30e-6, 60e-6), 90, 193.175, 2.075e-6),
+        ((60e-6, 30e-6), -60, 193.092, 2.417e-6),
+    ],
+)
+def test_a_subharmonic_resonance_is_met_where_twice_its_phase_is_the_one_asked_for(
+    carried_out, gap_m, phase_deg, model_hz, model_m
+):
+    """Beside harmonic balance (`benchmarks/backbones.py --subharmonic 2 --spring bumpers`), at 23.64 m/s2."""
+    plan = ResonanceTracking(
+        amplitude_vpp=9.0,
+        start_hz=192,
+        low_hz=187,
+        high_hz=199,
+        widest_step_hz=0.5,
+        subharmonic=2,
+        phase_deg=phase_deg,
+        accelerations_m_per_s2=(23.64,),
+        settling=Settling(tolerance=0.02, longest_wait_s=20.0),
+    )
+    recording = carried_out(plan, contact="linear_gap:100", gap_m=gap_m)
+    (found,) = said(recording, "resonance")
+    assert found["lock"] == "locked"
+    # The resonance moves by 0.17 Hz with each m/s2.
+    expected_hz = model_hz + 0.17 * (found["base_m_per_s2"] - 23.64)
+    assert found["frequency_hz"] == pytest.approx(expected_hz, abs=3 * found["frequency_u_hz"])
+    assert found["frequency_u_hz"] < 0.1
+    assert found["harmonic_m"] == pytest.approx(model_m, rel=0.03)
+    assert said(recording, "achieved")[-1]["period"] == 2
+
+
+@pytest.mark.thorough
 def test_among_stops_that_are_not_reached_there_is_no_superharmonic_resonance(carried_out):
     found = said(carried_out(superharmonic(5.0, 8.0)), "resonance")
     assert [each.get("frequency_hz") for each in found] == [None, None]

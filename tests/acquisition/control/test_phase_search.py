@@ -60,3 +60,13 @@ def test_errors_beyond_a_right_angle_tell_no_crossing():
     assert found.frequency_hz == 101.0
     assert found.uncertainty_hz == np.inf
     assert found.half_width_hz == 0.0
+
+
+def test_of_a_phase_that_is_no_mode_s_the_slope_is_taken_close_by():
+    """It falls by 300 degrees a hertz at the resonance, and hardly at all further off."""
+    tries = [PhaseError(192 + 0.25 * n, 18.0 - n, 0.1) for n in range(4)]
+    tries += [PhaseError(193.09 + off, -300.0 * off + 0.3, 0.1) for off in (-0.02, 0.01, 0.0)]
+    found = PhaseSearch(190.0, 195.0, 0.5, tries, is_mode=False).resonance(0.3)
+    assert found.frequency_hz == pytest.approx(193.091, abs=1e-4)
+    assert found.slope_deg_per_hz == pytest.approx(-300.0, rel=0.01)
+    assert PhaseSearch(190.0, 195.0, 0.5, tries).resonance(0.3).slope_deg_per_hz > -100.0

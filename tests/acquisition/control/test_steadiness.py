@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.control._steadiness import judged
+from vibench.acquisition.control._steadiness import in_drives, judged
 from vibench.acquisition.excitation import Settling
 from vibench.acquisition.recording import Steadiness
 
@@ -104,3 +104,20 @@ def test_the_scatter_has_the_uncertainty_that_repetitions_show():
 
 def test_too_few_periods_are_unsettled():
     assert judged(points(40), RULE).steadiness is Steadiness.UNSETTLED
+
+
+@pytest.mark.parametrize(("drives", "share", "period"), [(2, 0.1, 2), (3, 0.1, 3), (2, 0.0, 1), (3, 0.0, 1)])
+def test_a_period_that_is_looked_at_over_several_drives_is_counted_in_them(drives, share, period):
+    """Orders that are no multiples of the drive's tell whether the motion is as long as it was looked at."""
+    seen = noise(300, 1e-3)
+    seen[:, drives] += 1.0
+    seen[:, 1] += share
+    assert in_drives(judged(seen, RULE), seen, drives, RULE.tolerance).period == period
+
+
+@pytest.mark.parametrize("kept", [0.5, 0.0])
+def test_a_single_order_that_wanders_is_judged_like_all_of_them(kept):
+    """It keeps its statistics and does not repeat, by itself too."""
+    random = np.random.default_rng(3)
+    moved = 1.0 + 0.2 * (random.standard_normal((500, 1)) + 1j * random.standard_normal((500, 1)))
+    assert judged(moved + kept, RULE).steadiness is Steadiness.APERIODIC

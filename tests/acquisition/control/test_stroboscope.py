@@ -11,9 +11,9 @@ FIRST_BLOCK = 52
 """Periods that are seen before a second block tells the clocks apart: up to 0.2 degrees off."""
 
 
-def looked_at(motion, ppm=17.0, blocks=12, block_s=0.2, phase=0.3):
+def looked_at(motion, ppm=17.0, blocks=12, block_s=0.2, phase=0.3, drives=1):
     """Feed blocks of a drive with its own clock, a base half a radian behind, and a motion of its phase."""
-    scope = Stroboscope(NEAR_HZ, RATE_HZ)
+    scope = Stroboscope(NEAR_HZ, RATE_HZ, drives)
     count = round(block_s * RATE_HZ)
     for block in range(blocks):
         time_s = (block * count + np.arange(count)) / RATE_HZ
@@ -51,6 +51,19 @@ def test_a_subharmonic_makes_periods_alternate():
     np.testing.assert_allclose(response[2:], response[:-2], atol=2e-4)
     # The mean of sin(a/2) over each period is 2/pi, with either sign.
     assert np.abs(np.diff(response[:, 0])).min() == pytest.approx(0.1 * 4 / np.pi, rel=1e-2)
+
+
+@pytest.mark.parametrize("drives", [2, 3])
+def test_a_motion_of_several_drives_has_one_row_for_all_of_them(drives):
+    motion = looked_at(lambda a: np.sin(a - 1) + 0.1 * np.sin(a / drives), drives=drives)
+    periods = motion.periods()
+    assert periods.count == int(12 * 0.2 * NEAR_HZ / drives)
+    sizes = np.abs(periods.response[FIRST_BLOCK:])
+    np.testing.assert_allclose(sizes[:, [1, drives]], [[0.1, 1.0]] * len(sizes), atol=2e-4)
+    np.testing.assert_allclose(periods.base[FIRST_BLOCK:], 2 * np.exp(-0.5j), atol=2e-4)
+    # From which of its drives a period is counted is any; so many times the phase is not.
+    turned = (10 * periods.response[FIRST_BLOCK:, 1]) ** drives
+    np.testing.assert_allclose(turned, 1.0, atol=0.01)
 
 
 def test_the_noise_of_silence_is_what_it_makes_of_a_period():

@@ -87,6 +87,18 @@ def test_a_displacement_s_acceleration_grows_with_the_square_of_frequency():
             "start_hz = 95 is not between",
         ),
         (
+            lambda: ResonanceTracking(
+                amplitude_vpp=1,
+                start_hz=97,
+                low_hz=96,
+                high_hz=99,
+                accelerations_m_per_s2=(1,),
+                harmonic=3,
+                subharmonic=2,
+            ),
+            "harmonic = 3 and subharmonic = 2 were given; one of them must be 1",
+        ),
+        (
             lambda: SettledSine(
                 amplitude_vpp=1,
                 grid=FrequencyGrid(start_hz=100, stop_hz=100 + MOST_SETTLED_STEPS, step_hz=1),

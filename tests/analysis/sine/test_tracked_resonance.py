@@ -74,7 +74,15 @@ def test_a_superharmonic_resonance_is_called_so_and_drawn_by_the_harmonic_that_r
     assert found == "Superharmonic 3:1 phase resonance at 31.700 ± 0.060 Hz (8 m/s²)."
     assert not_found.startswith("No superharmonic 3:1 phase resonance at 9 m/s²: outside the range;")
     (drawn,) = tracked_resonances([met])
-    assert (drawn.amplitude_m, drawn.harmonic) == (8e-8, 3)
+    assert (drawn.amplitude_m, drawn.is_fundamental) == (8e-8, False)
+
+
+def test_a_subharmonic_resonance_is_called_so_and_drawn_by_its_amplitude():
+    met = note(0, 30.0, 192.4, subharmonic=2, harmonic_m=2e-6)
+    (found,) = feedback_sentences([met])
+    assert found == "Subharmonic 1:2 phase resonance at 192.400 ± 0.060 Hz (30 m/s²)."
+    (drawn,) = tracked_resonances([met])
+    assert (drawn.amplitude_m, drawn.is_fundamental) == (2e-6, False)
 
 
 @pytest.mark.parametrize(

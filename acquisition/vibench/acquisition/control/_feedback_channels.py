@@ -42,17 +42,17 @@ class FeedbackChannels:
             samples.volts[self.response] * self.response_units_per_volt,
         )
 
-    def stroboscope(self, near_hz: float) -> Stroboscope:
-        """Begin to look once a period."""
-        return Stroboscope(near_hz, self.sample_rate_hz)
+    def stroboscope(self, near_hz: float, drives: int = 1) -> Stroboscope:
+        """Begin to look once a period of the motion, which is so many of the drive."""
+        return Stroboscope(near_hz, self.sample_rate_hz, drives)
 
     def transmissibility(
-        self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: int = 1
+        self, base: Phasors, response: Phasors, frequency_hz: float, harmonic: float = 1.0
     ) -> complex:
         """Displacement of m0 over that of the base, from velocity and the fundamental of the acceleration.
 
-        Of a harmonic of m0, over the size of the base's fundamental and its phase times as much. Zero where
-        the base shows nothing at all.
+        Of a harmonic of m0, half or a third of the drive's frequency too, over the size of the base's
+        fundamental and its phase times as much. Zero where the base shows nothing at all.
         """
         if not np.any(base):
             return 0j

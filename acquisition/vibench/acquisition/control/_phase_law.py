@@ -54,7 +54,8 @@ class PhaseLaw:
     frequency, r that of the resonance, e the error of the phase in radians, and h = 2 pi L w what the mode
     forgets in it, w its half-width. The frequency moves by g times what this says of r - f: the error falls
     by the share g at every look. Where it does not, its own part in that, ``g w e``, grows. Of the n-th
-    harmonic r and w are taken at the drive, and L is n times as long.
+    harmonic r and w are taken at the drive, and L is n times as long. Of a subharmonic e is that of so many
+    times its phase, r and w are taken at the drive as well, and a look has so many times the drives.
 
     A bent resonance moves while the motion grows to its new level. The level that the motion has grown to
     follows the base as fast as the mode forgets; r moves with its logarithm, as the levels before tell, and
@@ -63,8 +64,8 @@ class PhaseLaw:
 
     def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
         self._plan = plan
-        self._turns = plan.harmonic * LOOK_PERIODS
-        """Periods of the motion whose phase counts, in a look."""
+        self._turns = plan.harmonic * plan.subharmonic * LOOK_PERIODS
+        """By how many turns a look's phase counts: periods of a harmonic, drives of a subharmonic."""
         self._last = last
         self._mode = mode
         self._bend_hz = mode.bend_hz + mode.steeper_hz

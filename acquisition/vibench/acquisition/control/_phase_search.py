@@ -8,6 +8,8 @@ import numpy as np
 _NEAR_DEG = 35.0
 """Errors up to this are on the straight part of the phase: its slope is taken from them."""
 _FEWEST = 2
+_NEAREST = 3
+"""Tries from which a slope is taken that changes from place to place."""
 _STEEPEST_DEG = 85.0
 """Errors beyond are taken for this: the tangent of a right angle has no end."""
 _BEND = 0.15
@@ -47,6 +49,8 @@ class PhaseSearch:
     widest_step_hz: float
     """What one step takes at most while the resonance is not bracketed [Hz]."""
     tries: list[PhaseError] = field(default_factory=list)
+    is_mode: bool = True
+    """Whether the phase goes as that of a linear mode; of another its slope is known close by alone."""
 
     def next_hz(self) -> float:
         """Give the next frequency to try, after at least one."""
@@ -76,6 +80,9 @@ class PhaseSearch:
         near = [each for each in nearest if abs(each.error_deg) <= _NEAR_DEG]
         used = near if len(near) >= _FEWEST else nearest[:_FEWEST]
         best = nearest[0]
+        if not self.is_mode:
+            away = sorted(self.tries, key=lambda each: abs(each.frequency_hz - best.frequency_hz))
+            used = away[:_NEAREST]
         frequency_hz = np.array([each.frequency_hz for each in used])
         error_deg = np.array([each.error_deg for each in used])
         # The tangent of the error is a straight line through a mode, whose phase itself bends away from it.

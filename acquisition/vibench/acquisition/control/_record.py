@@ -20,7 +20,7 @@ def recorded_and_judged(
     settling_controller: SettlingController, segment: Segment, duration_s: float, waited_s: float
 ) -> Controller[SettledState]:
     """Record a motion as a segment, long enough to judge it by that."""
-    shortest_s = (settling_controller.rule.periods + 2) / settling_controller.loop.setting.frequency_hz
+    shortest_s = (settling_controller.rule.periods + 2) / settling_controller.loop.motion_hz
     duration_s = max(duration_s, shortest_s)
     yield from _listened(settling_controller, segment, duration_s)
     found = settling_controller.found(waited_s)

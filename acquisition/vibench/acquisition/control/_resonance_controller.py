@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import degrees, hypot, pi, radians, sqrt
+from math import degrees, hypot, isfinite, pi, radians, sqrt
 
 import numpy as np
 
@@ -29,6 +29,8 @@ _LEFT = 1.5
 """How far the motion may have to go still, over the tolerance of the phase in radians."""
 _LOOKS_LOCKED = 3
 """Looks in a row with phase and level where they should be, before it counts as locked."""
+_SAME_LEVEL = 0.004
+"""Tolerance of the level within one search, a share."""
 _BATCHES = 8
 _FURTHEST = 1.5
 """Half-widths of the resonance between it and the furthest point of a flank."""
@@ -36,6 +38,10 @@ _FURTHEST = 1.5
 
 def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
     """Lock on to the resonance at every level, record there, go on to the next level from there."""
+    loop.drives = plan.subharmonic
+    if not plan.is_fundamental:
+        # It may be a hundredth of the whole motion, which then seems settled long before.
+        loop.judged_order = plan.harmonic
     yield from started(loop, plan.start_hz, plan.held_levels[0])
     last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
     for number in range(len(plan.accelerations_m_per_s2)):
@@ -57,7 +63,7 @@ def _followed(
     looks, lock = yield from _locked(controller, plan, law)
     if lock is None:
         return None
-    periods = looks * LOOK_PERIODS
+    periods = looks * LOOK_PERIODS * loop.drives
     segment = plan.segment(number, loop.setting.frequency_hz)
     found = yield from recorded_and_judged(controller, segment, plan.record_s, periods / loop.drive_hz)
     error = _phase_error(loop.periods, found, plan)
@@ -65,7 +71,7 @@ def _followed(
     is_met = abs(error.error_deg) <= plan.phase_tolerance_deg and (lock is LockResult.LOCKED or is_steady)
     lock = LockResult.LOCKED if is_met else LockResult.LOST
     mode = law.learnt(found, radians(error.error_deg))
-    left_deg = hypot(error.uncertainty_deg, _sensor_phase_deg(plan, found), _CORRECTED * error.error_deg)
+    left_deg = hypot(error.uncertainty_deg, _open_phase_deg(plan, found), _CORRECTED * error.error_deg)
     resonance = PhaseResonance(
         found.drive_hz + radians(error.error_deg) * mode.half_width_hz,
         radians(left_deg) * mode.half_width_hz,
@@ -81,10 +87,10 @@ def _locked(
     """Hold phase and level at once; gives the looks it took, and how it ended: None far off the resonance."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
-    in_a_row, looks = 0, plan.most_periods // LOOK_PERIODS
+    in_a_row, looks = 0, plan.most_periods // (LOOK_PERIODS * loop.drives)
     for look in range(1, looks + 1):
         now = loop.setting
-        yield from loop.listen(RunState.SETTLING, LOOK_PERIODS / now.frequency_hz)
+        yield from loop.listen(RunState.SETTLING, LOOK_PERIODS / loop.motion_hz)
         base, seen = controller.measured(), controller.found(0.0)
         require_answer(loop.rig, now.frequency_hz, now.setting_vpp, base.amplitude)
         error_rad, left = law.see(now.frequency_hz, seen)
@@ -114,9 +120,15 @@ def _searched(
     loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace
 ) -> Controller[TrackedPlace]:
     """Search the resonance at one level in settled motion, and record there."""
-    level = plan.held_levels[number]
-    settling_controller = SettlingController(loop, plan.settling, level)
-    search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz)
+    level, rule = plan.held_levels[number], plan.settling
+    if not plan.is_fundamental:
+        # Its resonance moves with the level, and its motion creeps: tries at different levels, or of motions
+        # that have still to go, would tell a wrong slope of the phase.
+        settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
+        level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
+        rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
+    settling_controller = SettlingController(loop, rule, level)
+    search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz, is_mode=plan.is_fundamental)
     states: list[SettledState] = []
     frequency_hz, lock = last.frequency_hz, LockResult.LOST
     for _ in range(plan.most_tries):
@@ -124,20 +136,24 @@ def _searched(
         states.append((yield from settling_controller.settled()))
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
-        # Where a harmonic is noise, its phase is any: it must be known as well.
-        is_known = error.uncertainty_deg <= plan.phase_tolerance_deg
+        # Where a harmonic is noise, its phase is any, and while it creeps, one that passes.
+        rests = plan.is_fundamental or states[-1].judgement.steadiness is Steadiness.PERIODIC
+        is_known = rests and error.uncertainty_deg <= plan.phase_tolerance_deg
         if abs(error.error_deg) <= plan.phase_tolerance_deg and is_known and len(search.tries) > 1:
             lock = LockResult.LOCKED
             break
         next_hz = search.next_hz()
+        if plan.low_hz < next_hz < plan.high_hz:
+            # The tries are in the converter's time, what is played in the generator's.
+            next_hz *= states[-1].frequency_hz / states[-1].drive_hz
         if next_hz == frequency_hz:
             lock = LockResult.AT_THE_EDGE
             break
         frequency_hz = next_hz
     found = states[-1]
-    resonance = search.resonance(_sensor_phase_deg(plan, found))
+    resonance = search.resonance(_open_phase_deg(plan, found))
     mode = None
-    if lock is LockResult.LOCKED and plan.harmonic == 1:
+    if lock is LockResult.LOCKED and plan.is_fundamental:
         flanks = yield from _flanks(settling_controller, plan, resonance)
         mode = _mode([*states, *flanks], resonance)
         # Back from the flanks before the recording: the next level begins where this one ends.
@@ -151,7 +167,7 @@ def _searched(
     width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
     # Contacts bend the flanks: the first width, found without them, is kept. What drives a superharmonic
     # hangs on the frequency too, the more the nearer contacts are to their first: that width is no bound.
-    narrowest_hz = width_hz if plan.harmonic == 1 else 0.0
+    narrowest_hz = width_hz if plan.is_fundamental else 0.0
     learnt = last.mode or LearntMode(narrowest_hz, width_hz)
     return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
 
@@ -191,10 +207,17 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
     )
 
 
-def _sensor_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
-    """Give what both sensors' phases and sensitivities leave open of the phase [degrees]."""
-    if plan.harmonic > 1:
-        return plan.harmonic * plan.sensor_phase_deg
+def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
+    """Give what both sensors' phases and sensitivities leave open of the phase [degrees].
+
+    Of a super- or subharmonic also what its motion may have to go still; a subharmonic one creeps, too slowly
+    to be seen from one look to the next, so that all counts which passes for settled.
+    """
+    if not plan.is_fundamental:
+        remaining = found.judgement.remaining if isfinite(found.judgement.remaining) else 1.0
+        if plan.subharmonic > 1:
+            remaining = max(remaining, plan.settling.tolerance)
+        return plan.subharmonic * hypot(plan.harmonic * plan.sensor_phase_deg, degrees(remaining))
     # Of a difference of motions the phase also turns with their ratio; of a single one it does not.
     turned = plan.motion(found.harmonics) - found.transmissibility
     size = max(abs(plan.motion(found.harmonics)), plan.sensor_gain)
@@ -203,7 +226,8 @@ def _sensor_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
 
 def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
     """Compare the phase of m0 against the base with the wanted one; batches tell its uncertainty."""
-    newer = periods.last(periods.count // 2)
+    count = periods.count // 2
+    newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
     length = len(newer.base) // _BATCHES
     angle = float(np.angle(plan.motion(found.harmonics)))
     error_deg = (degrees(angle) - plan.phase_deg + 180) % 360 - 180
@@ -213,7 +237,9 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
     response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
     # Each harmonic over the phase of the base times as much; turned and scaled as all together are.
-    ratios = response / np.exp(1j * np.outer(np.angle(base), np.arange(1, ORDERS))) / np.abs(base)[:, None]
+    away = np.angle(base * base.mean().conjugate())
+    orders = np.arange(1, ORDERS) / plan.subharmonic
+    ratios = response / np.exp(1j * np.outer(away, orders)) / np.abs(base)[:, None]
     ratios *= np.array(found.harmonics) / ratios.mean(axis=0)
     ratios = np.array([plan.motion(each) for each in ratios])
     spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
@@ -247,6 +273,7 @@ def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledSta
             mode_u_hz=None if mode is None else mode.frequency_u_hz,
             damping_ratio=None if mode is None else mode.damping_ratio,
             harmonic=plan.harmonic,
-            harmonic_m=None if plan.harmonic == 1 else abs(plan.motion(found.harmonics)) * base_m,
+            subharmonic=plan.subharmonic,
+            harmonic_m=None if plan.is_fundamental else abs(plan.motion(found.harmonics)) * base_m,
         )
     )

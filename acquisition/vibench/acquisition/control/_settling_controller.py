@@ -11,8 +11,8 @@ from ._control_action import Controller
 from ._jump_search import SettledPoint
 from ._level_control import LevelControl, MeasuredLevel, measured_level
 from ._sine_loop import SineLoop
-from ._steadiness import Judgement, judged
-from ._stroboscope import ORDERS
+from ._steadiness import Judgement, in_drives, judged
+from ._stroboscope import ORDERS, Phasors
 
 _SURE = 2.0
 _PROMPT = 0.7
@@ -34,12 +34,14 @@ class SettledState:
     """Acceleration of the base's fundamental [m/s2]."""
     held: Held
     harmonics: tuple[complex, ...]
-    """Displacement of m0, fundamental and harmonics, over that of the base's fundamental."""
+    """Displacement of m0, first and higher orders of its period, over that of the base's fundamental."""
+    drives: int = 1
+    """Periods of the drive in one of m0."""
 
     @property
     def transmissibility(self) -> complex:
-        """Displacement of m0 over that of the base, fundamentals."""
-        return self.harmonics[0]
+        """Displacement of m0 over that of the base, at the drive's frequency."""
+        return self.harmonics[self.drives - 1]
 
     @property
     def response(self) -> float:
@@ -82,7 +84,7 @@ class SettlingController:
         """Wait at the frequency that is played; correct the setting whenever the level is off."""
         waited_s = 0.0
         while True:
-            stretch_s = look_s(self.loop.setting.frequency_hz)
+            stretch_s = look_s(self.loop.motion_hz)
             yield from self.loop.listen(RunState.SETTLING, stretch_s)
             waited_s += stretch_s
             is_late = waited_s + stretch_s > self.rule.longest_wait_s
@@ -138,21 +140,33 @@ class SettlingController:
     def found(self, waited_s: float) -> SettledState:
         """Judge what was seen since the last change."""
         loop, periods = self.loop, self.loop.periods
-        newest = periods.last(max(self.rule.periods, periods.count // 2))
+        # What creeps has only just come to rest.
+        newest = periods.last(
+            max(self.rule.periods, periods.count // 2) if loop.judged_order is None else self.rule.periods
+        )
         measured = measured_level(newest.base)
         return SettledState(
             frequency_hz=loop.setting.frequency_hz,
             drive_hz=loop.drive_hz,
             setting_vpp=loop.setting.setting_vpp,
             waited_s=waited_s,
-            judgement=judged(periods.response, self.rule, loop.noise),
+            judgement=self._judged(periods.response),
             base=measured,
             held=self.held(measured),
             harmonics=tuple(
-                loop.channels.transmissibility(newest.base, newest.response[:, order], loop.drive_hz, order)
+                loop.channels.transmissibility(
+                    newest.base, newest.response[:, order], loop.drive_hz, order / loop.drives
+                )
                 for order in range(1, ORDERS)
             ),
+            drives=loop.drives,
         )
+
+    def _judged(self, points: Phasors) -> Judgement:
+        order = self.loop.judged_order
+        judged_points = points if order is None else points[:, order : order + 1]
+        found = judged(judged_points, self.rule, self.loop.noise)
+        return in_drives(found, points, self.loop.drives, self.rule.tolerance) if len(points) else found
 
     def _is_steady(self, found: SettledState) -> bool:
         """Whether the level is known well enough to be called held; it may be out of reach, too."""

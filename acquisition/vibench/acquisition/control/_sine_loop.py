@@ -34,6 +34,10 @@ class SineLoop:
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
         """Largest setting of the plan [V]."""
+        self.drives = 1
+        """Periods of the drive in one of the motion that is looked at; set before anything is played."""
+        self.judged_order: int | None = None
+        """Of the response, if one alone tells whether the motion has settled; likewise."""
         self.least_vpp = lowest_setting_vpp(measurement, rig)
         """Smallest setting of what plays [V]."""
         self.setting = DriveSetting(0.0, self.least_vpp)
@@ -51,9 +55,14 @@ class SineLoop:
         return self._scope.clock.frequency_hz
 
     @property
+    def motion_hz(self) -> float:
+        """One over the period of the motion that is looked at [Hz]."""
+        return self.setting.frequency_hz / self.drives
+
+    @property
     def noise(self) -> float:
         """Rms of the response channel's own noise, in the orders seen at the frequency of now [m/s]."""
-        return Stroboscope.noise_of(self._silence, self.setting.frequency_hz, self.channels.sample_rate_hz)
+        return Stroboscope.noise_of(self._silence, self.motion_hz, self.channels.sample_rate_hz)
 
     def listen_to_silence(self) -> Controller[None]:
         """Listen to silence: what the response shows then is noise."""
@@ -65,7 +74,7 @@ class SineLoop:
     def change(self, frequency_hz: float, setting_vpp: float) -> None:
         """Play something else from the next move on."""
         if frequency_hz != self.setting.frequency_hz:
-            self._scope = self.channels.stroboscope(frequency_hz)
+            self._scope = self.channels.stroboscope(frequency_hz, self.drives)
         self.setting = DriveSetting(frequency_hz, setting_vpp)
         self.forget()
 

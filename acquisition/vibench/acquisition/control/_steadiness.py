@@ -75,6 +75,17 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
     return unsettled
 
 
+def in_drives(found: Judgement, points: Phasors, drives: int, tolerance: float) -> Judgement:
+    """Count the period in drives, of which each of the ``points`` is so many long.
+
+    A motion that repeats after one drive has nothing at the orders in between.
+    """
+    between = points.mean(axis=0)[np.arange(points.shape[1]) % drives != 0]
+    size = sqrt(float(np.mean(np.sum(np.abs(points) ** 2, axis=1))))
+    repeats_at_once = found.period == 1 and np.linalg.norm(between) <= _allowed(found, tolerance) * size
+    return replace(found, period=1 if repeats_at_once else found.period * drives)
+
+
 def _clustered(points: Phasors, period: int, noise: float) -> Judgement:
     """Measure the clusters that points make which lie a whole number of ``period`` apart."""
     turns = len(points) // period
@@ -129,7 +140,8 @@ def _stationary(points: Phasors, found: Judgement) -> Judgement:
     """Test whether the statistics of blocks keep still: no trend, and no step between the halves."""
     length = len(points) // _BLOCKS
     blocks = points[len(points) - length * _BLOCKS :].reshape(_BLOCKS, length, -1)
-    fundamental = blocks[:, :, 1].mean(axis=1)
+    # Beside the mean, unless a single order is judged.
+    fundamental = blocks[:, :, min(1, blocks.shape[2] - 1)].mean(axis=1)
     power = np.log(np.mean(np.sum(np.abs(blocks) ** 2, axis=2), axis=1))
     away = blocks - blocks.mean(axis=1, keepdims=True)
     scatter = np.log(np.mean(np.sum(np.abs(away) ** 2, axis=2), axis=1))

@@ -69,15 +69,18 @@ class DriveClock:
 Phasors = NDArray[np.complex128]
 
 ORDERS = 5
-"""Mean and the first four harmonics of the drive: what tells one period from the next."""
+"""Mean and the first four harmonics of a period: what tells one from the next."""
 
 
 @dataclass(frozen=True, eq=False)
 class Periods:
-    """One row for each drive period; phases count from the drive's upward zero crossing (a sine is real)."""
+    """One row for each period of the motion, a drive or several of them long.
+
+    Phases count from the drive's upward zero crossing (a sine is real): of several, from any one.
+    """
 
     base: Phasors
-    """Fundamental of the base channel, unit of the channel, shape (periods,)."""
+    """The base channel at the drive's frequency, unit of the channel, shape (periods,)."""
     response: Phasors
     """Orders 0 to 4 of the response channel, unit of the channel, shape (periods, 5)."""
 
@@ -92,10 +95,18 @@ class Periods:
 
 
 class Stroboscope:
-    """Cuts blocks into drive periods as they come; what a block leaves over is kept for the next."""
+    """Cuts blocks into periods as they come; what a block leaves over is kept for the next.
 
-    def __init__(self, near_hz: float, sample_rate_hz: float) -> None:
+    Parameters
+    ----------
+    drives
+        Periods of the drive in one of the motion.
+
+    """
+
+    def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
         self._rate_hz = sample_rate_hz
+        self._drives = drives
         self.clock = DriveClock(near_hz, sample_rate_hz)
         self._left = np.empty((3, 0))
         self._first = 0
@@ -113,13 +124,13 @@ class Stroboscope:
         start_s = self._first / self._rate_hz if self._begun_s is None else self._begun_s
         end_s = (self._first + self._left.shape[1] - 1) / self._rate_hz
         starts_s = self.clock.starts_s(start_s - 0.25 / self.clock.frequency_hz, end_s)
-        starts_s = starts_s[starts_s >= self._first / self._rate_hz]
+        starts_s = starts_s[starts_s >= self._first / self._rate_hz][:: self._drives]
         if len(starts_s) < 2:
             return
         within = (starts_s - self._first / self._rate_hz) * self._rate_hz
         turns = self.clock.frequency_hz / self._rate_hz
         self._base.append(_orders(self._left[1], within, turns, 2)[:, 1])
-        self._response.append(_orders(self._left[2], within, turns, ORDERS))
+        self._response.append(_orders(self._left[2], within, turns / self._drives, ORDERS))
         self._keep_from(starts_s[-1])
 
     def periods(self) -> Periods:

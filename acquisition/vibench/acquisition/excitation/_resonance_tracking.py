@@ -31,7 +31,9 @@ class ResonanceTracking(AbstractFeedback):
     Kerschen, arXiv 2401.01151). The phase of the second one counts from the cosine of twice the base's,
     as its square does. It lags where the spring between the masses is the stiffer at positive p and the
     mode's p goes with m0 (the paper's first and third), and leads by as much (``phase_deg = 90``) where one
-    of both is the other way round. Natural frequency and damping are not told there.
+    of both is the other way round. With ``subharmonic = 2`` or 3 m0 repeats every so many drives, at half or
+    a third of their frequency: so many times its phase there lags the base by a quarter of a period, and for
+    2 counts as the phase of its square does. Natural frequency and damping are told for neither.
     """
 
     family: ClassVar[Family] = Family.STEPPED
@@ -49,6 +51,9 @@ class ResonanceTracking(AbstractFeedback):
     """Which motion of m0 has it: the one against the base, or the absolute one."""
     harmonic: Literal[1, 2, 3] = 1
     """Of m0, whose phase counts; above 1 that of m0 in space, against as many times the base's phase."""
+    subharmonic: Literal[1, 2, 3] = 1
+    """Drives in a period of m0, whose phase in space counts as many times; the motion must be there at
+    ``start_hz`` by itself."""
     phase_tolerance_deg: float = Field(default=1.0, gt=0, le=30)
     """How closely the phase must be met [degrees]."""
     sensor_phase_deg: float = Field(default=0.3, ge=0, le=30)
@@ -81,12 +86,31 @@ class ResonanceTracking(AbstractFeedback):
             )
         return self
 
+    @model_validator(mode="after")
+    def _super_or_sub(self) -> Self:
+        if self.harmonic > 1 and self.subharmonic > 1:
+            raise ValueError(
+                f"harmonic = {self.harmonic} and subharmonic = {self.subharmonic} were given; one of them "
+                "must be 1"
+            )
+        return self
+
+    @property
+    def is_fundamental(self) -> bool:
+        """Whether m0 resonates at the frequency of the drive."""
+        return self.harmonic == self.subharmonic == 1
+
     def motion(self, harmonics: Sequence[complex]) -> complex:
-        """Give the motion whose phase counts, from harmonics of m0 over the base, the first one first."""
-        if self.harmonic == 1:
+        """Give the motion whose phase counts, from harmonics of m0 over the base, the first one first.
+
+        The first one is that of m0's own period, which a subharmonic motion has several drives long.
+        """
+        if self.is_fundamental:
             return self.phase_of.motion(harmonics[0])
+        moved = harmonics[self.harmonic - 1]
         # The cube of a sine has a sine at three times its phase, its square a cosine at twice.
-        return harmonics[self.harmonic - 1] * (-1j if self.harmonic == 2 else 1.0)
+        turned = -1j if 2 in (self.harmonic, self.subharmonic) else 1.0
+        return turned * moved * (moved / max(abs(moved), 1e-300)) ** (self.subharmonic - 1)
 
     @property
     def band_hz(self) -> tuple[float, float]:

@@ -206,8 +206,10 @@ class ResonanceNote(AbstractNote):
     damping_ratio: SixFigures | None = None
     harmonic: int = 1
     """Of m0, whose phase counts: above 1 the resonance is a superharmonic one."""
+    subharmonic: int = 1
+    """Drives in a period of m0: above 1 the resonance is a subharmonic one."""
     harmonic_m: SixFigures | None = None
-    """Amplitude of that harmonic [m]."""
+    """Amplitude of that harmonic, or subharmonic [m]."""
 
 
 class NoiseNote(AbstractNote):

@@ -148,7 +148,7 @@ def _simulated_m(
     levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None
 ) -> Reals | None:
     """Give m0's simulated amplitude at each level, where one recorded stretch belongs to each."""
-    if laid is None or levels[0].harmonic > 1 or laid.response.left_out or analysis.response.left_out:
+    if laid is None or not levels[0].is_fundamental or laid.response.left_out or analysis.response.left_out:
         return None
     found = laid.response.response_ii * laid.response.drive_amplitude_m
     return found[[each.number for each in levels]] if max(_numbers(levels)) < found.size else None

@@ -90,7 +90,11 @@ def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
 
 def _resonance(note: ResonanceNote) -> str:
     level = f"{note.asked_m_per_s2:g} m/s²"
-    of = "phase resonance" if note.harmonic == 1 else f"superharmonic {note.harmonic}:1 phase resonance"
+    of = "phase resonance"
+    if note.harmonic > 1:
+        of = f"superharmonic {note.harmonic}:1 {of}"
+    if note.subharmonic > 1:
+        of = f"subharmonic 1:{note.subharmonic} {of}"
     if note.frequency_hz is None or note.frequency_u_hz is None:
         after = f"after {note.periods} periods " if note.periods else ""
         return (
@@ -121,9 +125,9 @@ class TrackedResonance:
     u_frequency_hz: float
     """Standard uncertainty, with that of the sensors' phase, which all levels share."""
     amplitude_m: float
-    """Of m0 at the drive frequency, or at its harmonic that resonates."""
-    harmonic: int
-    """1 for the drive frequency."""
+    """Of m0 at the drive frequency, or at its harmonic or subharmonic that resonates."""
+    is_fundamental: bool
+    """Whether it is at the drive frequency."""
     mode_hz: float | None
     """Natural frequency, fitted to both flanks; None where they do not tell it."""
     u_mode_hz: float | None
@@ -152,7 +156,7 @@ def _found(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
             u_frequency_hz=each.frequency_u_hz,
             amplitude_m=each.harmonic_m
             or each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2,
-            harmonic=each.harmonic,
+            is_fundamental=each.harmonic == each.subharmonic == 1,
             mode_hz=each.mode_hz,
             u_mode_hz=each.mode_u_hz,
             damping_ratio=each.damping_ratio,
