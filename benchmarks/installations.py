@@ -25,6 +25,8 @@ from packaging.markers import default_environment
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).resolve().parent.parent
+EXTRAS = ("none", "figures", "bench", "gui")
+"""Each brings what those before it do."""
 PREDICT = ("predict", "--model", "hertz", "--amplitude", "5e-6", "--frequency", "260", "--json")
 
 
@@ -52,8 +54,8 @@ def lowest(python_version: str, extra: str) -> list[str]:
     """Give each library of an installation at its lowest allowed version."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = project["optional-dependencies"]
-    wanted = {"none": (), "bench": ("bench",), "gui": ("bench", "gui")}[extra]
-    texts = [*project["dependencies"], *(text for each in wanted for text in extras[each])]
+    wanted = EXTRAS[: EXTRAS.index(extra) + 1]
+    texts = [*project["dependencies"], *(text for each in wanted for text in extras.get(each, ()))]
     environment = {**default_environment(), "python_version": python_version}
     found = []
     for text in texts:
@@ -105,7 +107,7 @@ def examine(each: Installation, folder: Path) -> None:
         "first prediction": PREDICT,
         "second prediction": PREDICT,
     }
-    if each.extra != "none":
+    if each.extra in {"bench", "gui"}:
         steps["measure quick"] = ("measure", "quick", "--out", "out")
         steps["analyse"] = ("analyse", "out/noise.h5", "--out", "report")
     for name, arguments in steps.items():
@@ -142,9 +144,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--python", nargs="+", default=[sys.executable], metavar="PROGRAM")
     parser.add_argument("--form", nargs="+", default=["wheel", "editable"], choices=["wheel", "editable"])
-    parser.add_argument(
-        "--extra", nargs="+", default=["none", "bench", "gui"], choices=["none", "bench", "gui"]
-    )
+    parser.add_argument("--extra", nargs="+", default=EXTRAS, choices=EXTRAS)
     parser.add_argument("--versions", nargs="+", default=["newest"], choices=["newest", "lowest"])
     parser.add_argument("--out", type=Path, metavar="FILE.md")
     options = parser.parse_args()

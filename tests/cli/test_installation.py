@@ -5,12 +5,15 @@ import os
 import re
 import subprocess
 import sys
-from importlib.metadata import version
+from importlib.metadata import distribution, version
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from vibench.acquisition import shipped_folder
+from vibench.acquisition.host._extras import EXTRAS
 from vibench.cli.doctor import VARIABLES
 from vibench.cli.exit_code import ExitCode
 from vibench.sim.lanes import lanes_pay
@@ -120,6 +123,14 @@ def test_what_is_compiled_beforehand_enters_the_lanes(tmp_path):
         ("grpc", ("serve-rig",), "bench"),
         ("PySide6", ("gui",), "gui"),
         ("pyqtgraph", ("gui",), "gui"),
+        ("matplotlib", ("analyse", "some.h5", "--out", "out"), "figures"),
+        (
+            "matplotlib",
+            ("branches", "--frequency", "60", "--amplitude", "1e-6:2e-6", "--out", "out"),
+            "figures",
+        ),
+        ("matplotlib", ("map", "basin", "--out", "out"), "figures"),
+        ("matplotlib", ("reproduce", "--out", "out"), "figures"),
     ],
 )
 def test_a_missing_library_is_one_sentence_with_the_command_that_brings_it(
@@ -133,24 +144,60 @@ def test_a_missing_library_is_one_sentence_with_the_command_that_brings_it(
     assert not (tmp_path / "out").exists()
 
 
-EXTRAS = ["pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf", "PySide6", "pyqtgraph"]
+INSTRUMENTS_AND_WINDOW = [*EXTRAS["bench"], *EXTRAS["gui"]]
 
 
-def test_a_prediction_needs_neither_instruments_nor_the_window(tmp_path):
-    arguments = ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json")
-    told = without(EXTRAS, *arguments, cwd=tmp_path)
-    assert json.loads(told.stdout)["points"][0]["relative_i"] > 0, told.stderr
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json"),
+        ("study", "paper", "--out", "out.h5", "--estimate", "--json"),
+        ("doctor", "--json"),
+        ("specimen", "asymmetric", "--json"),
+    ],
+)
+def test_what_draws_nothing_needs_the_core_alone(tmp_path, arguments):
+    told = without([*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], *arguments, cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert json.loads(told.stdout)
 
 
-def test_plans_recordings_and_figures_need_neither_instruments_nor_the_window(tmp_path):
+@pytest.mark.parametrize(
+    ("left_out", "imported"),
+    [
+        (INSTRUMENTS_AND_WINDOW, "from vibench.analysis.report import result_figures"),
+        ([*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], "from vibench.sim.maps import solve_map"),
+    ],
+)
+def test_plans_recordings_and_analysis_need_neither_instruments_nor_the_window(left_out, imported):
     program = (
-        f"import sys\nfor library in {EXTRAS!r}: sys.modules[library] = None\n"
+        f"import sys\nfor library in {left_out!r}: sys.modules[library] = None\n"
         "from vibench.acquisition import load_campaign, open_recording, run_campaign\n"
-        "from vibench.analysis import analyse\nfrom vibench.analysis.report import result_figures\n"
+        f"from vibench.analysis import analyse, analyse_files\n{imported}\n"
         "print(load_campaign('paper').name)"
     )
     told = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert told.stdout == "paper\n", told.stderr
+
+
+def installed_mb(name, seen):
+    """Give what the files of a library and of all that it needs take, each once."""
+    if name in seen:
+        return 0.0
+    seen.add(name)
+    found = distribution(name)
+    paths = [Path(str(found.locate_file(each))) for each in found.files or ()]
+    size = sum(path.stat().st_size for path in paths if path.is_file()) / 1e6
+    needed = [Requirement(text) for text in found.requires or ()]
+    return size + sum(
+        installed_mb(canonicalize_name(each.name), seen)
+        for each in needed
+        if each.marker is None or each.marker.evaluate({"extra": ""})
+    )
+
+
+def test_the_core_takes_less_than_half_a_gigabyte():
+    assert 300 < installed_mb("vibench", set()) < 500
 
 
 def test_the_page_lists_the_exit_codes_and_variables_that_there_are():

@@ -8,6 +8,7 @@ from ..errors import MissingLibrary
 
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
+        "figures": ("matplotlib",),
         "bench": ("pyvisa", "pyvisa_py", "usb", "nidaqmx", "grpc", "google.protobuf"),
         "sound": ("sounddevice",),
         "gui": ("PySide6", "pyqtgraph"),

@@ -6,4 +6,7 @@ the same data give the same bytes. Colours are told apart by colour-blind reader
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from vibench.acquisition import naming_its_extra
+
+_found, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__ = naming_its_extra(_found, "figures")

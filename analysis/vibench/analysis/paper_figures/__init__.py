@@ -6,4 +6,7 @@ kept with every figure. Figures 12 to 14 show the experiment and are drawn from 
 
 import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+from vibench.acquisition import naming_its_extra
+
+_found, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__ = naming_its_extra(_found, "figures")
