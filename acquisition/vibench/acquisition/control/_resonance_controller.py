@@ -25,8 +25,8 @@ _LOST_RAD = pi / 4
 """An error of the phase beyond which the loop is no longer on the resonance."""
 _CORRECTED = 0.5
 """Standard uncertainty of the correction for the phase that is left, as a share."""
-_LEFT = 1.5
-"""How far the motion may have to go still, over the tolerance of the phase in radians."""
+_LEFT, _LEFT_TO_CREEP = 1.5, 0.5
+"""How far the motion may have to go still, over the tolerance of the phase in radians; one that creeps."""
 _LOOKS_LOCKED = 3
 """Looks in a row with phase and level where they should be, before it counts as locked."""
 _SAME_LEVEL = 0.004
@@ -87,6 +87,7 @@ def _locked(
     """Hold phase and level at once; gives the looks it took, and how it ended: None far off the resonance."""
     loop, error_rad = controller.loop, 0.0
     tolerance_rad = radians(plan.phase_tolerance_deg)
+    most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
     in_a_row, looks = 0, plan.most_periods // (LOOK_PERIODS * loop.drives)
     for look in range(1, looks + 1):
         now = loop.setting
@@ -94,7 +95,7 @@ def _locked(
         base, seen = controller.measured(), controller.found(0.0)
         require_answer(loop.rig, now.frequency_hz, now.setting_vpp, base.amplitude)
         error_rad, left = law.see(now.frequency_hz, seen)
-        is_on = abs(error_rad) <= tolerance_rad and left <= _LEFT * tolerance_rad and seen.held is Held.WITHIN
+        is_on = abs(error_rad) <= tolerance_rad and left <= most_left and seen.held is Held.WITHIN
         in_a_row = in_a_row + 1 if is_on else 0
         if in_a_row == _LOOKS_LOCKED:
             return look, LockResult.LOCKED
