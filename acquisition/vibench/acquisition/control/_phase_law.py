@@ -15,6 +15,8 @@ _SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
 """An error that keeps more than this of itself in a look makes the gain grow by this factor, up to this."""
 _WIDER = np.linspace(-0.25, 0.25, 15)
 """Logarithms by which the half-width may have changed from one level to the next."""
+_MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
+"""The same for a super- or subharmonic, whose first one the search knows roughly."""
 _SURE_RAD = radians(12.0)
 """Unexplained drift of the phase that weighs as much as a half-width that has changed by e."""
 _STEEPER = 0.5
@@ -119,11 +121,12 @@ class PhaseLaw:
             drift = np.diff(error) + 0.5 * turned * (away_hz[1:] + away_hz[:-1])
             return float(np.mean(drift**2))
 
-        left = np.array([unexplained(self._mode.half_width_hz * exp(each)) for each in _WIDER])
-        best = int(np.argmin(left + (_SURE_RAD * _WIDER) ** 2 / (len(base) - 1)))
+        wider = _WIDER if self._plan.is_fundamental else _MUCH_WIDER
+        left = np.array([unexplained(self._mode.half_width_hz * exp(each)) for each in wider])
+        best = int(np.argmin(left + (_SURE_RAD * wider) ** 2 / (len(base) - 1)))
         if left[best] > _EXPLAINED_RAD**2:
             return replace(self._mode, bend_hz=0.0, steeper_hz=0.0)
-        width_hz = max(self._mode.narrowest_hz, self._mode.half_width_hz * exp(_WIDER[best]))
+        width_hz = max(self._mode.narrowest_hz, self._mode.half_width_hz * exp(wider[best]))
         most_hz = _STEEPER * abs(bend_hz) if self._mode.bend_hz else 0.0
         steeper_hz = min(max(bend_hz - self._mode.bend_hz, -most_hz), most_hz)
         return LearntMode(self._mode.narrowest_hz, width_hz, bend_hz, steeper_hz)
