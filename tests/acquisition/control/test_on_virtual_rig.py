@@ -332,6 +332,27 @@ def test_a_subharmonic_resonance_is_met_where_twice_its_phase_is_the_one_asked_f
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize(("subharmonic", "start_hz"), [(2, 192), (3, 290)])
+def test_where_m0_repeats_every_drive_no_subharmonic_is_met_however_wide_the_tolerance(
+    carried_out, subharmonic, start_hz
+):
+    """Noise at half the drive has some phase, and one of thirty degrees' tolerance was met by it."""
+    plan = ResonanceTracking(
+        amplitude_vpp=9.0,
+        start_hz=start_hz,
+        low_hz=start_hz - 5,
+        high_hz=start_hz + 5,
+        subharmonic=subharmonic,
+        phase_tolerance_deg=30,
+        accelerations_m_per_s2=(2, 3),
+        settling=Settling(longest_wait_s=6.0),
+    )
+    found = said(carried_out(plan, contact="linear_gap:150", gap_m=(60e-6, 25e-6)), "resonance")
+    assert [each["lock"] for each in found] == ["no motion of that period"] * 2
+    assert [each["tries"] for each in found] == [1, 1]
+
+
+@pytest.mark.thorough
 def test_among_stops_that_are_not_reached_there_is_no_superharmonic_resonance(carried_out):
     found = said(carried_out(superharmonic(5.0, 8.0)), "resonance")
     assert [each.get("frequency_hz") for each in found] == [None, None]

@@ -29,8 +29,8 @@ _LEFT, _LEFT_TO_CREEP = 1.5, 0.5
 """How far the motion may have to go still, over the tolerance of the phase in radians; one that creeps."""
 _LOOKS_LOCKED = 3
 """Looks in a row with phase and level where they should be, before it counts as locked."""
-_SAME_LEVEL = 0.004
-"""Tolerance of the level within one search, a share."""
+_FINEST = 2e-6
+"""Share of a frequency by which a search goes at least: closer together lie the sides of a jump."""
 _BATCHES = 8
 _FURTHEST = 1.5
 """Half-widths of the resonance between it and the furthest point of a flank."""
@@ -69,6 +69,7 @@ def _followed(
     error = _phase_error(loop.periods, found, plan)
     is_steady = found.held is Held.WITHIN and found.judgement.steadiness is Steadiness.PERIODIC
     is_met = abs(error.error_deg) <= plan.phase_tolerance_deg and (lock is LockResult.LOCKED or is_steady)
+    is_met = is_met and (plan.subharmonic == 1 or found.judgement.period != 1)
     lock = LockResult.LOCKED if is_met else LockResult.LOST
     mode = law.learnt(found, radians(error.error_deg))
     left_deg = hypot(error.uncertainty_deg, _open_phase_deg(plan, found), _CORRECTED * error.error_deg)
@@ -123,10 +124,8 @@ def _searched(
     """Search the resonance at one level in settled motion, and record there."""
     level, rule = plan.held_levels[number], plan.settling
     if not plan.is_fundamental:
-        # Its resonance moves with the level, and its motion creeps: tries at different levels, or of motions
-        # that have still to go, would tell a wrong slope of the phase.
+        # Its motion creeps: tries of motions that have still to go would tell a wrong slope of the phase.
         settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
-        level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
         rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
     settling_controller = SettlingController(loop, rule, level)
     search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz, is_mode=plan.is_fundamental)
@@ -138,10 +137,12 @@ def _searched(
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
         # Where a harmonic is noise, its phase is any, and while it creeps, one that passes.
-        rests = plan.is_fundamental or states[-1].judgement.steadiness is Steadiness.PERIODIC
-        is_known = rests and error.uncertainty_deg <= plan.phase_tolerance_deg
+        is_known = _rests(plan, states[-1]) and error.uncertainty_deg <= plan.phase_tolerance_deg
         if abs(error.error_deg) <= plan.phase_tolerance_deg and is_known and len(search.tries) > 1:
             lock = LockResult.LOCKED
+            break
+        if plan.subharmonic > 1 and all(each.judgement.period == 1 for each in states[-2:]):
+            lock = LockResult.ABSENT
             break
         next_hz = search.next_hz()
         if plan.low_hz < next_hz < plan.high_hz:
@@ -149,6 +150,9 @@ def _searched(
             next_hz *= states[-1].frequency_hz / states[-1].drive_hz
         if next_hz == frequency_hz:
             lock = LockResult.AT_THE_EDGE
+            break
+        if not plan.is_fundamental and abs(next_hz - frequency_hz) < _FINEST * frequency_hz:
+            lock = LockResult.BETWEEN_MOTIONS
             break
         frequency_hz = next_hz
     found = states[-1]
@@ -206,6 +210,12 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
     return fitted_mode(
         np.array([each.drive_hz for each in near]), np.array([each.transmissibility for each in near])
     )
+
+
+def _rests(plan: ResonanceTracking, found: SettledState) -> bool:
+    """Whether the phase of a super- or subharmonic is that of a motion which has settled, and is there."""
+    is_there = plan.subharmonic == 1 or found.judgement.period != 1
+    return plan.is_fundamental or (is_there and found.judgement.steadiness is Steadiness.PERIODIC)
 
 
 def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:

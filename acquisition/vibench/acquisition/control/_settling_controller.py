@@ -15,6 +15,8 @@ from ._steadiness import Judgement, in_drives, judged
 from ._stroboscope import ORDERS, Phasors
 
 _SURE = 2.0
+_SAME_LEVEL = 0.004
+"""Tolerance with which the level is held where one order of the response alone is judged, a share."""
 _PROMPT = 0.7
 """Part of a correction that is made at once where the specimen still answers the one before."""
 
@@ -130,7 +132,11 @@ class SettlingController:
         now = self.loop.setting
         measured = self.measured()
         require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
-        control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
+        level = self.level
+        if self.loop.judged_order is not None:
+            # Its phase moves with the level as well: all that is compared is seen at the same one.
+            level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
+        control = LevelControl(level, self.loop.most_vpp, self.loop.least_vpp)
         next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
         if next_vpp == now.setting_vpp:
             return False
@@ -166,7 +172,8 @@ class SettlingController:
         order = self.loop.judged_order
         judged_points = points if order is None else points[:, order : order + 1]
         found = judged(judged_points, self.rule, self.loop.noise)
-        return in_drives(found, points, self.loop.drives, self.rule.tolerance) if len(points) else found
+        newest = points[-self.rule.periods :]
+        return in_drives(found, newest, self.loop.drives) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
         """Whether the level is known well enough to be called held; it may be out of reach, too."""

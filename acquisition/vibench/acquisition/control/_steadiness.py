@@ -16,6 +16,8 @@ _FEWEST_TURNS = 2
 """Repetitions of a long period in each third of the window, so that a third has a mean."""
 _SURE = 2.0
 """Standard uncertainties that a figure must stay away from its limit."""
+_CERTAIN = 5.0
+"""Standard errors of a mean above which it is none of noise."""
 _BLOCKS = 12
 """Stretches that a stationarity test compares."""
 _SIGNIFICANCE = 0.01 / 8
@@ -75,14 +77,16 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
     return unsettled
 
 
-def in_drives(found: Judgement, points: Phasors, drives: int, tolerance: float) -> Judgement:
+def in_drives(found: Judgement, points: Phasors, drives: int) -> Judgement:
     """Count the period in drives, of which each of the ``points`` is so many long.
 
-    A motion that repeats after one drive has nothing at the orders in between.
+    A motion that repeats after one drive has nothing but noise at the orders in between, however weak a
+    subharmonic may be beside the rest.
     """
-    between = points.mean(axis=0)[np.arange(points.shape[1]) % drives != 0]
-    size = sqrt(float(np.mean(np.sum(np.abs(points) ** 2, axis=1))))
-    repeats_at_once = found.period == 1 and np.linalg.norm(between) <= _allowed(found, tolerance) * size
+    between = points[:, np.arange(points.shape[1]) % drives != 0]
+    mean = between.mean(axis=0)
+    error = sqrt(float(np.sum(np.abs(between - mean) ** 2))) / len(points)
+    repeats_at_once = found.period == 1 and np.linalg.norm(mean) <= _CERTAIN * error
     return replace(found, period=1 if repeats_at_once else found.period * drives)
 
 

@@ -57,6 +57,8 @@ class LockResult(StrEnum):
     LOCKED = "locked"
     LOST = "not met"
     AT_THE_EDGE = "outside the range"
+    ABSENT = "no motion of that period"
+    BETWEEN_MOTIONS = "a jump of the phase, as between two motions"
 
     @classmethod
     def _missing_(cls, value: object) -> "LockResult | None":
