@@ -62,11 +62,12 @@ def figure(
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     studies = KeptStudies(out / "studies", workers)
+
+    def simulated(each: int) -> Iterator[DrawnFigure]:
+        yield PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))
+
     for each in numbers:
-        drawn = experiment(each)
-        if each in asked:
-            drawn = iter([PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))])
-        for one in drawn:
+        for one in experiment(each) if each in EXPERIMENT else simulated(each):
             paths = one.save(out, kinds)
             console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")
     studies.complain()

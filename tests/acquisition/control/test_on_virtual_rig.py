@@ -227,18 +227,21 @@ def test_a_resonance_is_followed_among_impacts_as_far_as_the_model_has_a_steady_
         assert each["motion"] == "periodic"
 
 
-def superharmonic(*levels):
-    return ResonanceTracking(
-        amplitude_vpp=9.0,
-        start_hz=31.6,
-        low_hz=29,
-        high_hz=36,
-        widest_step_hz=0.3,
-        harmonic=3,
-        accelerations_m_per_s2=levels,
-        settling=Settling(tolerance=0.02, longest_wait_s=6.0),
-        most_tries=12,
-    )
+def other_resonance(near_hz, *levels, **options):
+    """Track a super- or subharmonic resonance at levels of the base [m/s2]."""
+    chosen = {
+        "start_hz": near_hz,
+        "low_hz": near_hz - 5,
+        "high_hz": near_hz + 7,
+        "widest_step_hz": 0.4,
+        "settling": Settling(tolerance=0.02, longest_wait_s=6.0),
+        "most_tries": 12,
+    }
+    return ResonanceTracking(amplitude_vpp=9.0, accelerations_m_per_s2=levels, **(chosen | options))
+
+
+def bumpers(below_m, above_m, stiffness=100):
+    return {"contact": f"linear_gap:{stiffness}", "gap_m": (below_m, above_m)}
 
 
 @pytest.mark.thorough
@@ -246,7 +249,7 @@ def test_a_superharmonic_resonance_is_met_where_table_and_specimen_have_it(carri
     """Beside harmonic balance of both together (`benchmarks/backbones.py --superharmonic`)."""
     k1 = 2.1e-3 * (2 * np.pi * 100) ** 2
     cubic = {"contact": "power:3", "gap_m": 99e-6, "hertz_stiffness": 0.1 * k1 * 1e-4 / 1e-9}
-    found = said(carried_out(superharmonic(10.92, 12.07), **cubic), "resonance")
+    found = said(carried_out(other_resonance(31.6, 10.92, 12.07, harmonic=3), **cubic), "resonance")
     assert [each["lock"] for each in found] == ["locked"] * 2
     levels, hertz, third_m = (9.88, 10.92, 12.07), (31.764, 31.802, 31.849), (1.55e-7, 2.08e-7, 2.80e-7)
     for each in found:
@@ -257,28 +260,12 @@ def test_a_superharmonic_resonance_is_met_where_table_and_specimen_have_it(carri
     assert found[1]["periods"] <= 150
 
 
-def second_superharmonic(*levels, **options):
-    return ResonanceTracking(
-        amplitude_vpp=9.0,
-        start_hz=47.5,
-        low_hz=46.5,
-        high_hz=50,
-        widest_step_hz=0.4,
-        harmonic=2,
-        accelerations_m_per_s2=levels,
-        settling=Settling(tolerance=0.02, longest_wait_s=6.0),
-        most_tries=12,
-        **options,
-    )
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize(("gap_m", "phase_deg"), [((60e-6, 30e-6), -90), ((30e-6, 60e-6), 90)])
 def test_a_second_superharmonic_leads_or_lags_by_which_bumper_is_nearer(carried_out, gap_m, phase_deg):
     """Beside harmonic balance (`benchmarks/backbones.py --superharmonic 2 --spring bumpers`)."""
-    bumpers = {"contact": "linear_gap:100", "gap_m": gap_m}
-    plan = second_superharmonic(10.38, 10.78, phase_deg=phase_deg)
-    found = said(carried_out(plan, **bumpers), "resonance")
+    plan = other_resonance(47.5, 10.38, 10.78, harmonic=2, phase_deg=phase_deg)
+    found = said(carried_out(plan, **bumpers(*gap_m)), "resonance")
     assert [each["lock"] for each in found] == ["locked"] * 2
     levels, hertz, second_m = (10, 10.5, 11), (47.756, 47.830, 47.881), (5.14e-7, 6.78e-7, 8.17e-7)
     for each in found:
@@ -291,8 +278,8 @@ def test_a_second_superharmonic_leads_or_lags_by_which_bumper_is_nearer(carried_
 
 @pytest.mark.thorough
 def test_a_second_superharmonic_is_not_met_with_the_phase_of_the_other_side(carried_out):
-    bumpers = {"contact": "linear_gap:100", "gap_m": (60e-6, 30e-6)}
-    found = said(carried_out(second_superharmonic(10.38, phase_deg=90), **bumpers), "resonance")
+    plan = other_resonance(47.5, 10.38, harmonic=2, phase_deg=90)
+    found = said(carried_out(plan, **bumpers(60e-6, 30e-6)), "resonance")
     assert [each.get("frequency_hz") for each in found] == [None]
 
 
@@ -309,18 +296,11 @@ def test_a_subharmonic_resonance_is_met_where_twice_its_phase_is_the_one_asked_f
     carried_out, gap_m, phase_deg, model_hz, model_m
 ):
     """Beside harmonic balance (`benchmarks/backbones.py --subharmonic 2 --spring bumpers`), at 23.64 m/s2."""
-    plan = ResonanceTracking(
-        amplitude_vpp=9.0,
-        start_hz=192,
-        low_hz=187,
-        high_hz=199,
-        widest_step_hz=0.5,
-        subharmonic=2,
-        phase_deg=phase_deg,
-        accelerations_m_per_s2=(23.64,),
-        settling=Settling(tolerance=0.02, longest_wait_s=20.0),
+    settling = Settling(tolerance=0.02, longest_wait_s=20.0)
+    plan = other_resonance(
+        192, 23.64, subharmonic=2, phase_deg=phase_deg, settling=settling, widest_step_hz=0.5, most_tries=25
     )
-    recording = carried_out(plan, contact="linear_gap:100", gap_m=gap_m)
+    recording = carried_out(plan, **bumpers(*gap_m))
     (found,) = said(recording, "resonance")
     assert found["lock"] == "locked"
     # The resonance moves by 0.17 Hz with each m/s2.
@@ -337,23 +317,23 @@ def test_where_m0_repeats_every_drive_no_subharmonic_is_met_however_wide_the_tol
     carried_out, subharmonic, start_hz
 ):
     """Noise at half the drive has some phase, and one of thirty degrees' tolerance was met by it."""
-    plan = ResonanceTracking(
-        amplitude_vpp=9.0,
-        start_hz=start_hz,
-        low_hz=start_hz - 5,
-        high_hz=start_hz + 5,
-        subharmonic=subharmonic,
-        phase_tolerance_deg=30,
-        accelerations_m_per_s2=(2, 3),
-        settling=Settling(longest_wait_s=6.0),
-    )
-    found = said(carried_out(plan, contact="linear_gap:150", gap_m=(60e-6, 25e-6)), "resonance")
+    plan = other_resonance(start_hz, 2, 3, subharmonic=subharmonic, phase_tolerance_deg=30)
+    found = said(carried_out(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
     assert [each["lock"] for each in found] == ["no motion of that period"] * 2
     assert [each["tries"] for each in found] == [1, 1]
 
 
 @pytest.mark.thorough
+def test_a_search_ends_where_the_phase_leaps_from_one_motion_to_another(carried_out):
+    """From 197 Hz downwards m0's half-drive motion is small until it jumps; it was halved 22 times there."""
+    plan = other_resonance(197, 24, low_hz=187, high_hz=199, subharmonic=2, most_tries=25)
+    (found,) = said(carried_out(plan, **bumpers(60e-6, 25e-6, 150)), "resonance")
+    assert found["lock"] == "a jump of the phase, as between two motions"
+    assert found["tries"] < 25
+
+
+@pytest.mark.thorough
 def test_among_stops_that_are_not_reached_there_is_no_superharmonic_resonance(carried_out):
-    found = said(carried_out(superharmonic(5.0, 8.0)), "resonance")
+    found = said(carried_out(other_resonance(31.6, 5.0, 8.0, harmonic=3)), "resonance")
     assert [each.get("frequency_hz") for each in found] == [None, None]
     assert "locked" not in [each["lock"] for each in found]

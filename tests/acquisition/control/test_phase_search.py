@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from vibench.acquisition.control._level_control import MeasuredLevel
 from vibench.acquisition.control._phase_search import PhaseError, PhaseSearch
+from vibench.acquisition.control._resonance_controller import _phase_error
+from vibench.acquisition.control._settling_controller import SettledState
+from vibench.acquisition.control._steadiness import Judgement
+from vibench.acquisition.control._stroboscope import Periods
+from vibench.acquisition.excitation import ResonanceTracking
+from vibench.acquisition.recording import Held, Steadiness
 
 
 def error_deg(frequency_hz, natural_hz, damping):
@@ -70,3 +77,28 @@ def test_of_a_phase_that_is_no_mode_s_the_slope_is_taken_close_by():
     assert found.frequency_hz == pytest.approx(193.091, abs=1e-4)
     assert found.slope_deg_per_hz == pytest.approx(-300.0, rel=0.01)
     assert PhaseSearch(190.0, 195.0, 0.5, tries).resonance(0.3).slope_deg_per_hz > -100.0
+
+
+def uncertainty_deg(response, **plan):
+    """Give how well the phase of a motion, shape (periods, 5), is known over a base without noise."""
+    periods = Periods(np.ones(len(response), complex), response)
+    judgement = Judgement(Steadiness.PERIODIC, 1, 0.0, 0.0, 0.0, 0.0)
+    base = MeasuredLevel(1.0, 0.0)
+    harmonics = tuple(response[:, 1:].mean(axis=0))
+    found = SettledState(95.0, 95.0, 1.0, 1.0, judgement, base, Held.WITHIN, harmonics)
+    tracking = ResonanceTracking(
+        amplitude_vpp=1, start_hz=95, low_hz=90, high_hz=99, accelerations_m_per_s2=(1,), **plan
+    )
+    return _phase_error(periods, found, tracking).uncertainty_deg
+
+
+@pytest.mark.parametrize("plan", [{"harmonic": 2}, {"harmonic": 3}, {"subharmonic": 2}, {"subharmonic": 3}])
+def test_noise_has_no_phase_and_what_rises_above_it_has(plan):
+    """Eight phases of noise scatter by 100 degrees, so that their mean seemed known to 30 or so."""
+    known = []
+    for seed in range(300):
+        random = np.random.default_rng(seed)
+        noise = random.standard_normal((160, 5)) + 1j * random.standard_normal((160, 5))
+        known.append(uncertainty_deg(noise, **plan) <= 30)
+        assert uncertainty_deg(noise + 6.0, **plan) <= 10
+    assert sum(known) <= 3

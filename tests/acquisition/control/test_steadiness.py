@@ -114,7 +114,7 @@ def test_a_period_that_is_looked_at_over_several_drives_is_counted_in_them(drive
     seen = noise(300, 1e-3)
     seen[:, drives] += 1.0
     seen[:, 1] += share
-    assert in_drives(judged(seen, RULE), seen, drives).period == period
+    assert in_drives(judged(seen, RULE), seen, drives, 0.0).period == period
 
 
 @pytest.mark.parametrize("kept", [0.5, 0.0])

@@ -83,6 +83,10 @@ def test_a_subharmonic_resonance_is_called_so_and_drawn_by_its_amplitude():
     assert found == "Subharmonic 1:2 phase resonance at 192.400 ± 0.060 Hz (30 m/s²)."
     (drawn,) = tracked_resonances([met])
     assert (drawn.amplitude_m, drawn.is_fundamental) == (2e-6, False)
+    louder = note(1, 33.0, 194.4, subharmonic=2, harmonic_m=2.2e-6)
+    assert "the drive at phase resonance moves by +2.000" in backbone_sentence(
+        tracked_resonances([met, louder])
+    )
 
 
 @pytest.mark.parametrize(

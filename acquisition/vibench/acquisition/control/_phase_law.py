@@ -31,7 +31,7 @@ class LearntMode:
 
     narrowest_hz: float
     """Half-width of the resonance as it was searched for; contacts and hard springs only widen it. Zero for a
-    superharmonic one."""
+    super- or subharmonic."""
     half_width_hz: float
     bend_hz: float = 0.0
     """What the resonance moved by while the level grew by e; zero where that is not known."""

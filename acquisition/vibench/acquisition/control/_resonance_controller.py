@@ -32,6 +32,8 @@ _LOOKS_LOCKED = 3
 _FINEST = 2e-6
 """Share of a frequency by which a search goes at least: closer together lie the sides of a jump."""
 _BATCHES = 8
+_KNOWN = 4.0
+"""Standard errors of a motion above which it has a phase."""
 _FURTHEST = 1.5
 """Half-widths of the resonance between it and the furthest point of a flank."""
 
@@ -69,7 +71,7 @@ def _followed(
     error = _phase_error(loop.periods, found, plan)
     is_steady = found.held is Held.WITHIN and found.judgement.steadiness is Steadiness.PERIODIC
     is_met = abs(error.error_deg) <= plan.phase_tolerance_deg and (lock is LockResult.LOCKED or is_steady)
-    is_met = is_met and (plan.subharmonic == 1 or found.judgement.period != 1)
+    is_met = is_met and _is_there(plan, found)
     lock = LockResult.LOCKED if is_met else LockResult.LOST
     mode = law.learnt(found, radians(error.error_deg))
     left_deg = hypot(error.uncertainty_deg, _open_phase_deg(plan, found), _CORRECTED * error.error_deg)
@@ -137,12 +139,13 @@ def _searched(
         error = _phase_error(loop.periods, states[-1], plan)
         search.tries.append(error)
         # Where a harmonic is noise, its phase is any, and while it creeps, one that passes.
-        is_known = _rests(plan, states[-1]) and error.uncertainty_deg <= plan.phase_tolerance_deg
+        rests = plan.is_fundamental or states[-1].judgement.steadiness is Steadiness.PERIODIC
+        is_known = rests and error.uncertainty_deg <= plan.phase_tolerance_deg
+        if not any(_is_there(plan, each) for each in states[-2:]):
+            lock = LockResult.ABSENT
+            break
         if abs(error.error_deg) <= plan.phase_tolerance_deg and is_known and len(search.tries) > 1:
             lock = LockResult.LOCKED
-            break
-        if plan.subharmonic > 1 and all(each.judgement.period == 1 for each in states[-2:]):
-            lock = LockResult.ABSENT
             break
         next_hz = search.next_hz()
         if plan.low_hz < next_hz < plan.high_hz:
@@ -212,10 +215,9 @@ def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | N
     )
 
 
-def _rests(plan: ResonanceTracking, found: SettledState) -> bool:
-    """Whether the phase of a super- or subharmonic is that of a motion which has settled, and is there."""
-    is_there = plan.subharmonic == 1 or found.judgement.period != 1
-    return plan.is_fundamental or (is_there and found.judgement.steadiness is Steadiness.PERIODIC)
+def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
+    """Whether a motion may be the one that is tracked: a subharmonic one does not repeat every drive."""
+    return plan.subharmonic == 1 or found.judgement.period != 1
 
 
 def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
@@ -253,6 +255,9 @@ def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking)
     ratios = response / np.exp(1j * np.outer(away, orders)) / np.abs(base)[:, None]
     ratios *= np.array(found.harmonics) / ratios.mean(axis=0)
     ratios = np.array([plan.motion(each) for each in ratios])
+    if abs(ratios.mean()) <= _KNOWN * float(np.std(ratios, ddof=1)) / sqrt(_BATCHES):
+        # Noise: the spread of its phases has a bound, and with it what they would be known to.
+        return PhaseError(found.drive_hz, error_deg, 180.0)
     spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
     return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
 

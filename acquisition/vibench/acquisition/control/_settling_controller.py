@@ -169,11 +169,10 @@ class SettlingController:
         )
 
     def _judged(self, points: Phasors) -> Judgement:
-        order = self.loop.judged_order
-        judged_points = points if order is None else points[:, order : order + 1]
-        found = judged(judged_points, self.rule, self.loop.noise)
+        order, noise = self.loop.judged_order, self.loop.noise
+        found = judged(points if order is None else points[:, order : order + 1], self.rule, noise)
         newest = points[-self.rule.periods :]
-        return in_drives(found, newest, self.loop.drives) if len(newest) else found
+        return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
 
     def _is_steady(self, found: SettledState) -> bool:
         """Whether the level is known well enough to be called held; it may be out of reach, too."""

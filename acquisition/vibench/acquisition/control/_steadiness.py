@@ -77,16 +77,17 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
     return unsettled
 
 
-def in_drives(found: Judgement, points: Phasors, drives: int) -> Judgement:
+def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> Judgement:
     """Count the period in drives, of which each of the ``points`` is so many long.
 
     A motion that repeats after one drive has nothing but noise at the orders in between, however weak a
-    subharmonic may be beside the rest.
+    subharmonic may be beside the rest. A hum that silence shows as well is noise.
     """
     between = points[:, np.arange(points.shape[1]) % drives != 0]
     mean = between.mean(axis=0)
     error = sqrt(float(np.sum(np.abs(between - mean) ** 2))) / len(points)
-    repeats_at_once = found.period == 1 and np.linalg.norm(mean) <= _CERTAIN * error
+    by_chance = hypot(_CERTAIN * error, _NOISE_MARGIN * noise)
+    repeats_at_once = found.period == 1 and np.linalg.norm(mean) <= by_chance
     return replace(found, period=1 if repeats_at_once else found.period * drives)
 
 

@@ -118,10 +118,9 @@ def _amplitudes(
             base, scale * simulated_m, color=SIMULATED, marker="s", markerfacecolor="none",
             markersize=5, linestyle="none", label=_SIMULATED,
         )  # fmt: skip
-    axes.set_ylabel(f"m0 at resonance [{unit}]")
     axes.set_xlabel(_LEVEL)
     axes.margins(_MARGIN)
-    axes.set_ylim(bottom=0.0)
+    _from_zero(axes, levels, unit)
 
 
 def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
@@ -132,10 +131,20 @@ def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
         color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8,
     )  # fmt: skip
     axes.xaxis.set_major_locator(MaxNLocator(_MOST_MARKS))
-    axes.set_xlabel("phase resonance [Hz]")
-    axes.set_ylabel(f"m0 at resonance [{unit}]")
+    axes.set_xlabel("phase resonance [Hz]" if levels[0].is_fundamental else "drive at phase resonance [Hz]")
     axes.margins(_MARGIN)
-    axes.set_ylim(bottom=0.0)
+    _from_zero(axes, levels, unit)
+
+
+def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> None:
+    """Name the amplitude, and draw it from zero to above the largest."""
+    of = "at resonance"
+    if levels[0].harmonic > 1:
+        of = f"at {levels[0].harmonic} times the drive"
+    if levels[0].subharmonic > 1:
+        of = f"at 1/{levels[0].subharmonic} of the drive"
+    axes.set_ylabel(f"m0 {of} [{unit}]")
+    axes.set_ylim(0.0, (1.0 + _MARGIN) * axes.dataLim.ymax)
 
 
 def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:

@@ -126,12 +126,19 @@ class TrackedResonance:
     """Standard uncertainty, with that of the sensors' phase, which all levels share."""
     amplitude_m: float
     """Of m0 at the drive frequency, or at its harmonic or subharmonic that resonates."""
-    is_fundamental: bool
-    """Whether it is at the drive frequency."""
+    harmonic: int
+    """Of the drive, at which m0 resonates."""
+    subharmonic: int
+    """Drives in a period of m0."""
     mode_hz: float | None
     """Natural frequency, fitted to both flanks; None where they do not tell it."""
     u_mode_hz: float | None
     damping_ratio: float | None
+
+    @property
+    def is_fundamental(self) -> bool:
+        """Whether m0 resonates at the frequency of the drive."""
+        return self.harmonic == self.subharmonic == 1
 
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
@@ -156,7 +163,8 @@ def _found(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
             u_frequency_hz=each.frequency_u_hz,
             amplitude_m=each.harmonic_m
             or each.response_ii * each.base_m_per_s2 / (2 * math.pi * each.at_hz) ** 2,
-            is_fundamental=each.harmonic == each.subharmonic == 1,
+            harmonic=each.harmonic,
+            subharmonic=each.subharmonic,
             mode_hz=each.mode_hz,
             u_mode_hz=each.mode_u_hz,
             damping_ratio=each.damping_ratio,
@@ -171,7 +179,8 @@ def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
     shift_hz = last.frequency_hz - first.frequency_hz
     u_hz = 2 * math.hypot(first.u_frequency_hz, last.u_frequency_hz)
     moved = f"by {'+' if shift_hz > 0 else ''}{plus_minus(shift_hz, u_hz)} Hz"
-    between = f"From {first.base_m_per_s2:.3g} to {last.base_m_per_s2:.3g} m/s² the phase resonance moves"
+    what = "the phase resonance" if first.is_fundamental else "the drive at phase resonance"
+    between = f"From {first.base_m_per_s2:.3g} to {last.base_m_per_s2:.3g} m/s² {what} moves"
     if abs(shift_hz) <= u_hz:
         return f"{between} {moved}: neither softening nor hardening is seen."
     return f"{between} {moved}: the mode {'hardens' if shift_hz > 0 else 'softens'}."
