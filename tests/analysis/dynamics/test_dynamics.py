@@ -232,7 +232,18 @@ def test_a_phase_resonance_is_drawn_by_its_frequency_with_what_was_tracked_on_it
     (found,) = diagram.lines
     assert found.frequency_hz == pytest.approx(94.602, abs=1e-3)
     base = 5e-8 * (2 * np.pi * 94.6) ** 2
-    tracked = TrackedResonance(0, base, 94.6, 0.01, 1.9e-7, 1, None, None, None)
+    tracked = TrackedResonance(
+        number=0,
+        base_m_per_s2=base,
+        frequency_hz=94.6,
+        u_frequency_hz=0.01,
+        amplitude_m=1.9e-7,
+        harmonic=1,
+        subharmonic=1,
+        mode_hz=None,
+        u_mode_hz=None,
+        damping_ratio=None,
+    )
     first, second = branches_figure(diagram, tracked=(tracked,)).figure.axes
     (bars,) = first.containers
     assert bars.lines[0].get_xydata().tolist() == [[pytest.approx(0.05), 94.6]]
