@@ -286,9 +286,9 @@ def _with_gaps(
     found, why = tracked_numbers(results, updated.specimen)
     if found is None:
         found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
+        both = f"{why}; by statistics: {why_not}" if why_not else why
         not_told.append(
-            "Each side's gap, m1, c1 and the contact law are not determined: "
-            f"{why}; by statistics: {why_not}."
+            f"Each side's gap, m1, c1 and the contact law are not determined: {both}."
             if found is None
             else f"No motion could be tracked: {why}."
         )
