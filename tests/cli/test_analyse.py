@@ -108,6 +108,7 @@ def test_a_bad_recording_in_a_folder_is_one_sentence_and_the_others_are_analysed
     assert "Traceback" not in done.stderr
     report = tmp_path / "night[red]_analysis" / "report.html"
     assert str(report) in done.stdout, "brackets are no markup"
+    assert "good: Noise at " in done.stdout, "what the report says in short stands on the terminal too"
     assert "<h1>night[red]</h1>" in report.read_text(encoding="utf-8")
 
 

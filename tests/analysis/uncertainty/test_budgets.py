@@ -249,4 +249,8 @@ def test_steps_without_collisions_scatter_by_noise_alone(stepped_file):
     ]
     assert first.share(Cause.CHANCE) == second.share(Cause.CHANCE) == 0.0
     assert Cause.CHANCE not in first.not_stated
+    # The lifted maximum and the scatter of A0 are one cause, named once.
+    assert sum(each.cause is Cause.NOISE for each in first.contributions) == 2
+    assert first.sentence.count("noise ") == 1
+    assert f"noise {100 * first.share(Cause.NOISE):.2g} %" in first.sentence
     assert first.value >= second.value * (1 - 1e-3)

@@ -39,6 +39,7 @@ from ._comparison_export import (
 from ._drawings import (
     DRAWINGS,
     Drawing,
+    findings,
     recording_figures,
     result_figures,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "chain_figure",
     "contact_forces_figure",
     "exponent_spectrum_figure",
+    "findings",
     "levels_figure",
     "map_figure",
     "recording_figures",

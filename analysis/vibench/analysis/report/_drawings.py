@@ -156,10 +156,21 @@ def result_tables(results: CampaignResults) -> tuple[ReportTable, ...]:
 
 
 def findings(results: CampaignResults) -> Iterator[str]:
-    """Say what each measurement found, weak to strong, and how far the simulation lies from it."""
+    """Say what each measurement found, weak to strong, and how far the simulation lies from it.
+
+    Parameters
+    ----------
+    results
+        As `vibench.analysis.analyse_files` gives them.
+
+    Returns
+    -------
+    Sentences: of a fit to all of them first, then of each recording, after its name.
+
+    """
     yield from results.model_said
     for each in results.in_order:
-        yield from DRAWINGS[each.kind].findings(each)
+        yield from (f"{each.analysis.facts.name}: {said}" for said in DRAWINGS[each.kind].findings(each))
 
 
 def recording_figures(result: AnyResult) -> tuple[DrawnFigure, ...]:

@@ -93,10 +93,8 @@ class Budget(Labelled):
     @property
     def sentence(self) -> str:
         """The same in words: expanded, and what adds to it as standard uncertainties, the largest first."""
-        parts = sorted(
-            ((each.relative, each.cause.value) for each in self.contributions if each.relative),
-            reverse=True,
-        )
+        causes = dict.fromkeys(each.cause for each in self.contributions)
+        parts = sorted(((size, cause.value) for cause in causes if (size := self.share(cause))), reverse=True)
         each = ", ".join(f"{what} {100 * relative:.2g} %" for relative, what in parts)
         said = f"standard uncertainties: {each}" if each else "nothing stated"
         missing = ", ".join(self.not_stated)
