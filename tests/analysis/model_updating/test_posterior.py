@@ -68,3 +68,18 @@ def test_a_run_of_the_model_is_hardly_ever_refused_however_few_it_is_held_agains
         seen = parameters @ rng.normal(size=(6, statistics)) + scatter
         refused += _distance(parameters, seen[:-1], seen[-1]) > _FAR
     assert refused <= 1
+
+
+def test_a_box_that_nothing_narrows_is_not_drawn_from_again():
+    """Runs of noise that knows no parameter: all of the first box stay within the second."""
+    rng, made = np.random.default_rng(7), []
+
+    def runs(parameters):
+        made.append(len(parameters))
+        return np.array([rng.standard_normal(20) for _ in parameters])
+
+    found = posterior(runs, rng.standard_normal(20), BOX, 7, ROUNDS)
+    assert made == [60, 60]
+    assert found.fits
+    bounds = np.quantile(found.draws, [0.025, 0.975], axis=0)
+    assert np.all(np.diff(bounds, axis=0) > 0.8 * 2.0 * 0.95)

@@ -73,8 +73,10 @@ def posterior(
         inside = np.all((parameters >= box[:, 0]) & (parameters <= box[:, 1]), axis=1)
         parameters, statistics = parameters[inside], statistics[inside]
         new = rng.uniform(box[:, 0], box[:, 1], (wanted - len(parameters), len(box)))
-        parameters = np.concatenate([parameters, new])
-        statistics = np.concatenate([statistics, runs(new)])
+        # A box that nothing has narrowed holds them all.
+        if len(new):
+            parameters = np.concatenate([parameters, new])
+            statistics = np.concatenate([statistics, runs(new)])
         middle, errors = _regressed(statistics, parameters, observed)
         reach = _MARGIN * np.abs(errors).max(axis=0)
         narrower = np.clip(np.stack([middle - reach, middle + reach], axis=1), box[:, :1], box[:, 1:])
