@@ -6,9 +6,10 @@
 Each rig has another specimen and shaker, and measures one plan `REPEATS` times: with other noise, with a
 converter whose clock is off by another error within what the configuration states, and, where the drive is
 random, with other phases. A quarter of the rigs measures so weakly that motion is linear, whose truth is a
-closed form: modes, transmissibility, both Responses of a dwell. Elsewhere a value is held against the median
-of the other repeats, and its bound is as much wider as that median scatters. Each kind of bound has a row:
-how many held, and how probable so few are where each holds in 95 of 100 cases.
+closed form: modes, transmissibility, both Responses of a dwell. So is that of noise elsewhere in which
+nothing was heard to collide. Any other value is held against the median of the repeats that collided as it
+did, and its bound is as much wider as that median scatters. Each kind of bound has a row: how many held, and
+how probable so few are where each holds in 95 of 100 cases.
 """
 
 import argparse
@@ -30,9 +31,12 @@ from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine
 from vibench.acquisition.rig import Rig, specimen_of
 from vibench.analysis import AnalysisError, Simulation, analyse_files, budgets_of
+from vibench.analysis.frequency_response import scatters_beyond_noise
 from vibench.sim import Specimen, base_transmissibility
 
 REPEATS = 8
+FEWEST_ALIKE = 5
+"""Repeats that a median is taken of."""
 CLOCK_PPM = 50.0
 WEAK_VPP = 0.03
 """At which nothing collides: p stays below half of the smallest gap drawn, and that is looked at."""
@@ -48,7 +52,7 @@ class Held:
 
     kind: str
     quantity: str
-    is_weak: bool
+    is_linear: bool
     off: float
     """Error over the expanded uncertainty (k = 2), or the share of lines that their bounds miss."""
     scene: str
@@ -56,7 +60,7 @@ class Held:
     @property
     def row(self) -> tuple[str, str]:
         """What is counted together."""
-        return f"{self.kind}, {'linear' if self.is_weak else 'any motion'}", self.quantity
+        return f"{self.kind}, {'linear' if self.is_linear else 'any motion'}", self.quantity
 
 
 def drawn(
@@ -182,31 +186,33 @@ def repeats(
     rig: Rig, plan: object, rng: np.random.Generator, kind: str, *, is_weak: bool, scene: str
 ) -> Iterator[Held]:
     """Measure a plan again and again, and hold every bound."""
-    told = defaultdict(list)
-    true = true_values(rig, plan) if is_weak else {}
+    told: dict[tuple[str, bool], list[tuple[float, float]]] = defaultdict(list)
     for _ in range(REPEATS):
         again = plan.model_copy(update={"seed": int(rng.integers(1, 1 << 30))}) if kind == "noise" else plan
         with TemporaryDirectory() as folder:
             found, analysis = measured(repeated(rig, rng), again, Path(folder) / "measured.h5")
+        is_linear = is_weak or (kind == "noise" and not scatters_beyond_noise(analysis.response.periodic))
         for name, value in found.items():
-            told[name].append(value)
+            told[name, is_linear].append(value)
         if is_weak and kind == "noise":
             lines = analysis.response.frequency_response
             exact = np.abs(base_transmissibility(specimen_of(rig), lines.frequency_hz)[:, 0])
             misses = (lines.magnitude_lower > exact) | (lines.magnitude_upper < exact)
             yield Held(kind, LINES, is_weak, float(np.mean(misses)), scene)
-    for name, values in told.items():
+    true = true_values(rig, plan)
+    for (name, is_linear), values in told.items():
         value, expanded = np.transpose(values)
-        if name in true:
+        count = value.size
+        if is_linear and name in true:
             off = (value - true[name]) / expanded
-        elif value.size == REPEATS:
+        elif count >= FEWEST_ALIKE:
             # Against the median of the others, which scatters too.
-            others = np.array([np.median(np.delete(value, place)) for place in range(REPEATS)])
-            off = (value - others) / (expanded * np.sqrt(1 + np.pi / 2 / (REPEATS - 1)))
+            others = np.array([np.median(np.delete(value, place)) for place in range(count)])
+            off = (value - others) / (expanded * np.sqrt(1 + np.pi / 2 / (count - 1)))
         else:
             continue
         for each in off:
-            yield Held(kind, name, is_weak, float(each), scene)
+            yield Held(kind, name, is_linear, float(each), scene)
 
 
 def table(found: list[Held]) -> Iterator[str]:

@@ -26,7 +26,7 @@ def test_bounds_of_a_report_hold_on_random_rigs(shard, tmp_path):
     for line in kept.read_text("utf-8").splitlines():
         each = json.loads(line)
         if "line by line" not in each["quantity"]:
-            rows[each["kind"], each["quantity"], each["is_weak"]].append(abs(each["off"]) <= 1)
+            rows[each["kind"], each["quantity"], each["is_linear"]].append(abs(each["off"]) <= 1)
     assert rows
     few = {row: sum(held) for row, held in rows.items() if binom.cdf(sum(held), len(held), 0.95) < LEAST}
     assert not few, few

@@ -26,6 +26,8 @@ _BLOCKS, _FEWEST_BLOCKS = 50, 10
 _ALIKE = 1e-12
 """Differences of maxima over their size that are roundings."""
 _FEWEST_DRAWS = 5
+_UNTOLD = Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
+"""Of a maximum, and of all that a sweep shows in a tenth of a second."""
 _ENDS = 2
 """Intervals at either end of a sweep, where the largest value is no peak: it depends on where they begin."""
 _PEAKED = 1.05
@@ -93,9 +95,10 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
     is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
     scatter = Cause.NOISE if is_steady else Cause.CHANCE
     drive = found.drive
+    of_base = scattered(scatter, drive.sd_amplitude_m, drive.amplitude_m, "parts of the window")
     noise = scattered(Cause.NOISE, found.noise_error_i, found.response_i, found.noise_source)
     return (
-        _amplitude(drive.amplitude_m, drive.sd_amplitude_m, stated, scatter),
+        _amplitude(drive.amplitude_m, stated, of_base),
         Budget(
             RESPONSE_I,
             found.response_i,
@@ -124,9 +127,8 @@ def _ratio(stated: Stated) -> tuple[Contribution, ...]:
     return (*stated.response, *stated.base, *stated.timed(1))
 
 
-def _amplitude(value_m: float, sd_m: float, stated: Stated, scatter: Cause, where: str = "") -> Budget:
-    noise = scattered(scatter, sd_m, value_m, "parts of the window")
-    return Budget(f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), noise))
+def _amplitude(value_m: float, stated: Stated, scatter: Contribution, where: str = "") -> Budget:
+    return Budget(f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), scatter))
 
 
 def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
@@ -180,9 +182,9 @@ def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) ->
     top = int(np.argmax(found.response_ii))
     collides = analysis.collisions.is_colliding
     stated = stated_of(analysis.facts.bench)
-    scatter = Cause.CHANCE if collides[top] else Cause.NOISE
-    at_top = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
-    amplitude = _amplitude(*at_top, stated, scatter, f", at {found.frequency_hz[top]:.4g} Hz")
+    value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
+    scatter = _UNTOLD if collides[top] else scattered(Cause.NOISE, sd_m, value_m, "parts of the window")
+    amplitude = _amplitude(value_m, stated, scatter, f", at {found.frequency_hz[top]:.4g} Hz")
     return amplitude, *_largest(analysis.facts, found, collides, laid)
 
 
@@ -211,8 +213,8 @@ def _largest(
         value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
         own = [scattered(Cause.NOISE, float(scatter[top]), value, source)]
         if collides[top]:
-            untold = Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
-            of_window = untold if name == RESPONSE_I else replace(own[0], cause=Cause.CHANCE)
+            is_long = name == RESPONSE_II and isinstance(found, SteppedResponse)
+            of_window = replace(own[0], cause=Cause.CHANCE) if is_long else _UNTOLD
             own = [_drawn(laid, name, top) or of_window]
         elif name == RESPONSE_I:
             own.append(_of_base(float(found.sd_drive_amplitude_m[top]), float(found.drive_amplitude_m[top])))
