@@ -30,7 +30,14 @@ from twin_agreement import random_rig as random_bench
 
 from vibench.acquisition import open_bench, rig as hardware, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise
-from vibench.analysis import Estimator, FrequencyResponse, Simulation, analyse_files, update_model
+from vibench.analysis import (
+    Estimator,
+    FrequencyResponse,
+    NotEnoughData,
+    Simulation,
+    analyse_files,
+    update_model,
+)
 from vibench.analysis.frequency_response import (
     FrequencyResponseSettings,
     PeriodicSums,
@@ -75,7 +82,11 @@ class Count:
     held: int
 
 
-def random_rig(rng: np.random.Generator) -> Rig:
+USUAL_NOISE, MUCH_NOISE = (-3.6, -2.6), (-1.5, -0.5)
+"""Logarithms of a line's relative scatter where m0 moves as the base does."""
+
+
+def random_rig(rng: np.random.Generator, noise: tuple[float, float] = USUAL_NOISE) -> Rig:
     """Draw one."""
     usual = gong2025(damping_time_s=float(rng.uniform(1.2e-5, 2.6e-5)))
 
@@ -91,29 +102,32 @@ def random_rig(rng: np.random.Generator) -> Rig:
     beta *= float(rng.uniform(0.7, 1.4))
     described = replace(true, stiffnesses=springs, dampings=(beta * k0, beta * k1, beta * k2))
     size = np.abs(base_transmissibility(true, LINES_HZ)[:, 0])
-    level = 10 ** rng.uniform(-3.6, -2.6)
+    level = 10 ** rng.uniform(*noise)
     return Rig(true, described, level * np.sqrt(1 + 1 / size**2), int(rng.integers(4, 25)))
 
 
 def measured(value: Complexes, rig: Rig, rng: np.random.Generator) -> FrequencyResponse:
     """Average so many realisations, whose scatter is all that is known of the lines'."""
-    count, shape = rig.realisations, (rig.realisations, value.size, 2)
-    parts = math.sqrt(count) * rig.sd[:, None] * rng.standard_normal(shape)
+    count, shape = rig.realisations, (rig.realisations, value.size)
+    parts = math.sqrt(count) * rig.sd * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
     mean = parts.mean(axis=0)
-    sd = np.sqrt(np.sum((parts - mean) ** 2, axis=(0, 2)) / (2 * (count - 1)) / count)
-    return _response(value * np.exp(mean[:, 0] + 1j * mean[:, 1]), sd, count)
+    sd = np.sqrt(np.sum(np.abs(parts - mean) ** 2, axis=0) / (2 * (count - 1)) / count)
+    sd /= np.abs(1 + mean)
+    return _response(value * (1 + mean), sd, count, 1.0 / (1.0 + 2.0 * count * sd**2))
 
 
-def _response(value: Complexes, sd: Reals, averages: float) -> FrequencyResponse:
+def _response(
+    value: Complexes, sd: Reals, averages: float, coherence: Reals | None = None
+) -> FrequencyResponse:
     return FrequencyResponse(
         frequency_hz=LINES_HZ,
         value=value,
-        coherence=np.full(value.size, 0.999),
+        coherence=np.full(value.size, 0.999) if coherence is None else coherence,
         n_eff=float(averages),
         relative_sd_magnitude=sd,
         sd_phase_rad=sd,
         half_width=2 * sd,
-        coherence_significance=0.5,
+        coherence_significance=1.0 - 0.05 ** (1.0 / (averages - 1.0)),
         resolution_hz=0.0,
         segments_used=round(averages),
         segments_excluded=0,
@@ -260,6 +274,7 @@ def friction(rig: Rig) -> tuple[Complexes, Specimen, bool]:
 
 CASES: dict[str, tuple[Wrong, Assumption | None]] = {
     "right model": (right, None),
+    "right model, much noise": (right, None),
     "m0 +3 %": (mass(0), Assumption.M0),
     "m1 +3 %": (mass(1), Assumption.M1),
     "c0 x3": (damper, Assumption.C0),
@@ -352,13 +367,16 @@ def counted(case: str, draws: int, seed: int) -> Count:
     above, refused, named, intervals, held = 0, 0, 0, 0, 0
     for number in range(draws):
         rng = np.random.default_rng((seed, list(CASES).index(case), number))
-        rig = random_rig(rng)
+        rig = random_rig(rng, MUCH_NOISE if case == "right model, much noise" else USUAL_NOISE)
         value, described, nonlinear = wrong(clocked(rig, rng))
         found: FrequencyResponse = measured(value, rig, rng)
         is_nonlinear: bool | None = nonlinear
         if culprit is Assumption.FRICTION:
             found, is_nonlinear = rubbed(rig, rng)
-        fit = fit_specimen(found, described, is_nonlinear=is_nonlinear)
+        try:
+            fit = fit_specimen(found, described, is_nonlinear=is_nonlinear)
+        except NotEnoughData:
+            continue
         if culprit is None:
             refused += not fit.fits
             for each in fit.values:

@@ -46,6 +46,20 @@ def measured(specimen, rng, sd=SD, lines_hz=LINES_HZ, gain=1.0):
     )
 
 
+def repeated(specimen, rng, sd, realisations):
+    """A transmission whose lines' scatter comes from so few; ``sd`` where m0 moves as the base does."""
+    exact = base_transmissibility(specimen, LINES_HZ)[:, 0]
+    shape = (realisations, LINES_HZ.size)
+    noise = sd * np.hypot(1.0, np.abs(exact)) * np.sqrt(realisations)
+    each = exact + noise * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
+    value = each.mean(axis=0)
+    scatter = np.sum(np.abs(each - value) ** 2, axis=0) / (2 * (realisations - 1)) / realisations
+    spread = np.sqrt(scatter) / np.abs(value)
+    coherence = 1.0 / (1.0 + 2.0 * realisations * spread**2)
+    told = {"value": value, "coherence": coherence, "n_eff": float(realisations)}
+    return replace(measured(specimen, rng), **told, relative_sd_magnitude=spread, sd_phase_rad=spread)
+
+
 @pytest.fixture(scope="module")
 def true():
     return with_values(NOMINAL, TRUE)
@@ -103,6 +117,30 @@ def test_the_intervals_hold_the_truth_as_often_as_they_say_and_are_no_wider_than
             value, abs=4 * scatter / math.sqrt(draws)
         )
     assert np.mean([fit.reduced_chi_square for fit in fits]) == pytest.approx(1.0, abs=0.1)
+
+
+def test_intervals_hold_as_often_where_the_scatter_comes_from_three_realisations(true):
+    """Few lines tell damping and the first frequency, and each line's own scatter is known to half."""
+    rng, held, draws = np.random.default_rng(2), [], 120
+    for _ in range(draws):
+        fit = fit_specimen(repeated(true, rng, 2e-3, 3), NOMINAL)
+        assert fit.fits
+        told = (fit.value(each) for each in (Parameter.DAMPING_TIME, Parameter.F1))
+        held += [each.low <= TRUE[each.parameter] <= each.high for each in told]
+    assert sum(held) > 0.95 * len(held) - 3 * math.sqrt(0.95 * 0.05 * len(held))
+
+
+def test_lines_that_noise_covers_refuse_no_right_model_and_run_no_search_away(true):
+    rng, said = np.random.default_rng(3), []
+    for sd in np.geomspace(0.03, 0.5, 30):
+        try:
+            fit = fit_specimen(repeated(true, rng, sd, 4), NOMINAL)
+        except NotEnoughData as error:
+            said.append(str(error))
+        else:
+            assert fit.fits, (sd, fit.reduced_chi_square, fit.limit)
+    assert 0 < len(said) < 30
+    assert all(each.endswith("measure longer or with more drive") for each in said)
 
 
 def test_a_high_pass_and_a_delay_of_a_channel_move_nothing(true):

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.optimize import OptimizeResult, least_squares
 
 from vibench.sim import Specimen
@@ -15,6 +16,15 @@ from ._parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
 """No line counts for more than this scatter says: calibrations and clocks are no better."""
+LEAST_CLEAR = 10.0
+"""Magnitude of a line over the scatter usual among its neighbours: the logarithm of less is not normal.
+
+Not over its own scatter, of few averages: lines whose scatter seems small by chance would be chosen, and a
+right model refused.
+"""
+NEIGHBOURS = 31
+MOST_OFF = np.log(1e4)
+"""Of a parameter from where the search begins, as a logarithm: further it runs away."""
 LEAST_DAMPING_TIME_S = 1e-8
 """Where the search begins for a specimen that is described without damping."""
 CHANNEL_PHASES = 2
@@ -76,6 +86,8 @@ class Descended:
     """Of the free parameters."""
     covariance: Reals
     """Of these, where the model is right."""
+    freedoms: Reals
+    """Of the scatter that each of their uncertainties rests on: few where few lines tell it."""
     phases: tuple[float, float]
     further: Reals
     chi_square: float
@@ -115,8 +127,15 @@ class Lines:
         return chi_square_limit(self.freedom, self.correlation[1])
 
     def specimen(self, logarithms: Reals) -> Specimen:
-        """Give the specimen of these parameters."""
-        return with_values(self.nominal, dict(zip(self.free, np.exp(logarithms).tolist(), strict=True)))
+        """Give the specimen of these parameters, which are not taken beyond `MOST_OFF`."""
+        begun = self.start[: len(self.free)]
+        values = np.exp(np.clip(logarithms, begun - MOST_OFF, begun + MOST_OFF)).tolist()
+        return with_values(self.nominal, dict(zip(self.free, values, strict=True)))
+
+    def is_away(self, at: Reals) -> bool:
+        """Whether a search has run away with a parameter that the lines do not tell."""
+        count = len(self.free)
+        return bool(np.any(np.abs(at[:count] - self.start[:count]) > MOST_OFF))
 
     def residuals(self, at: Reals, model: Model) -> Reals:
         """Measured less model in standard deviations: magnitudes, phases, and a stated scale's."""
@@ -134,30 +153,46 @@ class Lines:
             ]
         )
 
+    def squared(self, residuals: Reals) -> Reals:
+        """Add up the squares of magnitude and phase of each line."""
+        magnitudes, phases = np.split(residuals[: 2 * self.frequency_hz.size], 2)
+        return np.asarray(magnitudes**2 + phases**2)
+
     def students(self, residuals: Reals) -> Reals:
         """Turn residuals so that their squares follow chi square although the scatter was estimated too."""
-        count = 2 * self.frequency_hz.size
-        squared = residuals[: count // 2] ** 2 + residuals[count // 2 : count] ** 2
+        count, squared = 2 * self.frequency_hz.size, self.squared(residuals)
         factor = np.sqrt(chi_square_of(squared, self.averages) / np.maximum(squared, 1e-300))
         return np.concatenate([residuals[:count] * np.tile(factor, 2), residuals[count:]])
 
 
 def lines_of(
-    frequency_response: FrequencyResponse, nominal: Specimen, free: tuple[Parameter, ...], scale_sd: float
+    frequency_response: FrequencyResponse,
+    nominal: Specimen,
+    free: tuple[Parameter, ...],
+    scale_sd: float,
+    fitted: Specimen | None = None,
 ) -> Lines:
-    """Take the lines that stand above their uncertainty; NotEnoughData where they are too few."""
-    used = frequency_response.is_significant & np.isfinite(frequency_response.relative_sd_magnitude)
+    """Take the lines that stand clear of the scatter; NotEnoughData where they are too few.
+
+    By what was measured, or by what a fitted specimen shows there: noise then has no part in the choice.
+    """
+    measured = np.abs(frequency_response.value)
+    frequency_hz = frequency_response.frequency_hz
+    size = measured if fitted is None else np.abs(as_described(fitted, frequency_hz, np.zeros(0)))
+    scatter = frequency_response.relative_sd_magnitude * measured
+    usual = median_filter(np.where(np.isfinite(scatter), scatter, np.inf), NEIGHBOURS, mode="nearest")
+    used = frequency_response.is_significant & np.isfinite(scatter) & (size > LEAST_CLEAR * usual)
     count, needed = int(np.count_nonzero(used)), 2 * (len(free) + CHANNEL_PHASES)
     if count < needed:
         raise NotEnoughData(
-            f"{count} lines of the transmission stand above their uncertainty, and {len(free)} parameters "
-            f"need {needed}; measure longer or with more drive"
+            f"{count} lines of the transmission are {LEAST_CLEAR:.2g} times as large as the scatter around "
+            f"them or more, and {len(free)} parameters need {needed}; measure longer or with more drive"
         )
     spreads = np.concatenate(
         [frequency_response.relative_sd_magnitude[used], frequency_response.sd_phase_rad[used]]
     )
     return Lines(
-        frequency_hz=frequency_response.frequency_hz[used],
+        frequency_hz=frequency_hz[used],
         measured=frequency_response.value[used],
         weights=1.0 / np.maximum(spreads, LEAST_RELATIVE_SD),
         averages=frequency_response.n_eff,
@@ -176,6 +211,11 @@ def descended(lines: Lines) -> Descended:
         # A phase may lie on another branch: begin again from specimens that are stiffer or softer.
         others = [_from(lines, usual, lines.start + _stiffer(lines, scale)) for scale in SCALES]
         best = min([best, *others], key=lambda each: each.cost)
+    if np.isinf(best.cost):
+        raise NotEnoughData(
+            f"the {lines.frequency_hz.size} lines of the transmission that stand clear of the scatter do not "
+            f"tell {', '.join(lines.free)}; measure longer or with more drive"
+        )
     return _described(lines, usual, best)
 
 
@@ -211,11 +251,13 @@ def _from(lines: Lines, allowed: Freedom, start: Reals) -> _Ended:
         return lines.students(plain(at))
 
     near = _descent(plain, start, bounds)
+    if lines.is_away(near.x):
+        return _Ended(near.x, np.inf)
     left = likely(near.x)
     if left @ left > _HOPELESS * lines.limit * lines.freedom:
         return _Ended(near.x, 0.5 * float(left @ left))
     found = _descent(likely, near.x, bounds)
-    return _Ended(found.x, float(found.cost))
+    return _Ended(found.x, np.inf if lines.is_away(found.x) else float(found.cost))
 
 
 def _descent(
@@ -236,16 +278,23 @@ def _descent(
 def _described(lines: Lines, allowed: Freedom, found: _Ended) -> Descended:
     count = len(lines.free)
     phases = found.x[count : count + CHANNEL_PHASES]
-    # What Student's distribution leaves of the information (Lange et al. 1989, J. Am. Stat. Assoc. 84).
     spread = 2.0 * max(lines.averages - 1.0, 0.5)
-    slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x) * np.sqrt(
-        (spread + 2) / (spread + 4)
-    )
-    whole = np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True) * lines.correlation[0]
+    # Student's likelihood, of scatters that were estimated: its curvature as it is, and the variance of its
+    # slope, which is (spread + 2) / spread times as large (Huber 1967; for 8 degrees of freedom 1.25 times).
+    squared = lines.squared(lines.residuals(found.x, allowed.model))
+    slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x)
+    slopes[: 2 * squared.size] *= np.tile(np.sqrt(spread * (spread + 2)) / (spread + squared), 2)[:, None]
+    wider = lines.correlation[0] * (spread + 2) / spread
+    whole = np.asarray(wider * np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True), np.float64)
+    # Welch and Satterthwaite (JCGM 100:2008, G.4): magnitude and phase of a line share its scatter.
+    told = (whole @ slopes.T)[:count, : 2 * lines.frequency_hz.size] ** 2
+    shares = told[:, : lines.frequency_hz.size] + told[:, lines.frequency_hz.size :]
+    shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
     return Descended(
         specimen=lines.specimen(found.x[:count]),
         logarithms=found.x[:count],
         covariance=whole[:count, :count],
+        freedoms=spread / np.maximum(np.sum(shares**2, axis=1), 1e-300),
         phases=(float(phases[0]), float(phases[1])),
         further=found.x[count + CHANNEL_PHASES + (lines.scale_sd > 0.0) :],
         chi_square=float(2.0 * found.cost),

@@ -116,10 +116,13 @@ def fit_specimen(
         )
     lines = lines_of(frequency_response, nominal, free, scale_sd)
     found = descended(lines)
+    clear = lines_of(frequency_response, nominal, free, scale_sd, found.specimen)
+    if clear.frequency_hz.size != lines.frequency_hz.size:
+        lines, found = clear, descended(clear)
     chi_square = found.chi_square / lines.freedom
     fits = chi_square <= lines.limit
     covariance = found.covariance * max(1.0, chi_square) + _of_the_clock(free)
-    reach = float(student.ppf(0.5 + 0.5 * confidence, lines.freedom))
+    reach = np.asarray(student.ppf(0.5 + 0.5 * confidence, np.minimum(found.freedoms, lines.freedom)))
     return SpecimenFit(
         specimen=found.specimen if fits else nominal,
         values=_values(lines, found.logarithms, covariance, reach) if fits else (),
@@ -140,16 +143,16 @@ def _of_the_clock(free: tuple[Parameter, ...]) -> Reals:
     return CLOCK_RELATIVE_SD**2 * np.outer(direction, direction)
 
 
-def _values(lines: Lines, found: Reals, covariance: Reals, reach: float) -> tuple[FittedValue, ...]:
+def _values(lines: Lines, found: Reals, covariance: Reals, reach: Reals) -> tuple[FittedValue, ...]:
     spreads = np.sqrt(np.diag(covariance))
     return tuple(
         FittedValue(
             parameter=name,
             value=float(np.exp(middle)),
-            low=float(np.exp(middle - reach * sd)),
-            high=float(np.exp(middle + reach * sd)),
+            low=float(np.exp(middle - far * sd)),
+            high=float(np.exp(middle + far * sd)),
             sd=float(np.exp(middle) * sd),
             nominal=parameter_value(lines.nominal, name),
         )
-        for name, middle, sd in zip(lines.free, found, spreads, strict=True)
+        for name, middle, sd, far in zip(lines.free, found, spreads, reach, strict=True)
     )

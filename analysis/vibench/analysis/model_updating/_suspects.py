@@ -76,8 +76,10 @@ def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tu
         parameters = len(allowed.parameters) + len(allowed.low)
         freedom = lines.freedom - parameters
         sentence = told(found.specimen, found.further)
-        if sentence:
+        if sentence and np.isfinite(found.chi_square):
             tried.append((assumption, sentence, found.chi_square, parameters, freedom))
+    if not tried:
+        return ()
     # Where even the best leaves something, it is in the scatter: else every small difference would be sure.
     left = max(1.0, min(chi / freedom for _, _, chi, _, freedom in tried)) * lines.correlation[0]
     reals = 2 * lines.frequency_hz.size
