@@ -72,6 +72,28 @@ def test_tracked_p_and_its_impacts_are_those_of_the_world(world_recording, kind,
 
 
 @pytest.mark.thorough
+def test_a_stop_on_one_side_is_followed_and_its_numbers_are_found(world_recording):
+    """No number is told of the side on which there is none, and what is not told stands together."""
+    one_sided = gong2025(gap_m=(30e-6, np.inf))
+    recorded = world_recording(180.0, 0.5, seed=11, specimen=one_sided)
+    motion = told(recorded, specimen=one_sided)
+    assert motion.tracked.share_followed > 0.95
+    error, scored = errors_of(motion, recorded, motion.tracked.p)
+    assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
+    found = {each.what: each for each in motion.parameters}
+    assert Hidden.UPPER_GAP not in found
+    gap, m1 = found[Hidden.LOWER_GAP], found[Hidden.M1]
+    assert gap.is_determined
+    assert gap.low <= 30e-6 <= gap.high
+    assert m1.low <= one_sided.masses[1] <= m1.high
+    assert gap.described == 30e-6
+    said = motion.sentences
+    assert any(each.startswith("Lower gap: ") and each.endswith("(described as 30 µm).") for each in said)
+    assert sum("m1" in each for each in said) == 1
+    assert not any("inf" in each for each in said)
+
+
+@pytest.mark.thorough
 def test_ten_times_the_noise_is_still_followed(world_recording):
     recorded = world_recording(260.0, 1.5, seed=42, noise=10.0, duration_s=2.4)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)

@@ -7,6 +7,7 @@ by tracking.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import isfinite
 from typing import ClassVar
 
 import numpy as np
@@ -162,7 +163,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     if described.steepness == 0.0:
         return _nothing(described, "the specimen is described without stops")
     if _can_be_tracked(described, motion):
-        refined = _refined(described, motion, described, _NEAR)
+        refined = _refined(described, motion, described, _looked_for(described, _NEAR))
         if isinstance(refined, FoundSpecimen):
             return refined
     stretches = _stretches(motion)
@@ -176,8 +177,13 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     return (
         replace(found, searched=True)
         if isinstance(found, FoundSpecimen)
-        else _nothing(start, found, searched=True)
+        else replace(_nothing(described, found, searched=True), tracked=start)
     )
+
+
+def _looked_for(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
+    """Leave out the gap of a side on which no stop is described."""
+    return {each: sd for each, sd in near.items() if isfinite(value_of(described, each))}
 
 
 def _refined(
@@ -304,15 +310,15 @@ def _freed(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, R
 
 
 def _judged(what: Hidden, value: float, half: float, described: float, *, is_told: bool) -> FoundParameter:
-    why = "" if is_told else f"{_SHOWN[what][0]} is not told by this motion better than it was assumed"
+    why = "" if is_told else "told by this motion no better than was assumed"
     half = float(np.hypot(half, _Z * _CLOCK_SD.get(what, 0.0) * value))
     return FoundParameter(what, float(value), float(value - half), float(value + half), described, why)
 
 
-def _nothing(tracked: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
-    nan = float("nan")
-    parameters = tuple(FoundParameter(each, nan, nan, nan, value_of(tracked, each), why) for each in PRIOR_SD)
-    return FoundSpecimen(tracked, parameters, 0, searched)
+def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) -> FoundSpecimen:
+    nan, wanted = float("nan"), _looked_for(described, PRIOR_SD)
+    parameters = tuple(FoundParameter(each, nan, nan, nan, value_of(described, each), why) for each in wanted)
+    return FoundSpecimen(described, parameters, 0, searched)
 
 
 def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
@@ -361,14 +367,18 @@ def _search(
     told = free_motion(motion_model(numbers.tracked, motion), motion.part(first, first + count))
     gaps = free_gaps(told.impacts)
     if not any(gaps):
+        count = told.impacts.samples.size
+        seen = f"{count} impacts that were found tell no gap" if count else "no impacts were found"
         return numbers.tracked, (
-            "no impacts were found, so m1 did not reach its stops in this motion or the specimen's linear "
-            "numbers are wrong; fit them to weak noise first"
+            f"{seen}, so m1 hardly reached its stops in this motion or the specimen's linear numbers are "
+            "wrong; fit them to weak noise first"
         )
     sides = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), gaps, strict=True))
-    known: dict[Hidden, FreeGap] = {side: gap for side, gap in sides.items() if gap is not None}
+    known: dict[Hidden, FreeGap] = {
+        side: gap for side, gap in sides.items() if gap is not None and isfinite(value_of(described, side))
+    }
     start = with_values(numbers.tracked, {side: gap.value_m for side, gap in known.items()})
     near = {**_NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05}
     near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
     near |= {each: max(_LEAST_SD[each], 3.0 * float(sd)) for each, sd in zip(FITTED, numbers.sd, strict=True)}
-    return start, near
+    return start, _looked_for(described, near)

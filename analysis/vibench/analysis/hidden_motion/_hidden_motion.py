@@ -327,7 +327,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     )
     for reason in dict.fromkeys(each.reason for each in tracked.not_followed):
         total = sum(each.stop - each.first for each in tracked.not_followed if each.reason == reason)
-        yield f"Not followed for {1e3 * total / rate:.3g} ms: {reason}."
+        yield f"Not followed for {total / rate:.3g} s: {reason}."
     told = [each for each in motion.free_gaps if each is not None]
     yield (
         f"Without a contact model, impacts: {motion.free.impacts.samples.size}"
@@ -339,5 +339,13 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
         + ("" if told else "; too few to tell a gap")
         + "."
     )
-    for label, said, described in parameter_rows(motion):
-        yield f"{label[0].upper()}{label[1:]}: {said} (described as {described})."
+    untold: dict[str, list[str]] = {}
+    for parameter in motion.parameters:
+        label, said, described = parameter.row
+        if parameter.is_determined:
+            # A symbol keeps its case.
+            begun = label if label[-1].isdigit() else f"{label[0].upper()}{label[1:]}"
+            yield f"{begun}: {said} (described as {described})."
+        else:
+            untold.setdefault(parameter.not_determined, []).append(label)
+    yield from (f"Not determined, {', '.join(labels)}: {why}." for why, labels in untold.items())

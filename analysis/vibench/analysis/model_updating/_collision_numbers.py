@@ -156,7 +156,7 @@ def numbers_from_statistics(
     The numbers, or None and a sentence that says why they are not determined.
 
     """
-    why: list[str] = []
+    why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
         observer.begin(each.name, "comparing its statistics with those of specimens drawn at random")
         try:
@@ -166,13 +166,13 @@ def numbers_from_statistics(
                     recording, specimen, each.within(recording), each.drive_hz, shaker, linear
                 )
         except AnalysisError as error:
-            why.append(f"{each.name}: {error}")
+            why.setdefault(str(error), []).append(each.name)
             continue
         numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
         if numbers.told:
             return numbers, ""
-        why.append(f"{each.name}: its statistics tell nothing better than it was assumed")
-    return None, "; ".join(why)
+        why.setdefault("its statistics tell nothing better than it was assumed", []).append(each.name)
+    return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())
 
 
 def _fitted_shaker(recording: Recording, results: CampaignResults, specimen: Specimen) -> FittedShaker | None:
