@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from vibench.acquisition.plan import EXCITATION_KINDS
 
+from ..chaos import MotionKind
 from ..figures import agreement_text, regions_text, stepped_level_caption, verdict_text
 from ..kinds import DwellResult, NoiseResult, SteppedSineResult, SweepResult
 from ..model import CLOCK_TOLERANCE, PREDICTION_S, WINDOW_S
@@ -68,11 +69,14 @@ def tracked_findings(result: SteppedSineResult) -> Iterator[str]:
 def dwell_findings(result: DwellResult) -> Iterator[str]:
     """Say both responses, measured and simulated, and how the motion repeats."""
     found, plan = result.analysis.response, result.analysis.excitation
+    verdict = result.analysis.motion.verdict
     text = (
         f"Dwell at {plan.frequency_hz:g} Hz and {plan.amplitude_vpp:g} Vpp (A0 = "
         f"{1e6 * found.drive.amplitude_m:.3g} µm): Response I {found.response_i:.3g}, Response II "
-        f"{found.response_ii:.3g}, {verdict_text(result.analysis.motion.verdict)}"
+        f"{found.response_ii:.3g}, {verdict_text(verdict)}"
     )
+    if verdict.kind is MotionKind.UNDECIDED:
+        text += f" ({verdict.why})"
     if result.laid is not None:
         if result.laid.run.driven.by_voltage:
             text += agreement_text(result.laid)

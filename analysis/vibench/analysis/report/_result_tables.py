@@ -227,8 +227,11 @@ def _simulated_band(laid: DwellOverlay, towards_hz: float) -> str:
     if found is None or not found.compared:
         levels = [each.decibel for each in laid.terminal if each.towards_hz == towards_hz]
         return f"{levels[0]:.1f}" if levels else ABSENT
-    low, middle, high = (20 * np.log10(each[0]) for each in (found.lower, found.median, found.upper))
-    return f"{middle:.1f} ({low:.1f} to {high:.1f}), z = {found.z[0]:+.1f}"
+    low, middle, high = (
+        f"{20 * np.log10(each[0]):.1f}" if each[0] > 0.0 else "nothing"
+        for each in (found.lower, found.median, found.upper)
+    )
+    return f"{middle} ({low} to {high}), z = {found.z[0]:+.1f}"
 
 
 def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
