@@ -155,6 +155,17 @@ def test_the_specimen_moves_as_its_points_say(frequency_hz, amplitude_m, kind, p
     assert period is None or found.period == period
 
 
+@pytest.mark.thorough
+def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
+    """The paper's dwell: a prediction from one neighbour, of three delays, left half of them undecided."""
+    window, skipped = 1300, 300
+    points = stroboscopic_section(gong2025(), Harmonic(260.0, 19e-6), skipped + 6 * window)[skipped:, :2]
+    points = points / points.std(axis=0)
+    kinds = [motion_verdict(Points(each, QUIET), 260.0).kind for each in np.split(points, 6)]
+    assert set(kinds) <= {MotionKind.CHAOTIC, MotionKind.UNDECIDED}
+    assert kinds.count(MotionKind.CHAOTIC) >= 5
+
+
 def test_a_period_is_the_shortest_and_needs_several_repeats():
     points = section(np.random.default_rng(6), 5)
     assert shortest_period(Points(points, QUIET)) == 5
