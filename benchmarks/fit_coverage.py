@@ -256,7 +256,7 @@ def rubbed(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool 
         seen = relative + moved
         seen = seen + float(np.median(rig.sd)) * np.std(seen) * rng.standard_normal(count)
         sums.add(base[-whole:], base[-whole:], seen[-whole:])
-    found = sums.frequency_response(band_hz=(50.0, 600.0))
+    found = sums.frequency_response()
     response = converted_frequency_response(
         found.frequency_response,
         drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),

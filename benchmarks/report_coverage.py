@@ -39,7 +39,7 @@ FEWEST_ALIKE = 5
 """Repeats that a median is taken of."""
 CLOCK_PPM = 50.0
 WEAK_VPP = 0.03
-"""At which nothing collides: p stays below half of the smallest gap drawn, and that is looked at."""
+"""At which nothing collides but in a dwell at a resonance, which is looked at."""
 KINDS = ("noise", "dwell", "sweep", "steps")
 LINES = "transmissibility, line by line"
 FARTHEST_HZ = 5.0
@@ -138,6 +138,15 @@ def true_values(rig: Rig, plan: object) -> dict[str, float]:
     return found
 
 
+def reaches_a_stop(rig: Rig, plan: object, found: dict[str, tuple[float, float]]) -> bool:
+    """Whether m1 would go beyond a gap if there were none: at a resonance even the weakest dwell may."""
+    if not isinstance(plan, Dwell) or "base amplitude A0" not in found:
+        return False
+    specimen = specimen_of(rig)
+    y, z = base_transmissibility(specimen, [plan.frequency_hz])[0, 1:]
+    return bool(1e-6 * found["base amplitude A0"][0] * abs(y - z) > min(specimen.gaps_m))
+
+
 def named(quantity: str, specimen: Specimen) -> str | None:
     """Give the name that repeats share: modes by their number, and without where a largest value was."""
     found = re.search(r"([\d.]+) Hz", quantity)
@@ -191,7 +200,8 @@ def repeats(
         again = plan.model_copy(update={"seed": int(rng.integers(1, 1 << 30))}) if kind == "noise" else plan
         with TemporaryDirectory() as folder:
             found, analysis = measured(repeated(rig, rng), again, Path(folder) / "measured.h5")
-        is_linear = is_weak or (kind == "noise" and not scatters_beyond_noise(analysis.response.periodic))
+        is_linear = is_weak and not reaches_a_stop(rig, plan, found)
+        is_linear |= kind == "noise" and not scatters_beyond_noise(analysis.response.periodic)
         for name, value in found.items():
             told[name, is_linear].append(value)
         if is_weak and kind == "noise":
