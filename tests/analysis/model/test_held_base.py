@@ -29,6 +29,7 @@ HELD_UM = {
     "smart-dwell_260": 5.0,
     "smart-sweep_held": 5.0,
     "branch-branch_3um": 3.0,
+    "superharmonic-superharmonic_3": 494.7,
 }
 """Highest level of the base that each plan names, as a displacement where it is played."""
 

@@ -13,7 +13,7 @@ from vibench.analysis.model_updating import Parameter
 from vibench.analysis.model_updating._bracketed_gap import bracketed_gap, brackets
 from vibench.analysis.model_updating._gap_fit import fit_gap, onsets, swept_relative
 from vibench.analysis.model_updating._parameters import LINEAR, parameter_value, with_values
-from vibench.analysis.report._drawings import findings
+from vibench.analysis.report import findings
 from vibench.sim import Sampled, base_transmissibility, gong2025, integrate
 
 TRUE = with_values(

@@ -19,8 +19,7 @@ from vibench.analysis.figures import (
     stepped_sine_figure,
 )
 from vibench.analysis.kinds import Result
-from vibench.analysis.report import result_figures
-from vibench.analysis.report._drawings import findings
+from vibench.analysis.report import findings, result_figures
 from vibench.analysis.sine import feedback_sentences, noted_jumps
 
 ROOT = Path(__file__).parents[3]
@@ -101,7 +100,7 @@ def test_a_tracked_resonance_is_analysed_and_said(analysed):
     assert sentence.startswith("Phase resonance at 266.")
     assert "natural frequency 266.1" in sentence
     said = findings(CampaignResults("run", (Result(analysis, None),), ()))
-    assert list(said) == [sentence], "it is no stepped sine"
+    assert list(said) == [f"run: {sentence}"], "it is no stepped sine"
     drawn = stepped_sine_figure(analysis, None, TRACKED_RESONANCE)
     assert drawn.title == "Tracked resonance, around 266.2 Hz"
     assert drawn.caption == f"Resonance tracked, levels of the base: 1. {sentence}"

@@ -10,8 +10,7 @@ from vibench.acquisition.plan import Measurement, SteppedLevel
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.kinds import Result
-from vibench.analysis.report import result_figures
-from vibench.analysis.report._drawings import findings
+from vibench.analysis.report import findings, result_figures
 from vibench.analysis.sine import SteppedResponse, hysteresis_vpp, level_jumps
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
@@ -83,7 +82,7 @@ def test_figure_and_summary_tell_both_jumps(analysis):
 
 def test_the_report_speaks_of_levels_and_jumps_in_short(analysis):
     (said,) = findings(CampaignResults("levels", (Result(analysis, None),), ()))
-    assert said.startswith("Level stepped at 195 Hz, 14 steps from 0.2 to 0.8 Vpp.")
+    assert said.startswith("level: Level stepped at 195 Hz, 14 steps from 0.2 to 0.8 Vpp.")
     assert "between 0.6 and 0.7 Vpp" in said
     assert "0.3 to 0.5 V above the fall back" in said
 
