@@ -157,7 +157,7 @@ def test_the_specimen_moves_as_its_points_say(frequency_hz, amplitude_m, kind, p
 
 @pytest.mark.thorough
 def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
-    """The paper's dwell: a prediction from one neighbour, of three delays, left half of them undecided."""
+    """The paper's dwell: a prediction from one neighbour, of three delays, left more of them undecided."""
     window, skipped = 1300, 300
     points = stroboscopic_section(gong2025(), Harmonic(260.0, 19e-6), skipped + 6 * window)[skipped:, :2]
     points = points / points.std(axis=0)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals import Integers, Reals
+from ..signals import Flags, Integers, Reals
 
 _MOST_TRIED = 64
 """Neighbours looked at before a point is given up: those in its own time window do not count."""
@@ -81,3 +81,17 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
         tried *= 4
     point = np.flatnonzero(found >= 0)
     return Neighbours(point, found[point], distance[point])
+
+
+def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
+    """Find several neighbours of each point that are ``apart`` steps from it in time or more.
+
+    Returns
+    -------
+    The nearest points of each, and which of them are its neighbours, at most ``count``; shapes (n, tried).
+
+    """
+    tried = min(count + 2 * apart - 1, len(points))
+    index = np.asarray(cKDTree(points).query(points, k=list(range(1, tried + 1)))[1])
+    allowed = np.abs(index - np.arange(len(points))[:, np.newaxis]) >= apart
+    return index, allowed & (np.cumsum(allowed, axis=1) <= count)

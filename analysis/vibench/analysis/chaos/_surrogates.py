@@ -3,14 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..signals import Reals
-from ._embedding import embedded
+from ._embedding import embedded, neighbours_apart
 
 SURROGATES = 39
 """The smallest statistic of 40 then has a chance of 1/40 = 0.025 if the series is linear noise."""
-DELAYS, NEIGHBOURS = 4, 10
+_DELAYS, _NEIGHBOURS = 4, 10
 """Values that make a past, and similar pasts that foretell the next value."""
 _ITERATIONS = 200
 _SETTLED = 1e-8
@@ -75,14 +74,11 @@ def prediction_error(series: Reals) -> float:
 
     Zeroth-order nonlinear prediction (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section
     4.2), the mean over neighbours: far below 1 where the past decides the future, near 1 where it does not.
-    A single neighbour, and fewer delays, saw chaos among impacts in half as many windows of 5 s.
+    One neighbour, and fewer delays, left more of the chaos among impacts undecided.
     """
-    pasts, next_values = embedded(series, DELAYS)[:-1], series[DELAYS:]
+    pasts, next_values = embedded(series, _DELAYS)[:-1], series[_DELAYS:]
     # Pasts that share values with the one in question are no neighbours of it.
-    reach = min(NEIGHBOURS + 2 * DELAYS - 1, len(pasts))
-    index = np.asarray(cKDTree(pasts).query(pasts, k=list(range(1, reach + 1)))[1])
-    allowed = np.abs(index - np.arange(len(pasts))[:, np.newaxis]) >= DELAYS
-    nearest = allowed & (np.cumsum(allowed, axis=1) <= NEIGHBOURS)
+    index, nearest = neighbours_apart(pasts, _DELAYS, _NEIGHBOURS)
     has = nearest.any(axis=1)
     foretold = np.sum(next_values[index[has]] * nearest[has], axis=1) / np.sum(nearest[has], axis=1)
     miss = next_values[has] - foretold

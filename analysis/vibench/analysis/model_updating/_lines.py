@@ -16,14 +16,15 @@ from ._parameters import LINEAR, Parameter, parameter_value, with_values
 
 LEAST_RELATIVE_SD = 1e-4
 """No line counts for more than this scatter says: calibrations and clocks are no better."""
-LEAST_CLEAR = 10.0
+_LEAST_CLEAR = 10.0
 """Magnitude of a line over the scatter usual among its neighbours: the logarithm of less is not normal.
 
 Not over its own scatter, of few averages: lines whose scatter seems small by chance would be chosen, and a
 right model refused.
 """
-NEIGHBOURS = 31
-MOST_OFF = np.log(1e4)
+_NEIGHBOURS = 31
+"""Lines whose median scatter is what is usual."""
+_MOST_OFF = np.log(1e4)
 """Of a parameter from where the search begins, as a logarithm: further it runs away."""
 LEAST_DAMPING_TIME_S = 1e-8
 """Where the search begins for a specimen that is described without damping."""
@@ -127,15 +128,15 @@ class Lines:
         return chi_square_limit(self.freedom, self.correlation[1])
 
     def specimen(self, logarithms: Reals) -> Specimen:
-        """Give the specimen of these parameters, which are not taken beyond `MOST_OFF`."""
+        """Give the specimen of these parameters, which are not taken beyond `_MOST_OFF`."""
         begun = self.start[: len(self.free)]
-        values = np.exp(np.clip(logarithms, begun - MOST_OFF, begun + MOST_OFF)).tolist()
+        values = np.exp(np.clip(logarithms, begun - _MOST_OFF, begun + _MOST_OFF)).tolist()
         return with_values(self.nominal, dict(zip(self.free, values, strict=True)))
 
     def is_away(self, at: Reals) -> bool:
         """Whether a search has run away with a parameter that the lines do not tell."""
         count = len(self.free)
-        return bool(np.any(np.abs(at[:count] - self.start[:count]) > MOST_OFF))
+        return bool(np.any(np.abs(at[:count] - self.start[:count]) > _MOST_OFF))
 
     def residuals(self, at: Reals, model: Model) -> Reals:
         """Measured less model in standard deviations: magnitudes, phases, and a stated scale's."""
@@ -180,12 +181,12 @@ def lines_of(
     frequency_hz = frequency_response.frequency_hz
     size = measured if fitted is None else np.abs(as_described(fitted, frequency_hz, np.zeros(0)))
     scatter = frequency_response.relative_sd_magnitude * measured
-    usual = median_filter(np.where(np.isfinite(scatter), scatter, np.inf), NEIGHBOURS, mode="nearest")
-    used = frequency_response.is_significant & np.isfinite(scatter) & (size > LEAST_CLEAR * usual)
+    usual = median_filter(np.where(np.isfinite(scatter), scatter, np.inf), _NEIGHBOURS, mode="nearest")
+    used = frequency_response.is_significant & np.isfinite(scatter) & (size > _LEAST_CLEAR * usual)
     count, needed = int(np.count_nonzero(used)), 2 * (len(free) + CHANNEL_PHASES)
     if count < needed:
         raise NotEnoughData(
-            f"{count} lines of the transmission are {LEAST_CLEAR:.2g} times as large as the scatter around "
+            f"{count} lines of the transmission are {_LEAST_CLEAR:.2g} times as large as the scatter around "
             f"them or more, and {len(free)} parameters need {needed}; measure longer or with more drive"
         )
     spreads = np.concatenate(

@@ -117,7 +117,7 @@ def fit_specimen(
     lines = lines_of(frequency_response, nominal, free, scale_sd)
     found = descended(lines)
     clear = lines_of(frequency_response, nominal, free, scale_sd, found.specimen)
-    if clear.frequency_hz.size != lines.frequency_hz.size:
+    if not np.array_equal(clear.frequency_hz, lines.frequency_hz):
         lines, found = clear, descended(clear)
     chi_square = found.chi_square / lines.freedom
     fits = chi_square <= lines.limit
