@@ -41,9 +41,11 @@ from ._hidden_view import (
 from ._kept_motion import (
     keep_hidden_motion as keep_hidden_motion,
 )
-from ._live_twin import (
+from ._live_motion import (
     LiveMotion as LiveMotion,
     LiveState as LiveState,
+)
+from ._live_twin import (
     LiveTwin as LiveTwin,
 )
 from ._numbers import (
