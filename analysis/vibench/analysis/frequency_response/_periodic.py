@@ -20,6 +20,7 @@ from ..tables import Labelled
 from ._estimators import coherence
 from ._repetition import Repetition, driven_lines, measured_repetition, period_spectra
 from ._results import Estimator, FrequencyResponse, FrequencyResponseSettings
+from ._steady import steady_relative_sd
 
 
 class Scatter(StrEnum):
@@ -39,6 +40,8 @@ class BestLinearApproximation:
     coherence: Reals
     relative_sd: Reals
     """Standard deviation of ln(magnitude), equal to that of the phase [rad]."""
+    steady_relative_sd: Reals
+    """The same, steadied by neighbouring lines."""
     noise_variance: Reals
     """Complex variance of one realisation's estimate that noise explains."""
     distortion_variance: Reals | None
@@ -79,10 +82,12 @@ def best_linear_approximation(
     noise_variance = to_one * noise
     if count == 1:
         signal = np.abs(value) ** 2
+        relative_sd = np.sqrt(noise_variance / 2) / np.abs(value)
         return BestLinearApproximation(
             value=value,
             coherence=signal / (signal + periods * noise_variance),
-            relative_sd=np.sqrt(noise_variance / 2) / np.abs(value),
+            relative_sd=relative_sd,
+            steady_relative_sd=steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (periods - 1)),
             noise_variance=noise_variance,
             distortion_variance=None,
             scatter=Scatter.PERIODS,
@@ -90,6 +95,7 @@ def best_linear_approximation(
         )
     residual = response - value * base
     variance = to_one * np.sum(np.abs(residual) ** 2, axis=0) / (count - 1)
+    relative_sd = np.sqrt(variance / count / 2) / np.abs(value)
     return BestLinearApproximation(
         value=value,
         coherence=coherence(
@@ -97,7 +103,8 @@ def best_linear_approximation(
             np.sum(np.abs(response) ** 2, axis=0),
             np.sum(np.conj(base) * response, axis=0),
         ),
-        relative_sd=np.sqrt(variance / count / 2) / np.abs(value),
+        relative_sd=relative_sd,
+        steady_relative_sd=steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (count - 1)),
         noise_variance=noise_variance,
         distortion_variance=np.maximum(variance - noise_variance, 0.0),
         scatter=Scatter.REALISATIONS,
@@ -283,6 +290,7 @@ class PeriodicSums:
             resolution_hz=0.0,
             segments_used=sum(one.repetition.periods for one in self._realisations),
             segments_excluded=0,
+            steady_relative_sd=estimate.steady_relative_sd,
             settings=FrequencyResponseSettings(
                 estimator=Estimator.DRIVE,
                 sample_rate_hz=self._sample_rate_hz,

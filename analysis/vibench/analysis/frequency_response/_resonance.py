@@ -1,7 +1,6 @@
 """Resonances of a transmission: frequency, damping and quality factor, with their uncertainties."""
 
 from dataclasses import replace
-from math import ceil
 
 import numpy as np
 import scipy
@@ -25,8 +24,6 @@ _LARGEST_SD_UNRESOLVED = 0.1
 ripples on top of a broad hill."""
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
-_LEAST_FREEDOM = 24.0
-"""Degrees of freedom of a line's variance with which it is known to a third."""
 _LARGEST_RELATIVE_SD_DAMPING = 0.5
 """Past it the damping is not significantly above zero: a ripple of noisy lines, and no resonance."""
 
@@ -56,32 +53,13 @@ def resonances(
             f"{_LEAST_LINES}"
         )
     found = []
-    band = _steadied(band)
+    if band.steady_relative_sd is not None:
+        band = replace(band, relative_sd_magnitude=band.steady_relative_sd)
     for line, width in _significant_peaks(band):
         fit = _refitted(band, _fitted(band, line, width))
         if fit is not None and low_hz <= fit.frequency_hz <= high_hz:
             found.append(fit)
     return jointly_fitted(band, _distinct(found))
-
-
-def _steadied(band: FrequencyResponse) -> FrequencyResponse:
-    """Average the variances of neighbouring lines until they have degrees of freedom enough.
-
-    One of two realisations is now and then a hundredth of the true one: as a weight it takes a few lines for
-    the whole truth. A square over a variance of n degrees of freedom is n / (n - 2) on average, Student's.
-    """
-    own = max(2 * (band.n_eff - 1), 1)
-    lines = ceil(_LEAST_FREEDOM / own)
-    variance = band.relative_sd_magnitude**2
-    known = np.isfinite(variance)
-    around = np.ones(min(lines, variance.size))
-    total, count = (
-        scipy.signal.convolve(each, around, mode="same", method="direct")
-        for each in (np.where(known, variance, 0.0), known.astype(np.float64))
-    )
-    wider = lines * own / (lines * own - 2)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        return replace(band, relative_sd_magnitude=np.where(known, np.sqrt(wider * total / count), np.nan))
 
 
 def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:

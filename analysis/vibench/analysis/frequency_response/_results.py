@@ -76,6 +76,8 @@ class FrequencyResponse(Labelled):
     segments_used: int
     segments_excluded: int
     settings: FrequencyResponseSettings
+    steady_relative_sd: Reals | None = None
+    """As `relative_sd_magnitude`, steadied by neighbouring lines: weights of a fit. None: that is steady."""
     reference_coherence: Reals | None = None
     """For the drive-referenced estimator: the lower of the reference's coherences with the two channels."""
 
@@ -143,7 +145,7 @@ class FrequencyResponse(Labelled):
             raise InvalidRequest(
                 f"no line lies between {low_hz:g} and {high_hz:g} Hz; the lines are at {span}"
             )
-        reference = self.reference_coherence
+        steady, reference = self.steady_relative_sd, self.reference_coherence
         return replace(
             self,
             frequency_hz=self.frequency_hz[kept],
@@ -152,6 +154,7 @@ class FrequencyResponse(Labelled):
             relative_sd_magnitude=self.relative_sd_magnitude[kept],
             sd_phase_rad=self.sd_phase_rad[kept],
             half_width=self.half_width[kept],
+            steady_relative_sd=None if steady is None else steady[kept],
             reference_coherence=None if reference is None else reference[kept],
         )
 

@@ -24,6 +24,7 @@ from ._estimators import (
     named_estimator,
 )
 from ._results import Estimator, FrequencyResponse, FrequencyResponseSettings
+from ._steady import steady_relative_sd
 
 _LEAST_SEGMENTS = 2
 _DRIVE, _RESPONSE, _REFERENCE = range(3)
@@ -185,10 +186,11 @@ def frequency_response_of(
     ordinary = coherence(s_xx, s_yy, s_xy)
     value = _value(products, settings)
     spread = relative_sd(ordinary, averages.n_eff)
-    reference_coherence = None
+    power, reference_coherence = s_xx, None
     if settings.estimator is Estimator.DRIVE:
         spread = drive_referenced_relative_sd(products, value, averages.n_eff)
         s_rr = products[_REFERENCE, _REFERENCE].real
+        power = np.abs(products[_REFERENCE, _DRIVE]) ** 2 / np.maximum(s_rr, np.finfo(float).tiny)
         reference_coherence = np.minimum(
             coherence(s_rr, s_xx, products[_REFERENCE, _DRIVE]),
             coherence(s_rr, s_yy, products[_REFERENCE, _RESPONSE]),
@@ -207,6 +209,7 @@ def frequency_response_of(
         segments_used=averages.segments_used,
         segments_excluded=averages.segments_excluded,
         settings=settings,
+        steady_relative_sd=steady_relative_sd(spread, value, power, 2 * (averages.n_eff - 1)),
         reference_coherence=reference_coherence,
     )
 
