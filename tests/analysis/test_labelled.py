@@ -173,8 +173,8 @@ noise_error_i noise_share order orders overlap overloaded_samples pairs period p
 planned_stretches realisations reduced_chi_square reference_coherence relative relative_i relative_sd
 relative_sd_magnitude residue residue_acceleration response_i response_ii restarts restitution runs
 sd_damping_ratio sd_exponent sd_response_ii sd_samples segment_samples segments_excluded segments_used
-share_at_full_scale share_told sides spectrum_error standard_errors statistic stop strobe_sample
-surrogates transmission turns_per_period up whole_stretches
+share_at_full_scale share_told sides spectrum_error standard_errors statistic steady_relative_sd stop
+strobe_sample surrogates transmission turns_per_period up whole_stretches
 """
 PURE = set(_PURE.split())
 """Counts, shares, ratios, flags and numbers of samples: names that mean the same in every result."""
