@@ -5,6 +5,7 @@ import inspect
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from decimal import Decimal
 from itertools import zip_longest
 from pathlib import Path
 from types import MappingProxyType
@@ -33,7 +34,9 @@ def plus_minus(value: float, half_width: float) -> str:
     largest = max(abs(value), half_width)
     if not _PLAIN[0] <= largest < _PLAIN[1]:
         power = int(np.floor(np.log10(largest)))
-        return f"({plus_minus(value / 10.0**power, half_width / 10.0**power)})e{power}"
+        # In decimals: a power of ten may lie beyond the numbers of the machine where its part does not.
+        scaled = (float(Decimal(float(each)).scaleb(-power)) for each in (value, half_width))
+        return f"({plus_minus(*scaled)})e{power}"
     # The exponent of the two digits as they are written: 0.0996 is 0.10.
     place = 1 - int(f"{half_width:.1e}".partition("e")[2])
     shown = max(place, 0)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings, strategies as st
+from hypothesis import HealthCheck, example, given, settings, strategies as st
 from hypothesis.extra.numpy import arrays
 
 from vibench.acquisition import open_recording
@@ -187,6 +187,7 @@ def test_the_scatter_of_a_maximum_is_told_from_one_window(bounded):
     value=st.one_of(st.floats(), st.floats(0.1, 10.0)),
     maxima=arrays(np.float64, 50, elements=st.floats(0.0, 1e3)),
 )
+@example(sd=5e-324, value=5e-324, maxima=np.array([5e-324, *np.zeros(49)]))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_standard_uncertainty_is_a_number_above_zero_or_not_stated(sd, value, maxima, request):
     """Whatever an analysis comes to: nothing heard, a constant signal, a measure that has no sign."""

@@ -158,7 +158,10 @@ def sd_of_largest(maxima: Reals) -> float:
     With their shape k, from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
     largest of n is n^-k of that of one: less where the motion is bounded, the same where it is not.
     """
-    ordered, count = np.sort(maxima), maxima.size
+    if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
+        return 0.0
+    # Of their largest: sums of the smallest numbers there are have no digits left.
+    ordered, count = np.sort(maxima) / np.max(maxima), maxima.size
     place = np.arange(count)
     first, second, third = (
         float(np.mean(ordered * weight))
@@ -168,8 +171,6 @@ def sd_of_largest(maxima: Reals) -> float:
             place * (place - 1) / ((count - 1) * (count - 2)),
         )
     )
-    if np.ptp(maxima) <= _ALIKE * first:
-        return 0.0
     skewness = (6 * third - 6 * second + first) / (2 * second - first)
     off = 2 / (3 + skewness) - np.log(2) / np.log(3)
     shape = float(np.clip(7.8590 * off + 2.9554 * off**2, 0.0, 0.5))
