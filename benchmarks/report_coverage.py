@@ -143,8 +143,8 @@ def reaches_a_stop(rig: Rig, plan: object, found: dict[str, tuple[float, float]]
     if not isinstance(plan, Dwell) or "base amplitude A0" not in found:
         return False
     specimen = specimen_of(rig)
-    y, z = base_transmissibility(specimen, [plan.frequency_hz])[0, 1:]
-    return bool(1e-6 * found["base amplitude A0"][0] * abs(y - z) > min(specimen.gaps_m))
+    relative = abs(base_transmissibility(specimen, [plan.frequency_hz])[0, 3])
+    return bool(1e-6 * found["base amplitude A0"][0] * relative > min(specimen.gaps_m))
 
 
 def named(quantity: str, specimen: Specimen) -> str | None:
