@@ -16,7 +16,7 @@ def curve(rng, draws, points, shift=0.0, scatter=0.1):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("draws", "points"), [(5, 1), (16, 1), (16, 40), (8, 40)])
+@pytest.mark.parametrize(("draws", "points"), [(5, 1), (16, 1), (16, 20), (8, 20)])
 def test_an_agreeing_twin_passes_its_limit_in_one_case_of_a_hundred(draws, points):
     rng = np.random.default_rng(1)
     trials = 3000
@@ -33,6 +33,44 @@ def test_a_magnitude_that_is_mostly_chance_passes_its_limit_no_more_often():
         outside += not EnsembleCurve("q", FREQUENCY_HZ, values[0], values[1:]).agrees
     # 20 expected, sd 4.4.
     assert 5 <= outside <= 36
+
+
+def rare_dips(rng, size):
+    """As chaos has them: one value of a hundred lies a third lower."""
+    return (1 + 0.05 * rng.standard_normal(size)) * np.where(rng.random(size) < 0.01, 0.67, 1.0)
+
+
+def long_tails(rng, size):
+    return np.abs(1 + 0.02 * rng.standard_t(5, size))
+
+
+@pytest.mark.parametrize("drawn", [rare_dips, long_tails])
+@pytest.mark.parametrize(("draws", "points"), [(8, 200), (16, 1000)])
+def test_long_tails_of_a_curve_pass_its_limit_no_more_often(drawn, draws, points):
+    """With the limit of normal values 14 to 100 % lay outside."""
+    rng, outside = np.random.default_rng(6), 0
+    for _ in range(100):
+        values = drawn(rng, (draws + 1, points))
+        outside += not EnsembleCurve("q", np.arange(points), values[0], values[1:]).agrees
+    assert outside <= 6
+
+
+def test_one_line_far_off_lies_outside_whatever_the_draws_are():
+    rng = np.random.default_rng(7)
+    values = rare_dips(rng, (17, 1000))
+    values[0, 500] = 3.0
+    found = EnsembleCurve("q", np.arange(1000), values[0], values[1:])
+    assert found.outside == 1
+    assert found.limit < 8
+
+
+def test_each_draw_is_set_into_the_others():
+    found = curve(np.random.default_rng(9), 9, 40)
+    by_hand = [
+        EnsembleCurve("q", found.frequency_hz, each, np.delete(found.draws, place, axis=0)).z
+        for place, each in enumerate(found.draws)
+    ]
+    np.testing.assert_allclose(found._z_of_draws, by_hand, rtol=1e-9)
 
 
 def test_the_band_holds_a_further_draw_as_often_as_it_says():
