@@ -7,6 +7,7 @@ import pytest
 
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
+from vibench.analysis.signals import standard_uncertainty
 from vibench.analysis.sine import dwell_response
 from vibench.analysis.sine._dwell_motion import stroboscope
 from vibench.analysis.spectra import spectral_density
@@ -74,6 +75,24 @@ def test_the_stated_noise_bias_and_spread_are_what_repeated_dwells_show():
     assert found[0].noise_density == pytest.approx(1e-6, rel=0.1)
     stated = np.sqrt(np.mean([each.sd_response_ii**2 for each in found]))
     assert stated == pytest.approx(np.std([each.response_ii for each in found]), rel=0.4)
+
+
+def test_twice_the_uncertainty_of_a0_holds_it_in_95_of_100_cases():
+    """Ten tenths of a window tell their own scatter to a quarter only: twice it held A0 in 92."""
+    rng, draws, held = np.random.default_rng(4), 1000, 0
+    for _ in range(draws):
+        drive, base, _ = dwell(0.5, {1: 1e-7})
+        level = drive_level(drive, base + 0.2 * rng.standard_normal(base.size), RATE, near_hz=260)
+        held += abs(level.amplitude_m - 5e-6) < 2 * level.sd_amplitude_m
+    # Three standard deviations of 1000 draws about 0.954.
+    assert held / draws == pytest.approx(0.954, abs=0.02)
+
+
+@pytest.mark.parametrize("count", [3, 10])
+def test_so_does_twice_that_of_either_part_of_a_complex_mean(count):
+    values = np.random.default_rng(5).standard_normal((4000, count, 2)).view(complex)[..., 0]
+    held = np.mean([abs(each.mean().real) < 2 * standard_uncertainty(each) for each in values])
+    assert held == pytest.approx(0.954, abs=0.012)
 
 
 @cache

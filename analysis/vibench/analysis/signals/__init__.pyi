@@ -14,6 +14,7 @@ from ._confidence import (
     magnitude_bounds as magnitude_bounds,
     phase_half_width as phase_half_width,
     relative_sd as relative_sd,
+    standard_uncertainty as standard_uncertainty,
     student_half_width as student_half_width,
 )
 from ._decimation import (

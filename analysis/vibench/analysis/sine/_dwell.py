@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals import Complexes, ConvertedSignal, Quantity, Reals, converted_signal
+from ..signals import Complexes, ConvertedSignal, Quantity, Reals, converted_signal, standard_uncertainty
 from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
 from ..tables import Labelled
 from ..tones import (
@@ -145,7 +145,7 @@ def dwell_response(
     turn = 1j * omega * np.exp(1j * omega * delay_s) / sensors
     ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
     each = turn * parts.order(1.0) / base_parts.order(1.0) / ratio
-    scatter = float(np.std(each, ddof=1)) / np.sqrt(2 * each.size)
+    scatter = standard_uncertainty(each)
     noise_density, sensor = _sensor_noise(response, displacement)
     silent = heard_in(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
     repeated = _repeated(motion, phase, orders)
@@ -228,7 +228,7 @@ def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) ->
     for index, order in enumerate(whole.orders):
         omega = 2 * np.pi * drive_hz * order
         size = float(whole.amplitude[index, 0])
-        spread = float(np.std(parts.value[index], ddof=1)) / np.sqrt(2 * parts.residual_rms.size)
+        spread = standard_uncertainty(parts.value[index])
         lines.append(
             Line(
                 order_label(order),

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..signals import Quantity, Reals, derivative_factor
+from ..signals import Quantity, Reals, derivative_factor, standard_uncertainty
 from ..spectra import SpectralDensity
 from ._order_tracking import tracked_orders
 from ._sine_fit import fitted_sine, steady_phase
@@ -53,7 +53,7 @@ def drive_level(drive: Reals, base: Reals, sample_rate_hz: float, *, near_hz: fl
     whole = tracked_orders(base, phase, interval_samples=base.size, orders=_ORDERS)
     parts = tracked_orders(base, phase, interval_samples=base.size // _SCATTER_BLOCKS, orders=_ORDERS)
     omega = 2 * np.pi * sine.frequency_hz
-    scatter = float(np.std(np.abs(parts.order(1.0)), ddof=1)) / np.sqrt(parts.residual_rms.size)
+    scatter = standard_uncertainty(np.abs(parts.order(1.0)))
     displacement = whole.amplitude[:, 0] / (omega * np.asarray(_ORDERS)) ** 2
     return DriveLevel(
         frequency_hz=sine.frequency_hz,
