@@ -4,22 +4,26 @@ from math import ceil
 
 import numpy as np
 
-from ..signals import Complexes, Flags, Reals
+from ..signals import Complexes, Reals
 
 _ENOUGH_FREEDOM = 24.0
 """Degrees of freedom of a line's variance with which it is known to a third."""
 _FREEDOM = 96.0
-"""Of the two noises that are found over neighbouring lines; the smaller one shows in a part of these only."""
-_ROUNDS = 8
+"""Of the noises that are found over neighbouring lines: a small one shows in a part of these only."""
+_ROUNDS = 60
+_NOTHING = 1e-300
+_FAINT = 1e-12
+"""Of a variance, or of a shape, over what its neighbours have on average."""
 
 
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
     """Give the standard deviation of ln(magnitude) with which lines are weighted in a fit.
 
     One of two realisations is now and then a hundredth of the true one: as a weight it takes a few lines for
-    the whole truth. What is level over neighbouring lines is the noise of the two sensors, not the relative
-    scatter: y - H x has a + b |H|^2, and the base moves little where the specimen pulls at it. Both are found
-    over lines enough, by maximum likelihood of variances that are chi-square distributed.
+    the whole truth. What is level over neighbouring lines is not the relative scatter, but the noise of both
+    sensors, and that of the base itself: y - H x has a + b |H|^2 + c |dH|^2, with dH from line to line, since
+    what does not repeat leaks by as much as a resonance rings on. They are found over lines enough, by
+    maximum likelihood of variances that are chi-square distributed.
 
     Parameters
     ----------
@@ -33,39 +37,35 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
         Degrees of freedom of each line's own variance.
 
     """
-    if freedom >= _ENOUGH_FREEDOM:
+    lines = min(ceil(_FREEDOM / freedom), value.size)
+    if freedom >= _ENOUGH_FREEDOM or lines < 2:
         return relative_sd
     gain = np.abs(value) ** 2
-    lines = min(ceil(_FREEDOM / freedom), gain.size)
     with np.errstate(invalid="ignore"):
         variance = relative_sd**2 * gain * power
     known = np.isfinite(variance) & (variance > 0)
+    shapes = np.where(known, [np.ones_like(gain), gain, np.abs(np.gradient(value)) ** 2], 0.0)
     around = np.clip(np.arange(gain.size) - lines // 2, 0, gain.size - lines)[:, None] + np.arange(lines)
-    own, other = _two_noises(np.where(known, variance, 0.0)[around], gain[around], known[around])
+    sizes = _sizes(np.where(known, variance, 0.0)[around], shapes[:, around])
     # A square over a variance of n degrees of freedom is n / (n - 2) on average, Student's.
     wider = lines * freedom / (lines * freedom - 2)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.where(known, np.sqrt(wider * (own + other * gain) / (gain * power)), np.nan)
+        smooth = np.sum(sizes * shapes, axis=0) / (gain * power)
+        return np.where(known, np.sqrt(wider * smooth), np.nan)
 
 
-def _two_noises(variance: Reals, gain: Reals, known: Flags) -> tuple[Reals, Reals]:
-    """Give a and b of variance = a + b gain, none below zero, for each row of neighbours."""
-    level, about = (np.maximum(each.mean(axis=1, keepdims=True), 1e-300) for each in (variance, gain))
-    variance, gain = variance / level, gain / about
-    own = other = np.full((len(gain), 1), 0.5)
+def _sizes(variance: Reals, shapes: Reals) -> Reals:
+    """Give how much of each shape a row of variances holds, shape (shapes, rows); none is below zero.
+
+    Fevotte, Bertin and Durrieu 2009 (Neural Comput. 21, 793-830): their updates raise the likelihood of
+    chi-square distributed values in every round.
+    """
+    level = np.maximum(variance.mean(axis=1), _NOTHING)[:, None]
+    heights = np.maximum(shapes.mean(axis=2, keepdims=True), _NOTHING)
+    variance, shapes = variance / level, shapes / heights
+    sizes = np.full((*shapes.shape[:2], 1), 1 / len(shapes))
     for _ in range(_ROUNDS):
-        weight = np.where(known, 1 / np.maximum(own + other * gain, 1e-9) ** 2, 0.0)
-        ones, slope, square, mean, along = (
-            np.sum(weight * each, axis=1, keepdims=True)
-            for each in (np.ones_like(gain), gain, gain**2, variance, gain * variance)
-        )
-        with np.errstate(invalid="ignore", divide="ignore"):
-            determinant = ones * square - slope**2
-            own = (square * mean - slope * along) / determinant
-            other = (ones * along - slope * mean) / determinant
-            only_own, only_other = ~(other > 0), ~(own > 0)
-            own, other = (
-                np.where(only_own, mean / ones, np.where(only_other, 0.0, own)),
-                np.where(only_own, 0.0, np.where(only_other, along / square, other)),
-            )
-    return (own * level)[:, 0], (other * level / about)[:, 0]
+        inverse = 1 / np.maximum(np.sum(sizes * shapes, axis=0), _FAINT)
+        seen = np.sum(shapes * variance * inverse**2, axis=2, keepdims=True)
+        sizes = sizes * np.sqrt(seen / np.maximum(np.sum(shapes * inverse, axis=2, keepdims=True), _FAINT))
+    return np.asarray(sizes * level / heights)[..., 0]
