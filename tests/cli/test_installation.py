@@ -64,6 +64,12 @@ def test_copies_of_what_is_shipped_are_whole_and_never_overwrite(vibench_here, t
     assert changed.read_text(encoding="utf-8") == "changed"
 
 
+def test_every_example_has_a_name_of_its_own(vibench_here, tmp_path):
+    for line in vibench_here("examples", cwd=tmp_path).stdout.splitlines()[:-1]:
+        names = line.partition(": ")[2].split(", ")
+        assert len(names) == len(set(names)), line
+
+
 def test_a_disk_without_room_is_one_sentence(vibench_here, tmp_path):
     resource = pytest.importorskip("resource", reason="bounds on files are POSIX")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)

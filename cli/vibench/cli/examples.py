@@ -1,6 +1,7 @@
 """`vibench examples`: what comes with vibench, by name, and copies of it to change."""
 
 import shutil
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
@@ -29,7 +30,7 @@ def examples(
         print_json({folder: [str(path) for path in paths] for folder, paths in found.items()})
     elif copy is None:
         for folder, paths in found.items():
-            console.print(f"{folder}: {', '.join(path.stem for path in paths)}")
+            console.print(f"{folder}: {', '.join(names_of(paths))}")
         console.print("vibench measure quick --out DIR takes a name; --copy DIR gives files to change")
     else:
         console.print(f"copied {sum(map(len, found.values()))} files to {copy}")
@@ -42,6 +43,12 @@ def files_of(folder: Path) -> list[Path]:
         for path in folder.rglob("*")
         if path.is_file() and "__pycache__" not in path.parts and not path.name.startswith(".")
     )
+
+
+def names_of(paths: list[Path]) -> list[str]:
+    """Name each file by its stem, and by its folder too where another one has that stem."""
+    often = Counter(path.stem for path in paths)
+    return [path.stem if often[path.stem] == 1 else f"{path.parent.name}/{path.stem}" for path in paths]
 
 
 def copy_all(found: dict[str, list[Path]], target: Path) -> None:
