@@ -94,6 +94,27 @@ def test_a_stop_on_one_side_is_followed_and_its_numbers_are_found(world_recordin
 
 
 @pytest.mark.thorough
+def test_a_mass_that_chatters_along_its_stop_is_followed_where_no_contact_model_tells_its_impacts(
+    world_recording,
+):
+    """Five impacts a period, most of them with hardly any flight between."""
+    one_sided = gong2025(gap_m=(30e-6, np.inf))
+    recorded = world_recording(260.0, 1.5, seed=11, duration_s=2.6, specimen=one_sided)
+    motion = told(recorded, specimen=one_sided)
+    error, scored = errors_of(motion, recorded, motion.tracked.p)
+    assert np.sqrt(np.mean(error[scored] ** 2)) < 0.1e-6
+    (found, false, _), true = impacts_scored(
+        motion, recorded, motion.tracked.collisions.samples, recorded.touches
+    )
+    assert true > 4 * 260 * 1.5
+    assert found > 0.99 * true
+    assert false < 0.005 * true
+    assert motion.free.impacts.samples.size < 0.1 * true
+    assert not any(each.is_determined for each in motion.parameters)
+    assert "or stayed at one of them" in motion.sentences[-1]
+
+
+@pytest.mark.thorough
 def test_ten_times_the_noise_is_still_followed(world_recording):
     recorded = world_recording(260.0, 1.5, seed=42, noise=10.0, duration_s=2.4)
     motion = told(recorded, numbers=Numbers.AS_DESCRIBED)

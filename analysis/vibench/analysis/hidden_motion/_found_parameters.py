@@ -370,8 +370,8 @@ def _search(
         count = told.impacts.samples.size
         seen = f"{count} impacts that were found tell no gap" if count else "no impacts were found"
         return numbers.tracked, (
-            f"{seen}, so m1 hardly reached its stops in this motion or the specimen's linear numbers are "
-            "wrong; fit them to weak noise first"
+            f"{seen} without a contact model, so m1 hardly reached its stops in this motion or stayed at one "
+            "of them, or the specimen's linear numbers are wrong; fit them to weak noise first"
         )
     sides = dict(zip((Hidden.LOWER_GAP, Hidden.UPPER_GAP), gaps, strict=True))
     known: dict[Hidden, FreeGap] = {
