@@ -10,7 +10,7 @@ _ENOUGH_FREEDOM = 24.0
 """Degrees of freedom of a line's variance with which it is known to a third."""
 _FREEDOM = 96.0
 """Of the noises that are found over neighbouring lines: a small one shows in a part of these only."""
-_ROUNDS = 60
+_ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
 """Of a variance, or of a shape, over what its neighbours have on average."""
@@ -43,15 +43,20 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
     gain = np.abs(value) ** 2
     with np.errstate(invalid="ignore"):
         variance = relative_sd**2 * gain * power
-    known = np.isfinite(variance) & (variance > 0)
-    shapes = np.where(known, [np.ones_like(gain), gain, np.abs(np.gradient(value)) ** 2], 0.0)
-    around = np.clip(np.arange(gain.size) - lines // 2, 0, gain.size - lines)[:, None] + np.arange(lines)
+        steps = np.nan_to_num(np.abs(np.gradient(value)) ** 2)
+    known = np.isfinite(variance)
+    shapes = np.where(known, [np.ones_like(gain), gain, steps], 0.0)
+    # Stretches overlap by half; between their middles sizes are interpolated.
+    last = value.size - lines
+    firsts = np.append(np.arange(0, last, max(lines // 2, 1)), last)
+    around = firsts[:, None] + np.arange(lines)
     sizes = _sizes(np.where(known, variance, 0.0)[around], shapes[:, around])
+    places, middles = np.arange(value.size), firsts + (lines - 1) / 2
+    smooth = sum(np.interp(places, middles, size) * shape for size, shape in zip(sizes, shapes, strict=True))
     # A square over a variance of n degrees of freedom is n / (n - 2) on average, Student's.
     wider = lines * freedom / (lines * freedom - 2)
     with np.errstate(invalid="ignore", divide="ignore"):
-        smooth = np.sum(sizes * shapes, axis=0) / (gain * power)
-        return np.where(known, np.sqrt(wider * smooth), np.nan)
+        return np.where(known, np.sqrt(wider * smooth / (gain * power)), np.nan)
 
 
 def _sizes(variance: Reals, shapes: Reals) -> Reals:

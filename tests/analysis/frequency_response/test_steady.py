@@ -1,0 +1,49 @@
+"""The scatter that a fit weighs lines by: what the three noises make, whatever few averages say of a line."""
+
+import numpy as np
+import pytest
+
+from vibench.analysis.frequency_response._steady import steady_relative_sd
+
+FREQUENCY_HZ = np.arange(50.0, 600.0, 2.0)
+RATIO = FREQUENCY_HZ / 94.6
+RESPONSE = 1 / (1 - RATIO**2 + 0.012j * RATIO) + 1 / (1 - (FREQUENCY_HZ / 266) ** 2 + 0.03j)
+POWER = 1 - 0.7 / (1 + ((FREQUENCY_HZ - 95) / 3) ** 2)
+SHAPES = np.array([np.ones(RESPONSE.size), np.abs(RESPONSE) ** 2, np.abs(np.gradient(RESPONSE)) ** 2])
+
+
+def told(rng, sizes, freedom):
+    """Give the true relative standard deviation, and one that so few degrees of freedom tell."""
+    true = np.sqrt(sizes @ SHAPES / (np.abs(RESPONSE) ** 2 * POWER))
+    return true, true * np.sqrt(rng.chisquare(freedom, true.size) / freedom)
+
+
+@pytest.mark.parametrize("sizes", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.3, 0.2, 0.2), (0.0, 0.0, 1.0)])
+@pytest.mark.parametrize("freedom", [2, 8])
+def test_the_scatter_of_each_line_is_what_its_noises_make(sizes, freedom):
+    rng, ratios = np.random.default_rng(3), []
+    for _ in range(40):
+        true, own = told(rng, 1e-6 * np.array(sizes), freedom)
+        ratios.append(steady_relative_sd(own, RESPONSE, POWER, freedom) / true)
+    typical = np.sqrt(np.mean(np.square(ratios), axis=0))
+    near_the_mode = np.abs(FREQUENCY_HZ - 94.6) < 8
+    assert np.all(typical[near_the_mode] > 0.8)
+    assert np.median(typical) == pytest.approx(1.0, abs=0.06)
+    # Of 2 degrees of freedom each, single lines scatter by more than half.
+    assert np.median(np.std(ratios, axis=0)) < 0.25
+
+
+def test_lines_that_are_not_known_spoil_no_other():
+    true, own = told(np.random.default_rng(4), np.array([1e-6, 0.0, 0.0]), 4)
+    value = RESPONSE.copy()
+    value[40], own[90] = np.nan, np.inf
+    found = steady_relative_sd(own, value, POWER, 4)
+    assert np.flatnonzero(np.isnan(found)).tolist() == [40, 90]
+    assert np.nanmax(found / true) < 2.0
+
+
+def test_no_noise_is_no_scatter_and_many_averages_are_left_alone():
+    none = np.zeros(RESPONSE.size)
+    np.testing.assert_array_equal(steady_relative_sd(none, RESPONSE, POWER, 2), none)
+    own = np.random.default_rng(5).random(RESPONSE.size)
+    assert steady_relative_sd(own, RESPONSE, POWER, 24) is own
