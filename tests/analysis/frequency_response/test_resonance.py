@@ -1,5 +1,7 @@
 """Resonances: exact on exact curves, as scattered as stated on noisy ones, silent where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
@@ -11,6 +13,8 @@ from vibench.analysis.frequency_response import (
     PeriodicSums,
     converted_frequency_response,
 )
+from vibench.analysis.frequency_response._resonance import scattered_resonances
+from vibench.analysis.frequency_response._steady import steady_relative_sd
 from vibench.analysis.signals import Quantity, student_half_width
 
 
@@ -190,6 +194,48 @@ def test_bounds_of_every_mode_hold_where_two_realisations_tell_the_noise(acceler
     # 0.95 less three standard deviations of 60 draws; with the relative scatter of neighbours averaged in
     # 0.68 to 0.78 at 95 Hz, with each line's own variance 0.78 to 0.88 at 500 Hz.
     assert np.all(held / draws > 0.865)
+
+
+def test_lines_that_a_realisation_moves_together_widen_what_a_resonance_is_known_to():
+    """As collisions do: fits that take lines as independent hold the frequency in fewer than six of ten draws."""
+    frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 50
+    rng, independent, together = np.random.default_rng(13), 0, 0
+
+    def told(values):
+        value = values.mean(axis=0)
+        variance = np.sum(np.abs(values - value) ** 2, axis=0) / (len(values) - 1) / len(values)
+        spread = np.sqrt(variance / 2) / np.abs(value)
+        power = np.ones_like(spread)
+        steady = steady_relative_sd(spread, value, power, 2.0 * (len(values) - 1))
+        return replace(
+            curve(frequency_hz, value, spread), n_eff=float(len(values)), steady_relative_sd=steady
+        )
+
+    for _ in range(draws):
+        values = np.array(
+            [
+                single(frequency_hz, 200 + 0.3 * rng.standard_normal(), 0.03)
+                * (1 + 1e-2 * rng.standard_normal(frequency_hz.size))
+                for _ in range(realisations)
+            ]
+        )
+        (found,) = resonances(told(values), low_hz=100, high_hz=300)
+        without = [
+            resonances(told(np.delete(values, place, axis=0)), low_hz=100, high_hz=300)
+            for place in range(realisations)
+        ]
+        (widened,) = scattered_resonances([found], without)
+        independent += abs(found.frequency_hz - 200) < 2 * found.sd_frequency_hz
+        together += abs(widened.frequency_hz - 200) < 2 * widened.sd_frequency_hz
+    assert independent < 0.6 * draws
+    assert together > 0.86 * draws
+
+
+def test_a_resonance_of_one_realisation_only_is_none():
+    frequency_hz = np.arange(100.0, 300.0)
+    (found,) = resonances(curve(frequency_hz, single(frequency_hz, 200.0, 0.03)), low_hz=100, high_hz=300)
+    assert scattered_resonances([found], [[found], [], []]) == ()
+    assert len(scattered_resonances([found], [[found], [found], []])) == 1
 
 
 def test_no_bias_of_frequency_or_damping_is_left_without_noise():

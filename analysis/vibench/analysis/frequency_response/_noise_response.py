@@ -15,12 +15,13 @@ from ..signals import Complexes, Flags, Quantity, Reals, relative_sd, student_ha
 from ..spectra import DensitySums
 from ..tables import Labelled
 from ..tones import NoiseDriveLevel, noise_drive_level
+from ._distortion import scatters_beyond_noise
 from ._estimators import coherence, least_squares
 from ._mode import Resonance
 from ._periodic import PeriodicFrequencyResponse, PeriodicSums
 from ._repetition import Repetition
 from ._request import FrequencyResponseRequest
-from ._resonance import resonances
+from ._resonance import resonances, scattered_resonances
 from ._results import Estimator, FrequencyResponse, converted_frequency_response
 from ._transmissibility import FrequencyResponseSums
 
@@ -73,7 +74,8 @@ def repeated_response(
     channels, noise, request
         What was recorded, how it was driven, and what is asked.
     repetitions
-        Of every realisation, where they were measured on the same drive before; measured if absent.
+        Of every realisation, where they were measured on the same drive before; measured if absent. A draw
+        of a measurement has them: how its resonances scatter among realisations is not asked again.
 
     """
     if request.cuts_segments:
@@ -106,23 +108,30 @@ def repeated_response(
         )
     periodic = sums.frequency_response(delay_s=channels.response_delay_s, orders=noise.lines)
     order = np.rint(periodic.frequency_response.frequency_hz / noise.repetition_hz).astype(int)
-    motion = sums.motion()[..., order]
-
     sensors = channels.response_gain(periodic.frequency_response.frequency_hz)
 
-    def by(estimator: Estimator) -> FrequencyResponse:
+    def by(estimator: Estimator, given: PeriodicSums = sums) -> FrequencyResponse:
+        found = (
+            periodic
+            if given is sums
+            else given.frequency_response(delay_s=channels.response_delay_s, orders=noise.lines)
+        ).frequency_response
         if estimator is Estimator.DRIVE:
-            return as_displacements(periodic.frequency_response).without_gain(sensors)
+            return as_displacements(found).without_gain(sensors)
         return _least_squares(
-            periodic.frequency_response, motion, estimator, channels.response_delay_s, request.noise_ratio
+            found, given.motion()[..., order], estimator, channels.response_delay_s, request.noise_ratio
         ).without_gain(sensors)
 
     chosen = by(request.estimator)
+    found = _resonances(chosen)
+    if found and not repetitions and scatters_beyond_noise(periodic):
+        without = (_resonances(by(request.estimator, each)) for each in sums.without_each())
+        found = scattered_resonances(found, tuple(without))
     return NoiseResponse(
         frequency_response=chosen,
         h1=by(Estimator.H1),
         h2=by(Estimator.H2),
-        resonances=_resonances(chosen),
+        resonances=found,
         base_level=noise_drive_level(level.density(), low_hz=noise.band_start_hz, high_hz=noise.band_stop_hz),
         periodic=periodic,
         used_s=used / rate,

@@ -7,6 +7,7 @@ robust method of Pintelon & Schoukens, System Identification, 2nd ed., section 4
 The best linear approximation over realisations of a periodic drive, its noise and its distortion.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
@@ -171,11 +172,20 @@ class PeriodicSums:
         Nominal rate of the converter; its clock is the one frequencies are stated in.
     repetition_hz
         Nominal repetition frequency of the drive; the true one is measured.
+    confidence
+        Probability that a pair of bounds holds the truth, one line at a time.
+    begun_with
+        Realisations of other sums.
 
     """
 
     def __init__(
-        self, sample_rate_hz: float, repetition_hz: float, *, confidence: float = DEFAULT_CONFIDENCE
+        self,
+        sample_rate_hz: float,
+        repetition_hz: float,
+        *,
+        confidence: float = DEFAULT_CONFIDENCE,
+        begun_with: Sequence[_Realisation] = (),
     ) -> None:
         if not 0 < repetition_hz < sample_rate_hz / 4:
             raise InvalidRequest(
@@ -185,7 +195,7 @@ class PeriodicSums:
         self._sample_rate_hz = sample_rate_hz
         self._repetition_hz = repetition_hz
         self._confidence = confidence
-        self._realisations: list[_Realisation] = []
+        self._realisations = list(begun_with)
 
     def add(
         self, drive: Reals, base: Reals, response: Reals, *, repetition: Repetition | None = None
@@ -224,6 +234,16 @@ class PeriodicSums:
                 covariance,
             )
         )
+
+    def without_each(self) -> Iterator["PeriodicSums"]:
+        """Give what stays when each realisation in turn is left out; nothing where there is one."""
+        for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
+            yield PeriodicSums(
+                self._sample_rate_hz,
+                self._repetition_hz,
+                confidence=self._confidence,
+                begun_with=[*self._realisations[:place], *self._realisations[place + 1 :]],
+            )
 
     def motion(self) -> Complexes:
         """Give the mean spectra of base and response, shape (realisations, 2, lines)."""
