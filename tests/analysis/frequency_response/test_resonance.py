@@ -197,7 +197,7 @@ def test_bounds_of_every_mode_hold_where_two_realisations_tell_the_noise(acceler
 
 
 def test_lines_that_a_realisation_moves_together_widen_what_a_resonance_is_known_to():
-    """As collisions do: fits that take lines as independent hold the frequency in fewer than six of ten draws."""
+    """As collisions do: fits that take lines as independent hold fewer than six of ten frequencies."""
     frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 50
     rng, independent, together = np.random.default_rng(13), 0, 0
 
