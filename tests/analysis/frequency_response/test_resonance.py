@@ -158,6 +158,7 @@ def test_frequency_and_damping_of_every_mode_are_held_by_their_bounds():
     assert np.all(held / draws > 0.865)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("accelerometer", [0.3, 0.003])
 def test_bounds_of_every_mode_hold_where_two_realisations_tell_the_noise(accelerometer):
     """The base moves a third of what it does elsewhere where the first mode pulls at it, one line wide."""
@@ -196,6 +197,7 @@ def test_bounds_of_every_mode_hold_where_two_realisations_tell_the_noise(acceler
     assert np.all(held / draws > 0.865)
 
 
+@pytest.mark.thorough
 def test_lines_that_a_realisation_moves_together_widen_what_a_resonance_is_known_to():
     """As collisions do: fits that take lines as independent hold fewer than six of ten frequencies."""
     frequency_hz, realisations, draws = np.arange(100.0, 300.0), 4, 50
