@@ -47,3 +47,11 @@ def test_no_noise_is_no_scatter_and_many_averages_are_left_alone():
     np.testing.assert_array_equal(steady_relative_sd(none, RESPONSE, POWER, 2), none)
     own = np.random.default_rng(5).random(RESPONSE.size)
     assert steady_relative_sd(own, RESPONSE, POWER, 24) is own
+
+
+@pytest.mark.parametrize("freedom", [1e-3, 0.06, 1.9])
+@pytest.mark.parametrize("lines", [2, 5, RESPONSE.size])
+def test_averages_that_are_worth_hardly_one_still_have_a_scatter(freedom, lines):
+    _, own = told(np.random.default_rng(6), np.array([1e-6, 0.0, 0.0]), 2)
+    found = steady_relative_sd(own[:lines], RESPONSE[:lines], POWER[:lines], freedom)
+    assert np.all(np.isfinite(found) & (found > 0))

@@ -10,6 +10,8 @@ _ENOUGH_FREEDOM = 24.0
 """Degrees of freedom of a line's variance with which it is known to a third."""
 _FREEDOM = 96.0
 """Of the noises that are found over neighbouring lines: a small one shows in a part of these only."""
+_FEWEST_FREEDOM = 4.0
+"""Of all lines together, below which neighbours tell no more than the line."""
 _ROUNDS = 40
 _NOTHING = 1e-300
 _FAINT = 1e-12
@@ -37,8 +39,10 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
         Degrees of freedom of each line's own variance.
 
     """
+    # Averages that overlap nearly wholly are worth hardly more than one.
+    freedom = max(freedom, 1.0)
     lines = min(ceil(_FREEDOM / freedom), value.size)
-    if freedom >= _ENOUGH_FREEDOM or lines < 2:
+    if freedom >= _ENOUGH_FREEDOM or lines * freedom <= _FEWEST_FREEDOM:
         return relative_sd
     gain = np.abs(value) ** 2
     with np.errstate(invalid="ignore"):
