@@ -16,7 +16,7 @@ def curve(rng, draws, points, shift=0.0, scatter=0.1):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("draws", "points"), [(5, 1), (16, 1), (16, 20), (8, 20)])
+@pytest.mark.parametrize(("draws", "points"), [(5, 1), (16, 1), (16, 40), (8, 40)])
 def test_an_agreeing_twin_passes_its_limit_in_one_case_of_a_hundred(draws, points):
     rng = np.random.default_rng(1)
     trials = 3000
