@@ -92,18 +92,27 @@ def scattered_resonances(
             widened.append(
                 replace(
                     each,
-                    sd_frequency_hz=_jackknifed(each, rest, "frequency_hz"),
-                    sd_damping_ratio=_jackknifed(each, rest, "damping_ratio"),
-                    sd_peak_magnitude=_jackknifed(each, rest, "peak_magnitude"),
+                    sd_frequency_hz=_moved(each, rest, "frequency_hz", len(without)),
+                    sd_damping_ratio=_moved(each, rest, "damping_ratio", len(without)),
+                    sd_peak_magnitude=_moved(each, rest, "peak_magnitude", len(without)),
                 )
             )
     return tuple(widened)
 
 
-def _jackknifed(found: Resonance, rest: Sequence[Resonance], name: str) -> float:
-    count, all_told = len(rest), getattr(found, name)
-    pseudo = np.array([count * all_told - (count - 1) * getattr(each, name) for each in rest])
-    return max(float(getattr(found, f"sd_{name}")), standard_uncertainty(pseudo))
+def _moved(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
+    """Give the largest of what the fit says, what realisations move, and what the choice of a fit moves.
+
+    A fit of all modes together and one of this mode alone differ by more than a realisation moves either:
+    only fits over about as many lines tell the latter, which the jackknife multiplies.
+    """
+    alike = [each for each in rest if 0.5 < each.lines_used / found.lines_used < 2.0]
+    told, moved = (
+        np.array([getattr(each, name) for each in some]) for some in (rest, alike if len(alike) > 2 else rest)
+    )
+    jackknife = (realisations - 1) * np.sqrt(moved.size / realisations) * standard_uncertainty(moved)
+    choice = np.std(np.append(told, getattr(found, name)), ddof=1)
+    return float(max(getattr(found, f"sd_{name}"), jackknife, choice))
 
 
 def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
