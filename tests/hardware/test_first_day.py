@@ -60,7 +60,8 @@ def measured(bench, excitation, tmp_path):
     with open_recording(path) as recording:
         assert recording.state.value == "complete"
         assert not recording.gaps
-        assert not [each for each in recording.events if each.kind == "late"]
+        # Cycles that a sweep lost to commands which take their time are noted too: its check judges those.
+        assert not [each.text for each in recording.events if "behind its plan" in each.text]
     return path
 
 
