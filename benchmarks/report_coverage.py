@@ -27,7 +27,7 @@ from scipy.stats import binom
 from twin_agreement import random_rig
 
 import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
-from vibench.acquisition import open_bench, run_measurement
+from vibench.acquisition import LimitExceeded, open_bench, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine
 from vibench.acquisition.rig import Rig, specimen_of
 from vibench.analysis import AnalysisError, Simulation, analyse_files, budgets_of
@@ -185,10 +185,23 @@ def scenes(rigs: int, seed: int, shard: tuple[int, int], kinds: list[str]) -> It
         rig, is_weak = with_stated_clock(rig), number % 4 == 0
         for kind in KINDS:
             plan = drawn(rng, kind, is_weak=is_weak)
-            own = np.random.default_rng((seed, number, KINDS.index(kind)))
-            scene = f"rig {number}: {words}, {plan.amplitude_vpp:.2g} Vpp"
             if kind in kinds:
-                yield from repeats(rig, plan, own, kind, is_weak=is_weak, scene=scene)
+                yield from within_limits(
+                    rig, plan, (seed, number, KINDS.index(kind)), f"rig {number}: {words}", is_weak=is_weak
+                )
+
+
+def within_limits(
+    rig: Rig, plan: object, seeds: tuple[int, int, int], words: str, *, is_weak: bool
+) -> list[Held]:
+    """Hold the bounds of a plan, at half its level where it would move the specimen beyond its limits."""
+    scene = f"{words}, {plan.amplitude_vpp:.2g} Vpp"
+    rng, kind = np.random.default_rng(seeds), KINDS[seeds[-1]]
+    try:
+        return list(repeats(rig, plan, rng, kind, is_weak=is_weak, scene=scene))
+    except LimitExceeded:
+        weaker = plan.model_copy(update={"amplitude_vpp": 0.5 * plan.amplitude_vpp})
+        return within_limits(rig, weaker, seeds, words, is_weak=is_weak)
 
 
 def repeats(
