@@ -129,14 +129,19 @@ def follow(
                 yield NotFollowed(done, stop, start)
                 done = stop
             case FilterState():
-                begun = _caught_up(model, motion, start, done)
-                if start.sample > done:
-                    yield NotFollowed(done, start.sample, "a track was being begun")
-                    done = start.sample
-                for piece in _pieces(model, motion, start) if begun else ():
+                began = start.sample
+                is_caught_up = _caught_up(model, motion, start, done)
+                pieces = _pieces(model, motion, start) if is_caught_up else iter(())
+                piece = next(pieces, None)
+                if began > done:
+                    why = "a track was being begun" if piece else "a track was lost as soon as it was begun"
+                    yield NotFollowed(done, began, why)
+                    done = began
+                while piece:
                     yield piece
                     done = piece.stop
                     on_sample(done)
+                    piece = next(pieces, None)
         # The next 60 ms are chosen so that their middle third begins where the track ended.
         following = max(done - window // 3, looked + window // 3)
         looked = last if looked < last < following else following
