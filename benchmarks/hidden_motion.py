@@ -166,7 +166,7 @@ HEADINGS = (
     "false",
     "p without a model, rms [um]",
     "gaps within [um], m1",
-    "told of 10",
+    "told of 11",
     "s per s",
 )
 

@@ -131,6 +131,7 @@ UNITS = {
     "_m_per_s2": "m s-2",
     "_n_per_m": "N m-1",
     "_ns_per_m": "N s m-1",
+    "_s_per_m": "s m-1",
 }
 """Unit of a value by the end of its name; the longest that fits."""
 COORDINATES = ("frequency_hz", "time_s", "harmonics_hz", "over_hz", "amplitude_m")

@@ -13,7 +13,7 @@ import numpy as np
 from ..signals import Reals
 from ._filter_kernels import STATES, forward
 from ._filtering import IMPULSE_SHARE, LOSS_LIMIT, SMOOTHING_S, FilterState, MotionModel, motion_model
-from ._parameters import Hidden, value_of, with_values
+from ._parameters import Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
 from ._tracking_model import StepTables, TrackedSpecimen, step_tables
@@ -29,6 +29,7 @@ _DEVIATION = {
     Hidden.C2: 1e-2,
     Hidden.FORCE: 1e-3,
     Hidden.EXPONENT: 1e-4,
+    Hidden.LOSS: 1e-3,
 }
 """Relative step of the derivatives by a parameter."""
 _WANDER = 0.02
@@ -38,7 +39,8 @@ REBUILT_S = 0.05
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
 """Until so much motion was tracked the variance of the velocity is taken as so many times larger."""
 _LEAST_OF_START = 0.05
-"""No parameter falls below this part of what it began with: none of them can be negative."""
+"""No parameter falls below this part of what it began with: none of them can be negative, but the loss,
+whose error goes both ways around none."""
 _FURTHEST = 8.0
 """Prior standard deviations from the description at which the search is given up."""
 
@@ -87,8 +89,10 @@ class _Search:
         self._described, self._motion, self._wanted = start, motion, tuple(relative_sd)
         wanted = self._wanted
         self._nominal = np.array([value_of(start, each) for each in wanted])
-        self._prior_sd = np.array(list(relative_sd.values())) * self._nominal
-        self._deviation = np.array([_DEVIATION[each] for each in wanted]) * self._nominal
+        scale = np.array([scale_of(start, each) for each in wanted])
+        self._prior_sd = np.array(list(relative_sd.values())) * scale
+        self._deviation = np.array([_DEVIATION[each] for each in wanted]) * scale
+        self._least = np.where(np.array(wanted) == Hidden.LOSS, -np.inf, _LEAST_OF_START * self._nominal)
         # In units of the prior standard deviations: forces and gaps differ by six powers of ten.
         self._values, self._covariance = self._nominal.copy(), np.eye(len(wanted))
         self._followed, self._level = 0, math.nan
@@ -112,9 +116,7 @@ class _Search:
             before = at.sample
             is_kept = self._block(model, at, min(block, stop - 1 - at.sample))
             if is_kept:
-                self._values = np.maximum(
-                    self._values + at.state[STATES:] * self._prior_sd, _LEAST_OF_START * self._nominal
-                )
+                self._values = np.maximum(self._values + at.state[STATES:] * self._prior_sd, self._least)
                 self._covariance = at.covariance[STATES:, STATES:].copy()
                 self._followed += at.sample - before
                 at.state[STATES:] = 0.0
@@ -125,7 +127,8 @@ class _Search:
                 self._covariance = np.diag(np.minimum(4.0 * np.diag(self._covariance), 1.0))
                 looked, at = at.sample, None
         if not self._followed:
-            return refused or "the motion was too short to begin a track in"
+            lost = f"every track was lost within {REBUILT_S:g} s while the numbers were looked for"
+            return refused or (lost if looked > first else "the motion was too short to begin a track in")
         return Estimate(
             self._current(),
             self._wanted,

@@ -18,7 +18,7 @@ from ..tables import Labelled, plus_minus, unit_of
 from ._contact_free import FITTED, FreeGap, free_gaps, free_motion, free_numbers
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
-from ._parameters import PRIOR_SD, Hidden, value_of, with_values
+from ._parameters import PRIOR_SD, Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
@@ -42,6 +42,7 @@ _NEAR = {
     Hidden.C2: 0.01,
     Hidden.FORCE: 0.1,
     Hidden.EXPONENT: 0.03,
+    Hidden.LOSS: 0.03,
 }
 """How far from a description that can be tracked its parameters are looked for, relative."""
 _LEAST_SD = {
@@ -75,6 +76,7 @@ _CLAIMED = {
     Hidden.C0: 0.5,
     Hidden.C2: 0.55,
     Hidden.FORCE: 1.1,
+    Hidden.LOSS: 0.5,
 }
 """Part of the standard deviation that a filter claims which its errors have; parameters that wander look
 less certain than they are. Found on 31 random rigs; held against others by the slow tests."""
@@ -94,6 +96,7 @@ _SHOWN = {
     Hidden.C2: ("c2", 1e3, "mN s/m"),
     Hidden.FORCE: ("contact force at 1 µm", 1.0, "N"),
     Hidden.EXPONENT: ("contact exponent", 1.0, ""),
+    Hidden.LOSS: ("contact loss", 1.0, "s/m"),
 }
 
 
@@ -197,7 +200,7 @@ def _refined(
             return good
         independent = max(1.0, min(len(good), motion.samples / (_STRETCH_S * motion.sample_rate_hz)))
         found = combined(good, described, independent)
-        narrow = np.array([near[each] * value_of(start, each) for each in wanted])
+        narrow = np.array([near[each] * scale_of(start, each) for each in wanted])
         is_told = (found.sd < _TOLD * found.assumed) & (found.sd < _FAR * narrow)
         is_beyond = is_told & (found.beyond > _SETTLED * narrow)
         start = with_values(
@@ -228,8 +231,8 @@ def _restarts(
     good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
-        # What does not hold from a start elsewhere is tried from the start itself.
-        for begin in (_apart(start, near, number), start):
+        # What does not hold from a start elsewhere is tried from the start itself, and from what was found.
+        for begin in (_apart(start, near, number), start, *(each.tracked for each in good[-1:])):
             answer = estimate(begin, motion, near, first, stop)
             if isinstance(answer, Estimate) and answer.followed_s > enough_s:
                 good.append(answer)
@@ -268,7 +271,7 @@ def combined(found: list[Estimate], described: TrackedSpecimen, independent: flo
     """
     wanted = found[0].wanted
     centre = np.array([value_of(described, each) for each in wanted])
-    assumed = np.array([PRIOR_SD[each] for each in wanted]) * centre
+    assumed = np.array([PRIOR_SD[each] * scale_of(described, each) for each in wanted])
     freed = [_freed(each, centre, _WIDE * assumed) for each in found]
     values = np.array([each[0] for each in freed])
     claimed = np.sqrt(np.mean([each[1] for each in freed], axis=0))
@@ -334,7 +337,10 @@ def _apart(start: TrackedSpecimen, near: Mapping[Hidden, float], number: int) ->
     sign = {each: 1.0 if (number >> (place % 2)) % 2 else -1.0 for place, each in enumerate(near)}
     return with_values(
         start,
-        {each: value_of(start, each) * (1 + _STARTS_APART * sd * sign[each]) for each, sd in near.items()},
+        {
+            each: value_of(start, each) + _STARTS_APART * sd * sign[each] * scale_of(start, each)
+            for each, sd in near.items()
+        },
     )
 
 
@@ -378,7 +384,7 @@ def _search(
         side: gap for side, gap in sides.items() if gap is not None and isfinite(value_of(described, side))
     }
     start = with_values(numbers.tracked, {side: gap.value_m for side, gap in known.items()})
-    near = {**_NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05}
+    near = {**_NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05, Hidden.LOSS: 0.1}
     near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
     near |= {each: max(_LEAST_SD[each], 3.0 * float(sd)) for each, sd in zip(FITTED, numbers.sd, strict=True)}
     return start, _looked_for(described, near)

@@ -19,8 +19,9 @@ class Hidden(StrEnum):
     C0 = "c0_ns_per_m"
     C2 = "c2_ns_per_m"
     FORCE = "force_at_1um_n"
-    """Of a stop pressed in by 1 um, F = FORCE (d / 1 um)^EXPONENT."""
+    """Of a stop pressed in by 1 um, F = FORCE (d / 1 um)^EXPONENT (1 + LOSS d')."""
     EXPONENT = "contact_exponent"
+    LOSS = "contact_loss_s_per_m"
     MEAN_GAP = "mean_gap_m"
     """Of both sides: what statistics tell better than either."""
 
@@ -36,12 +37,13 @@ PRIOR_SD = {
     Hidden.C2: 0.3,
     Hidden.FORCE: 0.3,
     Hidden.EXPONENT: 0.1,
+    Hidden.LOSS: 0.3,
 }
 """Relative to the description: how far from it a parameter is looked for."""
 
 
 def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
-    """Read one parameter [m, kg, kg/s, N/m, N; the exponent has no unit]."""
+    """Read one parameter [m, kg, kg/s, N/m, N, s/m; the exponent has no unit]."""
     specimen = tracked.specimen
     lower, upper = specimen.gaps_m
     (k0, _, k2), (c0, c1, c2) = specimen.stiffnesses, specimen.dampings
@@ -56,8 +58,14 @@ def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
         Hidden.C2: c2,
         Hidden.FORCE: tracked.force_at_1um_n,
         Hidden.EXPONENT: tracked.exponent,
+        Hidden.LOSS: tracked.loss_s_per_m,
         Hidden.MEAN_GAP: 0.5 * (lower + upper),
     }[what]
+
+
+def scale_of(tracked: TrackedSpecimen, what: Hidden) -> float:
+    """Give what relative distances are parts of: the parameter; of the loss, which may be none, 1 s/m."""
+    return 1.0 if what is Hidden.LOSS else value_of(tracked, what)
 
 
 def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> TrackedSpecimen:
@@ -72,4 +80,4 @@ def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> Tra
         gap_m=new[Hidden.UPPER_GAP],
         lower_gap_m=new[Hidden.LOWER_GAP],
     )
-    return TrackedSpecimen(specimen, new[Hidden.FORCE], new[Hidden.EXPONENT])
+    return TrackedSpecimen(specimen, new[Hidden.FORCE], new[Hidden.EXPONENT], new[Hidden.LOSS])

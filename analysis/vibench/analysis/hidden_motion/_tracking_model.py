@@ -22,12 +22,14 @@ _MICROMETRE = 1e-6
 
 @dataclass(frozen=True)
 class TrackedSpecimen:
-    """A specimen whose contact law is F = f (d / 1 um)^n at the indentation d, both free."""
+    """A specimen whose contact law is F = f (d / 1 um)^n (1 + chi d') at the indentation d, all free."""
 
     specimen: Specimen
     force_at_1um_n: float
     """f, without the spring that a law may have beside it."""
     exponent: float
+    loss_s_per_m: float
+    """chi; a search may find it below zero, as far as its bounds reach."""
 
     @property
     def steepness(self) -> float:
@@ -45,8 +47,9 @@ def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
                 "hunt_crossley:LOSS, linear_gap or linear"
             )
         case _:
-            stiffness, exponent = specimen.contact.stops.term
-            return TrackedSpecimen(specimen, stiffness * _MICROMETRE**exponent, exponent)
+            stops = specimen.contact.stops
+            stiffness, exponent = stops.term
+            return TrackedSpecimen(specimen, stiffness * _MICROMETRE**exponent, exponent, stops.loss)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +107,6 @@ def step_tables(tracked: TrackedSpecimen, sample_rate_hz: float, coupling_rad_pe
     step_s = 1.0 / sample_rate_hz
     a, base, force = equations(specimen, coupling_rad_per_s)
     count = small_steps_of(tracked, step_s)
-    law = specimen.contact.stops
     lower, upper = specimen.gaps_m
     _, m1, m2 = specimen.masses
     flow = exact_flow(a, base, step_s)
@@ -118,8 +120,8 @@ def step_tables(tracked: TrackedSpecimen, sample_rate_hz: float, coupling_rad_pe
                 upper,
                 tracked.steepness,
                 tracked.exponent,
-                law.spring_beside,
-                law.loss,
+                specimen.contact.stops.spring_beside,
+                tracked.loss_s_per_m,
                 1.0 / m1,
                 1.0 / m2,
             ]

@@ -40,6 +40,7 @@ _JUDGED = (
     Hidden.C1,
     Hidden.FORCE,
     Hidden.EXPONENT,
+    Hidden.LOSS,
 )
 """What noise does not tell."""
 _SIDES = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)

@@ -174,5 +174,6 @@ def _told(found: Posterior, specimen: Specimen) -> Iterator[FoundParameter]:
         why = "the motion's statistics tell it no better than it was assumed" if flat else ""
         # The middle of its bounds, for they are written as it and a half width.
         yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
-    nan, why = float("nan"), "statistics are compared with runs of the described exponent"
-    yield FoundParameter(Hidden.EXPONENT, nan, nan, nan, described.exponent, why)
+    nan, why = float("nan"), "statistics are compared with runs of the described exponent and loss"
+    for untold in (Hidden.EXPONENT, Hidden.LOSS):
+        yield FoundParameter(untold, nan, nan, nan, value_of(described, untold), why)
