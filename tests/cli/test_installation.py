@@ -5,7 +5,7 @@ import os
 import re
 import subprocess
 import sys
-from importlib.metadata import distribution, version
+from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
 
 import pytest
@@ -14,7 +14,7 @@ from packaging.utils import canonicalize_name
 
 from vibench.acquisition import shipped_folder
 from vibench.acquisition.host._extras import EXTRAS
-from vibench.cli.doctor import VARIABLES
+from vibench.cli.doctor import VARIABLES, libraries
 from vibench.cli.exit_code import ExitCode
 from vibench.sim.lanes import lanes_pay
 
@@ -93,6 +93,29 @@ def test_the_doctor_names_versions_folders_and_permissions_and_keeps_secrets(vib
     assert sections["environment"]["VIBENCH_RIG_TOKEN"] == "(set, secret)"
     assert "do-not-tell" not in told.stdout
     assert vibench_here("doctor", cwd=tmp_path).stdout.startswith("vibench:\n  version: ")
+
+
+@pytest.mark.parametrize("state", ["file", "file/below"])
+def test_where_no_state_can_be_kept_the_doctor_says_so_and_predictions_go_on(vibench_here, tmp_path, state):
+    (tmp_path / "file").write_text("a file in the way")
+    environment = {"VIBENCH_STATE_DIR": str(tmp_path / state)}
+    told = vibench_here("doctor", "--json", cwd=tmp_path, environment=environment)
+    assert json.loads(told.stdout)["folders"]["state"].startswith(f"{tmp_path / state}, NOT writable, ")
+    predicted = vibench_here(
+        "predict", "--amplitude", "1e-6", "--frequency", "100", cwd=tmp_path, environment=environment
+    )
+    assert predicted.returncode == 0, predicted.stderr
+
+
+def test_the_doctor_names_the_smallest_extra_that_brings_a_library(monkeypatch):
+    def missing(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("vibench.cli.doctor.version", missing)
+    found = dict(libraries())
+    assert found["matplotlib"] == "not installed (extra figures)"
+    assert found["pyvisa"] == "not installed (extra bench)"
+    assert found["numpy"] == "not installed"
 
 
 @pytest.mark.parametrize(

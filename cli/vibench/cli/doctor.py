@@ -5,6 +5,7 @@ import platform
 import re
 import shutil
 import sys
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
@@ -14,7 +15,7 @@ from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
 from vibench.acquisition.recording import KEY_VARIABLE
 from vibench.acquisition.rig import TOKEN_VARIABLE
 from vibench.sim.kernels import advance_clock
-from vibench.sim.operating_system import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_folder
+from vibench.sim.operating_system import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_place
 
 from .output import console, print_json
 from .paths import AsJson
@@ -74,31 +75,41 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Give the version of each library that vibench asks for; of an extra's, whether it is there."""
-    for requirement in dict.fromkeys(requires("vibench") or ()):
+    """Give the version of each library that vibench asks for; of one that is missing, who brings it."""
+    asking: dict[str, list[str]] = {}
+    for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
         extra = re.search(r"""extra == ['"](\w+)['"]""", requirement)
-        if name == "vibench" or (extra and extra[1] in FOR_DEVELOPERS):
+        asking.setdefault(name, []).append(extra[1] if extra else "")
+    sizes = Counter(extra for extras in asking.values() for extra in extras)
+    for name, extras in asking.items():
+        # Extras bring others: the one that asks for the fewest libraries brings the least.
+        smallest = min(set(extras) - FOR_DEVELOPERS, key=sizes.__getitem__, default=None)
+        if name == "vibench" or smallest is None:
             continue
         try:
             yield name, version(name)
         except PackageNotFoundError:
-            yield name, f"{NOT_INSTALLED}{f' (extra {extra[1]})' if extra else ''}"
+            yield name, f"{NOT_INSTALLED}{f' (extra {smallest})' if smallest else ''}"
 
 
 def folders() -> Iterator[tuple[str, str]]:
     """Give where vibench keeps what it learns and compiles, and whether it may write there."""
-    state, here = state_folder(), Path.cwd()
     # Where numba writes in truth: it falls back on a folder of the user if the first is not writable.
-    compiled = Path(advance_clock.stats.cache_path).parent  # type: ignore[attr-defined]
-    yield "state", _place(state)
-    yield "compiled kernels", f"{_place(compiled)}, {_size_mb(compiled):.0f} MB"
-    yield "this folder", _place(here)
+    compiled: str | None = advance_clock.stats.cache_path  # type: ignore[attr-defined]
+    yield "state", _place(state_place())
+    if compiled is None:
+        nowhere = "kept nowhere, so that every program compiles anew; NUMBA_CACHE_DIR names a folder for them"
+        yield "compiled kernels", nowhere
+    else:
+        folder = Path(compiled).parent
+        yield "compiled kernels", f"{_place(folder)}, {_size_mb(folder):.0f} MB"
+    yield "this folder", _place(Path.cwd())
 
 
 def _place(folder: Path) -> str:
     standing = next(each for each in (folder, *folder.parents) if each.exists())
-    may = "writable" if os.access(standing, os.W_OK) else "NOT writable"
+    may = "writable" if standing.is_dir() and os.access(standing, os.W_OK) else "NOT writable"
     return f"{folder}, {may}, {shutil.disk_usage(standing).free / 1e9:.1f} GB free"
 
 

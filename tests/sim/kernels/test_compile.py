@@ -122,3 +122,12 @@ def test_no_kernel_without_memory_makes_an_array_or_is_handed_one():
         assert not makers & {each.id for each in called if isinstance(each, ast.Name)}, name
         made = {each.attr for each in called if isinstance(each, ast.Attribute)}
         assert not made & {"zeros", "empty", "ones", "full", "eye", "array", "copy", "zeros_like"}, name
+
+
+def test_where_no_folder_may_be_written_kernels_are_compiled_without_a_cache(tmp_path):
+    """It was a traceback, "cannot cache function", from every command of a read-only installation."""
+    script = tmp_path / "twice.py"
+    # Beside a source that is no file numba finds no folder, whoever runs it.
+    script.write_text(f"exec(compile({TWICE!r}, '<nowhere>', 'exec'))")
+    run = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
+    assert run.stdout == "3.0\n", run.stderr

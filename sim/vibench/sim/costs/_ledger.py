@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Self
 
 from ..kernels import SOURCES
-from ..operating_system import state_folder
+from ..operating_system import state_folder, state_place
 
 MEMORY = 30
 """So many runs later a run counts for a third of a new one."""
@@ -152,6 +152,8 @@ def cost_ledger() -> CostLedger:
     """Give the ledger of this machine, these versions and sources; it is saved when the process ends."""
     about = (platform.node(), platform.machine(), platform.python_version(), version("numba"), SOURCES)
     name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]
-    ledger = CostLedger(state_folder() / "costs" / f"{name}.json")
+    with contextlib.suppress(OSError):  # nothing is learnt then
+        state_folder()
+    ledger = CostLedger(state_place() / "costs" / f"{name}.json")
     atexit.register(ledger.save)
     return ledger

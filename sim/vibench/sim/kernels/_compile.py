@@ -99,6 +99,14 @@ _COUNTING, _WITHOUT_REFCOUNT = ({**_OPTIONS, "_nrt": counts} for counts in (True
 """With numba's memory and without. Said outright, or a kernel would take after the first that calls it."""
 
 
+def _compiled(function: Kernel, options: dict[str, Any]) -> Kernel:
+    with _cache_of(function):
+        try:
+            return cast("Kernel", njit(**options)(function))
+        except RuntimeError:  # numba found no folder that it may write to: each process compiles anew
+            return cast("Kernel", njit(**{**options, "cache": False})(function))
+
+
 def kernel(function: Kernel) -> Kernel:
     """Compile with numba: cached on disk, without the interpreter lock, IEEE division.
 
@@ -106,8 +114,7 @@ def kernel(function: Kernel) -> Kernel:
     denominators and must not raise. ``fastmath`` stays off: it may assume that no NaN exists,
     and the step control must see one.
     """
-    with _cache_of(function):
-        return cast("Kernel", njit(**_COUNTING)(function))
+    return _compiled(function, _COUNTING)
 
 
 def kernel_without_refcount(function: Kernel) -> Kernel:
@@ -116,8 +123,7 @@ def kernel_without_refcount(function: Kernel) -> Kernel:
     Such a kernel need not count references to the arrays that it is given. Counting is atomic, twice for
     every array of a named tuple in every call: more than half of the time of a step under a power law.
     """
-    with _cache_of(function):
-        return cast("Kernel", njit(**_WITHOUT_REFCOUNT)(function))
+    return _compiled(function, _WITHOUT_REFCOUNT)
 
 
 def inlined(function: Kernel) -> Kernel:
@@ -126,5 +132,4 @@ def inlined(function: Kernel) -> Kernel:
     numba hands a named tuple of arrays to a call as hundreds of numbers, each copied; a run with impacts took
     twice as long for that alone. What is copied as source has no arguments.
     """
-    with _cache_of(function):
-        return cast("Kernel", njit(**_WITHOUT_REFCOUNT, inline="always")(function))
+    return _compiled(function, {**_WITHOUT_REFCOUNT, "inline": "always"})

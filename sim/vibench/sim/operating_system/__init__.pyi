@@ -13,6 +13,7 @@ from ._state_folder import (
     VARIABLE as VARIABLE,
     shared_folder as shared_folder,
     state_folder as state_folder,
+    state_place as state_place,
 )
 from ._this import (
     allocate as allocate,
