@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis import motion_verdict
+from vibench.analysis import AnalysisError, motion_verdict
 from vibench.analysis.chaos import MotionKind, Points
 from vibench.analysis.chaos._period import shortest_period
 from vibench.sim import Harmonic, gong2025
@@ -188,3 +188,19 @@ def test_a_motion_that_noise_could_hide_is_not_called_periodic():
     noise = np.full(2, 0.25)
     found = motion_verdict(Points(hidden + noise * rng.standard_normal((1500, 2)), noise), DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED
+
+
+@pytest.mark.parametrize(
+    ("value", "noise", "drive_hz", "said"),
+    [
+        (np.full((500, 2), np.nan), QUIET, DRIVE_HZ, "points hold values that are not finite"),
+        (np.zeros(500), QUIET, DRIVE_HZ, r"points of shape \(500,\) with noise of shape \(2,\) were given"),
+        (np.zeros((500, 2)), np.full(3, 1e-3), DRIVE_HZ, r"with noise of shape \(3,\) were given"),
+        (np.zeros((500, 2)), -QUIET, DRIVE_HZ, "is none; give standard deviations"),
+        (np.zeros((500, 2)), QUIET, -260.0, "a drive of -260.0 Hz is none"),
+    ],
+)
+def test_points_that_are_none_are_refused(value, noise, drive_hz, said):
+    """One lost point among five hundred chaotic ones was "quasi-periodic"."""
+    with pytest.raises(AnalysisError, match=said):
+        motion_verdict(Points(value, noise), drive_hz)

@@ -4,10 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import InvalidRequest, UnusableData
 from ..signals import Reals
 from ..tables import Labelled
 
 LONGEST_PERIOD = 32
+_TABLE = 2
+"""Dimensions of points: periods and coordinates."""
 STEADY = 2e-3
 """A motion that repeats to this part of its size is steady: no drive is steadier."""
 _NOISE_MARGIN = 1.5
@@ -25,6 +28,19 @@ class Points(Labelled):
     """Displacement and velocity over the size of the orbit, shape (periods, 2)."""
     noise: Reals
     """Standard deviation of the noise on each coordinate, in the same measure, shape (2,)."""
+
+    def __post_init__(self) -> None:
+        """Raise InvalidRequest for other shapes, or noise that is none; UnusableData for lost points."""
+        points, noise = np.shape(self.value), np.shape(self.noise)
+        if len(points) != _TABLE or noise != points[1:]:
+            raise InvalidRequest(
+                f"points of shape {points} with noise of shape {noise} were given; points are of shape "
+                "(periods, 2), their noise of shape (2,)"
+            )
+        if not np.all((np.asarray(self.noise) >= 0.0) & np.isfinite(self.noise)):
+            raise InvalidRequest(f"a noise of {self.noise} is none; give standard deviations, zero or more")
+        if not np.all(np.isfinite(self.value)):
+            raise UnusableData("points hold values that are not finite; give a stretch in which none is lost")
 
     @property
     def spread(self) -> float:

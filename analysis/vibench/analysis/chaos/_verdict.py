@@ -3,13 +3,14 @@
 Where in a record its last motion begins: chaos may be a transient that ends in the middle of a dwell.
 """
 
+import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
 
-from ..errors import NotEnoughData
+from ..errors import InvalidRequest, NotEnoughData
 from ..signals import Reals
 from ..tables import Labelled
 from ._divergence import Divergence, divergence
@@ -125,7 +126,14 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     seed
         Of the random frequencies and surrogates.
 
+    Raises
+    ------
+    InvalidRequest
+        When the drive's frequency is not positive and finite.
+
     """
+    if not 0.0 < drive_hz < math.inf:
+        raise InvalidRequest(f"a drive of {drive_hz} Hz is none; give a positive frequency")
     last = Points(points.value[-MOST_POINTS:], points.noise)
     count = len(last.value)
     if count < FEWEST:
