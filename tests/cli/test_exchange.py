@@ -61,9 +61,9 @@ def test_a_recording_goes_out_and_comes_back(run, recorded):
         assert [each.label for each in second.segments] == ["dwell"]
 
 
-@pytest.mark.parametrize("folder", [".", "made", "..", "made/"])
+@pytest.mark.parametrize("folder", [".", "made", "..", "made/", "new/", "other/new"])
 def test_a_folder_takes_a_file_of_the_usual_name(run, recorded, folder):
-    """Of "." the export was a traceback, of any other folder a name that is taken."""
+    """Of "." the export was a traceback, of any other folder a name that is taken; of a new one a file."""
     recorded.with_name("made").mkdir()
     place = recorded.parent / folder
     out = run("export", "run.h5", "--to", "csv", "--out", folder)

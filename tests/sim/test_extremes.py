@@ -21,12 +21,15 @@ from vibench.sim import (
     base_transmissibility,
     gong2025,
     integrate,
+    lyapunov_exponent,
     spring_of,
     steady_response,
 )
+from vibench.sim.chain import band_frequencies_hz, chain_of
 from vibench.sim.contact import CVX, STAGES, WIDTH, R, W, step_factor
 from vibench.sim.contact._flow import WORK_ROWS, contact_error
 from vibench.sim.power_law._smooth import MOTIONS, smooth_error
+from vibench.sim.scene import wilson_share
 
 pytestmark = pytest.mark.timeout(300)
 """A hang is a failure: the first test compiles, the others take milliseconds."""
@@ -317,6 +320,8 @@ REFUSED = [
     (lambda: gong2025(gap_m=0.0), "Gap 0.0 m is not allowed"),
     (lambda: gong2025(gap_m=math.nan), "Gap nan m is not allowed"),
     (lambda: gong2025(gap_m=(math.inf, math.inf)), "Gap .* is not allowed"),
+    (lambda: gong2025(gap_m=(1e-6,)), r"Gap \(1e-06,\) m is not allowed: give one clearance, or"),
+    (lambda: gong2025(gap_m=(1e-6, 2e-6, 3e-6)), "give one clearance, or"),
     (lambda: gong2025(damping_time_s=-1e-5), "Damping time -1e-05 s is not allowed"),
     (lambda: replace(gong2025(), masses=(1.0, -1.0, 1.0)), "mass m1 = -1.0 kg is not allowed"),
     (lambda: replace(gong2025(), masses=(1.0, 1.0, math.nan)), "mass m2 = nan kg is not allowed"),
@@ -332,6 +337,7 @@ REFUSED = [
     (lambda: LinearSweep(1e-300, 1.0, 1.0, 1e-6), "Sweep start 1e-300 Hz is not allowed"),
     (lambda: Harmonic(100.0, math.nan), "nan m is not allowed"),
     (lambda: Sampled(np.array([]), 1e3), r"shape \(0,\) is not allowed"),
+    (lambda: Sampled(1e3, np.zeros(10)), r"shape \(\) is not allowed"),
     (lambda: Sampled(np.array([0.0, math.inf, 0.0, 0.0]), 1e3), "Sample 1 of the drive is inf"),
     (lambda: Harmonic(math.nan, 1e-6), "Drive frequency nan Hz is not allowed"),
     (lambda: steady_response(gong2025(), Harmonic(100.0, 0.0)), "A drive of amplitude 0 m has no response"),
@@ -341,6 +347,12 @@ REFUSED = [
     (lambda: integrate(gong2025(), DRIVE, 1.0, start_time_s=1e300), r"Start time 1e\+300 s is not allowed"),
     (lambda: integrate(gong2025(), DRIVE, 1.0, sample_rate_hz=1e300), r"1e\+300 samples are not allowed"),
     (lambda: integrate(gong2025(), DRIVE, 1.0, max_impact_rate_hz=math.nan), "Impact rate nan Hz"),
+    (lambda: steady_response(gong2025(), DRIVE, max_impact_rate_hz=-1.0), "Impact rate -1.0 Hz"),
+    (lambda: lyapunov_exponent(gong2025(), DRIVE, max_impact_rate_hz=-1.0), "Impact rate -1.0 Hz"),
+    (lambda: wilson_share(0, 0), "0 of 0 trials.* are not allowed"),
+    (lambda: wilson_share(11, 10), "11 of 10 trials.* are not allowed"),
+    (lambda: wilson_share(1, 10, 2.0), "unsure to 2.0, are not allowed"),
+    (lambda: band_frequencies_hz(chain_of(gong2025(), 2), [math.nan]), "A wave number that is not finite"),
     (lambda: integrate(gong2025(), DRIVE, 1.0, initial_state=[math.nan] * 6), "give six finite numbers"),
 ]
 

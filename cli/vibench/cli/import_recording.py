@@ -1,6 +1,7 @@
 """`vibench import`: somebody else's file as a recording."""
 
 import math
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -52,7 +53,7 @@ def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool
     if as_json:
         print_json({"recording": str(made)})
     else:
-        console.print(f"wrote {made}; next: vibench analyse {made}")
+        console.print(f"wrote {made}; next: vibench analyse {shlex.quote(str(made))}")
 
 
 def _tell(file: Path, as_json: bool) -> None:

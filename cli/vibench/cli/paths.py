@@ -68,9 +68,14 @@ def room_for_page(path: Path) -> None:
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
-    """Give the path of a new file: the one that was named, or in a folder that was, by its usual name."""
+    """Give the path of a new file: the one that was named, or in a folder that was, by its usual name.
+
+    What is named without a suffix where nothing is, is a folder that is wanted: it is made.
+    """
     if out is None:
         return usual
+    if not out.suffix and not out.exists():
+        out.mkdir(parents=True)
     return out / usual.name if out.is_dir() else out
 
 

@@ -98,6 +98,15 @@ def test_every_shipped_file_names_its_schema_and_passes_it(kind):
         assert faults(kind, text) == [], path
 
 
+@pytest.mark.parametrize("package", ["controller_package", "instrument_package"])
+def test_the_bench_of_an_example_names_its_schema_and_passes_it(package):
+    path = shipped_folder("examples") / package / "bench.toml"
+    text = path.read_text(encoding="utf-8")
+    assert text.startswith("#:schema ")
+    assert (path.parent / text.split()[1]).resolve() == shipped_folder("schemas") / "rig-1.schema.json"
+    assert faults("rig", text) == []
+
+
 @pytest.mark.parametrize("name", shipped_specimens())
 def test_every_shipped_specimen_names_its_schema_and_passes_it(name):
     path = Path(str(files("vibench.sim") / "specimens" / f"{name}.toml"))

@@ -1,5 +1,6 @@
 """A file that appears whole, under a name that nobody had, or not at all."""
 
+import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 from ..errors import InvalidRequest
 
 UNFINISHED = ".unfinished"
+_REFUSED = (errno.EACCES, errno.EPERM, errno.EROFS)
 
 
 def require_unused(path: Path) -> None:
@@ -35,8 +37,9 @@ def new_file(path: Path) -> Iterator[Path]:
         require_unused(path)  # another program may have been as busy
         unfinished.rename(path)
     except OSError as error:
+        mend = "choose another folder" if error.errno in _REFUSED else "make room and try again"
         raise InvalidRequest(
-            f"{path} could not be written: {error}; nothing was kept of it, so make room and try again"
+            f"{path} could not be written: {error}; nothing was kept of it, so {mend}"
         ) from error
     finally:
         unfinished.unlink(missing_ok=True)

@@ -150,7 +150,8 @@ def pieces(signals: tuple[Reals, ...], valid: Flags | None) -> Iterator[tuple[Re
         valid is not None and valid.shape != (length,)
     ):
         shapes = ", ".join(str(signal.shape) for signal in signals)
-        raise InvalidRequest(f"signals (and valid) must be 1-D and equally long; got shapes {shapes}")
+        marks = "" if valid is None else f", and valid of {valid.shape}"
+        raise InvalidRequest(f"signals (and valid) must be 1-D and equally long; got shapes {shapes}{marks}")
     for first in range(0, length, _PIECE_SAMPLES):
         part = slice(first, first + _PIECE_SAMPLES)
         block = np.stack([np.asarray(signal[part], dtype=np.float64) for signal in signals])

@@ -95,9 +95,12 @@ def seen_from_outside(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOut
 def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float64]:
     """Frequencies at which a wave of phase ``wave_number`` from unit to unit travels without damping [Hz].
 
-    Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,).
+    Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,), finite (else ValueError).
     """
     phase = np.atleast_1d(np.asarray(wave_number, dtype=np.float64))
+    if not np.all(np.isfinite(phase)):
+        msg = "A wave number that is not finite is not allowed: give radians per unit."
+        raise ValueError(msg)
     root = np.sqrt(unit.masses)
     first, last, link = 0, MASSES_PER_CELL * (unit.size - 1), unit.cells[0].stiffnesses[0]
     # The first cell's link leads to the last of the unit before, whose phase lags.

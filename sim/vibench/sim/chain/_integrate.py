@@ -15,6 +15,7 @@ from ..motion import (
     ROUNDING,
     SPARE_IMPACTS,
     Trajectory,
+    check_impact_rate,
     check_times,
     check_within,
     integrate,
@@ -113,7 +114,7 @@ def integrate_chain(
 
     """
     accuracy = chosen(Accuracy, accuracy)
-    check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
+    check_times(duration_s, start_time_s, sample_rate_hz)
     if chain.size == 1:
         start = None if initial_state is None else start_motion(chain, initial_state)[0]
         run = integrate(
@@ -227,6 +228,7 @@ def new_chain_record(
     chain: Chain, start_s: float, duration_s: float, sample_rate_hz: float | None, impact_rate_hz: float
 ) -> ChainRecord:
     """Make what a run fills: room for its samples and for the impacts that are allowed."""
+    check_impact_rate(impact_rate_hz)
     count = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
     impacts = min(chain.size * (math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS), MOST_IMPACTS)
     return ChainRecord(

@@ -101,7 +101,6 @@ class Sampled:
     sample_rate_hz: float
 
     def __post_init__(self) -> None:
-        _require_positive("Sample rate of the drive", self.sample_rate_hz, "Hz")
         samples = np.array(self.displacement_m, dtype=np.float64)
         if samples.ndim != 1 or len(samples) < FEWEST_SAMPLES:
             msg = (
@@ -109,6 +108,7 @@ class Sampled:
                 f"give one row of {FEWEST_SAMPLES} samples or more."
             )
             raise ValueError(msg)
+        _require_positive("Sample rate of the drive", self.sample_rate_hz, "Hz")
         if not bool(np.all(np.isfinite(samples))):
             bad = int(np.flatnonzero(~np.isfinite(samples))[0])
             msg = f"Sample {bad} of the drive is {samples[bad]}: every displacement must be finite."

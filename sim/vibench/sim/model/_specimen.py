@@ -185,6 +185,9 @@ def gong2025(
         msg = f"Damping time {damping_time_s} s is not allowed: it must be zero or positive."
         raise ValueError(msg)
     stiffness = hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M)
+    if isinstance(gap_m, tuple) and len(gap_m) != len(("lower", "upper")):
+        msg = f"Gap {gap_m} m is not allowed: give one clearance, or (lower, upper)."
+        raise ValueError(msg)
     lower, upper = gap_m if isinstance(gap_m, tuple) else (None, gap_m)
     law = model_named(contact, stiffness, upper if lower is None else min(lower, upper))
     m0, m1, m2 = PAPER_MASSES

@@ -10,6 +10,7 @@ from ._integrate import (
     SPARE_IMPACTS as SPARE_IMPACTS,
     Impacts as Impacts,
     Trajectory as Trajectory,
+    check_impact_rate as check_impact_rate,
     check_times as check_times,
     check_within as check_within,
     integrate as integrate,

@@ -112,7 +112,7 @@ def integrate(
 
     """
     accuracy = chosen(Accuracy, accuracy)
-    check_times(duration_s, start_time_s, sample_rate_hz, max_impact_rate_hz)
+    check_times(duration_s, start_time_s, sample_rate_hz)
     state = new_state(specimen, start_motion(initial_state), accuracy)
     clock = clock_at(float(start_time_s))
     end = float(start_time_s + duration_s)
@@ -213,6 +213,7 @@ def new_record(
     start_s: float, duration_s: float, sample_rate_hz: float | None, impact_rate_hz: float
 ) -> Record:
     """Make what a run fills: room for its samples and for the impacts that are allowed."""
+    check_impact_rate(impact_rate_hz)
     count = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
     return Record(
         start=float(start_s),
@@ -246,9 +247,14 @@ def _trajectory(
     )
 
 
-def check_times(
-    duration_s: float, start_time_s: float, sample_rate_hz: float | None, max_impact_rate_hz: float
-) -> None:
+def check_impact_rate(max_impact_rate_hz: float) -> None:
+    """Refuse a number of impacts that no run can be held to."""
+    if not 0.0 <= max_impact_rate_hz < math.inf:
+        msg = f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
+        raise ValueError(msg)
+
+
+def check_times(duration_s: float, start_time_s: float, sample_rate_hz: float | None) -> None:
     """Refuse times and rates that no run can have."""
     if not 0.0 <= duration_s < math.inf:
         msg = f"Duration {duration_s} s is not allowed: it must be zero or positive, and finite."
@@ -264,9 +270,6 @@ def check_times(
             f"{duration_s * sample_rate_hz:.3g} samples are not allowed: {MOST_SAMPLES:.1g} at most; "
             "lower the sample rate or cut the run."
         )
-        raise ValueError(msg)
-    if not 0.0 <= max_impact_rate_hz < math.inf:
-        msg = f"Impact rate {max_impact_rate_hz} Hz is not allowed: it must be zero or more, and finite."
         raise ValueError(msg)
 
 

@@ -133,7 +133,18 @@ def first_order_states(
     frequency_hz, amplitude_m
         Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
 
+    Raises
+    ------
+    ValueError
+        When frequency or amplitude is not allowed.
+
     """
+    if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
+        msg = (
+            f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: "
+            "its frequency must be positive, its amplitude zero or positive, both finite."
+        )
+        raise ValueError(msg)
     seen = condense(structure, 2.0 * math.pi * frequency_hz, FUNDAMENTAL)
     drive = -1j * amplitude_m
     alone = seen.linear * drive

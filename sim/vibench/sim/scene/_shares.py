@@ -32,7 +32,18 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
     unsure
         Probability that the interval misses the share.
 
+    Raises
+    ------
+    ValueError
+        When there are no trials, more counted than tried, or no such probability.
+
     """
+    if not (0.0 <= count <= trials < math.inf and trials > 0.0 and 0.0 < unsure < 1.0):
+        msg = (
+            f"{count} of {trials} trials, unsure to {unsure}, are not allowed: "
+            "give one trial or more, at most as many counted, and a probability between 0 and 1."
+        )
+        raise ValueError(msg)
     deviations = float(ndtri(1.0 - 0.5 * unsure))
     share, weight = count / trials, deviations**2 / trials
     middle = (share + 0.5 * weight) / (1.0 + weight)
