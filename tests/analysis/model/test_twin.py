@@ -71,7 +71,7 @@ def test_under_the_base_motion_the_same_dwell_is_told_as_one_run_without_a_place
 
 
 def test_another_gap_lies_outside_the_draws(recordings):
-    found = laid(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6), draws=6).laid
+    found = laid(recordings / "dwell.h5", specimen=gong2025(gap_m=60e-6), draws=12).laid
     assert not found.quantity("Response II").agrees
 
 

@@ -13,6 +13,8 @@ _BLOCKS = 200
 """Looked at, evenly over the recording; the whole first and last second besides."""
 _BAND = (0.2, 0.4)
 """Part of the sample rate that shows a channel's own noise: no mode reaches there, and only impacts do."""
+_ALIKE = 6.0
+"""Standard deviations of a block's power, of so many lines, between blocks of one level."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,21 @@ def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
     starts = np.unique(np.concatenate([ends, np.linspace(0, samples - length, _BLOCKS)]).astype(int))
     starts = starts[(starts >= 0) & (starts <= samples - length)]
     rms = {
-        role: min((_white(recording.read(role, int(at), int(at) + length)) for at in starts), default=0.0)
+        role: _quiet([_white(recording.read(role, int(at), int(at) + length)) for at in starts], length)
         for role in roles
     }
     volts = [rms[role] / abs(recording.channel(role).physical_per_volt) for role in roles]
     return ChannelNoise(rms, min(volts))
+
+
+def _quiet(rms: list[float], length: int) -> float:
+    """Give the level of the blocks that are as quiet as the quietest: alone it is some per cent too low."""
+    if not rms:
+        return 0.0
+    power = np.square(rms)
+    lines = (_BAND[1] - _BAND[0]) * length
+    alike = power <= power.min() * (1.0 + _ALIKE / np.sqrt(lines))
+    return float(np.sqrt(np.mean(power[alike]))) if np.isfinite(power.min()) else float(np.inf)
 
 
 def _white(samples: Reals) -> float:

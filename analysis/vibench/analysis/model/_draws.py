@@ -22,6 +22,7 @@ from ._channel_noise import ChannelNoise, channel_noise
 from ._driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
 from ._ensemble import FEWEST_DRAWS, Quantity, ensemble_curves
 from ._escape import Ending
+from ._played_voltage import PlayedVoltage
 from ._shaker_fit import FittedShaker
 from ._simulated_channels import (
     HIGHEST_PART,
@@ -49,7 +50,7 @@ _MORE = 3
 _SEED = 17
 _MOST_BYTES = 2e9
 """That the draws under way at a time may take."""
-_BYTES_PER_SAMPLE = 80
+_BYTES_PER_SAMPLE = 120
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +136,8 @@ def voltage_source(
     rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
     volts = recorded_voltage(recording, rig)
     drive_v = volts if rig.role == DRIVE else recording.read(DRIVE)
-    noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
+    noise = channel_noise(recording, tuple(recording.roles))
+    voltage = PlayedVoltage(volts, noise.converter_v * abs(recording.channel(rig.role).physical_per_volt))
     return DrawSource(
         specimen=specimen,
         driven=rig.driven,
@@ -143,7 +145,7 @@ def voltage_source(
         base_band_hz=None,
         most=draws,
         why="" if fitted is None else fitted.sentence,
-        channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, volts, drive_v, noise),
+        channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, voltage, drive_v, noise),
     )
 
 
@@ -211,14 +213,16 @@ def _drawn_channels(
     recorded: RecordedChannels,
     rig: DrivenRig,
     fitted: FittedShaker | None,
-    volts: Reals,
+    voltage: PlayedVoltage,
     drive_v: Reals,
     noise: ChannelNoise,
     number: int,
 ) -> SimulatedChannels:
     rng = np.random.default_rng([_SEED, number])
     table = rig.table if fitted is None else replace(rig.table, shaker=fitted.drawn(rng))
-    motion, base, velocity = _moved(replace(rig, table=table), volts, recorded.recording, noise, rng)
+    motion, base, velocity = _moved(
+        replace(rig, table=table), voltage.drawn(rng), recorded.recording, noise, rng
+    )
     return SimulatedChannels(
         recorded,
         velocity,
@@ -240,8 +244,6 @@ def _moved(
             volts,
             recording.sample_rate_hz * (1 + CLOCK_TOLERANCE * rng.uniform(-1.0, 1.0)),
             start=np.concatenate([START_M * rng.standard_normal(3), np.zeros(3)]),
-            noise_rms_v=noise.converter_v * abs(recording.channel(rig.role).physical_per_volt),
-            seed=int(rng.integers(2**32)),
         )
     except MotionFailed as error:
         raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
@@ -290,7 +292,7 @@ class StretchDraws:
         shaker = self.rig.table.shaker if self.fitted is None else self.fitted.drawn(rng)
         rig = replace(self.rig, table=replace(self.rig.table, shaker=shaker, specimen=specimen))
         rms = {role: each * np.exp(rng.uniform(-1, 1) * _NOISE) for role, each in self.noise.rms.items()}
-        noise = ChannelNoise(rms, converter_v=0.0)
+        noise = ChannelNoise(rms, self.noise.converter_v)
         _, base, velocity = _moved(rig, self.volts, self.recording, noise, rng)
         return np.stack([base[self.kept], velocity[self.kept]])
 

@@ -150,10 +150,13 @@ class EnsembleCurve(Labelled):
             return f"{self.name}: too few draws of the measured kind of motion to compare"
         verdict = "within" if self.agrees else "outside"
         if self.measured.size == 1:
+            agrees = "agrees with" if self.agrees else "is not"
+            # Where the band alone does not show the verdict, the limit does.
+            limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
             return (
-                f"{self.name} {self.measured[0]:.4g} lies {verdict} the twin's {self.median[0]:.4g} "
-                f"({self.lower[0]:.4g} to {self.upper[0]:.4g}; rank {self.rank[0]} of {self.count[0]}, z = "
-                f"{self.z[0]:+.1f})"
+                f"{self.name} {self.measured[0]:.4g} {agrees} the twin's {self.median[0]:.4g} (95 % of draws "
+                f"{self.lower[0]:.4g} to {self.upper[0]:.4g}; rank {self.rank[0]} of {self.count[0]}, z = "
+                f"{self.z[0]:+.1f}{limit})"
             )
         return (
             f"{self.name}: {100 * self.share_in_band:.0f} % of {self.compared} values within the twin's 95 % "

@@ -76,8 +76,6 @@ def follow_voltage(
     sample_rate_hz: float,
     *,
     start: ArrayLike = (0.0,) * 6,
-    noise_rms_v: float = 0.0,
-    seed: int = 0,
 ) -> SampledMotion:
     """Move table and specimen, from rest, by a sampled voltage.
 
@@ -90,11 +88,6 @@ def follow_voltage(
         (samples,), finite. Best with silence at both ends.
     start
         The specimen's x, y, z, vx, vy, vz [m, m/s], absolute.
-    noise_rms_v
-        White noise added at the amplifier's output, rms at the sample rate's band: what is not known of a
-        recorded voltage. In chaos any of it leads to another motion.
-    seed
-        Of that noise.
 
     Raises
     ------
@@ -105,20 +98,18 @@ def follow_voltage(
     ratio = ceil(FINEST_STEP_HZ / sample_rate_hz)
     step_s = 1 / (sample_rate_hz * ratio)
     shaken = LoadedShaker(table.amplifier, table.shaker, table.specimen, step_s, start)
-    rng = np.random.default_rng(seed)
     gains = (table.base_sensor, table.m0_sensor)
     kept = [np.empty(volts.size), np.empty(volts.size)]
     impacts = [0]
     block = max(1, round(_BLOCK_S * sample_rate_hz)) * ratio
     tail = np.zeros((2, 0))
     done = 0
-    noise_v = noise_rms_v * np.sqrt(ratio)
     resampling = _Resampling(sample_rate_hz, ratio)
     for stop, fine in resampling.stretches(volts):
         means = np.empty((2, fine.size))
         for begin in range(0, fine.size, block):
             end = min(begin + block, fine.size)
-            motion = shaken.move(fine[begin:end], noise_v * rng.standard_normal(end - begin))
+            motion = shaken.move(fine[begin:end])
             means[0, begin:end] = motion.base_acceleration
             means[1, begin:end] = motion.m0_velocity
             impacts.append(shaken.impacts)
