@@ -62,7 +62,7 @@ def test_noise_that_collides_promises_nothing():
     plan = Measurement(name="strong", excitation=NOISE.model_copy(update={"amplitude_vpp": 3.0}))
     for each in expected_uncertainty(plan, RIG):
         assert each.after(10.0) is None
-        assert "will collide" in each.sentence
+        assert "may collide" in each.sentence
 
 
 def test_a_chaotic_dwell_is_told_to_be_chance_and_a_quiet_one_noise():

@@ -23,7 +23,7 @@ from ._budget import COVERAGE, Cause, Contribution
 from ._quantities import sd_of_largest
 from ._stated import Stated, stated_of
 
-_SIMULATED_S, _WINDOW_S = 7.5, 5.0
+_SETTLED_S, _WINDOW_S = 2.5, 5.0
 _RATE_PER_HZ = 64
 _PARTS, _TENTHS = 50, 10
 _STEADY = 1e-4
@@ -74,7 +74,7 @@ class Expected:
             return {
                 Cause.NOISE: "not known beforehand, for "
                 + (heard if self.quantity == RESPONSE_I else "the sensors' noise is not stated"),
-                Cause.CHANCE: "not known beforehand, for the masses will collide under this noise",
+                Cause.CHANCE: "not known beforehand, for the masses may collide under this noise",
             }[self.cause]
         if self.scatter == 0.0:
             return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, whatever the time; k = 2)"
@@ -101,8 +101,9 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
     """Say how well a plan will tell what it is made for; opens no instrument.
 
     Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
-    Responses over their window of 5 s, whose chance in chaos is taken from a simulated run under a base that
-    does not yield. Scatter falls with the root of the time. Other kinds of plan give nothing.
+    Responses over their window, 5 s or all that is recorded if that is less, whose chance in chaos is taken
+    from a simulated run under a base that does not yield. Scatter falls with the root of the time. Other
+    kinds of plan give nothing.
 
     Parameters
     ----------
@@ -201,11 +202,12 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
 
     Nothing where a window has no period for each of its tenths, or the motion cannot be simulated.
     """
-    if at_hz * _WINDOW_S < _TENTHS:
+    window_s = min(_WINDOW_S, sum(each.record_s for each in measurement.excitation.steps()))
+    if at_hz * window_s < _TENTHS:
         return
     specimen = rig.specimen.specimen()
     amplitude_m = float(base_motion(measurement.excitation, rig, np.array([at_hz])).amplitude_m[0])
-    chance = _simulated_scatter(specimen, amplitude_m, at_hz)
+    chance = _simulated_scatter(specimen, amplitude_m, at_hz, window_s)
     if chance is None:
         return
     noise = _densities(rig)
@@ -214,30 +216,35 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
     by_noise = None
     if noise is not None:
         shares = noise[0] / (omega * size_m) ** 2 + noise[1] / (omega**2 * amplitude_m) ** 2
-        by_noise = float(np.sqrt(shares / _WINDOW_S))
+        by_noise = float(np.sqrt(shares / window_s))
     lasting = float(np.hypot(stated.scale_sd, stated.clock.relative or 0.0))
     missing = _missing(stated.response, stated.base, stated.timed(1))
     for name, scatter in zip((RESPONSE_I, RESPONSE_II), chance, strict=True):
         if scatter > _STEADY and name == RESPONSE_I:
             # The largest of a window of its own: no time makes it another's.
-            yield Expected(name, _WINDOW_S, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing)
+            yield Expected(name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing)
         elif scatter > _STEADY:
-            yield Expected(name, _WINDOW_S, scatter, Cause.CHANCE, lasting, missing)
+            yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)
         else:
             # What generator and amplifier hiss moves the masses, and no rig states it.
             told = None if name == RESPONSE_I else by_noise
-            yield Expected(name, _WINDOW_S, told, Cause.NOISE, lasting, missing)
+            yield Expected(name, window_s, told, Cause.NOISE, lasting, missing)
 
 
-def _simulated_scatter(specimen: Specimen, amplitude_m: float, at_hz: float) -> tuple[float, float] | None:
-    """Relative scatter of both Responses over windows of 5 s, from one simulated run; None if it was lost."""
+def _simulated_scatter(
+    specimen: Specimen, amplitude_m: float, at_hz: float, window_s: float
+) -> tuple[float, float] | None:
+    """Relative scatter of both Responses over windows, from one simulated run; None if it was lost."""
     rate = _RATE_PER_HZ * at_hz
     path = integrate(
-        specimen, Harmonic(frequency_hz=at_hz, amplitude_m=amplitude_m), _SIMULATED_S, sample_rate_hz=rate
+        specimen,
+        Harmonic(frequency_hz=at_hz, amplitude_m=amplitude_m),
+        _SETTLED_S + window_s,
+        sample_rate_hz=rate,
     )
     if path.outcome is not Outcome.REACHED_END:
         return None
-    kept = round(_WINDOW_S * rate)
+    kept = round(window_s * rate)
     x: Reals = np.asarray(path.states[-kept:, 0], dtype=np.float64)
     turn = np.exp(-2j * np.pi * at_hz * np.arange(kept) / rate)
     tenth = kept // _TENTHS // _RATE_PER_HZ * _RATE_PER_HZ
