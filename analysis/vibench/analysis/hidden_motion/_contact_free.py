@@ -40,7 +40,9 @@ _DEPTH_POWER = 0.8
 """Depth of a Hertz collision over its impulse: d ~ v^(4/5), and J ~ v."""
 _LAW_UNKNOWN = 0.15
 """Of the mean depth: what another law would change in a gap."""
-_FEWEST_IMPACTS = 8
+FEWEST_IMPACTS = 8
+_LEAST_SPREAD = 0.3
+"""Of the depths of nine impacts in ten, over their mean: a line through impacts all alike leads nowhere."""
 _HUBER, _HUBER_ROUNDS, _LEAST_SCATTER_M = 2.0, 20, 1e-12
 _WORST_SCATTER_OF_GAP = 0.1
 """Scatter of |p| at the impacts of a block, of the gap, beyond which its p is not believed."""
@@ -212,12 +214,25 @@ class _GapLine:
 
 
 def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Give both gaps from |p| in the middle of contacts against the impulse; None where too few were met.
+    """Give both gaps from |p| in the middle of contacts against the impulse; None of too few, or all alike.
 
     A stop is pressed in more the harder it is struck. The straight line of |p| over J^0.8, robustly fitted
     with one slope for both sides, begins at the gap.
     """
     return _gap_line(impacts).gaps
+
+
+def free_loss(impacts: FreeImpacts) -> float | None:
+    """Give the loss of the stops [s/m] by the speeds before and after impacts; None where too few tell it.
+
+    Hunt and Crossley's stops, hardly lossy, give back 1 - 2/3 loss speed of the approach: a beginning for a
+    search, since both speeds are carried over from flights and a few per cent too low.
+    """
+    before, after = impacts.rate_before, impacts.rate_after
+    good = (before > np.median(before)) & (after > 0.0) if before.size else before > 0.0
+    if int(good.sum()) < FEWEST_IMPACTS:
+        return None
+    return float(np.median(1.5 * (1.0 - after[good] / before[good]) / before[good]))
 
 
 def measured_gaps(impacts: FreeImpacts) -> Reals:
@@ -232,12 +247,15 @@ def measured_gaps(impacts: FreeImpacts) -> Reals:
 
 def _gap_line(impacts: FreeImpacts) -> _GapLine:
     sides = [impacts.sides < 0, impacts.sides > 0]
-    told = [each for each in sides if each.sum() >= _FEWEST_IMPACTS]
+    told = [each for each in sides if each.sum() >= FEWEST_IMPACTS]
     residuals = np.full(impacts.samples.size, np.nan)
     if not told:
         return _GapLine((None, None), residuals)
     used = np.logical_or.reduce(told)
     depth = impacts.impulses**_DEPTH_POWER
+    if np.subtract(*np.quantile(depth[used], [0.95, 0.05])) < _LEAST_SPREAD * depth[used].mean():
+        residuals[used] = _apart_by_side(np.abs(impacts.p), told)[used]
+        return _GapLine((None, None), residuals)
     matrix = np.column_stack([*(each.astype(float) for each in told), depth / depth.mean()])[used]
     target = np.abs(impacts.p[used])
     solution, covariance = _robust_line(matrix, target)
@@ -246,11 +264,19 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
     places = iter(range(len(told)))
     gaps = [
         _gap(float(solution[n := next(places)]), covariance[n, n], unknown, each)
-        if each.sum() >= _FEWEST_IMPACTS
+        if each.sum() >= FEWEST_IMPACTS
         else None
         for each in sides
     ]
     return _GapLine((gaps[0], gaps[1]), residuals)
+
+
+def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
+    """Give how far values lie from the median of their side, NaN where they are on none."""
+    apart = np.full(values.size, np.nan)
+    for each in sides:
+        apart[each] = values[each] - np.median(values[each])
+    return apart
 
 
 def _robust_line(matrix: Reals, target: Reals) -> tuple[Reals, Reals]:

@@ -15,13 +15,22 @@ from scipy.stats import t as student
 
 from ..signals import Reals
 from ..tables import Labelled, plus_minus, unit_of
-from ._contact_free import FITTED, FreeGap, free_gaps, free_motion, free_numbers
+from ._contact_free import (
+    FEWEST_IMPACTS,
+    FITTED,
+    FreeGap,
+    FreeImpacts,
+    free_gaps,
+    free_loss,
+    free_motion,
+    free_numbers,
+)
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
 from ._parameters import PRIOR_SD, Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
-from ._tracking_model import TrackedSpecimen
+from ._tracking_model import TrackedSpecimen, indentation_m
 
 _STRETCH_S = 1.2
 """Of each restart."""
@@ -53,7 +62,11 @@ _LEAST_SD = {
     Hidden.C0: 0.03,
     Hidden.C2: 0.03,
 }
-_FREE_S = 1.0
+_TELLING_LOSS = 0.15
+"""Loss [s/m] from which speeds without a contact model tell more than a description."""
+_LAW_UNKNOWN = 0.3
+"""Of a depth by the described law, which may be another."""
+_FREE_S = 3.0
 _TOLD = 0.5
 """Standard deviation over that of a description above which the data say nothing that was not assumed."""
 _WIDE = 3.0
@@ -373,6 +386,8 @@ def _search(
     told = free_motion(motion_model(numbers.tracked, motion), motion.part(first, first + count))
     gaps = free_gaps(told.impacts)
     if not any(gaps):
+        gaps = _gaps_by_law(numbers.tracked, told.impacts)
+    if not any(gaps):
         count = told.impacts.samples.size
         seen = f"{count} impacts that were found tell no gap" if count else "no impacts were found"
         return numbers.tracked, (
@@ -384,7 +399,24 @@ def _search(
         side: gap for side, gap in sides.items() if gap is not None and isfinite(value_of(described, side))
     }
     start = with_values(numbers.tracked, {side: gap.value_m for side, gap in known.items()})
+    loss = free_loss(told.impacts)
+    if loss is not None and loss > _TELLING_LOSS:
+        start = with_values(start, {Hidden.LOSS: loss})
     near = {**_NEAR, Hidden.FORCE: 0.25, Hidden.EXPONENT: 0.05, Hidden.LOSS: 0.1}
     near |= {side: gap.sd_m / gap.value_m for side, gap in known.items()}
     near |= {each: max(_LEAST_SD[each], 3.0 * float(sd)) for each, sd in zip(FITTED, numbers.sd, strict=True)}
     return start, _looked_for(described, near)
+
+
+def _gaps_by_law(described: TrackedSpecimen, impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
+    """Give gaps where impacts are all alike: |p| there, less the depth that the described law has."""
+
+    def gap(side: float) -> FreeGap | None:
+        here = impacts.sides == side
+        if int(here.sum()) < FEWEST_IMPACTS:
+            return None
+        depth_m = indentation_m(described, float(np.median(impacts.rate_before[here])))
+        value_m = float(np.median(np.abs(impacts.p[here]))) - depth_m
+        return FreeGap(value_m, _LAW_UNKNOWN * depth_m, int(here.sum()))
+
+    return gap(-1.0), gap(1.0)

@@ -1,7 +1,7 @@
 """The hidden motion of one recording: tracked, and without a contact model, side by side."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -79,6 +79,11 @@ class HiddenMotion(Labelled):
         return self.specimen.specimen.gaps_m
 
     @property
+    def is_confirmed(self) -> bool:
+        """Whether the specimen's numbers were taken as given, or found: otherwise nothing told has bounds."""
+        return self.found is None or any(each.is_determined for each in self.found.parameters)
+
+    @property
     def parameters(self) -> tuple[FoundParameter, ...]:
         """What collisions told of the specimen; empty when nobody asked."""
         return () if self.found is None else self.found.parameters
@@ -112,7 +117,7 @@ class HiddenMotion(Labelled):
                 "share_told": self.free.share_told,
                 "impacts": int(self.free.impacts.samples.size),
                 "gaps_m": [gap and gap.value_m for gap in self.free_gaps],
-                "gaps_sd_m": [gap and gap.sd_m for gap in self.free_gaps],
+                "gaps_sd_m": [gap and (gap.sd_m if self.is_confirmed else None) for gap in self.free_gaps],
             },
         }
 
@@ -242,7 +247,7 @@ def hidden_motion_of(
     followed = _tracked(motion, tracked, found, told)
     watcher.begin(name, "hidden motion without a contact model")
     free = free_motion(model, motion, told)
-    return HiddenMotion(
+    found_motion = HiddenMotion(
         name,
         motion.sample_rate_hz,
         motion.first_sample,
@@ -253,6 +258,9 @@ def hidden_motion_of(
         free,
         free_gaps(free.impacts),
     )
+    if found_motion.is_confirmed:
+        return found_motion
+    return replace(found_motion, free=replace(free, p_sd=np.full_like(free.p_sd, np.nan)))
 
 
 def _stretch(recording: Recording, start_s: float, stop_s: float | None) -> tuple[int, int]:
@@ -313,6 +321,19 @@ def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
     return tuple(each.row for each in motion.parameters)
 
 
+def _free_sentence(motion: HiddenMotion) -> str:
+    said = f"Without a contact model, impacts: {motion.free.impacts.samples.size}"
+    for side, gap in zip(("lower", "upper"), motion.free_gaps, strict=True):
+        if gap is not None and motion.is_confirmed:
+            said += f", {side} gap {with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
+        elif gap is not None:
+            said += f", {side} gap {MICRO * gap.value_m:.3g} µm"
+    if not any(motion.free_gaps):
+        return f"{said}; too few to tell a gap."
+    no_bounds = "without bounds, since no track confirms the numbers of the specimen that they rest on"
+    return f"{said}." if motion.is_confirmed else f"{said}, {no_bounds}."
+
+
 def _sentences(motion: HiddenMotion) -> Iterator[str]:
     tracked, rate = motion.tracked, motion.sample_rate_hz
     yield (
@@ -328,17 +349,7 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
     for reason in dict.fromkeys(each.reason for each in tracked.not_followed):
         total = sum(each.stop - each.first for each in tracked.not_followed if each.reason == reason)
         yield f"Not followed for {total / rate:.3g} s: {reason}."
-    told = [each for each in motion.free_gaps if each is not None]
-    yield (
-        f"Without a contact model, impacts: {motion.free.impacts.samples.size}"
-        + "".join(
-            f", {side} gap {with_unit(MICRO * gap.value_m, 2 * MICRO * gap.sd_m, 'µm')}"
-            for side, gap in zip(("lower", "upper"), motion.free_gaps, strict=True)
-            if gap is not None
-        )
-        + ("" if told else "; too few to tell a gap")
-        + "."
-    )
+    yield _free_sentence(motion)
     untold: dict[str, list[str]] = {}
     for parameter in motion.parameters:
         label, said, described = parameter.row

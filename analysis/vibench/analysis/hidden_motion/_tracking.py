@@ -76,7 +76,7 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
     found = latent_motion(model, motion, first, count)
     if not found.misfit < _WORST_MISFIT:
         return (
-            f"the specimen's equations leave {found.misfit:.3g} times what the channels' noise explains, "
+            f"the specimen's equations leave over {_WORST_MISFIT:g} times what the channels' noise explains, "
             "even with an unknown contact force"
         )
     begin = _calmest(model, found.smoothed, found.is_open, motion.sample_rate_hz)

@@ -132,14 +132,18 @@ def step_tables(tracked: TrackedSpecimen, sample_rate_hz: float, coupling_rad_pe
     )
 
 
+def indentation_m(tracked: TrackedSpecimen, approach_m_per_s: float) -> float:
+    """How far a stop is pressed in by an approach whose energy it takes up."""
+    _, m1, m2 = tracked.specimen.masses
+    energy, n = 0.5 * m1 * m2 / (m1 + m2) * approach_m_per_s**2, tracked.exponent
+    return float(((n + 1.0) * energy / tracked.steepness) ** (1.0 / (n + 1.0)))
+
+
 def small_steps_of(tracked: TrackedSpecimen, step_s: float) -> int:
     """Count the small steps in a sample that resolve the shortest collision."""
-    _, m1, m2 = tracked.specimen.masses
-    mass, n = m1 * m2 / (m1 + m2), tracked.exponent
     if tracked.steepness == 0.0:
         return _FEWEST_SMALL_STEPS
-    # Depth at which all energy is in the stop, and pi / 2 of the time to get there at full speed and back.
-    energy = 0.5 * mass * _FASTEST_APPROACH_M_PER_S**2
-    deepest_m = float(((n + 1.0) * energy / tracked.steepness) ** (1.0 / (n + 1.0)))
+    # pi / 2 of the time to the deepest point at full speed, and back.
+    deepest_m = indentation_m(tracked, _FASTEST_APPROACH_M_PER_S)
     duration_s = math.pi * deepest_m / _FASTEST_APPROACH_M_PER_S
     return max(_FEWEST_SMALL_STEPS, math.ceil(step_s * _SMALL_STEPS_A_CONTACT / duration_s))
