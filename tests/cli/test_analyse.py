@@ -192,3 +192,14 @@ def test_a_sine_that_just_fills_its_range_is_analysed(tmp_path):
     velocity = 0.9999 * np.sin(2 * np.pi * 260.0 * time_s)
     path = synthetic.write_recording(tmp_path, plan, base, velocity, [part], name="full")
     assert not analyse_files([path], "full", Simulation.LEFT_OUT).failures
+
+
+def test_what_to_look_at_before_a_result_is_trusted_is_printed(vibench_here, tmp_path):
+    """It stood in the report alone."""
+    base = synthetic.sine(4.0, 260.0, 5e-7)
+    velocity = 0.1 * np.sin(2 * np.pi * 260.0 * synthetic.times(4.0))
+    plan = Dwell(amplitude_vpp=0.01, frequency_hz=262.0, settle_s=2.0, duration_s=2.0)
+    part = synthetic.Part("dwell", 2.0, 4.0, {"frequency_hz": 262.0})
+    synthetic.write_recording(tmp_path, plan, base, velocity, [part], name="other")
+    done = vibench_here("analyse", "other.h5", "--no-simulate", cwd=tmp_path)
+    assert "warning: other: drive frequency: " in " ".join(done.stdout.split()), done.stdout

@@ -34,7 +34,7 @@ from vibench.analysis import (
 )
 from vibench.analysis.dynamics import BranchDiagram, read_diagram
 from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion, tracked_specimen
-from vibench.analysis.report import findings, write_report
+from vibench.analysis.report import check_warnings, findings, write_report
 from vibench.sim import Specimen
 from vibench.sim.maps import MapResults, open_map
 
@@ -280,6 +280,7 @@ def _analyse(
         if as_json
         else (
             *findings(results),
+            *(f"warning: {each}" for each in check_warnings(results)),
             *(s for each in motions for s in each.sentences),
             *budget_sentences(results),
         )

@@ -44,6 +44,7 @@ from ._drawings import (
     result_figures,
 )
 from ._report import (
+    check_warnings,
     write_report,
 )
 
@@ -59,6 +60,7 @@ __all__ = [
     "accuracy_document",
     "branches_figure",
     "chain_figure",
+    "check_warnings",
     "contact_forces_figure",
     "exponent_spectrum_figure",
     "findings",

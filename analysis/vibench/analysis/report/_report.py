@@ -183,6 +183,22 @@ def _overview(results: CampaignResults) -> ReportTable:
 def _warnings(results: CampaignResults) -> Iterator[str]:
     for failure in results.failures:
         yield _sentence(failure)
+    yield from check_warnings(results)
+
+
+def check_warnings(results: CampaignResults) -> Iterator[str]:
+    """Say what to look at before a result is trusted.
+
+    Parameters
+    ----------
+    results
+        As `vibench.analysis.analyse_files` gives them.
+
+    Returns
+    -------
+    A sentence for each check of a recording that ended with a warning.
+
+    """
     for result in results.results:
         for check in result.analysis.checks:
             if check.verdict is Verdict.WARNING:
