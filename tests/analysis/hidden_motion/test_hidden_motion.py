@@ -199,6 +199,35 @@ def test_a_stop_that_loses_energy_is_not_taken_for_a_damper(world_recording, los
     assert found[Hidden.LOSS].half_width < 0.01
 
 
+@pytest.mark.thorough
+def test_a_motion_that_has_settled_for_half_of_the_time_is_searched_all_the_same(world_recording):
+    """Its later impacts are all alike, and a search that looked at its middle began 1.3 um off."""
+    recorded = world_recording(257.0, 1.7, duration_s=2.2, seed=31)
+    m0, m1, m2 = recorded.specimen.masses
+    motion = told(recorded, specimen=replace(recorded.specimen, masses=(m0, 1.03 * m1, m2)))
+    found = {each.what: each for each in motion.parameters}
+    assert found[Hidden.M1].value == pytest.approx(m1, rel=1e-3)
+    assert found[Hidden.LOWER_GAP].value == pytest.approx(45e-6, abs=0.05e-6)
+
+
+@pytest.mark.thorough
+def test_what_no_track_confirms_is_told_without_bounds(world_recording):
+    """Of an m0 that is 3 % heavier than described both gaps were told as (44.0 +- 0.2) um; 45 is true."""
+    usual = gong2025()
+    m0, m1, m2 = usual.masses
+    recorded = world_recording(
+        257.0, 1.7, duration_s=2.2, seed=31, specimen=replace(usual, masses=(1.03 * m0, m1, m2))
+    )
+    motion = told(recorded, specimen=usual)
+    assert not motion.is_confirmed
+    assert not any(each.is_determined for each in motion.parameters)
+    assert np.all(np.isnan(motion.free.p_sd))
+    (said,) = (each for each in motion.sentences if each.startswith("Without a contact model"))
+    assert "±" not in said
+    assert motion.to_dict()["without_contact_model"]["gaps_sd_m"] in ([None, None], (None, None))
+    assert len(motion.sentences) < 10
+
+
 def test_two_gaps_and_a_linear_law_are_followed_too(world_recording):
     specimen = replace(
         gong2025(gap_m=(38e-6, 50e-6)), contact=LinearGap(4.9e6), masses=(6.1e-3, 1.9e-3, 2.2e-3)
