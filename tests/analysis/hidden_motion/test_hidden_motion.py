@@ -225,6 +225,8 @@ def test_what_no_track_confirms_is_told_without_bounds(world_recording):
     (said,) = (each for each in motion.sentences if each.startswith("Without a contact model"))
     assert "±" not in said
     assert motion.to_dict()["without_contact_model"]["gaps_sd_m"] in ([None, None], (None, None))
+    # It was said to be too short, of two seconds.
+    assert "may be otherwise" in motion.sentences[-1]
     assert len(motion.sentences) < 10
 
 

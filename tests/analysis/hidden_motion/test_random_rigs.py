@@ -53,6 +53,7 @@ def described_wrong(rng, true):
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1700)
 def test_random_specimens_described_wrong_are_followed_and_bounds_cover(world_recording):
     rng = np.random.default_rng(SEED)
     parts = []

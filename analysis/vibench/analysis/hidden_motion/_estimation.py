@@ -36,6 +36,10 @@ _WANDER = 0.02
 """Of the prior standard deviation, in every block: a parameter that is sure of itself too early moves on."""
 REBUILT_S = 0.05
 """After so much motion the tables are those of the parameters found so far."""
+_LOST = (
+    f"each track was lost within {REBUILT_S:g} s while the numbers were looked for, so that what is taken as "
+    "described (m0, m2, k1, the kind of contact) may be otherwise"
+)
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
 """Until so much motion was tracked the variance of the velocity is taken as so many times larger."""
 _LEAST_OF_START = 0.05
@@ -102,14 +106,15 @@ class _Search:
         rate = self._motion.sample_rate_hz
         block = round(REBUILT_S * rate)
         at: FilterState | None = None
-        looked, refused = first, ""
+        looked, why = first, ""
         while looked + block < stop:
             model = motion_model(self._current(), self._motion)
             if at is None:
                 begun = acquire(self._inflated(model), self._motion, looked)
                 match begun:
                     case str():
-                        refused, looked = begun, looked + block
+                        # The first reason: the last one is that the motion ends.
+                        why, looked = why or begun, looked + block
                         continue
                     case FilterState():
                         at = self._with_parameters(begun)
@@ -126,9 +131,9 @@ class _Search:
             else:
                 self._covariance = np.diag(np.minimum(4.0 * np.diag(self._covariance), 1.0))
                 looked, at = at.sample, None
+                why = why or _LOST
         if not self._followed:
-            lost = f"every track was lost within {REBUILT_S:g} s while the numbers were looked for"
-            return refused or (lost if looked > first else "the motion was too short to begin a track in")
+            return why or "the motion was too short to begin a track in"
         return Estimate(
             self._current(),
             self._wanted,
