@@ -8,7 +8,7 @@ by tracking.
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import ClassVar
+from typing import ClassVar, TypeGuard
 
 import numpy as np
 from scipy.stats import t as student
@@ -66,6 +66,8 @@ _TELLING_LOSS = 0.15
 """Loss [s/m] from which speeds without a contact model tell more than a description."""
 _LAW_UNKNOWN = 0.3
 """Of a depth by the described law, which may be another."""
+_GAP_SHIFTS = (-1.5, 1.5, -3.0, 3.0)
+"""Standard deviations by which gaps told without a contact model are moved where no track holds with them."""
 _FREE_S = 3.0
 _TOLD = 0.5
 """Standard deviation over that of a description above which the data say nothing that was not assumed."""
@@ -198,11 +200,31 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
     if isinstance(first_look, Estimate):
         start = first_look.tracked
     found = _refined(described, motion, start, near)
+    for shift in () if isinstance(found, FoundSpecimen) else _GAP_SHIFTS:
+        moved = _with_gaps_moved(start, near, shift)
+        looks = (estimate(moved, motion, near, *each) for each in stretches[:2])
+        held = next((each for each in looks if _is_held(each, motion)), None)
+        again = found if held is None else _refined(described, motion, held.tracked, near)
+        if isinstance(again, FoundSpecimen):
+            found = again
+            break
     return (
         replace(found, searched=True)
         if isinstance(found, FoundSpecimen)
         else replace(_nothing(described, found, searched=True), tracked=start)
     )
+
+
+def _with_gaps_moved(start: TrackedSpecimen, near: Mapping[Hidden, float], shift: float) -> TrackedSpecimen:
+    """Move both gaps by so many standard deviations: without a contact model they err together."""
+    gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
+    return with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
+
+
+def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estimate]:
+    """Whether a search over a stretch kept its track for half of it."""
+    enough_s = 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
+    return isinstance(answer, Estimate) and answer.followed_s > enough_s
 
 
 def _looked_for(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict[Hidden, float]:
@@ -249,14 +271,13 @@ def _restarts(
 ) -> list[Estimate] | str:
     """Search several parts of a motion from different beginnings; a sentence where too few held."""
     stretches = _stretches(motion)
-    enough_s = 0.5 * min(_STRETCH_S, motion.samples / motion.sample_rate_hz)
     good: list[Estimate] = []
     refused = ""
     for number, (first, stop) in enumerate(stretches):
         # What does not hold from a start elsewhere is tried from the start itself, and from what was found.
         for begin in (_apart(start, near, number), start, *(each.tracked for each in good[-1:])):
             answer = estimate(begin, motion, near, first, stop)
-            if isinstance(answer, Estimate) and answer.followed_s > enough_s:
+            if _is_held(answer, motion):
                 good.append(answer)
                 break
             refused = answer if isinstance(answer, str) else refused
