@@ -211,6 +211,17 @@ def test_a_motion_that_has_settled_for_half_of_the_time_is_searched_all_the_same
 
 
 @pytest.mark.thorough
+def test_numbers_with_which_the_track_is_lost_again_and_again_are_not_told(world_recording):
+    """Of rigid stops, described as Hertz's, gaps were told as (42.3 +- 0.9) um, where 45 is true."""
+    usual = gong2025()
+    recorded = world_recording(
+        257.0, 1.7, duration_s=2.2, seed=31, specimen=replace(usual, contact=RigidStops(0.8))
+    )
+    motion = told(recorded, specimen=usual)
+    assert not any(each.is_determined for each in motion.parameters)
+
+
+@pytest.mark.thorough
 def test_what_no_track_confirms_is_told_without_bounds(world_recording):
     """Of an m0 that is 3 % heavier than described both gaps were told as (44.0 +- 0.2) um; 45 is true."""
     usual = gong2025()

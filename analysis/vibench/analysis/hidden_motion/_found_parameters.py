@@ -367,6 +367,16 @@ def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) ->
     return FoundSpecimen(described, parameters, 0, searched)
 
 
+def not_believed(found: FoundSpecimen, why: str) -> FoundSpecimen:
+    """Give what was found without its values, of which ``why`` says that they are not the specimen's."""
+    nan = float("nan")
+    parameters = tuple(
+        each if each.not_determined else replace(each, value=nan, low=nan, high=nan, not_determined=why)
+        for each in found.parameters
+    )
+    return replace(found, parameters=parameters)
+
+
 def _stretches(motion: PreparedMotion) -> list[tuple[int, int]]:
     """Spread the restarts evenly over the motion."""
     length = min(round(_STRETCH_S * motion.sample_rate_hz), motion.samples)

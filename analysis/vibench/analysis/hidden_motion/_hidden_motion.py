@@ -17,7 +17,7 @@ from ..tables import Labelled
 from ._collisions import Collisions, collisions_of, joined_collisions
 from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
 from ._filtering import motion_model
-from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, with_unit
+from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, not_believed, with_unit
 from ._numbers import Numbers
 from ._parameters import Hidden
 from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion
@@ -25,6 +25,11 @@ from ._tracking import NotFollowed, TrackedPiece, follow
 from ._tracking_model import TrackedSpecimen, tracked_specimen
 
 MICRO = 1e6
+_LEAST_HELD = 0.95
+"""Share of the motion, once a track was begun, that numbers which are right lose none of."""
+_HIGHEST_LEVEL = 1.25
+"""Mean squared innovation in flight above which the specimen is another than the filter's; 0.8 to 1.1 with
+the right one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,6 +250,9 @@ def hidden_motion_of(
 
     watcher.begin(name, "tracking the hidden motion")
     followed = _tracked(motion, tracked, found, told)
+    why_not = _why_not_believed(followed)
+    if found is not None and why_not:
+        found = not_believed(found, why_not)
     watcher.begin(name, "hidden motion without a contact model")
     free = free_motion(model, motion, told)
     found_motion = HiddenMotion(
@@ -305,6 +313,20 @@ def _tracked(
         tuple(lost),
         level,
     )
+
+
+def _why_not_believed(tracked: TrackedMotion) -> str:
+    """Say why the numbers that a motion was tracked with are not its specimen's, or nothing."""
+    told = ~np.isnan(tracked.p)
+    held = float(np.mean(told[int(np.argmax(told)) :]))
+    if held < _LEAST_HELD:
+        return f"a track with the numbers that were found held in {100 * held:.3g} % of the motion only"
+    if not tracked.innovation_level <= _HIGHEST_LEVEL:
+        return (
+            f"the motion tracked with the numbers that were found leaves {tracked.innovation_level:.3g} "
+            "times the noise"
+        )
+    return ""
 
 
 def _gap_sd(found: FoundSpecimen | None) -> float:

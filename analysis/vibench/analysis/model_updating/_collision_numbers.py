@@ -6,7 +6,7 @@ Tracked where the motion can be followed; else from statistics of its chaos.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from math import isfinite, isnan
+from math import isnan
 from pathlib import Path
 
 from vibench.acquisition import open_recording
@@ -27,11 +27,6 @@ CALM, COLLIDING = 1.01, 1.05
 _LENGTH_S = 3.0
 """Of a tracked stretch: the bounds of what is found are those of four restarts over it."""
 _MOST_RECORDINGS = 3
-_LEAST_FOLLOWED = 0.95
-"""A track begins within 60 ms."""
-_HIGHEST_LEVEL = 1.25
-"""Mean squared innovation in flight above which the specimen is another than the filter's; 0.8 to 1.1 with
-the right one."""
 _JUDGED = (
     Hidden.LOWER_GAP,
     Hidden.UPPER_GAP,
@@ -190,14 +185,6 @@ def _width(found: CollisionNumbers) -> float:
 
 def _refused(motion: HiddenMotion) -> str:
     """Say why a motion's numbers are none, or nothing."""
-    tracked = motion.tracked
-    if tracked.share_followed < _LEAST_FOLLOWED:
-        return f"only {100 * tracked.share_followed:.3g} % of the motion were followed"
-    if not isfinite(tracked.innovation_level) or tracked.innovation_level > _HIGHEST_LEVEL:
-        return (
-            f"the tracked motion leaves {tracked.innovation_level:.3g} times the noise, so the specimen is "
-            "not the one it was tracked with"
-        )
     missing = [each for each in motion.parameters if each.what in _SIDES and not each.is_determined]
     return missing[0].not_determined if missing else ""
 
