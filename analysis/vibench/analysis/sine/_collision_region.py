@@ -72,6 +72,9 @@ class Collisions(Labelled):
     """What a smooth motion may leave, shape (intervals,) [m/s]."""
     is_colliding: Flags
     """Intervals that lie in a region, shape (intervals,)."""
+    is_unexplained: Flags
+    """Intervals that leave more than the sensors' noise and distortion explain, shape (intervals,): what
+    rattles from a sweep's beginning to its end passes for the bench's own noise."""
     noise_rms: float
     """Noise that the threshold allows for [m/s]."""
 
@@ -106,6 +109,7 @@ def collisions(sweep: SweepResponse) -> Collisions:
         residual_rms=residual,
         threshold=threshold,
         is_colliding=inside,
+        is_unexplained=residual > np.hypot(_NOISE_FACTOR * sweep.noise_rms, _DISTORTION * fundamental),
         noise_rms=noise,
     )
 

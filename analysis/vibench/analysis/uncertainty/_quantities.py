@@ -181,7 +181,8 @@ def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) ->
     """Give base amplitude and largest Responses of a sweep, with where they are."""
     found = analysis.response
     top = int(np.argmax(found.response_ii))
-    collides = analysis.collisions.is_colliding
+    # What no noise of a sensor explains may be chaos, of which one sweep shows one draw.
+    collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
     stated = stated_of(analysis.facts.bench)
     value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
     scatter = _UNTOLD if collides[top] else scattered(Cause.NOISE, sd_m, value_m, "parts of the window")
