@@ -100,4 +100,12 @@ def test_a_dwell_of_hours_a_period_promises_nothing():
 
 
 def test_a_motion_that_cannot_be_computed_has_no_scatter():
-    assert _simulated_scatter(gong2025(), 1e99, 260.0) is None
+    assert _simulated_scatter(gong2025(), 1e99, 260.0, 5.0) is None
+
+
+@pytest.mark.parametrize(("duration_s", "window_s"), [(2.0, 2.0), (30.0, 5.0)])
+def test_a_dwell_is_looked_at_over_its_window_or_all_of_it(duration_s, window_s):
+    """Of four seconds it said "after 5 s as planned"."""
+    dwell = Dwell(amplitude_vpp=0.05, frequency_hz=130.0, settle_s=1.0, duration_s=duration_s)
+    found = expected_uncertainty(Measurement(name="dwell", excitation=dwell), RIG)
+    assert {each.time_s for each in found} == {window_s}
