@@ -3,8 +3,7 @@
 from functools import cached_property
 
 import numpy as np
-from scipy.signal import ShortTimeFFT
-from scipy.signal.windows import hann
+import scipy
 
 from ..signals import Complexes, Reals
 
@@ -29,7 +28,7 @@ class PlayedVoltage:
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
         self._volts, self._own_v = volts, converter_rms_v
         frame = min(_FRAME_SAMPLES, max(4, volts.size // 2))
-        self._frames = ShortTimeFFT(hann(frame, sym=False), frame // 2, 1.0)
+        self._frames = scipy.signal.ShortTimeFFT(scipy.signal.windows.hann(frame, sym=False), frame // 2, 1.0)
 
     @cached_property
     def _likely(self) -> tuple[Complexes, Reals]:

@@ -95,7 +95,13 @@ def seen_from_outside(cell: Specimen, omega: NDArray[np.float64]) -> SeenFromOut
 def band_frequencies_hz(unit: Chain, wave_number: ArrayLike) -> NDArray[np.float64]:
     """Frequencies at which a wave of phase ``wave_number`` from unit to unit travels without damping [Hz].
 
-    Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,), finite (else ValueError).
+    Shape (n, 3 cells), ascending; ``wave_number`` in radians per unit, shape (n,).
+
+    Raises
+    ------
+    ValueError
+        When a wave number is not finite.
+
     """
     phase = np.atleast_1d(np.asarray(wave_number, dtype=np.float64))
     if not np.all(np.isfinite(phase)):
