@@ -22,7 +22,7 @@ from ._channel_noise import ChannelNoise, channel_noise
 from ._driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
 from ._ensemble import FEWEST_DRAWS, Quantity, ensemble_curves
 from ._escape import Ending
-from ._played_voltage import PlayedVoltage
+from ._played_voltage import PlayedVoltage, above_noise
 from ._shaker_fit import FittedShaker
 from ._simulated_channels import (
     HIGHEST_PART,
@@ -44,8 +44,6 @@ _LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
 """Simulated before a stretch, raised from nothing within it, and lowered to nothing behind [s]."""
 _NOISE = 0.15
 """How far, as a logarithm, a channel's noise may be from what its quietest stretch shows."""
-_SURELY = 20.0
-"""Power of a line over that of noise, which exceeds it once in 5e8 lines."""
 _MORE = 3
 _SEED = 17
 _MOST_BYTES = 2e9
@@ -315,12 +313,5 @@ def stretch_draws(
         fade = min(volts.size, round(fade_s * rate))
         end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
     noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
-    played = _above_noise(volts, noise.rms[rig.role])
+    played = above_noise(volts, noise.rms[rig.role])
     return StretchDraws(recording, rig, fitted, noise, played, first, slice(start - first, stop - first))
-
-
-def _above_noise(volts: Reals, rms: float) -> Reals:
-    """Give what surely is voltage and no noise of its channel, which would shake a simulated table."""
-    spectrum = np.fft.rfft(volts)
-    spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * rms**2] = 0.0
-    return np.asarray(np.fft.irfft(spectrum, volts.size))

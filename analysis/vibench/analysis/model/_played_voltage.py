@@ -54,3 +54,10 @@ class PlayedVoltage:
         lines, share = self._likely
         own = self._frames.stft(self._own_v * rng.standard_normal(self._volts.size))
         return np.asarray(self._frames.istft(lines + np.sqrt(share) * own, k1=self._volts.size).real)
+
+
+def above_noise(volts: Reals, rms: float) -> Reals:
+    """Give what surely is voltage and no noise of its channel, which would shake a simulated table."""
+    spectrum = np.fft.rfft(volts)
+    spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * rms**2] = 0.0
+    return np.asarray(np.fft.irfft(spectrum, volts.size))
