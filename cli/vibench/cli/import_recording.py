@@ -45,9 +45,9 @@ def _import(file: Path, mapping: Path | None, out: Path | None, *, as_json: bool
         _tell(file, as_json)
         return
     meaning = load_toml(mapping, ImportMapping)
-    target = file_at(out, file.with_suffix(".h5"))
     with opened_source(file) as source:
         longest = max(each.samples for each in source.channels)
+    target = file_at(out, file.with_suffix(".h5"))
     with transfer_bar("import", longest * len(meaning.channels)) as observer:
         made = import_recording(file, meaning, target, observer)
     if as_json:
