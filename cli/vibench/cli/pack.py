@@ -29,12 +29,19 @@ def pack(
     ] = None,
     title: Annotated[str, typer.Option("--title", help="The folder's name if absent.")] = "",
     description: Annotated[str, typer.Option("--description", help="A sentence or two.")] = "",
+    organisation: Annotated[
+        str, typer.Option("--organisation", metavar="NAME", help="Publishes it; the authors belong to it.")
+    ] = "",
+    organisation_url: Annotated[
+        str,
+        typer.Option("--organisation-url", metavar="URL", help="Of its home page, or https://ror.org/..."),
+    ] = "",
 ) -> None:
     """Pack a folder of recordings as a Research Object Crate, described for a repository."""
     here = folder.resolve()
     # Not with_suffix: a folder may be called after a level, "0.5Vpp".
     crate = file_at(out, here.parent / f"{here.name}.zip")
-    facts = CrateFacts(licence, tuple(author or ()), title, description)
+    facts = CrateFacts(licence, tuple(author or ()), title, description, organisation, organisation_url)
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     found = verify_recordings(folder, key=seal_key())
     untrusted = {

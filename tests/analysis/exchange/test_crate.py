@@ -30,16 +30,23 @@ def crate(folder, tmp_path):
     return tmp_path / "crate.zip"
 
 
-def test_every_byte_is_packed_and_described(folder, crate):
+def described(crate):
+    """Give the entities of a crate by their names."""
     with ZipFile(crate) as archive:
-        graph = {each["@id"]: each for each in json.loads(archive.read("ro-crate-metadata.json"))["@graph"]}
+        graph = json.loads(archive.read("ro-crate-metadata.json"))["@graph"]
+    return {each["@id"]: each for each in graph}
+
+
+def test_every_byte_is_packed_and_described(folder, crate):
+    graph = described(crate)
+    with ZipFile(crate) as archive:
         for name in ("known.h5", "report/table.csv", "broken.h5"):
             assert archive.read(name) == (folder / name).read_bytes()
             assert graph[name]["sha256"] == hashlib.sha256((folder / name).read_bytes()).hexdigest()
         assert "unfinished.h5.part" not in archive.namelist()
     assert "m0_velocity [m s-1]" in graph["known.h5"]["description"]
     assert graph["broken.h5"]["description"].startswith("Cannot be read as a recording")
-    assert graph["./"]["author"] == [{"@id": "#author-1"}]
+    assert graph["./"]["author"] == {"@id": "#author-1"}
     assert not (folder / "ro-crate-metadata.json").exists()
 
 
@@ -63,6 +70,29 @@ def test_what_cannot_be_deposited_is_refused(folder, tmp_path):
     with pytest.raises(NotEnoughData, match="no recording"):
         pack_folder(folder / "report", tmp_path / "x.zip", CrateFacts(LICENCE), {})
     assert not (tmp_path / "x.zip").exists()
+
+
+@pytest.mark.parametrize(
+    ("address", "name"),
+    [
+        (LICENCE, "CC BY 4.0"),
+        ("http://creativecommons.org/licenses/by-nc-sa/3.0", "CC BY-NC-SA 3.0"),
+        ("https://creativecommons.org/publicdomain/zero/1.0/", "CC0 1.0"),
+        ("https://spdx.org/licenses/BSD-3-Clause", "BSD-3-Clause"),
+        ("https://example.org", "example.org"),
+    ],
+)
+def test_a_licence_is_named_as_people_name_it(folder, tmp_path, address, name):
+    pack_folder(folder, tmp_path / "crate.zip", CrateFacts(address), {})
+    assert described(tmp_path / "crate.zip")[address]["name"] == name
+
+
+def test_the_organisation_publishes_and_every_author_belongs_to_it(folder, tmp_path):
+    pack_folder(folder, tmp_path / "crate.zip", CrateFacts(LICENCE, ("A", "B"), organisation="Institute"), {})
+    graph = described(tmp_path / "crate.zip")
+    assert graph["./"]["publisher"] == {"@id": "#organisation"}
+    assert graph["#organisation"] == {"@id": "#organisation", "@type": "Organization", "name": "Institute"}
+    assert [graph[f"#author-{number}"]["affiliation"]["@id"] for number in (1, 2)] == ["#organisation"] * 2
 
 
 def test_a_reader_of_crates_finds_every_file(crate, tmp_path):

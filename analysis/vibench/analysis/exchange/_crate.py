@@ -37,6 +37,9 @@ class CrateFacts:
     title: str = ""
     """The folder's name if empty."""
     description: str = ""
+    organisation: str = ""
+    """Who publishes it, and what the authors belong to."""
+    organisation_url: str = ""
 
 
 def pack_folder(
@@ -55,7 +58,7 @@ def pack_folder(
     crate
         The new zip; nothing is overwritten.
     facts
-        Licence, authors, title.
+        Licence, authors and their organisation, title.
     untrusted
         Why a recording cannot be trusted, by its path below the folder: what `vibench.acquisition.campaign`'s
         ``verify_recordings`` calls bad, recordings that are missing among them. They are packed as they are,
@@ -107,10 +110,11 @@ def _belongs(path: Path) -> bool:
 def _about(
     folder: Path, facts: CrateFacts, untrusted: Mapping[str, str], entities: Sequence[Entity]
 ) -> Iterator[Entity]:
-    """Describe the description, the crate, its licence, its authors, and the software."""
+    """Describe the description, the crate, its licence, its authors and their organisation."""
     described = facts.description or "Recordings of vibro-impact shaker tests, made with vibench"
     warned = (f"{name} cannot be trusted ({why})" for name, why in untrusted.items())
     people = [{"@id": f"#author-{number}"} for number, _ in enumerate(facts.authors, 1)]
+    publisher = {"@id": "#organisation"} if facts.organisation else None
     yield {
         "@id": METADATA,
         "@type": "CreativeWork",
@@ -124,17 +128,37 @@ def _about(
         "description": "; ".join((described, *warned)),
         "datePublished": datetime.now(UTC).date().isoformat(),
         "license": {"@id": facts.licence},
-        **({"author": people} if people else {}),
-        "hasPart": [{"@id": each["@id"]} for each in entities],
+        **({"author": _unpacked(people)} if people else {}),
+        **({"publisher": publisher} if publisher else {}),
+        "hasPart": _unpacked([{"@id": each["@id"]} for each in entities]),
     }
     yield {
         "@id": facts.licence,
         "@type": "CreativeWork",
-        "name": facts.licence.rstrip("/").rpartition("licenses/")[2],
+        "name": _licence_name(facts.licence),
         "description": "The licence of this dataset",
     }
     for person, name in zip(people, facts.authors, strict=True):
-        yield {**person, "@type": "Person", "name": name}
+        yield {
+            **person, "@type": "Person", "name": name,
+            **({"affiliation": publisher} if publisher else {}),
+        }  # fmt: skip
+    if publisher:
+        url = {"url": facts.organisation_url} if facts.organisation_url else {}
+        yield {**publisher, "@type": "Organization", "name": facts.organisation, **url}
+
+
+def _unpacked(entities: list[Entity]) -> list[Entity] | Entity:
+    """Give one alone as itself: RO-Crate 1.1 recommends it (appendix on JSON-LD, compacted form)."""
+    return entities[0] if len(entities) == 1 else entities
+
+
+def _licence_name(address: str) -> str:
+    """Give "CC BY 4.0" for Creative Commons' addresses, and the end of any other."""
+    *_, last_but_one, last = ("", *address.rstrip("/").split("/"))
+    if "creativecommons.org/publicdomain/zero/" in address:
+        return f"CC0 {last}"
+    return f"CC {last_but_one.upper()} {last}" if "creativecommons.org/licenses/" in address else last
 
 
 def _file_entity(path: Path, folder: Path, untrusted: Mapping[str, str]) -> Entity:
