@@ -152,12 +152,28 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
         assert promise in done.stdout
 
 
-def test_the_contract_says_which_option_is_missing():
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ((), "--instrument NAME is missing: the name of an entry point, such as afg1022x"),
+        (("--instrument=unknown",), "'unknown' is no installed instrument; install its package first"),
+        (("--instrument=afg1022x", "--bench=nowhere.toml"), "nowhere.toml: cannot be read"),
+        (("--instrument=file",), "no shipped virtual bench names 'file' as one of vibench.generators"),
+        (("--instrument=plain_python", "--bench=BENCH"), "'plain_python' is no installed instrument"),
+        (("--instrument=file", "--bench=BENCH"), "virtual_rig.toml does not name 'file' as one of"),
+    ],
+)
+def test_the_contract_says_once_what_is_wrong_with_its_command(tmp_path, options, sentence):
+    bench = CONFIGS / "virtual_rig.toml"
     done = run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),
-        *("--pyargs", "vibench.acquisition.contract.test_sensor"),
+        *("--pyargs", "vibench.acquisition.contract", "--rootdir", tmp_path),
+        *(each.replace("BENCH", str(bench)) for each in options),
+        folder=tmp_path,
     )
-    assert "--instrument NAME is missing" in done.stdout
+    assert done.returncode == pytest.ExitCode.USAGE_ERROR, done.stdout + done.stderr
+    assert (done.stdout + done.stderr).count(sentence) == 1
+    assert "no tests ran" in done.stdout
 
 
 OUR_INSTRUMENTS = sorted({row.name for row in OURS} - {"file", "none", "soundcard"})

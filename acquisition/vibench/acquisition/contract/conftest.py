@@ -16,6 +16,7 @@ from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor
 LEVEL = 0.02
 """Of the bench's amplitude limit: what is played."""
 SETTLING_S = 0.3
+_RIGS = pytest.StashKey[dict[PlugInKind, Rig | None]]()
 
 
 def named_in(rig: Rig) -> dict[PlugInKind, set[str]]:
@@ -38,24 +39,44 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
     return next((rig for rig in rigs if rig.virtual is not None and name in named_in(rig)[kind]), None)
 
 
-@pytest.fixture(scope="module")
-def rig(request: pytest.FixtureRequest) -> Rig:
-    """Give the bench's configuration; the module under way says of which kind its instrument is."""
-    name, given = request.config.getoption("--instrument"), request.config.getoption("--bench")
-    kind: PlugInKind = request.module.KIND
+def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
+    """Give a bench for each kind of plug-in that bears the name, or refuse what no test could use."""
     if name is None:
         raise pytest.UsageError("--instrument NAME is missing: the name of an entry point, such as afg1022x")
     kinds = [each for each in PlugInKind if name in plug_in_names(each)]
     if not kinds:
         raise pytest.UsageError(f"{name!r} is no installed instrument; install its package first")
-    if kind not in kinds:
+    try:
+        found = {kind: chosen_rig(name, given, kind) for kind in kinds}
+    except ConfigurationError as error:
+        raise pytest.UsageError(str(error)) from None
+    if not any(found.values()):
+        raise pytest.UsageError(unnamed(name, given, kinds))
+    return found
+
+
+def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
+    """Say that no bench names the instrument."""
+    who = "no shipped virtual bench names" if given is None else f"{given} does not name"
+    kinds_in_words = " or ".join(each.value for each in kinds)
+    return f"{who} {name!r} as one of {kinds_in_words}; give a hardware configuration that does with --bench"
+
+
+def pytest_collection_modifyitems(config: pytest.Config) -> None:
+    """Say once, and before the first test, what is wrong with the command."""
+    config.stash[_RIGS] = chosen_rigs(config.getoption("--instrument"), config.getoption("--bench"))
+
+
+@pytest.fixture(scope="module")
+def rig(request: pytest.FixtureRequest) -> Rig:
+    """Give the bench's configuration; the module under way says of which kind its instrument is."""
+    name, kind = request.config.getoption("--instrument"), request.module.KIND
+    rigs = request.config.stash[_RIGS]
+    if kind not in rigs:
         pytest.skip(f"{name} is none of {kind.value}")
-    found = chosen_rig(name, given, kind)
+    found = rigs[kind]
     if found is None:
-        raise ConfigurationError(
-            f"{given or 'no shipped virtual bench'} names {name!r} as one of {kind.value}; give a hardware "
-            "configuration that does with --bench"
-        )
+        raise ConfigurationError(unnamed(name, request.config.getoption("--bench"), [kind]))
     return found
 
 
