@@ -81,6 +81,30 @@ def test_a_bench_that_is_being_closed_takes_nothing_on(shipped_rig):
     jobs.run()
 
 
+def test_whoever_sees_a_bench_closed_may_open_it_at_once(shipped_rig):
+    """The closing thread shows the state a moment before it is done, and opening was refused in between."""
+    engine = Engine(Supervision.UNATTENDED)
+    jobs = JobQueue(engine)
+    handler = RequestHandler(engine, jobs)
+    engine.open(shipped_rig)
+    shown = engine.published.enter
+
+    def seen(state):
+        shown(state)
+        if state is EngineState.CLOSED:
+            engine.published.enter = shown
+            try:
+                handler.carry_out(VERBS["open"], {"rig": shipped_rig})
+            finally:
+                jobs.leave()
+
+    engine.published.enter = seen
+    handler.carry_out(VERBS["close"], {})
+    jobs.run()
+    told = [each.what for each in engine.published.status().messages]
+    assert told.count(f"{shipped_rig.name} is open") == 2
+
+
 def looked_after_until(handler, is_over):
     """Let an engine's round go by again and again, as its server does; nobody attends it."""
     give_up_s = monotonic() + PATIENCE_S

@@ -131,7 +131,7 @@ class RequestHandler:
         self._asking = Lock()
         self._request: CampaignRequest | None = None
         self._carried: CampaignRequest | None = None
-        self._is_orphan = self._is_closing = False
+        self._is_orphan = self._is_closing = self._is_ending = False
         self._armed_s = 0.0
         self._stops = 0
         self._last_request_s = self._last_round_s = monotonic()
@@ -145,7 +145,8 @@ class RequestHandler:
             return method(**arguments)
         with self._asking:
             state = self._engine.published.state
-            if self._is_closing:
+            # Whoever has seen that the bench is closed may open it, though its closing has not returned yet.
+            if self._is_ending or (self._is_closing and state is not EngineState.CLOSED):
                 raise EngineError(
                     f"the bench is being closed, and the engine cannot {verb.word} meanwhile; "
                     "ask again when it is closed"
@@ -279,7 +280,7 @@ class RequestHandler:
     def shutdown(self, cause: Cause = Cause.OPERATOR, reason: str = "the engine was told to end") -> None:
         """End what runs, silence everything, and let the engine end. Legal in every state."""
         self._stop(StopRequest.by(cause, reason))
-        self._is_closing = True
+        self._is_ending = True
         self._jobs.leave()
 
     def enforce_deadlines(self) -> None:
