@@ -6,11 +6,11 @@ import pytest
 
 from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
-from vibench.acquisition.rig import load_rig
+from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files, budgets_of, expected_uncertainty
 from vibench.analysis.uncertainty import Cause
-from vibench.analysis.uncertainty._expected import _simulated_scatter
-from vibench.sim import gong2025
+from vibench.sim import shipped_specimens
+from vibench.sim.shaker import LoadedShaker, MotionFailed
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 NOISE = MultisineNoise(
@@ -65,22 +65,22 @@ def test_noise_that_collides_promises_nothing():
         assert "may collide" in each.sentence
 
 
-def test_a_chaotic_dwell_is_told_to_be_chance_and_a_quiet_one_noise():
-    def dwell(level_vpp):
-        excitation = Dwell(amplitude_vpp=level_vpp, frequency_hz=260, settle_s=2, duration_s=8)
-        return expected_uncertainty(Measurement(name="dwell", excitation=excitation), RIG)
+def dwell(at_hz, level_vpp):
+    excitation = Dwell(amplitude_vpp=level_vpp, frequency_hz=at_hz, settle_s=2, duration_s=8)
+    return Measurement(name="dwell", excitation=excitation)
 
-    first, second = dwell(1.5)
+
+def test_a_chaotic_dwell_is_told_to_be_chance_and_a_quiet_one_noise():
+    first, second = expected_uncertainty(dwell(260, 1.5), RIG)
     assert first.cause is second.cause is Cause.CHANCE
     assert first.after(5.0) == first.after(500.0) > 0.01
     assert 0.01 < second.after(5.0) < 0.2
-    assert {each.cause for each in dwell(0.05)} == {Cause.NOISE}
+    assert {each.cause for each in expected_uncertainty(dwell(260, 0.05), RIG)} == {Cause.NOISE}
 
 
 def test_response_i_of_a_quiet_dwell_is_not_promised_from_the_sensors_noise_alone():
     """A recording of it has 0.7 % where the sensors' noise, averaged over the window, makes 0.002 %."""
-    excitation = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=2, duration_s=8)
-    first, second = expected_uncertainty(Measurement(name="dwell", excitation=excitation), RIG)
+    first, second = expected_uncertainty(dwell(260, 0.05), RIG)
     assert first.after(5.0) is None
     assert "Response I: not known beforehand, for noise in the motion lifts" in first.sentence
     assert 1e-6 < second.after(5.0) < 1e-3
@@ -99,8 +99,46 @@ def test_a_dwell_of_hours_a_period_promises_nothing():
     assert expected_uncertainty(Measurement(name="slow", excitation=slow), RIG) == ()
 
 
-def test_a_motion_that_cannot_be_computed_has_no_scatter():
-    assert _simulated_scatter(gong2025(), 1e99, 260.0, 5.0) is None
+def test_a_motion_that_cannot_be_computed_promises_nothing(monkeypatch):
+    def lost(*_, **__):
+        raise MotionFailed("it is not finite")
+
+    monkeypatch.setattr(LoadedShaker, "move", lost)
+    assert expected_uncertainty(dwell(260.0, 1.5), RIG) == ()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("at_hz", "level_vpp"), [(260.0, 1.5), (160.0, 2.0), (300.0, 5.0)])
+def test_a_dwell_that_collides_is_known_as_well_as_was_said_before(tmp_path, at_hz, level_vpp):
+    """A base that does not yield told it up to 3.4 times too well, and twelve times too ill."""
+    plan = dwell(at_hz, level_vpp)
+    said = {each.quantity: each.after(each.time_s) for each in expected_uncertainty(plan, RIG)}
+    with open_bench(RIG) as bench:
+        run_measurement(bench, plan, tmp_path / "dwell.h5")
+    (result,) = analyse_files([tmp_path / "dwell.h5"], "dwell", Simulation.LEFT_OUT).results
+    told = {each.quantity: each.expanded / each.value for each in budgets_of(result)}
+    for name in ("Response I", "Response II"):
+        # Tenths of a window tell a scatter within a third; the rest is another draw of chaos.
+        assert 0.3 < said[name] / told[name] < 4.0, name
+
+
+def test_where_the_beginning_decides_the_motion_nothing_is_promised():
+    """Begun gently m1 stays between the stops; thrown against them it stays at them."""
+    first, second = expected_uncertainty(dwell(430, 2.0), RIG)
+    for each in (first, second):
+        assert each.after(each.time_s) is None
+        assert "this drive has several motions" in each.sentence
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", shipped_specimens())
+def test_a_dwell_of_every_shipped_specimen_is_told_or_not_promised(name):
+    """Stops on one side, rigid ones and none at all included."""
+    document = RIG.model_dump(mode="json")
+    limit_m = document["specimen"]["amplitude_limit_m"]
+    document["specimen"] = {"model": name, "amplitude_limit_m": limit_m}
+    found = expected_uncertainty(dwell(180, 3.0), Rig.model_validate(document))
+    assert {each.quantity for each in found} == {"Response I", "Response II"}
 
 
 @pytest.mark.parametrize(("duration_s", "window_s"), [(2.0, 2.0), (30.0, 5.0)])

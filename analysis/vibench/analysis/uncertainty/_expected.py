@@ -15,19 +15,15 @@ from vibench.acquisition.plan import (
     preview_measurement,
 )
 from vibench.acquisition.rig import BaseQuantity, Rig, RigModel
-from vibench.sim import Harmonic, Outcome, Specimen, base_transmissibility, integrate
+from vibench.sim import Specimen, base_transmissibility
 
 from ..model import RESPONSE_I, RESPONSE_II
 from ..signals import Reals
 from ._budget import COVERAGE, Cause, Contribution
-from ._quantities import sd_of_largest
+from ._simulated_dwell import STEADY, simulated_dwell
 from ._stated import Stated, stated_of
 
-_SETTLED_S, _WINDOW_S = 2.5, 5.0
-_RATE_PER_HZ = 64
-_PARTS, _TENTHS = 50, 10
-_STEADY = 1e-4
-"""Scatter over size below which a simulated motion repeats."""
+_WINDOW_S, _TENTHS = 5.0, 10
 _GRID_HZ = 0.25
 _HIGHEST_TURN = 4.0
 """Largest value of Gaussian noise over its rms, within some ten thousand turns."""
@@ -70,12 +66,7 @@ class Expected:
     @property
     def _how(self) -> str:
         if self.scatter is None:
-            heard = "noise in the motion lifts the largest value, and only a recording tells it"
-            return {
-                Cause.NOISE: "not known beforehand, for "
-                + (heard if self.quantity == RESPONSE_I else "the sensors' noise is not stated"),
-                Cause.CHANCE: "not known beforehand, for the masses may collide under this noise",
-            }[self.cause]
+            return f"not known beforehand, for {self._hindrance}"
         if self.scatter == 0.0:
             return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, whatever the time; k = 2)"
         told = ", ".join(
@@ -84,6 +75,18 @@ class Expected:
             if half
         )
         return f"± {told} ({self.cause.value}; k = 2)"
+
+    @property
+    def _hindrance(self) -> str:
+        match self.cause, self.quantity:
+            case Cause.NOISE, name if name == RESPONSE_I:
+                return "noise in the motion lifts the largest value, and only a recording tells it"
+            case Cause.NOISE, _:
+                return "the sensors' noise is not stated"
+            case Cause.CHANCE, name if name in {RESPONSE_I, RESPONSE_II}:
+                return "this drive has several motions, and how it is begun decides which one is measured"
+            case _:
+                return "the masses may collide under this noise"
 
     def to_dict(self) -> dict[str, object]:
         """Plain values for JSON."""
@@ -101,9 +104,9 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
     """Say how well a plan will tell what it is made for; opens no instrument.
 
     Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
-    Responses over their window, 5 s or all that is recorded if that is less, whose chance in chaos is taken
-    from a simulated run under a base that does not yield. Scatter falls with the root of the time. Other
-    kinds of plan give nothing.
+    Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
+    runs of the described rig under its voltage, analysed like a recording; where these settle on different
+    motions nothing is told. Scatter falls with the root of the time. Other kinds of plan give nothing.
 
     Parameters
     ----------
@@ -207,7 +210,7 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
         return
     specimen = rig.specimen.specimen()
     amplitude_m = float(base_motion(measurement.excitation, rig, np.array([at_hz])).amplitude_m[0])
-    chance = _simulated_scatter(specimen, amplitude_m, at_hz, window_s)
+    chance = simulated_dwell(measurement, rig, at_hz, window_s)
     if chance is None:
         return
     noise = _densities(rig)
@@ -219,36 +222,15 @@ def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -
         by_noise = float(np.sqrt(shares / window_s))
     lasting = float(np.hypot(stated.scale_sd, stated.clock.relative or 0.0))
     missing = _missing(stated.response, stated.base, stated.timed(1))
-    for name, scatter in zip((RESPONSE_I, RESPONSE_II), chance, strict=True):
-        if scatter > _STEADY and name == RESPONSE_I:
+    for name, scatter in ((RESPONSE_I, chance.sd_largest), (RESPONSE_II, chance.sd_second)):
+        if chance.has_several_motions:
+            yield Expected(name, window_s, None, Cause.CHANCE, lasting, missing)
+        elif scatter > STEADY and name == RESPONSE_I:
             # The largest of a window of its own: no time makes it another's.
             yield Expected(name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing)
-        elif scatter > _STEADY:
+        elif scatter > STEADY:
             yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)
         else:
             # What generator and amplifier hiss moves the masses, and no rig states it.
             told = None if name == RESPONSE_I else by_noise
             yield Expected(name, window_s, told, Cause.NOISE, lasting, missing)
-
-
-def _simulated_scatter(
-    specimen: Specimen, amplitude_m: float, at_hz: float, window_s: float
-) -> tuple[float, float] | None:
-    """Relative scatter of both Responses over windows, from one simulated run; None if it was lost."""
-    rate = _RATE_PER_HZ * at_hz
-    path = integrate(
-        specimen,
-        Harmonic(frequency_hz=at_hz, amplitude_m=amplitude_m),
-        _SETTLED_S + window_s,
-        sample_rate_hz=rate,
-    )
-    if path.outcome is not Outcome.REACHED_END:
-        return None
-    kept = round(window_s * rate)
-    x: Reals = np.asarray(path.states[-kept:, 0], dtype=np.float64)
-    turn = np.exp(-2j * np.pi * at_hz * np.arange(kept) / rate)
-    tenth = kept // _TENTHS // _RATE_PER_HZ * _RATE_PER_HZ
-    lines = (x * turn)[: _TENTHS * tenth].reshape(_TENTHS, -1).mean(axis=1)
-    second = float(np.std(lines, ddof=1) / np.sqrt(2 * _TENTHS) / np.abs(lines.mean()))
-    largest = np.max(np.abs(x[: kept // _PARTS * _PARTS].reshape(_PARTS, -1)), axis=1)
-    return float(sd_of_largest(largest) / largest.max()), second

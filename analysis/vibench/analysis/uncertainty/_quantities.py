@@ -13,6 +13,7 @@ from ..recordings import RecordingFacts
 from ..signals import Flags, Reals
 from ..sine import (
     DwellAnalysis,
+    DwellResponse,
     SteppedResponse,
     SteppedSineAnalysis,
     SweepAnalysis,
@@ -139,17 +140,19 @@ def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
 def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
     """Scatter of the largest |x| over equal windows: that of the draws, else of the window's parts."""
     drawn = _drawn(laid, RESPONSE_I, 0)
-    if drawn is not None:
-        return (drawn,)
-    found = analysis.response
+    return (of_one_draw(analysis.response) if drawn is None else drawn,)
+
+
+def of_one_draw(found: DwellResponse) -> Contribution:
+    """Scatter of the largest |x| of a window, as its parts tell it."""
     motion = found.displacement.settled
     window = motion[-round(found.window_s * found.displacement.sample_rate_hz) :]
     blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
     if blocks < _FEWEST_BLOCKS:
-        return (Contribution(Cause.CHANCE, None, "the window is too short to tell"),)
+        return Contribution(Cause.CHANCE, None, "the window is too short to tell")
     largest = np.max(np.abs(window[: window.size // blocks * blocks].reshape(blocks, -1)), axis=1)
     source = f"largest |x| of {blocks} parts of the window"
-    return (scattered(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source),)
+    return scattered(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source)
 
 
 def sd_of_largest(maxima: Reals) -> float:
