@@ -2,10 +2,11 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
+from vibench.acquisition.plan import Dwell, HeldDwell, Measurement, MultisineNoise, SineSweep, base_motion
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files, budgets_of, expected_uncertainty
 from vibench.analysis.uncertainty import Cause
@@ -120,6 +121,19 @@ def test_a_dwell_that_collides_is_known_as_well_as_was_said_before(tmp_path, at_
     for name in ("Response I", "Response II"):
         # Tenths of a window tell a scatter within a third; the rest is another draw of chaos.
         assert 0.3 < said[name] / told[name] < 4.0, name
+
+
+def test_a_dwell_whose_base_is_held_is_told_at_the_voltage_that_holds_it():
+    """The same base by a setting and by feedback: the same promise."""
+    by_setting = expected_uncertainty(dwell(260, 0.05), RIG)
+    base_m = base_motion(dwell(260, 0.05).excitation, RIG, np.array([260.0])).amplitude_m
+    level = {"acceleration_m_per_s2": float((2 * np.pi * 260) ** 2 * base_m[0])}
+    held = HeldDwell(amplitude_vpp=4, frequency_hz=260, duration_s=8, base_level=level)
+    for first, second in zip(
+        by_setting, expected_uncertainty(Measurement(name="held", excitation=held), RIG), strict=True
+    ):
+        assert first.cause is second.cause is Cause.NOISE
+        assert first.scatter is second.scatter is None or first.scatter == pytest.approx(second.scatter)
 
 
 def test_where_the_beginning_decides_the_motion_nothing_is_promised():

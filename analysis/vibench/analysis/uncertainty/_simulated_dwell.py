@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vibench.acquisition.excitation import HeldAcceleration
-from vibench.acquisition.plan import Measurement
+from vibench.acquisition.plan import HeldDwell, Measurement, base_motion
 from vibench.acquisition.rig import Rig, RigModel, amplifier_of, shaker_of, specimen_of
 from vibench.sim.shaker import LoadedShaker, MotionFailed
 
@@ -88,8 +87,8 @@ def _scatter(found: DwellResponse) -> tuple[float, float]:
 
 def _terminal_v(measurement: Measurement, rig: Rig, at_hz: float) -> float:
     """Peak at the terminal: as set, or as feedback will set it for the level that it holds."""
-    match measurement.excitation.level_at(at_hz):
-        case HeldAcceleration(acceleration):
-            return float(RigModel(rig).volts_for([acceleration], at_hz)[0])
-        case _:
-            return 0.5 * measurement.excitation.amplitude_vpp * rig.generator.terminal_factor()
+    excitation = measurement.excitation
+    if not isinstance(excitation, HeldDwell):
+        return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
+    held_m = base_motion(excitation, rig, np.array([at_hz])).amplitude_m
+    return float(RigModel(rig).volts_for((2 * np.pi * at_hz) ** 2 * held_m, at_hz)[0])
