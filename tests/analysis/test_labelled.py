@@ -165,7 +165,7 @@ def wholes():
 _PURE = """
 averages block_points blocks cells coherence coherence_significance collides confidence covariance
 damping_ratio damping_ratios differs dimension dimension_high dimension_low distortion distortion_share
-down draws edge_samples ends error_estimate events exponent first first_sample half_width holdable
+down draws dropouts edge_samples ends error_estimate events exponent first first_sample half_width holdable
 impact_cell impacts index innovation_level is_colliding is_unexplained is_significant is_similar is_stable
 largest_multiplier left_out left_over level limit linear lines lines_used logarithm lost_samples
 multiplier multiplier_imaginary multiplier_real multiplier_u n_eff neighbour_correlation noise_bias_i

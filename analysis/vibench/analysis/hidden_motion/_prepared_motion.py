@@ -9,7 +9,7 @@ import numpy as np
 from vibench.acquisition.recording import Recording
 
 from ..errors import NotEnoughData, UnusableData
-from ..recordings import BASE, RESPONSE
+from ..recordings import BASE, RESPONSE, BridgedChannel
 from ..signals import Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 
@@ -96,11 +96,13 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
     correction = sensor_correction(
         recording.bench, recording.channel(BASE), recording.channel(RESPONSE), rate
     )
+    response = BridgedChannel(recording, RESPONSE)
     kept = np.empty((2, stop - start), dtype=np.float32)
     lost = 0
     for begin in range(start, stop, _PIECE):
         end = min(begin + _PIECE, stop)
-        raw = [recording.read(role, begin - HALF_LENGTH, end + HALF_LENGTH) for role in (BASE, RESPONSE)]
+        first, last = begin - HALF_LENGTH, end + HALF_LENGTH
+        raw = [recording.read(BASE, first, last), response.read(first, last)]
         lost += _lost(*raw)
         for row, values in zip(kept, correction.corrected(*raw), strict=True):
             row[begin - start : end - start] = values[HALF_LENGTH:-HALF_LENGTH]

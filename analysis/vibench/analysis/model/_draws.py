@@ -16,7 +16,7 @@ from vibench.sim import Accuracy, Specimen
 from vibench.sim.shaker import MotionFailed, SampledMotion, follow_voltage
 
 from ..errors import UnusableData
-from ..recordings import BASE, DRIVE, RESPONSE, RecordedChannels
+from ..recordings import BASE, DRIVE, RESPONSE, BridgedChannel, RecordedChannels
 from ..signals import Reals
 from ._channel_noise import ChannelNoise, channel_noise
 from ._driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
@@ -275,7 +275,8 @@ class StretchDraws:
     def measured(self) -> Reals:
         """Base acceleration and m0's velocity of the recording, over the same samples as a draw's."""
         start, stop = (self.first + each for each in (self.kept.start, self.kept.stop))
-        return np.stack([self.recording.read(role, start, stop) for role in (BASE, RESPONSE)])
+        velocity = BridgedChannel(self.recording, RESPONSE).read(start, stop)
+        return np.stack([self.recording.read(BASE, start, stop), velocity])
 
     @property
     def noise_rms(self) -> Reals:

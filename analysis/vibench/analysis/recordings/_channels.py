@@ -3,7 +3,7 @@
 Who is told how far an analysis is: a progress bar, or nobody.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -12,6 +12,7 @@ from vibench.acquisition.recording import Recording
 
 from ..errors import NotEnoughData, UnusableData
 from ..signals import Complexes, Flags, Reals
+from ._dropouts import BridgedChannel
 from ._sensor_gain import coupled_gain
 
 DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"
@@ -64,11 +65,13 @@ class Channels(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class RecordedChannels:
-    """The channels of a recording; lost samples read as NaN."""
+    """The channels of a recording; lost samples read as NaN, and the vibrometer's drop-outs are bridged."""
 
     recording: Recording
+    _response: BridgedChannel = field(init=False)
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "_response", BridgedChannel(self.recording, RESPONSE))
         missing = [role for role in (DRIVE, BASE, RESPONSE) if role not in self.recording.roles]
         if missing:
             raise UnusableData(
@@ -110,7 +113,8 @@ class RecordedChannels:
 
     def read(self, start: int, stop: int) -> Reals:
         """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
-        return np.stack([self.recording.read(role, start, stop) for role in (DRIVE, BASE, RESPONSE)])
+        drive, base = (self.recording.read(role, start, stop) for role in (DRIVE, BASE))
+        return np.stack([drive, base, self._response.read(start, stop)])
 
     def overloaded(self, start: int, stop: int) -> Flags:
         """Say at which samples one of the channels was near its full scale, shape (samples,)."""
@@ -118,6 +122,8 @@ class RecordedChannels:
         for each in self.recording.overloads:
             if each.channel in (DRIVE, BASE, RESPONSE):
                 marks[max(0, each.first_sample - start) : max(0, each.last_sample + 1 - start)] = True
+        for dropout in self._response.between(start, stop):
+            marks[max(0, dropout.first - start) : dropout.stop - start] = False
         return marks
 
 

@@ -39,6 +39,8 @@ class Check:
 
 _LEAST_SHARE_OF_RANGE = 1e-3
 """A channel below a thousandth of its range is recorded with little of the converter."""
+_OFTEN_DARK = 0.01
+"""Share of a recording without light beyond which its results deserve a second look."""
 _SAME_RATE = 1e-9
 _LEVEL_TOLERANCE = 0.05
 """Overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
@@ -67,6 +69,7 @@ def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
         _seal(facts),
         _stretches(facts),
         _overloads(facts),
+        *_dropouts(facts),
         _lost(facts),
         *_drive(facts),
         *_late(facts),
@@ -110,6 +113,17 @@ def _overloads(facts: RecordingFacts) -> Check:
     parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
     text = f"near full scale: {', '.join(parts)}; peaks may be cut, so Response I is a lower bound"
     return Check("Overloads", Verdict.WARNING, text)
+
+
+def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
+    if facts.dropouts:
+        times = "once" if facts.dropouts == 1 else f"{facts.dropouts} times"
+        text = (
+            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in all; m0's motion was "
+            "bridged there from both sides. Refocus the laser, or stick on reflective tape"
+        )
+        often = facts.dropout_s > _OFTEN_DARK * facts.duration_s
+        yield Check("Drop-outs", Verdict.WARNING if often else Verdict.NOTE, text)
 
 
 def _lost(facts: RecordingFacts) -> Check:

@@ -21,6 +21,8 @@ from vibench.sim import Specimen, SpecimenTable
 from ..errors import UnusableData
 from ..tables import named
 from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
+from ._channels import RESPONSE
+from ._dropouts import BridgedChannel, Dropout
 from ._intact import require_intact, require_measured_size
 
 
@@ -35,6 +37,9 @@ class RecordingFacts(RecordingDescription):
     channels: tuple[ChannelLevel, ...]
     overload_s: Mapping[str, float]
     """Time each channel spent near its full scale, by role; channels that never did are left out."""
+    dropouts: int
+    """Moments in which the vibrometer lost its light, bridged in every analysis."""
+    dropout_s: float
     lost_samples: int
     planned_stretches: int
     whole_stretches: int
@@ -70,7 +75,12 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     _require_bench(recording)
     rate = recording.sample_rate_hz
     overload_s: dict[str, float] = {}
+    dropouts = _dropouts(recording)
     for each in recording.overloads:
+        if each.channel == RESPONSE and any(
+            one.first <= each.first_sample and each.last_sample < one.stop for one in dropouts
+        ):
+            continue
         seconds = (each.last_sample - each.first_sample + 1) / rate
         overload_s[each.channel] = overload_s.get(each.channel, 0.0) + seconds
     steps = {id(step.segment): step.segment for step in measurement.excitation.steps()}
@@ -85,6 +95,8 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         measurement=measurement,
         channels=channel_levels(recording, on_read),
         overload_s=overload_s,
+        dropouts=len(dropouts),
+        dropout_s=sum(each.stop - each.first for each in dropouts) / rate,
         lost_samples=sum(each.last_sample - each.first_sample + 1 for each in recording.gaps),
         planned_stretches=len(steps),
         whole_stretches=sum(each.is_complete for each in played),
@@ -94,6 +106,12 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
         feedback=tuple(note for _, note in noted),
         feedback_s=tuple(time_s for time_s, _ in noted),
     )
+
+
+def _dropouts(recording: Recording) -> tuple[Dropout, ...]:
+    if RESPONSE not in recording.roles:
+        return ()
+    return BridgedChannel(recording, RESPONSE).between(0, recording.samples)
 
 
 def plan_of(recording: Recording) -> Measurement:

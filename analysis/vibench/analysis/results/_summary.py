@@ -75,7 +75,7 @@ def _facts(facts: RecordingFacts) -> Json:
         **named(facts, "duration_s", "sample_rate_hz", "requested_sample_rate_hz"),
         "excitation": facts.measurement.excitation.model_dump(mode="json"),
         "overload_s": dict(facts.overload_s),
-        "lost_samples": facts.lost_samples,
+        **named(facts, "dropouts", "dropout_s", "lost_samples"),
         "feedback": [
             {"kind": each.kind, "time_s": time_s, **each.numbers}
             for time_s, each in zip(facts.feedback_s, facts.feedback, strict=True)

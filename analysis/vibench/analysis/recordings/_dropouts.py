@@ -1,0 +1,209 @@
+"""Moments in which the vibrometer lost its light: found in the velocity, and bridged from both sides.
+
+Speckle leaves the laser without light for a fraction of a millisecond; the decoder then shows any velocity.
+It leaves the motion within a sample and comes back to it. No motion does: an impact changes the velocity and
+does not take that back, and what rings has many turns.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import lstsq, toeplitz
+
+from vibench.acquisition.recording import Recording
+
+from ..signals import Flags, Integers, Reals
+
+LONGEST_S = 4e-3
+"""What is longer is no drop-out that the motion on both sides tells anything of."""
+LOWEST_RATE_HZ = 20_000.0
+"""Below it an impact and its answer may lie within a few samples."""
+_FAR = 60.0
+"""How far the fourth difference lies from its usual size where light is lost."""
+_HEARD = 6.0
+"""How far it lies where the converter's filter still rings of it."""
+_SILENT = 6
+_JOINED_S = 1e-3
+_FLANK_S = 1e-3
+_OUTSTANDING = 8.0
+"""Largest distance from the bridge, over what the bridge's fit leaves of the flanks."""
+_ORDER = 48
+_CONTEXT = 12 * _ORDER
+"""Samples on each side that the linear prediction is taken from."""
+_TOGETHER = 4 * _CONTEXT
+"""Samples that are solved for at once."""
+_BLOCK_S = 1.0
+
+
+class Dropout(NamedTuple):
+    """Samples that show no motion, the converter's ringing about them included."""
+
+    first: int
+    stop: int
+    """One past the last."""
+
+
+def found_dropouts(velocity: Reals, sample_rate_hz: float) -> tuple[Dropout, ...]:
+    """Find what leaves the motion and comes back to it.
+
+    Parameters
+    ----------
+    velocity
+        A second of it or so, shape (samples,); lost samples are NaN.
+    sample_rate_hz
+        Of the samples; nothing is found below 20 kHz.
+
+    """
+    flank = round(_FLANK_S * sample_rate_hz)
+    if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
+        return ()
+    # Twice differenced, and differenced twice again: nothing of a motion is left but its sharpest corners.
+    sharp = np.zeros(velocity.size)
+    sharp[2:-2] = np.abs(np.diff(velocity, 4))
+    usual = float(np.nanmedian(sharp))
+    if usual == 0.0 or not np.any(sharp > _FAR * usual):
+        return ()
+    rings, far = sharp > _HEARD * usual, np.flatnonzero(sharp > _FAR * usual)
+    longest = LONGEST_S * sample_rate_hz
+
+    def believed(edges: Integers) -> Dropout | None:
+        first = int(edges[0]) - _ringing(rings[edges[0] :: -1], flank) - 2
+        stop = int(edges[-1]) + _ringing(rings[edges[-1] :], flank) + 3
+        is_whole = first >= flank and stop + flank <= velocity.size and stop - first <= longest
+        return Dropout(first, stop) if is_whole and _comes_back(velocity, first, stop, flank) else None
+
+    found: list[Dropout | None] = []
+    for edges in _apart(far, longest):
+        whole = believed(edges)
+        found += [whole] if whole else map(believed, _apart(edges, _JOINED_S * sample_rate_hz))
+    return tuple(each for each in found if each)
+
+
+def _apart(places: Integers, distance: float) -> list[Integers]:
+    """Split where neighbours are farther apart."""
+    return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
+
+
+def _ringing(rings: Flags, longest: int) -> int:
+    """For how many samples from here on the converter's filter is heard, `_SILENT` of them in a row not."""
+    heard = np.flatnonzero(rings[:longest])
+    breaks = np.flatnonzero(np.diff(heard) > _SILENT)
+    return int(heard[breaks[0]] if breaks.size else heard[-1])
+
+
+def _comes_back(velocity: Reals, first: int, stop: int, flank: int) -> bool:
+    """Whether one smooth motion passes through both flanks, and what lies between is far from it."""
+    first, stop = first - flank, stop + flank
+    at = np.linspace(-1.0, 1.0, stop - first)
+    outside = np.ones(at.size, dtype=np.bool_)
+    outside[flank:-flank] = False
+    near = velocity[first:stop]
+    if not np.all(np.isfinite(near)):
+        return False
+    shape = np.polynomial.legendre.legvander(at, 5)
+    left = near - shape @ lstsq(shape[outside], near[outside])[0]
+    return bool(np.max(np.abs(left[~outside])) > _OUTSTANDING * np.sqrt(np.mean(left[outside] ** 2)))
+
+
+def bridged(velocity: Reals, dropouts: tuple[Dropout, ...]) -> Reals:
+    """Replace drop-outs by what a linear prediction of the motion makes likeliest there.
+
+    Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330: the unknown samples with the smallest
+    prediction error, for a predictor from the samples about them.
+
+    Parameters
+    ----------
+    velocity
+        Shape (samples,); it is left as it is.
+    dropouts
+        As `found_dropouts` gives them.
+
+    """
+    mended, hidden = velocity.copy(), np.zeros(velocity.size, dtype=np.bool_)
+    for each in dropouts:
+        hidden[each.first : each.stop] = True
+    for first, stop, behind in _together(dropouts, velocity.size):
+        near = slice(max(first - _CONTEXT, 0), min(stop + _CONTEXT, behind))
+        if np.all(np.isfinite(mended[near][~hidden[near]])):
+            mended[near] = _likeliest(mended[near], ~hidden[near])
+        hidden[:stop] = False
+    return mended
+
+
+def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, int, int]]:
+    """Give begin and end of drop-outs that lie close together, and where the next begin."""
+    groups: list[list[Dropout]] = []
+    for each in dropouts:
+        is_near = groups and each.first - groups[-1][-1].stop < _CONTEXT
+        if is_near and each.stop - groups[-1][0].first < _TOGETHER:
+            groups[-1].append(each)
+        else:
+            groups.append([each])
+    for place, group in enumerate(groups):
+        behind = groups[place + 1][0].first if place + 1 < len(groups) else samples
+        yield group[0].first, group[-1].stop, behind
+
+
+def _likeliest(near: Reals, known: Flags) -> Reals:
+    """Solve for the samples that are not known, given a predictor from the others."""
+    mean = float(np.mean(near[known]))
+    values = np.where(known, near - mean, 0.0)
+    windows, whole = (np.lib.stride_tricks.sliding_window_view(each, _ORDER + 1) for each in (values, known))
+    past, now = np.split(windows[whole.all(axis=1)], [_ORDER], axis=1)
+    predictor = lstsq(past, now[:, 0])[0]
+    # Prediction errors of all windows, as a band matrix times the samples.
+    row, column = np.zeros(near.size), np.zeros(near.size - _ORDER)
+    row[: _ORDER + 1] = np.append(-predictor, 1.0)
+    column[0] = row[0]
+    errors = toeplitz(column, row)
+    values[~known] = lstsq(errors[:, ~known], -errors @ values)[0]
+    return mean + values
+
+
+@dataclass(frozen=True, eq=False)
+class BridgedChannel:
+    """The vibrometer's channel of a recording without its drop-outs.
+
+    They are looked for in seconds counted from the first sample, so that whatever is read says the same.
+    """
+
+    recording: Recording
+    role: str
+    _known: dict[int, tuple[Dropout, ...]] = field(default_factory=dict)
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give velocities [m/s], shape (samples,); lost samples are NaN."""
+        values = self.recording.read(self.role, start, stop)
+        if not self.between(start, stop):
+            return values
+        # With their neighbours, which are no context to learn from.
+        dropouts = self.between(max(start - _TOGETHER, 0), min(stop + _TOGETHER, self.recording.samples))
+        first = max(dropouts[0].first - _CONTEXT, 0)
+        last = min(dropouts[-1].stop + _CONTEXT, self.recording.samples)
+        mended = bridged(
+            self.recording.read(self.role, first, last),
+            tuple(Dropout(each.first - first, each.stop - first) for each in dropouts),
+        )
+        for each in self.between(start, stop):
+            begin, end = max(each.first, start), min(each.stop, stop)
+            values[begin - start : end - start] = mended[begin - first : end - first]
+        return values
+
+    def between(self, start: int, stop: int) -> tuple[Dropout, ...]:
+        """Give the drop-outs that reach into these samples."""
+        rate = self.recording.sample_rate_hz
+        block, longest = round(_BLOCK_S * rate), round(LONGEST_S * rate)
+        blocks = range(max(start - longest, 0) // block, -(-stop // block))
+        found = (each for place in blocks for each in self._beginning_in(place, block, 2 * longest))
+        return tuple(each for each in found if each.first < stop and each.stop > start)
+
+    def _beginning_in(self, place: int, block: int, margin: int) -> tuple[Dropout, ...]:
+        if place not in self._known:
+            first, stop = place * block, min((place + 1) * block, self.recording.samples)
+            begin, end = max(first - margin, 0), min(stop + margin, self.recording.samples)
+            heard = found_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
+            moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
+            self._known[place] = tuple(each for each in moved if first <= each.first < stop)
+        return self._known[place]

@@ -1,0 +1,172 @@
+"""Moments without light: found, and nothing else is; bridged as if the light had stayed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import open_bench, open_recording, run_measurement
+from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
+from vibench.acquisition.rig import load_rig
+from vibench.analysis import Simulation, analyse_files
+from vibench.analysis.recordings import (
+    BridgedChannel,
+    Dropout,
+    Verdict,
+    bridged,
+    found_dropouts,
+    measurement_checks,
+    recording_facts,
+)
+
+RATE_HZ = 51_200.0
+ROLE = "m0_velocity"
+
+
+def motion(seed, seconds=1.0, noise=3e-6):
+    """Sines and white noise, like m0's velocity under weak noise [m/s]."""
+    rng = np.random.default_rng(seed)
+    time_s = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    sines = sum(
+        rng.uniform(0.001, 0.05) * np.sin(2 * np.pi * rng.uniform(50, 600) * time_s + rng.uniform(0, 6))
+        for _ in range(5)
+    )
+    return sines + noise * rng.standard_normal(time_s.size)
+
+
+def darkened(velocity, at, samples, level):
+    dark = velocity.copy()
+    dark[at : at + samples] = level
+    return dark
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_dropout_is_found_and_bridged(seed):
+    rng = np.random.default_rng((seed, 1))
+    velocity = motion(seed)
+    begins = np.arange(2_000, 48_000, 9_000) + rng.integers(0, 4_000, 6)
+    dark = velocity
+    for at in begins:
+        level = float(rng.choice((-1, 1)) * rng.uniform(0.3, 1.0))
+        dark = darkened(dark, at, int(rng.integers(1, 100)), level)
+    found = found_dropouts(dark, RATE_HZ)
+    assert [bool(each.first <= at < each.stop) for each, at in zip(found, begins, strict=True)] == [True] * 6
+    assert np.max(np.abs(bridged(dark, found) - velocity)) < 0.02 * np.std(velocity)
+
+
+def test_two_close_together_do_not_spoil_each_other():
+    velocity = motion(3)
+    dark = darkened(darkened(velocity, 20_000, 12, 0.8), 20_250, 20, -0.6)
+    found = found_dropouts(dark, RATE_HZ)
+    assert len(found) == 2
+    assert np.max(np.abs(bridged(dark, found) - velocity)) < 0.02 * np.std(velocity)
+
+
+@pytest.mark.parametrize("step", [0.01, 0.1, 1.0])
+def test_an_impact_changes_the_velocity_for_good_and_is_no_dropout(step):
+    velocity = motion(4)
+    velocity[20_000:] += step
+    assert found_dropouts(velocity, RATE_HZ) == ()
+
+
+def test_what_rings_after_a_blow_is_no_dropout():
+    velocity = motion(5)
+    after = np.arange(velocity.size - 20_000) / RATE_HZ
+    velocity[20_000:] += 0.5 * np.exp(-after / 0.01) * np.sin(2 * np.pi * 4_000 * after)
+    assert found_dropouts(velocity, RATE_HZ) == ()
+
+
+@pytest.mark.parametrize(
+    "velocity",
+    [np.zeros(51_200), np.full(51_200, np.nan), motion(6)[:300], np.round(motion(7), 2)],
+    ids=["silent", "lost", "short", "coarse"],
+)
+def test_nothing_is_found_where_nothing_can_be_told(velocity):
+    assert found_dropouts(velocity, RATE_HZ) == ()
+
+
+def test_a_longer_darkness_is_left_as_it_is():
+    assert found_dropouts(darkened(motion(8), 20_000, 2_000, 0.0), RATE_HZ) == ()
+
+
+def test_below_20_khz_nothing_is_looked_for():
+    assert found_dropouts(darkened(motion(9), 20_000, 12, 0.8), 19_000.0) == ()
+
+
+def measured(rig, plan, path, dropouts_per_s):
+    virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": dropouts_per_s, "seed": 5})
+    with open_bench(rig.model_copy(update={"virtual": virtual})) as bench:
+        run_measurement(bench, Measurement(name="m", excitation=plan, ramp_s=0.3), path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def rig():
+    return load_rig("virtual_rig")
+
+
+def test_a_dwell_with_dropouts_says_what_it_says_without(rig, tmp_path):
+    """Response I was 91 where it is 1.63, and a warning called that a lower bound."""
+    plan = Dwell(amplitude_vpp=0.05, frequency_hz=180, settle_s=1, duration_s=6)
+    results = []
+    for dropouts_per_s in (0.0, 4.0):
+        path = measured(rig, plan, tmp_path / f"d{dropouts_per_s:g}.h5", dropouts_per_s)
+        results.append(analyse_files([path], "d", Simulation.LEFT_OUT).results[0].analysis)
+    light, dark = (each.response for each in results)
+    assert dark.response_i == pytest.approx(light.response_i, rel=2e-3)
+    assert dark.response_ii == pytest.approx(light.response_ii, abs=4 * light.sd_response_ii)
+    checks = {each.what: each for each in results[1].checks}
+    assert "the vibrometer lost its light" in checks["Drop-outs"].text
+    assert checks["Overloads"].verdict is Verdict.PASSED
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "plan",
+    [
+        Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1, duration_s=6),
+        Dwell(amplitude_vpp=6.0, frequency_hz=397, settle_s=1, duration_s=6),
+        SineSweep(amplitude_vpp=3.0, start_hz=220, stop_hz=300, duration_s=6, settle_s=1),
+        MultisineNoise(
+            amplitude_vpp=5.0, band_start_hz=50, band_stop_hz=600, repetition_hz=2, realisations=3, settle_s=1
+        ),
+    ],
+    ids=["chaos", "strong", "sweep", "noise"],
+)
+def test_among_collisions_every_dropout_is_found_and_no_collision_is_one(rig, tmp_path, plan):
+    """The same run with light and without: what is read differs by a fiftieth of the motion at most."""
+    with open_recording(measured(rig, plan, tmp_path / "light.h5", 0.0)) as recording:
+        light = recording.read(ROLE)
+        assert BridgedChannel(recording, ROLE).between(0, recording.samples) == ()
+    with open_recording(measured(rig, plan, tmp_path / "dark.h5", 3.0)) as recording:
+        dark, mended = recording.read(ROLE), BridgedChannel(recording, ROLE).read(0, recording.samples)
+        facts = recording_facts(recording)
+    assert facts.dropouts > 5
+    assert np.max(np.abs(dark - light)) > 0.5
+    assert np.sqrt(np.mean((mended - light) ** 2)) < 0.02 * np.std(light)
+
+
+def test_a_part_is_read_as_the_whole(rig, tmp_path):
+    plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
+    with open_recording(measured(rig, plan, tmp_path / "d.h5", 8.0)) as recording:
+        whole = BridgedChannel(recording, ROLE).read(0, recording.samples)
+        dropouts = BridgedChannel(recording, ROLE).between(0, recording.samples)
+        assert len(dropouts) > 5
+        for each in dropouts[1:-1]:
+            inside = (each.first + each.stop) // 2
+            part = BridgedChannel(recording, ROLE).read(inside, inside + 3_000)
+            assert part == pytest.approx(whole[inside : inside + 3_000], abs=2e-5)
+            assert isinstance(each, Dropout)
+
+
+def test_a_recording_that_is_often_dark_is_warned_of(rig, tmp_path):
+    plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=2)
+    with open_recording(measured(rig, plan, tmp_path / "d.h5", 1.0)) as recording:
+        facts = recording_facts(recording)
+    (note,) = (each for each in measurement_checks(facts) if each.what == "Drop-outs")
+    (warning,) = (
+        each
+        for each in measurement_checks(replace(facts, dropouts=30, dropout_s=0.02 * facts.duration_s))
+        if each.what == "Drop-outs"
+    )
+    assert (note.verdict, warning.verdict) == (Verdict.NOTE, Verdict.WARNING)
