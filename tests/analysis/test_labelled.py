@@ -171,7 +171,8 @@ largest_multiplier left_out left_over level limit linear lines lines_used logari
 multiplier multiplier_imaginary multiplier_real multiplier_u n_eff neighbour_correlation noise_bias_i
 noise_error_i noise_share order orders overlap overloaded_samples pairs period period_samples periods
 planned_stretches realisations reduced_chi_square reference_coherence relative relative_i relative_sd
-relative_sd_magnitude residue residue_acceleration response_i response_ii restarts restitution runs
+relative_sd_magnitude residue residue_acceleration response_i response_ii rest_bias_i rest_error_i restarts
+restitution runs
 sd_damping_ratio sd_exponent sd_response_ii sd_samples segment_samples segments_excluded segments_used
 share_at_full_scale share_told sides spectrum_error standard_errors statistic steady_relative_sd stop
 strobe_sample surrogates transmission turns_per_period up whole_stretches

@@ -3,6 +3,7 @@ from ._period import (
     shortest_period as shortest_period,
 )
 from ._verdict import (
+    LARGEST_NOISE as LARGEST_NOISE,
     SMALL as SMALL,
     MotionKind as MotionKind,
     MotionVerdict as MotionVerdict,

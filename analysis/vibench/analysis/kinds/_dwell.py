@@ -4,7 +4,7 @@ import numpy as np
 
 from vibench.acquisition.recording import SegmentLabel
 
-from ..chaos import MotionVerdict
+from ..chaos import MotionKind, MotionVerdict
 from ..comparison import dwell_traces
 from ..frequency_response import FrequencyResponseRequest
 from ..model import (
@@ -42,6 +42,9 @@ def _analyse(
 ) -> DwellAnalysis:
     towards_hz = bound_frequencies_hz(facts)
     found = measured_dwell(channels, plan, towards_hz)
+    motion = dwell_motion(channels, found)
+    if motion.verdict.kind is MotionKind.PERIODIC:
+        found = found.known_to_repeat()
     frequency = frequency_check(np.array([found.drive.frequency_hz]), np.array([plan.frequency_hz]))
     return DwellAnalysis(
         facts=facts,
@@ -50,7 +53,7 @@ def _analyse(
         response=found,
         displacement=settled_envelope(found),
         terminal=terminal_levels(found, towards_hz),
-        motion=dwell_motion(channels, found),
+        motion=motion,
         irregular=irregular_motion(channels, found),
     )
 

@@ -17,7 +17,7 @@ _EXPLAINED = 1.5
 """What is left of a motion over the vibrometer's noise, up to which that is all of it."""
 _SILENT = 3.0
 """... and over what the silence held, which is shorter than the memory of a mode."""
-_BETWEEN = "what the motion holds between its lines"
+BETWEEN = "what the motion holds between its lines"
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Background:
     @property
     def is_rest(self) -> bool:
         """Whether it is all that does not repeat, so that what repeats is the motion."""
-        return self.source == _BETWEEN
+        return self.source == BETWEEN
 
     @property
     def is_known(self) -> bool:
@@ -68,7 +68,7 @@ def left_between(rest: Reals, rate_hz: float) -> Background:
     """Say what a displacement holds without all that repeats with the drive."""
     rms_m = float(np.std(rest))
     turns = float(np.std(np.diff(rest))) * rate_hz / (2 * np.pi)
-    return Background(rms_m, turns / rms_m if rms_m else 0.0, _BETWEEN)
+    return Background(rms_m, turns / rms_m if rms_m else 0.0, BETWEEN)
 
 
 def background_of(rest: Background, motion_m: float, sensor: Background, silent: Background) -> Background:

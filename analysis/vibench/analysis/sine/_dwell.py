@@ -1,10 +1,11 @@
 """What a dwell shows at one frequency: Responses I and II, spectrum, lines, and how the motion repeats."""
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
+from ..chaos import LARGEST_NOISE
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals import Complexes, ConvertedSignal, Quantity, Reals, converted_signal, standard_uncertainty
 from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
@@ -22,7 +23,7 @@ from ..tones import (
     steady_phase,
     tracked_orders,
 )
-from ._background import NOTHING, Background, background_of, heard_in, left_between, louder
+from ._background import BETWEEN, NOTHING, Background, background_of, heard_in, left_between, louder
 
 _LOWEST_ORDER = 0.1
 """Displacement is kept down to this part of the drive frequency, where drift and hum begin to matter."""
@@ -69,6 +70,9 @@ class DwellResponse(Labelled):
     """Root mean square error that noise makes of it, the lift included; NaN likewise."""
     noise_source: str
     """What tells that noise, or why it is not determined."""
+    rest_bias_i: float
+    """The same lift, if all that does not repeat with the drive were noise; NaN where that is too much."""
+    rest_error_i: float
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
@@ -87,6 +91,14 @@ class DwellResponse(Labelled):
     spectrum: AmplitudeSpectrum
     """Displacement amplitudes over the window [m]."""
     lines: tuple[Line, ...]
+
+    def known_to_repeat(self) -> Self:
+        """Give the same for a motion that repeats with the drive: what does not is noise then."""
+        if np.isnan(self.rest_error_i) or self.rest_error_i <= self.noise_error_i:
+            return self
+        return replace(
+            self, noise_bias_i=self.rest_bias_i, noise_error_i=self.rest_error_i, noise_source=BETWEEN
+        )
 
 
 def dwell_response(
@@ -151,6 +163,8 @@ def dwell_response(
     repeated = _repeated(motion, phase, orders)
     rest = left_between(motion - repeated, sample_rate_hz)
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
+    rest_m = rest.rms_m if rest.rms_m <= LARGEST_NOISE * np.std(motion) else np.nan
+    rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
     lift = noise_lift(repeated if noise.is_rest else motion, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
     spectrum = spectrum.converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
@@ -161,6 +175,8 @@ def dwell_response(
         noise_bias_i=lift.bias / level.amplitude_m,
         noise_error_i=lift.error / level.amplitude_m,
         noise_source=noise.source,
+        rest_bias_i=rest_lift.bias / level.amplitude_m,
+        rest_error_i=rest_lift.error / level.amplitude_m,
         response_ii=abs(ratio),
         sd_response_ii=abs(ratio) * scatter,
         phase_rad=float(np.angle(ratio)),
