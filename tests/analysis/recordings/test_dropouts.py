@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
-from vibench.acquisition.rig import load_rig
+from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.recordings import (
     BridgedChannel,
@@ -18,6 +18,7 @@ from vibench.analysis.recordings import (
     measurement_checks,
     recording_facts,
 )
+from vibench.sim import shipped_specimens
 
 RATE_HZ = 51_200.0
 ROLE = "m0_velocity"
@@ -62,6 +63,21 @@ def test_two_close_together_do_not_spoil_each_other():
     assert np.max(np.abs(bridged(dark, found) - velocity)) < 0.02 * np.std(velocity)
 
 
+def test_where_too_little_motion_is_left_between_them_the_samples_stay():
+    dark = motion(10)[:1_500]
+    many = tuple(Dropout(at, at + 40) for at in range(20, 1_440, 60))
+    assert np.array_equal(bridged(dark, many), dark)
+
+
+def test_a_clipped_peak_is_no_dropout():
+    velocity = 1.2 * np.sin(2 * np.pi * 5 * np.arange(51_200) / RATE_HZ)
+    velocity = np.clip(velocity, -1.0, 1.0) + 3e-6 * np.random.default_rng(0).standard_normal(51_200)
+    assert found_dropouts(velocity, RATE_HZ) == ()
+    fast = 1.02 * np.sin(2 * np.pi * 20 * np.arange(51_200) / RATE_HZ)
+    fast = np.clip(fast, -1.0, 1.0) + 3e-6 * np.random.default_rng(0).standard_normal(51_200)
+    assert found_dropouts(fast, RATE_HZ) == ()
+
+
 @pytest.mark.parametrize("step", [0.01, 0.1, 1.0])
 def test_an_impact_changes_the_velocity_for_good_and_is_no_dropout(step):
     velocity = motion(4)
@@ -93,10 +109,10 @@ def test_below_20_khz_nothing_is_looked_for():
     assert found_dropouts(darkened(motion(9), 20_000, 12, 0.8), 19_000.0) == ()
 
 
-def measured(rig, plan, path, dropouts_per_s):
+def measured(rig, plan, path, dropouts_per_s, **how):
     virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": dropouts_per_s, "seed": 5})
     with open_bench(rig.model_copy(update={"virtual": virtual})) as bench:
-        run_measurement(bench, Measurement(name="m", excitation=plan, ramp_s=0.3), path)
+        run_measurement(bench, Measurement(name="m", excitation=plan, ramp_s=0.3), path, **how)
     return path
 
 
@@ -144,6 +160,27 @@ def test_among_collisions_every_dropout_is_found_and_no_collision_is_one(rig, tm
     assert facts.dropouts > 5
     assert np.max(np.abs(dark - light)) > 0.5
     assert np.sqrt(np.mean((mended - light) ** 2)) < 0.02 * np.std(light)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", [each for each in shipped_specimens() if each != "two_masses"])
+def test_no_collision_of_a_shipped_specimen_is_a_dropout(rig, tmp_path, name):
+    """Stops on one side, rigid ones and a heavy m1 among them, at ten volts."""
+    document = rig.model_dump(mode="json")
+    document["specimen"] = {
+        "model": name,
+        "amplitude_limit_m": document["specimen"]["amplitude_limit_m"] | {"value": 1.0},
+    }
+    document["shaker"]["limits"]["force_n"]["value"] = 1e3
+    other = Rig.model_validate(document)
+    noise = MultisineNoise(
+        amplitude_vpp=8.0, band_start_hz=50, band_stop_hz=600, repetition_hz=2, realisations=2, settle_s=1
+    )
+    dwells = (Dwell(amplitude_vpp=8.0, frequency_hz=each, settle_s=1, duration_s=3) for each in (140, 200))
+    for number, plan in enumerate((noise, *dwells)):
+        path = tmp_path / f"{number}.h5"
+        with open_recording(measured(other, plan, path, 0.0, bench_check="recently passed")) as recording:
+            assert recording_facts(recording).dropouts == 0
 
 
 def test_a_part_is_read_as_the_whole(rig, tmp_path):

@@ -29,6 +29,10 @@ _JOINED_S = 1e-3
 _FLANK_S = 1e-3
 _OUTSTANDING = 8.0
 """Largest distance from the bridge, over what the bridge's fit leaves of the flanks."""
+_JUMP = 4.0
+"""Change from sample to sample where light goes, over the fastest of the flanks."""
+_MOST_PER_S = 40.0
+"""What comes more often is made by the motion."""
 _ORDER = 48
 _CONTEXT = 12 * _ORDER
 """Samples on each side that the linear prediction is taken from."""
@@ -78,7 +82,8 @@ def found_dropouts(velocity: Reals, sample_rate_hz: float) -> tuple[Dropout, ...
     for edges in _apart(far, longest):
         whole = believed(edges)
         found += [whole] if whole else map(believed, _apart(edges, _JOINED_S * sample_rate_hz))
-    return tuple(each for each in found if each)
+    believable = tuple(each for each in found if each)
+    return believable if len(believable) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
 
 
 def _apart(places: Integers, distance: float) -> list[Integers]:
@@ -94,13 +99,19 @@ def _ringing(rings: Flags, longest: int) -> int:
 
 
 def _comes_back(velocity: Reals, first: int, stop: int, flank: int) -> bool:
-    """Whether one smooth motion passes through both flanks, and what lies between is far from it."""
+    """Whether one smooth motion passes through both flanks, and what lies between jumps far from it.
+
+    A clipped peak is far from it too, and gets there at the motion's own pace.
+    """
     first, stop = first - flank, stop + flank
     at = np.linspace(-1.0, 1.0, stop - first)
     outside = np.ones(at.size, dtype=np.bool_)
     outside[flank:-flank] = False
     near = velocity[first:stop]
     if not np.all(np.isfinite(near)):
+        return False
+    pace = np.abs(np.diff(near))
+    if np.max(pace[flank:-flank]) < _JUMP * max(np.max(pace[:flank]), np.max(pace[-flank:])):
         return False
     shape = np.polynomial.legendre.legvander(at, 5)
     left = near - shape @ lstsq(shape[outside], near[outside])[0]
@@ -147,11 +158,13 @@ def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int
 
 
 def _likeliest(near: Reals, known: Flags) -> Reals:
-    """Solve for the samples that are not known, given a predictor from the others."""
+    """Solve for the samples that are not known, given a predictor from the others, if those are enough."""
     mean = float(np.mean(near[known]))
     values = np.where(known, near - mean, 0.0)
     windows, whole = (np.lib.stride_tricks.sliding_window_view(each, _ORDER + 1) for each in (values, known))
     past, now = np.split(windows[whole.all(axis=1)], [_ORDER], axis=1)
+    if len(past) < 2 * _ORDER:
+        return near
     predictor = lstsq(past, now[:, 0])[0]
     # Prediction errors of all windows, as a band matrix times the samples.
     row, column = np.zeros(near.size), np.zeros(near.size - _ORDER)
