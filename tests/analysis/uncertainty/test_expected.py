@@ -111,7 +111,7 @@ def test_a_motion_that_cannot_be_computed_promises_nothing(monkeypatch):
 @pytest.mark.thorough
 @pytest.mark.parametrize(("at_hz", "level_vpp"), [(260.0, 1.5), (160.0, 2.0), (300.0, 5.0)])
 def test_a_dwell_that_collides_is_known_as_well_as_was_said_before(tmp_path, at_hz, level_vpp):
-    """A base that does not yield told it up to 3.4 times too well, and twelve times too ill."""
+    """One run under a base that does not yield told it up to 3.4 times too well."""
     plan = dwell(at_hz, level_vpp)
     said = {each.quantity: each.after(each.time_s) for each in expected_uncertainty(plan, RIG)}
     with open_bench(RIG) as bench:
