@@ -67,6 +67,13 @@ def test_a_crate_is_never_overwritten(folder, crate):
 def test_what_cannot_be_deposited_is_refused(folder, tmp_path):
     with pytest.raises(InvalidRequest, match="no address of a licence"):
         pack_folder(folder, tmp_path / "x.zip", CrateFacts("CC-BY"), {})
+    with pytest.raises(InvalidRequest, match="without a name"):
+        pack_folder(
+            folder, tmp_path / "x.zip", CrateFacts(LICENCE, organisation_url="https://example.org"), {}
+        )
+    wrong = CrateFacts(LICENCE, organisation="Institute", organisation_url="example")
+    with pytest.raises(InvalidRequest, match="'example' is no address of an organisation"):
+        pack_folder(folder, tmp_path / "x.zip", wrong, {})
     with pytest.raises(NotEnoughData, match="no recording"):
         pack_folder(folder / "report", tmp_path / "x.zip", CrateFacts(LICENCE), {})
     assert not (tmp_path / "x.zip").exists()
@@ -78,6 +85,9 @@ def test_what_cannot_be_deposited_is_refused(folder, tmp_path):
         (LICENCE, "CC BY 4.0"),
         ("http://creativecommons.org/licenses/by-nc-sa/3.0", "CC BY-NC-SA 3.0"),
         ("https://creativecommons.org/publicdomain/zero/1.0/", "CC0 1.0"),
+        ("https://creativecommons.org/licenses/by/4.0/deed.en", "CC BY 4.0"),
+        ("https://creativecommons.org/publicdomain/zero/1.0/legalcode", "CC0 1.0"),
+        ("https://creativecommons.org/licenses/by", "CC BY"),
         ("https://spdx.org/licenses/BSD-3-Clause", "BSD-3-Clause"),
         ("https://example.org", "example.org"),
     ],

@@ -6,6 +6,7 @@ they ended, which channels in which units, and with which software.
 
 import hashlib
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -23,6 +24,10 @@ from ._new_file import new_file
 
 METADATA = "ro-crate-metadata.json"
 CONTEXT = "https://w3id.org/ro/crate/1.1"
+_CREATIVE_COMMONS = re.compile(
+    r"creativecommons\.org/(?:licenses/(?P<kind>[a-z-]+)|publicdomain/zero)/?(?P<version>[\d.]*)"
+)
+_SCHEMES = ("https://", "http://")
 HDF5_TYPE = "application/x-hdf5"
 Entity = dict[str, Any]
 
@@ -71,14 +76,11 @@ def pack_folder(
     NotEnoughData
         When the folder holds no recording.
     InvalidRequest
-        When the licence is no address, a link leads out of the folder, or the zip exists or is refused.
+        When the licence or the organisation's page is no address, the page has no organisation, a link leads
+        out of the folder, or the zip exists or is refused.
 
     """
-    if not facts.licence.startswith(("https://", "http://")):
-        raise InvalidRequest(
-            f"{facts.licence!r} is no address of a licence; nothing was packed, give one like "
-            "https://creativecommons.org/licenses/by/4.0/"
-        )
+    _require_addresses(facts)
     paths = tuple(path for path in sorted(folder.rglob("*")) if _belongs(path) and path != crate)
     outside = [each for each in paths if not each.resolve().is_relative_to(folder.resolve())]
     if outside:
@@ -101,6 +103,24 @@ def pack_folder(
             archive.write(path, path.relative_to(folder).as_posix(), compress_type=kind)
             observer(path.stat().st_size)
     return paths
+
+
+def _require_addresses(facts: CrateFacts) -> None:
+    if not facts.licence.startswith(_SCHEMES):
+        raise InvalidRequest(
+            f"{facts.licence!r} is no address of a licence; nothing was packed, give one like "
+            "https://creativecommons.org/licenses/by/4.0/"
+        )
+    if facts.organisation_url and not facts.organisation:
+        raise InvalidRequest(
+            f"{facts.organisation_url} is the page of an organisation without a name; nothing was packed, "
+            "give its name too"
+        )
+    if facts.organisation_url and not facts.organisation_url.startswith(_SCHEMES):
+        raise InvalidRequest(
+            f"{facts.organisation_url!r} is no address of an organisation; nothing was packed, give one like "
+            "https://ror.org/03yrm5c26"
+        )
 
 
 def _belongs(path: Path) -> bool:
@@ -154,11 +174,12 @@ def _unpacked(entities: list[Entity]) -> list[Entity] | Entity:
 
 
 def _licence_name(address: str) -> str:
-    """Give "CC BY 4.0" for Creative Commons' addresses, and the end of any other."""
-    *_, last_but_one, last = ("", *address.rstrip("/").split("/"))
-    if "creativecommons.org/publicdomain/zero/" in address:
-        return f"CC0 {last}"
-    return f"CC {last_but_one.upper()} {last}" if "creativecommons.org/licenses/" in address else last
+    """Give "CC BY 4.0" for Creative Commons' addresses, those of deeds too, and the end of any other."""
+    found = _CREATIVE_COMMONS.search(address)
+    if found is None:
+        return address.rstrip("/").rpartition("/")[2]
+    kind = f"CC {found['kind'].upper()}" if found["kind"] else "CC0"
+    return f"{kind} {found['version']}".rstrip()
 
 
 def _file_entity(path: Path, folder: Path, untrusted: Mapping[str, str]) -> Entity:

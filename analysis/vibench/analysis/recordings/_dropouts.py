@@ -6,8 +6,9 @@ does not take that back, and what rings has many turns.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.linalg import lstsq, toeplitz
@@ -175,6 +176,10 @@ def _likeliest(near: Reals, known: Flags) -> Reals:
     return mean + values
 
 
+_FOUND: WeakKeyDictionary[Recording, dict[tuple[str, int], tuple[Dropout, ...]]] = WeakKeyDictionary()
+"""What was found in each second of an open recording: facts, estimators and tracks ask for the same."""
+
+
 @dataclass(frozen=True, eq=False)
 class BridgedChannel:
     """The vibrometer's channel of a recording without its drop-outs.
@@ -184,7 +189,6 @@ class BridgedChannel:
 
     recording: Recording
     role: str
-    _known: dict[int, tuple[Dropout, ...]] = field(default_factory=dict)
 
     def read(self, start: int, stop: int) -> Reals:
         """Give velocities [m/s], shape (samples,); lost samples are NaN."""
@@ -213,10 +217,14 @@ class BridgedChannel:
         return tuple(each for each in found if each.first < stop and each.stop > start)
 
     def _beginning_in(self, place: int, block: int, margin: int) -> tuple[Dropout, ...]:
-        if place not in self._known:
-            first, stop = place * block, min((place + 1) * block, self.recording.samples)
-            begin, end = max(first - margin, 0), min(stop + margin, self.recording.samples)
-            heard = found_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
-            moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
-            self._known[place] = tuple(each for each in moved if first <= each.first < stop)
-        return self._known[place]
+        known = _FOUND.setdefault(self.recording, {})
+        if (self.role, place) in known:
+            return known[self.role, place]
+        first, stop = place * block, (place + 1) * block
+        begin, end = max(first - margin, 0), min(stop + margin, self.recording.samples)
+        heard = found_dropouts(self.recording.read(self.role, begin, end), self.recording.sample_rate_hz)
+        moved = (Dropout(each.first + begin, each.stop + begin) for each in heard)
+        found = tuple(each for each in moved if first <= each.first < stop)
+        if end == stop + margin:  # else a recording that grows may tell more
+            known[self.role, place] = found
+        return found
