@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 
@@ -194,6 +195,16 @@ def test_a_part_is_read_as_the_whole(rig, tmp_path):
             part = BridgedChannel(recording, ROLE).read(inside, inside + 3_000)
             assert part == pytest.approx(whole[inside : inside + 3_000], abs=2e-5)
             assert isinstance(each, Dropout)
+
+
+@pytest.mark.parametrize("rate_hz", [1e-6, 0.4, 1e12])
+def test_a_recording_of_a_rate_that_no_converter_has_is_answered(rig, tmp_path, rate_hz):
+    plan = Dwell(amplitude_vpp=0.5, frequency_hz=200, settle_s=0.5, duration_s=1)
+    path = measured(rig, plan, tmp_path / "d.h5", 0.0)
+    with h5py.File(path, "r+") as file:
+        file.attrs["sample_rate_hz"] = rate_hz
+    with open_recording(path) as recording:
+        assert BridgedChannel(recording, ROLE).between(0, recording.samples) == ()
 
 
 def test_a_recording_that_is_often_dark_is_warned_of(rig, tmp_path):

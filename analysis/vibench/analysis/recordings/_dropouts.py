@@ -211,6 +211,8 @@ class BridgedChannel:
     def between(self, start: int, stop: int) -> tuple[Dropout, ...]:
         """Give the drop-outs that reach into these samples."""
         rate = self.recording.sample_rate_hz
+        if rate < LOWEST_RATE_HZ:
+            return ()
         block, longest = round(_BLOCK_S * rate), round(LONGEST_S * rate)
         blocks = range(max(start - longest, 0) // block, -(-stop // block))
         found = (each for place in blocks for each in self._beginning_in(place, block, 2 * longest))
