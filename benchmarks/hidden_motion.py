@@ -51,6 +51,7 @@ class Line:
     kind: object
     level_vpp: float
     noise: float = 1.0
+    dropouts_per_s: float = 0.0
     rate_hz: float = 51_200.0
     described: Callable[[Specimen], Specimen] = _same
     numbers: Numbers = Numbers.AS_DESCRIBED
@@ -106,6 +107,11 @@ LINES = (
             ("damping x1.1", _damped(1.1)),
         )
     ),
+    *(
+        Line(f"{name}, {per_s:g} drop-outs a second, found", *what, dropouts_per_s=per_s, numbers=FOUND)
+        for per_s in (2.0, 10.0)
+        for name, what in (("dwell", DWELL), ("sweep", SWEEP), ("noise 10 Vpp", NOISE))
+    ),
 )
 
 
@@ -118,6 +124,7 @@ def scored(line: Line, seed: int, world: ModuleType, folder: Path) -> str:
         duration_s=DURATION_S,
         seed=seed,
         noise=line.noise,
+        dropouts_per_s=line.dropouts_per_s,
         rate_hz=line.rate_hz,
     )
     begun = perf_counter()

@@ -52,9 +52,9 @@ class LiveWorld:
         return (truth[:, 4] - truth[:, 5])[np.maximum(rows, 0)]
 
 
-def live_world(kind, level_vpp, duration_s, seed, known=None):
+def live_world(kind, level_vpp, duration_s, seed, known=None, dropouts_per_s=0.0):
     """Begin to shake the rig's specimen."""
-    rig = shaken_world.noisy(1.0, seed)
+    rig = shaken_world.noisy(1.0, seed, dropouts_per_s)
     world = World(rig, shaken_world.Played(shaken_world.drive(kind, level_vpp, duration_s, seed)))
     world.keep_truth()
     channels = channels_of(rig)

@@ -73,11 +73,12 @@ class Shaken:
     """... and in their middle."""
 
 
-def noisy(times, seed):
-    """Give the rig with all noise so many times larger."""
+def noisy(times, seed, dropouts_per_s=0.0):
+    """Give the rig with all noise so many times larger, and a vibrometer that loses its light."""
     virtual = RIG.virtual.model_copy(
         update={
             "seed": seed,
+            "vibrometer_dropouts_per_s": dropouts_per_s,
             "accelerometer_noise_m_per_s2": times * RIG.virtual.accelerometer_noise_m_per_s2,
             "vibrometer_noise_m_per_s_per_rthz": times * RIG.virtual.vibrometer_noise_m_per_s_per_rthz,
             "converter_noise_v": times * RIG.virtual.converter_noise_v,
@@ -130,9 +131,20 @@ def header(rig, rate_hz, samples):
     )
 
 
-def shaken(folder, kind, level_vpp, *, duration_s=1.6, seed=1, noise=1.0, rate_hz=51_200.0, specimen=None):
+def shaken(
+    folder,
+    kind,
+    level_vpp,
+    *,
+    duration_s=1.6,
+    seed=1,
+    noise=1.0,
+    dropouts_per_s=0.0,
+    rate_hz=51_200.0,
+    specimen=None,
+):
     """Let the world move a specimen, and write what the converter saw as a recording."""
-    rig = noisy(noise, seed)
+    rig = noisy(noise, seed, dropouts_per_s)
     world = World(rig, Played(drive(kind, level_vpp, duration_s, seed)), specimen)
     world.keep_truth()
     inputs = tuple(

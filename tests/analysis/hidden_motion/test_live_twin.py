@@ -34,8 +34,8 @@ def test_p_is_the_worlds_while_samples_come(dwell):
         newest = slice(-4000, None)
         error = (each.p - truth[each.first : each.first + each.p.size])[newest]
         assert np.sqrt(np.mean(error**2)) < 0.1e-6
-        # A third of a millisecond behind what was recorded last: half of the sensors' filters.
-        assert end - (each.first + each.p.size) == 16
+        # Behind what was recorded last: half of the sensors' filters, and 6 ms that tell of lost light.
+        assert end - (each.first + each.p.size) == 16 + 307
 
 
 def test_gaps_and_mass_are_found_on_the_way(dwell):
@@ -116,6 +116,22 @@ def test_a_bench_and_a_specimen_that_cannot_be_followed_are_refused(live_world, 
     daq = rig.daq.model_copy(update={"channels": rig.daq.channels[:1]})
     with pytest.raises(UnusableData, match=r"has no channel base_acceleration and no channel m0_velocity"):
         LiveTwin(rig.model_copy(update={"daq": daq}), 51_200.0, at_once)
+
+
+@pytest.mark.parametrize(("kind", "level_vpp"), [(261.0, 1.7), ("noise", 8.0)])
+def test_a_vibrometer_that_loses_its_light_is_no_change(live_world, kind, level_vpp):
+    running = live_world(kind, level_vpp, 4.2, seed=74, dropouts_per_s=8.0)
+    rng = np.random.default_rng(4)
+    while running.samples < 4 * 51_200:
+        assert running.go_on(int(rng.integers(100, 6000))) == ()
+        if running.samples > 0.6 * 51_200:
+            assert running.twin.newest.state is LiveState.TRACKED
+    newest = running.twin.newest
+    error = newest.p - running.p()[newest.first : newest.first + newest.p.size]
+    assert np.sqrt(np.nanmean(error**2)) < 0.1e-6
+    assert np.mean(np.isnan(newest.p)) < 0.01
+    found = {each.what: each for each in running.twin.found}
+    assert found[Hidden.UPPER_GAP].low < 45e-6 < found[Hidden.UPPER_GAP].high
 
 
 @pytest.mark.slow

@@ -100,7 +100,7 @@ def free_motion(
             offset = latent.smoothed.first
             stop = min(end, begin + round(_BLOCK_S * motion.sample_rate_hz))
             place = slice(max(begin, offset) - offset, stop - offset)
-            p[max(begin, offset) : stop] = latent.smoothed.p[place]
+            p[max(begin, offset) : stop] = np.where(latent.is_dark, np.nan, latent.smoothed.p)[place]
             sd[max(begin, offset) : stop] = np.sqrt(latent.smoothed.variances[place, 0])
             rows = _impacts(latent, motion.sample_rate_hz)
             inside = (rows[:, 0] >= begin) & (rows[:, 0] < stop)
@@ -155,7 +155,7 @@ def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
     # Held over the step that ends at a sample: its middle lies half a sample earlier.
     place = np.arange(force.size) - 0.5
     for begin, end in _runs(latent.is_open):
-        if begin < 2 or end > force.size - 2:
+        if begin < 2 or end > force.size - 2 or latent.is_dark[begin:end].any():
             continue
         part = slice(begin, end)
         impulse = float(force[part].sum()) / sample_rate_hz
@@ -363,5 +363,5 @@ def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequenc
         start = latent_start(each.run.first - 1)
         run = run_filter(model, motion, start, each.force_variance.size, force_variance=each.force_variance)
         value, variance = run.innovations[begin:].T
-        parts.append(value / np.sqrt(variance))
+        parts.append(value[variance > 0] / np.sqrt(variance[variance > 0]))
     return np.concatenate(parts)

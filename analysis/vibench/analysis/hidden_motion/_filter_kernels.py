@@ -217,6 +217,7 @@ def forward(  # noqa: C901, PLR0912 - a step, its derivatives, and the use of a 
 ) -> int:
     """Filter ``velocity.size`` samples, each at the end of a step; gives how many were done before a loss.
 
+    A velocity that is NaN was not measured: the motion goes on without it, as it does in contact.
     ``acceleration`` has one sample more. Row 0 of ``flows`` and ``stops`` is the model; further rows are
     the model with one parameter raised by its deviation. ``settings`` is the running mean of the squared
     normalised innovation, and the share of it that a sample makes up.
@@ -283,17 +284,18 @@ def forward(  # noqa: C901, PLR0912 - a step, its derivatives, and the use of a 
             _blur(covariance, impulse_share * pushed[0], stops[0])
         innovation = velocity[k] - state[VX] - state[W]
         variance = covariance[VX, VX] + 2.0 * covariance[VX, W] + covariance[W, W] + velocity_variance
+        is_used = kind != IN_CONTACT and np.isfinite(innovation)
         if states.shape[0] > 0:
             states[k] = state[: states.shape[1]]
             kinds[k] = kind
             impulses[k] = pushed[0]
             innovations[k, 0] = innovation
-            innovations[k, 1] = variance if kind != IN_CONTACT else 0.0
+            innovations[k, 1] = variance if is_used else 0.0
         if covariances.shape[0] > 0:
             covariances[k] = covariance
             if kind != FLIGHT:
                 jacobians[k] = whole
-        if kind == IN_CONTACT:
+        if not is_used:
             continue
         settings[0] += settings[1] * (innovation * innovation / variance - settings[0])
         if not settings[0] < limit:

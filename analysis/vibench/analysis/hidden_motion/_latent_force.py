@@ -46,6 +46,8 @@ class LatentMotion:
     smoothed: Smoothed
     is_open: Flags
     """Samples at whose step a contact force was allowed."""
+    is_dark: Flags
+    """Those of them of which nothing was measured."""
     force_variance: Reals
     misfit: float
     """Mean squared normalised innovation, its largest thousandth left out; 1 when all fits."""
@@ -62,7 +64,9 @@ def latent_motion(
     guess_n = _force_guess(model, motion, first, count)
     variance = np.full(count, guess_n**2)
     run, smoothed = _smoothed(free, motion, first, variance)
-    windows = _peaks(smoothed.forces[:, 0], guess_n, motion.sample_rate_hz)
+    # Whether m1 met a stop without light nobody saw.
+    is_dark = _widened(motion.is_dark[first + 1 : first + count + 1], motion.sample_rate_hz)
+    windows = _peaks(smoothed.forces[:, 0], guess_n, motion.sample_rate_hz) | is_dark
     closed = (closed_share * guess_n) ** 2
     variance = np.where(windows, (6.0 * guess_n) ** 2, closed)
     for _ in range(_RERUNS):
@@ -73,14 +77,15 @@ def latent_motion(
         if settled:
             break
         variance = following
-    squared = np.sort(run.squared[_start_up(motion.sample_rate_hz, count) :])
-    misfit = float(np.mean(squared[: max(1, int(0.999 * squared.size))]))
-    return LatentMotion(run, smoothed, windows, variance, misfit)
+    squared = run.squared[_start_up(motion.sample_rate_hz, count) :]
+    squared = np.sort(squared[~np.isnan(squared)])
+    misfit = float(np.mean(squared[: int(0.999 * squared.size) or 1])) if squared.size else np.inf
+    return LatentMotion(run, smoothed, windows, is_dark, variance, misfit)
 
 
 def _force_guess(model: MotionModel, motion: PreparedMotion, first: int, count: int) -> float:
     """Guess the size of the force: m1 times the rms acceleration of m0."""
-    velocity = motion.velocities(first, first + count + 1)
+    velocity = motion.velocity[first : first + count + 1].astype(np.float64)
     smooth_v = gaussian_filter1d(velocity, motion.sample_rate_hz / (2 * np.pi * _PEAK_BAND_HZ))
     rms = float(np.std(np.diff(smooth_v))) * motion.sample_rate_hz
     return max(model.specimen.masses[1] * 3.0 * rms, _LEAST_GUESS_N)
@@ -121,7 +126,7 @@ def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tup
     """Open a window where an innovation tells a force that came just before."""
     squared = run.squared
     # Wrong numbers of the specimen surprise everywhere: only what stands out from that is an impact.
-    usual = max(1.0, float(np.median(squared)) / _MEDIAN_OF_SQUARE)
+    usual = max(1.0, float(np.nanmedian(squared)) / _MEDIAN_OF_SQUARE)
     surprise = squared > _SURPRISE * usual
     surprise[: _start_up(sample_rate_hz, surprise.size)] = False
     onsets = surprise & ~np.concatenate(([False], surprise[:-1]))

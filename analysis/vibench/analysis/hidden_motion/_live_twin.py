@@ -1,7 +1,8 @@
 """The hidden motion beside a running measurement: the same filter, fed as samples come.
 
 The sensors' dynamics are undone by the filters of `_sensor_correction`, which makes the motion a third of a
-millisecond late; the accelerometer's coupling is a state of the filter. Nothing here waits or sleeps.
+millisecond late, and a sample is used when what follows tells whether the vibrometer saw it, six later; the
+accelerometer's coupling is a state of the filter. Nothing here waits or sleeps.
 """
 
 from concurrent.futures import Executor, Future
@@ -12,7 +13,7 @@ import numpy as np
 from vibench.acquisition.rig import Rig, channels_of, specimen_of
 from vibench.sim import Specimen
 
-from ..recordings import BASE, RESPONSE
+from ..recordings import BASE, DROPOUTS_TOLD_AFTER_S, RESPONSE, bridged, found_dropouts
 from ..signals import Reals
 from ._change_watch import BLOCK_S, ChangeWatch, KnownNumber, Level
 from ._filter_kernels import STATES
@@ -21,7 +22,7 @@ from ._forecast import LEARNT_S, Forecast, Forecaster
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
 from ._live_motion import LiveMotion, LiveState
 from ._parameters import Hidden, with_values
-from ._prepared_motion import ChannelNoise, PreparedMotion, require_channels, white_noise
+from ._prepared_motion import ChannelNoise, PreparedMotion, dark_samples, require_channels, white_noise
 from ._sensor_correction import HALF_LENGTH, sensor_correction
 from ._tracking import ACQUISITION_S, acquire, believed
 from ._tracking_model import TrackedSpecimen, tracked_specimen
@@ -29,6 +30,8 @@ from ._tracking_model import TrackedSpecimen, tracked_specimen
 HELD_S = 3.0
 """Of motion that is held for finding numbers in."""
 _NOISE_S = 0.5
+_LOOKED_S = 0.25
+"""Of the newest samples in which drop-outs are looked for."""
 _FIND_S = 2.4
 """Of motion that numbers are found in."""
 _PATIENCE = 2.0
@@ -115,11 +118,12 @@ class LiveTwin:
 
     def _begin_anew(self, sample: int) -> None:
         self._next = sample
-        self._raw = np.empty((2, 0))
+        self._raw, self._used = np.empty((2, 0)), HALF_LENGTH
         nothing = np.empty(0)
         self._motion = PreparedMotion(
             nothing,
             nothing,
+            np.empty(0, dtype=np.bool_),
             self._rate,
             self._correction.coupling_rad_per_s,
             sample + HALF_LENGTH,
@@ -194,18 +198,23 @@ class LiveTwin:
     def _append(self, acceleration: Reals, velocity: Reals) -> None:
         """Correct new samples and hold them; forget the oldest."""
         self._raw = np.concatenate([self._raw, (acceleration, velocity)], axis=1)
-        if self._raw.shape[1] <= 2 * HALF_LENGTH:
+        first, stop = self._used, self._raw.shape[1] - HALF_LENGTH - round(DROPOUTS_TOLD_AFTER_S * self._rate)
+        if stop <= first:
             return
-        new = [
-            each[HALF_LENGTH:-HALF_LENGTH] for each in self._correction.corrected(self._raw[0], self._raw[1])
-        ]
-        self._raw = self._raw[:, -2 * HALF_LENGTH :]
+        dropouts = found_dropouts(self._raw[1], self._rate)
+        around = slice(first - HALF_LENGTH, stop + HALF_LENGTH)
+        seen = self._correction.corrected(self._raw[0, around], bridged(self._raw[1], dropouts)[around])
+        new = [each[HALF_LENGTH:-HALF_LENGTH] for each in seen]
+        is_dark = dark_samples(dropouts, first, stop)
+        surplus = max(0, stop - round(_LOOKED_S * self._rate))
+        self._raw, self._used = self._raw[:, surplus:], stop - surplus
         held = self._motion
         surplus = max(0, held.samples + new[0].size - round(HELD_S * self._rate))
         self._motion = replace(
             held,
             acceleration=np.concatenate([held.acceleration, new[0]])[surplus:],
             velocity=np.concatenate([held.velocity, new[1]])[surplus:],
+            is_dark=np.concatenate([held.is_dark, is_dark])[surplus:],
             first_sample=held.first_sample + surplus,
         )
         unknown = np.full((new[0].size, STATES), np.nan)

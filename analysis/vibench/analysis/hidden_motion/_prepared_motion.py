@@ -1,6 +1,6 @@
 """The two channels as base and m0 moved, and how noisy they are: what every way starts from."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -9,8 +9,8 @@ import numpy as np
 from vibench.acquisition.recording import Recording
 
 from ..errors import NotEnoughData, UnusableData
-from ..recordings import BASE, RESPONSE, BridgedChannel
-from ..signals import Reals, Samples
+from ..recordings import BASE, RESPONSE, BridgedChannel, Dropout
+from ..signals import Flags, Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 
 _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))
@@ -24,6 +24,8 @@ _LEAST_NOISE = 1e-6
 """Of the signal: a channel without noise has rounding, and a filter needs a variance."""
 _MEDIAN_OF_SQUARE = float(np.log(2.0))
 """Median over mean of a periodogram's line of white noise, exponentially distributed."""
+_DARK_MARGIN = 8
+"""Samples on either side of a drop-out that a corrected one is still made of by more than a hundredth."""
 LOWEST_RATE_HZ = 10_000.0
 """A collision of a twentieth of a millisecond leaves nothing to see at a lower rate."""
 
@@ -51,7 +53,9 @@ class PreparedMotion:
     acceleration: Samples
     """Of the base, shape (samples,) [m/s2]; its AC coupling is left to the tracker."""
     velocity: Samples
-    """Of m0, shape (samples,) [m/s]."""
+    """Of m0, shape (samples,) [m/s]; a bridge where the vibrometer had no light."""
+    is_dark: Flags
+    """Where it had none, shape (samples,)."""
     sample_rate_hz: float
     coupling_rad_per_s: float
     first_sample: int
@@ -68,8 +72,8 @@ class PreparedMotion:
         return self.acceleration[start:stop].astype(np.float64, copy=False)
 
     def velocities(self, start: int, stop: int) -> Reals:
-        """Give those of a short stretch."""
-        return self.velocity[start:stop].astype(np.float64, copy=False)
+        """Give those of a short stretch as measured; NaN without light, of which a filter uses nothing."""
+        return np.where(self.is_dark[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
 
     def part(self, start: int, stop: int) -> "PreparedMotion":
         """Give a stretch of it, noise as found in the whole."""
@@ -77,6 +81,7 @@ class PreparedMotion:
             self,
             acceleration=self.acceleration[start:stop],
             velocity=self.velocity[start:stop],
+            is_dark=self.is_dark[start:stop],
             first_sample=self.first_sample + start,
         )
 
@@ -107,15 +112,35 @@ def prepared_motion(recording: Recording, start: int, stop: int) -> PreparedMoti
         for row, values in zip(kept, correction.corrected(*raw), strict=True):
             row[begin - start : end - start] = values[HALF_LENGTH:-HALF_LENGTH]
     _require_finite(lost)
-    return _motion(kept, rate, correction, start)
+    dropouts = response.between(start - _DARK_MARGIN, stop + _DARK_MARGIN)
+    return _motion(kept, dark_samples(dropouts, start, stop), rate, correction, start)
+
+
+def dark_samples(dropouts: Sequence[Dropout], start: int, stop: int) -> Flags:
+    """Mark corrected samples from ``start`` to before ``stop`` that drop-outs leave nothing of."""
+    is_dark = np.zeros(stop - start, dtype=np.bool_)
+    for each in dropouts:
+        first, behind = each.first - _DARK_MARGIN - start, each.stop + _DARK_MARGIN - start
+        is_dark[max(first, 0) : max(behind, 0)] = True
+    return is_dark
 
 
 def _motion(
-    corrected: Samples, sample_rate_hz: float, correction: SensorCorrection, first_sample: int
+    corrected: Samples,
+    is_dark: Flags,
+    sample_rate_hz: float,
+    correction: SensorCorrection,
+    first_sample: int,
 ) -> PreparedMotion:
     noise = ChannelNoise(*(white_noise(each) for each in corrected))
     return PreparedMotion(
-        corrected[0], corrected[1], sample_rate_hz, correction.coupling_rad_per_s, first_sample, noise
+        corrected[0],
+        corrected[1],
+        is_dark,
+        sample_rate_hz,
+        correction.coupling_rad_per_s,
+        first_sample,
+        noise,
     )
 
 
@@ -126,7 +151,8 @@ def motion_in_samples(acceleration: Reals, velocity: Reals, sample_rate_hz: floa
     _require_finite(_lost(acceleration, velocity))
     correction = ideal_sensors(sample_rate_hz)
     corrected = np.array(correction.corrected(acceleration, velocity))[:, HALF_LENGTH:-HALF_LENGTH]
-    return _motion(corrected, sample_rate_hz, correction, HALF_LENGTH)
+    light = np.zeros(corrected.shape[1], dtype=np.bool_)
+    return _motion(corrected, light, sample_rate_hz, correction, HALF_LENGTH)
 
 
 def _require_rate(sample_rate_hz: float) -> None:

@@ -22,6 +22,7 @@ from ._checks import (
     measurement_checks as measurement_checks,
 )
 from ._dropouts import (
+    DROPOUTS_TOLD_AFTER_S as DROPOUTS_TOLD_AFTER_S,
     BridgedChannel as BridgedChannel,
     Dropout as Dropout,
     bridged as bridged,

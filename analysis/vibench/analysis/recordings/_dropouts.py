@@ -28,6 +28,8 @@ _HEARD = 6.0
 _SILENT = 6
 _JOINED_S = 1e-3
 _FLANK_S = 1e-3
+DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
+"""Of motion behind a sample that tells whether it was measured."""
 _OUTSTANDING = 8.0
 """Largest distance from the bridge, over what the bridge's fit leaves of the flanks."""
 _JUMP = 4.0
