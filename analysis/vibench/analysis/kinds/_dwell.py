@@ -43,8 +43,8 @@ def _analyse(
     towards_hz = bound_frequencies_hz(facts)
     found = measured_dwell(channels, plan, towards_hz)
     motion = dwell_motion(channels, found)
-    if motion.verdict.kind is MotionKind.PERIODIC:
-        found = found.known_to_repeat()
+    if motion.verdict.kind not in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
+        found = found.with_rest_as_noise(is_known_to_repeat=motion.verdict.kind is MotionKind.PERIODIC)
     frequency = frequency_check(np.array([found.drive.frequency_hz]), np.array([plan.frequency_hz]))
     return DwellAnalysis(
         facts=facts,

@@ -17,6 +17,12 @@ _EXPLAINED = 1.5
 """What is left of a motion over the vibrometer's noise, up to which that is all of it."""
 _SILENT = 3.0
 """... and over what the silence held, which is shorter than the memory of a mode."""
+OVERHEARD = 20.0
+"""What is left over what was heard, up to which it may be noise all the same.
+
+A mode that noise rings is as faint in one silence of 400 that is shorter than its memory, and a
+generator's own noise is not heard at all.
+"""
 BETWEEN = "what the motion holds between its lines"
 
 

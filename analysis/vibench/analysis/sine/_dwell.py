@@ -23,7 +23,16 @@ from ..tones import (
     steady_phase,
     tracked_orders,
 )
-from ._background import BETWEEN, NOTHING, Background, background_of, heard_in, left_between, louder
+from ._background import (
+    BETWEEN,
+    NOTHING,
+    OVERHEARD,
+    Background,
+    background_of,
+    heard_in,
+    left_between,
+    louder,
+)
 
 _LOWEST_ORDER = 0.1
 """Displacement is kept down to this part of the drive frequency, where drift and hum begin to matter."""
@@ -71,8 +80,10 @@ class DwellResponse(Labelled):
     noise_source: str
     """What tells that noise, or why it is not determined."""
     rest_bias_i: float
-    """The same lift, if all that does not repeat with the drive were noise; NaN where that is too much."""
+    """The same lift, if all that does not repeat with the drive were noise; NaN where it is surely more."""
     rest_error_i: float
+    rest_displacement_m: float
+    """Root mean square of what does not repeat with the drive [m]."""
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
@@ -92,8 +103,14 @@ class DwellResponse(Labelled):
     """Displacement amplitudes over the window [m]."""
     lines: tuple[Line, ...]
 
-    def known_to_repeat(self) -> Self:
-        """Give the same for a motion that repeats with the drive: what does not is noise then."""
+    def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
+        """Give the same, what does not repeat taken as noise, for a motion that is not known to be irregular.
+
+        Of one that is not known to repeat either it is, up to `OVERHEARD` times what was heard.
+        """
+        heard_m = self.noise_displacement_m
+        if not (is_known_to_repeat or self.rest_displacement_m <= OVERHEARD * heard_m):
+            return self
         if np.isnan(self.rest_error_i) or self.rest_error_i <= self.noise_error_i:
             return self
         return replace(
@@ -163,7 +180,8 @@ def dwell_response(
     repeated = _repeated(motion, phase, orders)
     rest = left_between(motion - repeated, sample_rate_hz)
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
-    rest_m = rest.rms_m if rest.rms_m <= LARGEST_NOISE * np.std(motion) else np.nan
+    most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * louder(silent, sensor).rms_m)
+    rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
     rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
     lift = noise_lift(repeated if noise.is_rest else motion, noise.rms_m, 2 * noise.frequency_hz * window_s)
     spectrum = amplitude_spectrum(response[window], sample_rate_hz)
@@ -177,6 +195,7 @@ def dwell_response(
         noise_source=noise.source,
         rest_bias_i=rest_lift.bias / level.amplitude_m,
         rest_error_i=rest_lift.error / level.amplitude_m,
+        rest_displacement_m=rest.rms_m,
         response_ii=abs(ratio),
         sd_response_ii=abs(ratio) * scatter,
         phase_rad=float(np.angle(ratio)),
