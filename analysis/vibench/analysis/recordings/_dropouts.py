@@ -5,7 +5,7 @@ It leaves the motion within a sample and comes back to it. No motion does: an im
 does not take that back, and what rings has many turns.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -26,8 +26,14 @@ _FAR = 60.0
 _HEARD = 6.0
 """How far it lies where the converter's filter still rings of it."""
 _SILENT = 6
-_JOINED_S = 1e-3
+_QUIET_S = 2.5e-4
+"""Between two runs of sharp corners, which may be edges of one drop-out or of two."""
+_MOST_RUNS = 12
+"""Close to each other; so many corners are made by the motion."""
 _FLANK_S = 1e-3
+"""Of motion on either side that a drop-out is told by."""
+_LEAST_OF_FLANK = 0.25
+"""Part of it that another drop-out close by must leave."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
 """Of motion behind a sample that tells whether it was measured."""
 _OUTSTANDING = 8.0
@@ -75,23 +81,53 @@ def found_dropouts(velocity: Reals, sample_rate_hz: float) -> tuple[Dropout, ...
     rings, far = sharp > _HEARD * usual, np.flatnonzero(sharp > _FAR * usual)
     longest = LONGEST_S * sample_rate_hz
 
-    def believed(edges: Integers) -> Dropout | None:
-        first = int(edges[0]) - _ringing(rings[edges[0] :: -1], flank) - 2
-        stop = int(edges[-1]) + _ringing(rings[edges[-1] :], flank) + 3
-        is_whole = first >= flank and stop + flank <= velocity.size and stop - first <= longest
-        return Dropout(first, stop) if is_whole and _comes_back(velocity, first, stop, flank) else None
+    def explained(edges: Integers) -> tuple[Dropout, ...]:
+        runs = [
+            Dropout(
+                int(run[0]) - _ringing(rings[run[0] :: -1], flank) - 2,
+                int(run[-1]) + _ringing(rings[run[-1] :], flank) + 3,
+            )
+            for run in _apart(edges, _QUIET_S * sample_rate_hz)
+        ]
+        return _explained(velocity, runs, flank, longest) if len(runs) <= _MOST_RUNS else ()
 
-    found: list[Dropout | None] = []
+    found: list[Dropout] = []
     for edges in _apart(far, longest):
-        whole = believed(edges)
-        found += [whole] if whole else map(believed, _apart(edges, _JOINED_S * sample_rate_hz))
-    believable = tuple(each for each in found if each)
-    return believable if len(believable) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+        together = explained(edges)
+        for each in [] if together else _apart(edges, flank):
+            together += explained(each)
+        found += together
+    return tuple(found) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
 
 
 def _apart(places: Integers, distance: float) -> list[Integers]:
     """Split where neighbours are farther apart."""
     return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
+
+
+def _explained(velocity: Reals, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
+    """Explain all of these runs of sharp corners by drop-outs, or none of them.
+
+    By the fewest, and of those by the ones about which the motion is smoothest: between the edges of two a
+    dark level looks like a motion as well.
+    """
+    ends = [0, *(each.stop for each in runs)]
+    begins = [*(each.first for each in runs), velocity.size]
+    best: list[tuple[int, float, tuple[Dropout, ...]] | None] = [(0, 0.0, ())]
+    for last in range(1, len(runs) + 1):
+        ways = []
+        for first, so_far in enumerate(best):
+            one = Dropout(begins[first], ends[last])
+            # What is next to it is no motion to compare with.
+            before, after = min(flank, one.first - ends[first]), min(flank, begins[last] - one.stop)
+            is_alone = min(before, after) >= flank * _LEAST_OF_FLANK
+            is_short = one.stop - one.first <= longest + flank  # with what rings on both sides
+            if so_far is not None and is_alone and is_short:
+                rough = _roughness(velocity, one, before, after)
+                if rough < np.inf:
+                    ways.append((so_far[0] + 1, so_far[1] + rough, (*so_far[2], one)))
+        best.append(min(ways, default=None))
+    return best[-1][2] if best[-1] else ()
 
 
 def _ringing(rings: Flags, longest: int) -> int:
@@ -101,24 +137,26 @@ def _ringing(rings: Flags, longest: int) -> int:
     return int(heard[breaks[0]] if breaks.size else heard[-1])
 
 
-def _comes_back(velocity: Reals, first: int, stop: int, flank: int) -> bool:
-    """Whether one smooth motion passes through both flanks, and what lies between jumps far from it.
+def _roughness(velocity: Reals, dropout: Dropout, before: int, after: int) -> float:
+    """Say what one smooth motion through both flanks leaves of them, mean square; infinite for no drop-out.
 
-    A clipped peak is far from it too, and gets there at the motion's own pace.
+    What lies between jumps far from that motion. A clipped peak is far from it too, and gets there at the
+    motion's own pace.
     """
-    first, stop = first - flank, stop + flank
-    at = np.linspace(-1.0, 1.0, stop - first)
-    outside = np.ones(at.size, dtype=np.bool_)
-    outside[flank:-flank] = False
-    near = velocity[first:stop]
+    near = velocity[dropout.first - before : dropout.stop + after]
     if not np.all(np.isfinite(near)):
-        return False
+        return np.inf
+    at = np.linspace(-1.0, 1.0, near.size)
+    outside = np.ones(at.size, dtype=np.bool_)
+    outside[before:-after] = False
     pace = np.abs(np.diff(near))
-    if np.max(pace[flank:-flank]) < _JUMP * max(np.max(pace[:flank]), np.max(pace[-flank:])):
-        return False
+    if np.max(pace[before:-after]) < _JUMP * max(np.max(pace[:before]), np.max(pace[-after:])):
+        return np.inf
     shape = np.polynomial.legendre.legvander(at, 5)
     left = near - shape @ lstsq(shape[outside], near[outside])[0]
-    return bool(np.max(np.abs(left[~outside])) > _OUTSTANDING * np.sqrt(np.mean(left[outside] ** 2)))
+    rough = float(np.mean(left[outside] ** 2))
+    is_far = np.max(left[~outside] ** 2) > _OUTSTANDING**2 * rough
+    return rough if is_far else np.inf
 
 
 def bridged(velocity: Reals, dropouts: tuple[Dropout, ...]) -> Reals:
