@@ -96,6 +96,16 @@ def test_a_fault_is_found_by_name_with_advice(checked, rig, tmp_path, fault, nam
     assert report.verdict is Verdict.FAIL
 
 
+def test_a_laser_that_loses_its_light_is_named_as_such_and_hum_is_not(checked, rig, tmp_path):
+    virtual = rig.virtual.model_copy(update={"vibrometer_dropouts_per_s": 10.0})
+    dark = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
+    assert dark.verdict is not Verdict.OK
+    assert "a laser that loses its light" in dark.advice
+    virtual = rig.virtual.model_copy(update={"vibrometer_noise_m_per_s_per_rthz": 1e-3})
+    loud = checked(rig.model_copy(update={"virtual": virtual}), tmp_path)["noise of m0_velocity"]
+    assert "look for hum" in loud.advice
+
+
 def test_a_vibrometer_whose_sign_is_reversed_is_warned_of(checked, rig, tmp_path):
     assert checked(rig, tmp_path)["sign of m0_velocity"].verdict is Verdict.OK
     report = checked(rig, tmp_path, lambda v: v.faults.reverse("cDAQ1Mod1/ai3"))

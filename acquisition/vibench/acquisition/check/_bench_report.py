@@ -25,6 +25,10 @@ _BYTES_PER_SAMPLE = 4
 _SECONDS_PER_HOUR = 3600.0
 NOISE_SHARE = Bounds(1e-3, 2e-2)
 """rms of a silent channel, of its full scale."""
+_MEDIAN_OF_NORMAL = 0.6745
+"""Of a normal variable's size, over its standard deviation."""
+_IN_MOMENTS = 0.2
+"""Usual noise over the rms of all, below which moments make it."""
 OFFSET_SHARE = Bounds(1e-2, 1e-1)
 """Mean of a silent channel, of its full scale."""
 LATENCY_S = Bounds(0.5, 5.0)
@@ -211,6 +215,12 @@ def _noise(channel: Channel, row: Samples) -> Finding:
     rms_v = float(np.std(row))
     verdict = NOISE_SHARE.verdict(rms_v / channel.full_scale_v)
     advice = "look for hum, a loose shield, or a cable that picks it up"
+    usual_v = float(np.median(np.abs(row - np.median(row)))) / _MEDIAN_OF_NORMAL
+    if usual_v < _IN_MOMENTS * rms_v:
+        advice = (
+            f"it comes in moments, and is {usual_v:.2g} V otherwise: look for a loose contact, or a laser "
+            "that loses its light; refocus it, or stick on reflective tape"
+        )
     if rms_v == 0.0:
         verdict, advice = (
             Verdict.FAIL,
