@@ -6,6 +6,10 @@ import numpy as np
 import pytest
 
 from tests.analysis.sine.sweep_in_memory import sweep_response
+from vibench.acquisition import open_bench, run_measurement
+from vibench.acquisition.plan import Measurement, SineSweep
+from vibench.acquisition.rig import load_rig
+from vibench.analysis import Simulation, analyse_files
 from vibench.analysis.sine import collisions
 from vibench.sim import LinearSweep, gong2025, integrate
 
@@ -86,3 +90,33 @@ def test_drop_outs_of_the_laser_are_outvoted():
     assert result.regions[-1].stop.frequency_hz == pytest.approx(impacts_hz[-1], abs=3)
     quiet, _ = found(2e-7, 225.0, 385.0, spoil)
     assert quiet.regions == ()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    ("start_hz", "stop_hz", "duration_s"), [(150, 330, 10), (330, 150, 6), (150, 330, 3), (60, 150, 5)]
+)
+def test_what_rings_of_the_steps_of_a_fast_weak_sweep_is_no_collision(
+    tmp_path, start_hz, stop_hz, duration_s
+):
+    """m1 stays within half of its gap; "the masses collide from 257 to 304 Hz" was said."""
+    plan = SineSweep(
+        amplitude_vpp=0.1 if max(start_hz, stop_hz) > 200 else 0.01,
+        start_hz=start_hz,
+        stop_hz=stop_hz,
+        duration_s=duration_s,
+        settle_s=1,
+    )
+    with open_bench(load_rig("virtual_rig")) as bench:
+        run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), tmp_path / "fast.h5")
+    (result,) = analyse_files([tmp_path / "fast.h5"], "fast", Simulation.LEFT_OUT).results
+    assert result.analysis.collisions.regions == ()
+
+
+@pytest.mark.thorough
+def test_a_fast_sweep_that_collides_is_told_to(tmp_path):
+    plan = SineSweep(amplitude_vpp=1.5, start_hz=220, stop_hz=310, duration_s=6, settle_s=1)
+    with open_bench(load_rig("virtual_rig")) as bench:
+        run_measurement(bench, Measurement(name="fast", excitation=plan, ramp_s=0.3), tmp_path / "fast.h5")
+    (result,) = analyse_files([tmp_path / "fast.h5"], "fast", Simulation.LEFT_OUT).results
+    assert sum(each.high_hz - each.low_hz for each in result.analysis.collisions.regions) > 80

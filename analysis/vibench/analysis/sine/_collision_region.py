@@ -14,6 +14,12 @@ _NOISE_FACTOR = 4.0
 """Residual over noise: an interval's rms of hundreds of samples scatters by a few percent only."""
 _DISTORTION = 0.02
 """Residual over order 1 that a smooth motion may have: harmonics above the third of amplifier and shaker."""
+_RINGS_ON = 0.003
+"""The same of a fast sweep, per hertz a second: each step of its frequency rings the modes nearby.
+
+0.0022 in linear motion of the paper's specimen, at any rate from 4 to 60 Hz/s.
+"""
+_RINGS_AT_MOST = 0.2
 _SMOOTH_AT_MOST = 0.1
 """A tenth of order 1 unexplained is no smooth motion, whatever the quietest intervals of a sweep show."""
 _QUIET_QUANTILE = 0.1
@@ -83,7 +89,8 @@ def collisions(sweep: SweepResponse) -> Collisions:
     """Find where the motion stops being a smooth, slowly varying sine.
 
     Impacts break the motion: they leave velocity that no order of the drive explains. An interval
-    collides when this residual is above 4 times the noise and above 2 % of order 1. The noise is the
+    collides when this residual is above 4 times the noise and above 2 % of order 1, or what
+    rings of its steps where a sweep is faster than 7 Hz/s. The noise is the
     larger of what the sixth difference of the samples shows and of the quietest tenth of the sweep
     (as far as that may be smooth at all). Single intervals, such as drop-outs of the laser, are
     outvoted by their neighbourhood.
@@ -91,7 +98,9 @@ def collisions(sweep: SweepResponse) -> Collisions:
     residual = sweep.velocity.residual_rms
     fundamental = np.abs(sweep.velocity.order(1.0))
     noise = _noise(sweep, residual, fundamental)
-    threshold = np.hypot(_NOISE_FACTOR * noise, _DISTORTION * fundamental)
+    ringing = min(_RINGS_ON * abs(sweep.sweep_rate_hz_per_s), _RINGS_AT_MOST)
+    smooth = max(_DISTORTION, ringing) * fundamental
+    threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
     above = residual > threshold
     votes = max(1, round(_VOTE_S / sweep.interval_s))
     if votes >= above.size:
@@ -109,7 +118,7 @@ def collisions(sweep: SweepResponse) -> Collisions:
         residual_rms=residual,
         threshold=threshold,
         is_colliding=inside,
-        is_unexplained=residual > np.hypot(_NOISE_FACTOR * sweep.noise_rms, _DISTORTION * fundamental),
+        is_unexplained=residual > np.hypot(_NOISE_FACTOR * sweep.noise_rms, smooth),
         noise_rms=noise,
     )
 
