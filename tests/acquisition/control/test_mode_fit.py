@@ -47,3 +47,19 @@ def test_the_stated_uncertainty_is_the_spread_of_repetitions(natural_hz, damping
 
 def test_four_points_are_too_few():
     assert fitted_mode(*points(*MODES[1], count=4)) is None
+
+
+def test_points_that_scatter_tell_no_mode_that_nobody_damps():
+    """A vibrometer without light led to "natural frequency 476.54 +- 0.12 Hz, damping ratio -1e-06"."""
+    random = np.random.default_rng(3)
+    frequency_hz, answers = points(*MODES[1])
+    found = [
+        fitted_mode(
+            frequency_hz, answers.mean() * (random.standard_normal(7) + 1j * random.standard_normal(7))
+        )
+        for _ in range(300)
+    ]
+    told = [each for each in found if each is not None]
+    assert len(told) < 0.2 * len(found)
+    assert all(frequency_hz[0] <= each.frequency_hz <= frequency_hz[-1] for each in told)
+    assert all(each.damping_ratio > 0 for each in told)

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 _UNKNOWNS = 8
 """Real numbers that are fitted: frequency, damping, and a complex polynomial of degree two."""
+_SURE = 2.0
+"""Standard uncertainties by which a damping differs from none."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +24,9 @@ class Mode:
 
 
 def fitted_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.complex128]) -> Mode | None:
-    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None with too few points.
+    """Fit T (s^2 + a1 s + a2) = b0 + b1 s + b2 s^2 with real a and complex b; None where points tell no mode.
+
+    They are too few, or what they tell is damped no more than they scatter, or lies beside them all.
 
     The polynomial on the right holds the mode's residue, the motion of the base itself and the flanks
     of other modes; a constant error of all phases only turns it. Levy's linear least squares, weighted
@@ -43,9 +47,11 @@ def fitted_mode(frequency_hz: NDArray[np.float64], transmissibility: NDArray[np.
     for _ in range(3):
         solution, covariance = _solved(s, transmissibility, weight)
         weight = 1 / np.abs(s**2 + solution[0] * s + solution[1])
-    if solution[1] <= 0:
+    if solution[1] <= 0 or solution[0] <= _SURE * sqrt(max(0.0, float(covariance[0, 0]))):
         return None
     natural = sqrt(float(solution[1]))
+    if not min(frequency_hz) <= middle_hz * natural <= max(frequency_hz):
+        return None
     return Mode(
         frequency_hz=middle_hz * natural,
         frequency_u_hz=middle_hz * sqrt(max(0.0, float(covariance[1, 1]))) / (2 * natural),
