@@ -176,7 +176,8 @@ def regions_text(found: Collisions) -> str:
     parts = []
     for region in found.regions:
         start, stop = region.start, region.stop
-        begin = plus_minus(start.frequency_hz, 0.5 * (start.upper_hz - start.lower_hz)) + " Hz"
+        middle_hz = 0.5 * (start.upper_hz + start.lower_hz)
+        begin = plus_minus(middle_hz, start.upper_hz - middle_hz) + " Hz"
         # Collisions live on by chance: where they end in one run is no edge with bounds.
         end = f"{stop.frequency_hz:.1f} Hz in this run"
         first = "the sweep's beginning" if region.reaches_start else begin
