@@ -233,3 +233,6 @@ def test_a_recording_that_is_often_dark_is_warned_of(rig, tmp_path):
         if each.what == "Drop-outs"
     )
     assert (note.verdict, warning.verdict) == (Verdict.NOTE, Verdict.WARNING)
+    left = replace(facts, overload_s={ROLE: 1e-3})
+    (overload,) = (each for each in measurement_checks(left) if each.what == "Overloads")
+    assert "do not trust Response I" in overload.text  # "a lower bound" stood beside one 5700 times too large

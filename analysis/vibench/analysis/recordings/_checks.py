@@ -14,7 +14,7 @@ from vibench.acquisition.recording import RecordingState, SealState
 from vibench.acquisition.rig import GeneratorConfig
 
 from ..tables import Labelled
-from ._channels import DRIVE
+from ._channels import DRIVE, RESPONSE
 from ._facts import RecordingFacts
 
 
@@ -111,8 +111,13 @@ def _overloads(facts: RecordingFacts) -> Check:
     if not facts.overload_s:
         return Check("Overloads", Verdict.PASSED, "no input came near its full scale")
     parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
-    text = f"near full scale: {', '.join(parts)}; peaks may be cut, so Response I is a lower bound"
-    return Check("Overloads", Verdict.WARNING, text)
+    what = "peaks may be cut, so Response I is a lower bound"
+    if facts.dropouts and RESPONSE in facts.overload_s:
+        what = (
+            "the vibrometer lost its light for longer than is bridged, or peaks were cut: look at the "
+            "velocity there, and do not trust Response I"
+        )
+    return Check("Overloads", Verdict.WARNING, f"near full scale: {', '.join(parts)}; {what}")
 
 
 def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
