@@ -1,11 +1,13 @@
 """Campaign files: defaults, refusals, exact round trips, and the two that are shipped."""
 
+import re
 from pathlib import Path
 
 import pytest
 from hypothesis import given, strategies as st
 
 from vibench.acquisition import ConfigurationError, load_campaign, toml_text
+from vibench.acquisition.excitation import EXCITATION_KINDS
 from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import (
     Campaign,
@@ -208,3 +210,14 @@ def test_the_paper_s_campaign_has_its_levels_band_and_times():
     assert {plan.frequency_hz for plan in dwells} == {260}
     assert min(plan.duration_s for plan in dwells) >= 10
     assert (sweep.start_hz, sweep.stop_hz, sweep.duration_s, sweep.amplitude_vpp) == (150, 350, 200, 1.5)
+
+
+def test_the_page_on_campaigns_says_of_every_kind_what_it_needs(tmp_path):
+    page = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| [^|]+ \| (.*=.*) \|$", page, re.MULTILINE)
+    assert {kind for kind, _ in rows} == set(EXCITATION_KINDS)
+    for kind, needs in rows:
+        for keys in re.findall(r"`([^`]+)`", needs):
+            excitation = f'{{ kind = "{kind}", amplitude_vpp = 0.2, {keys} }}'
+            text = f'name = "c"\n[[measurements]]\nname = "m"\nexcitation = {excitation}\n'
+            assert loaded(tmp_path, text).measurements[0].excitation.kind == kind
