@@ -8,17 +8,10 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
+from vibench.acquisition.recording import BridgedChannel, Dropout, bridged, found_dropouts
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files
-from vibench.analysis.recordings import (
-    BridgedChannel,
-    Dropout,
-    Verdict,
-    bridged,
-    found_dropouts,
-    measurement_checks,
-    recording_facts,
-)
+from vibench.analysis.recordings import Verdict, measurement_checks, recording_facts
 from vibench.sim import shipped_specimens
 
 RATE_HZ = 51_200.0

@@ -8,6 +8,13 @@ from ._disk_trouble import (
     DiskTrouble as DiskTrouble,
     troubled_disks as troubled_disks,
 )
+from ._dropouts import (
+    DROPOUTS_TOLD_AFTER_S as DROPOUTS_TOLD_AFTER_S,
+    BridgedChannel as BridgedChannel,
+    Dropout as Dropout,
+    bridged as bridged,
+    found_dropouts as found_dropouts,
+)
 from ._feedback_note import (
     BranchEnd as BranchEnd,
     BranchEndNote as BranchEndNote,

@@ -10,10 +10,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from vibench.acquisition.recording import DROPOUTS_TOLD_AFTER_S, bridged, found_dropouts
 from vibench.acquisition.rig import Rig, channels_of, specimen_of
 from vibench.sim import Specimen
 
-from ..recordings import BASE, DROPOUTS_TOLD_AFTER_S, RESPONSE, bridged, found_dropouts
+from ..recordings import BASE, RESPONSE
 from ..signals import Reals
 from ._change_watch import BLOCK_S, ChangeWatch, KnownNumber, Level
 from ._filter_kernels import STATES

@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from vibench.acquisition.recording import Recording
+from vibench.acquisition.recording import BridgedChannel, Dropout, Recording
 
 from ..errors import NotEnoughData, UnusableData
-from ..recordings import BASE, RESPONSE, BridgedChannel, Dropout
+from ..recordings import BASE, RESPONSE
 from ..signals import Flags, Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 

@@ -11,12 +11,12 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from vibench.acquisition.plan import Measurement
-from vibench.acquisition.recording import Recording
+from vibench.acquisition.recording import BridgedChannel, Recording
 from vibench.sim import Accuracy, Specimen
 from vibench.sim.shaker import MotionFailed, SampledMotion, follow_voltage
 
 from ..errors import UnusableData
-from ..recordings import BASE, DRIVE, RESPONSE, BridgedChannel, RecordedChannels
+from ..recordings import BASE, DRIVE, RESPONSE, RecordedChannels
 from ..signals import Reals
 from ._channel_noise import ChannelNoise, channel_noise
 from ._driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage

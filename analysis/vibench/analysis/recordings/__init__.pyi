@@ -21,13 +21,6 @@ from ._checks import (
     Verdict as Verdict,
     measurement_checks as measurement_checks,
 )
-from ._dropouts import (
-    DROPOUTS_TOLD_AFTER_S as DROPOUTS_TOLD_AFTER_S,
-    BridgedChannel as BridgedChannel,
-    Dropout as Dropout,
-    bridged as bridged,
-    found_dropouts as found_dropouts,
-)
 from ._facts import (
     RecordingFacts as RecordingFacts,
     described_specimen as described_specimen,

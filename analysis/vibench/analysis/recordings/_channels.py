@@ -8,11 +8,10 @@ from typing import Protocol
 
 import numpy as np
 
-from vibench.acquisition.recording import Recording
+from vibench.acquisition.recording import BridgedChannel, Recording
 
 from ..errors import NotEnoughData, UnusableData
 from ..signals import Complexes, Flags, Reals
-from ._dropouts import BridgedChannel
 from ._sensor_gain import coupled_gain
 
 DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"

@@ -8,6 +8,8 @@ from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, Val
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import (
+    BridgedChannel,
+    Dropout,
     EventKind,
     FeedbackNote,
     Origin,
@@ -22,7 +24,6 @@ from ..errors import UnusableData
 from ..tables import named
 from ._channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
 from ._channels import RESPONSE
-from ._dropouts import BridgedChannel, Dropout
 from ._intact import require_intact, require_measured_size
 
 

@@ -11,11 +11,13 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lstsq, toeplitz
 
-from vibench.acquisition.recording import Recording
+from ..instruments import Samples
+from ._reader import Recording
 
-from ..signals import Flags, Integers, Reals
+Places = NDArray[np.int64]
 
 LONGEST_S = 4e-3
 """What is longer is no drop-out that the motion on both sides tells anything of."""
@@ -58,7 +60,7 @@ class Dropout(NamedTuple):
     """One past the last."""
 
 
-def found_dropouts(velocity: Reals, sample_rate_hz: float) -> tuple[Dropout, ...]:
+def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, ...]:
     """Find what leaves the motion and comes back to it.
 
     Parameters
@@ -81,7 +83,7 @@ def found_dropouts(velocity: Reals, sample_rate_hz: float) -> tuple[Dropout, ...
     rings, far = sharp > _HEARD * usual, np.flatnonzero(sharp > _FAR * usual)
     longest = LONGEST_S * sample_rate_hz
 
-    def explained(edges: Integers) -> tuple[Dropout, ...]:
+    def explained(edges: Places) -> tuple[Dropout, ...]:
         runs = [
             Dropout(
                 int(run[0]) - _ringing(rings[run[0] :: -1], flank) - 2,
@@ -100,12 +102,12 @@ def found_dropouts(velocity: Reals, sample_rate_hz: float) -> tuple[Dropout, ...
     return tuple(found) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
 
 
-def _apart(places: Integers, distance: float) -> list[Integers]:
+def _apart(places: Places, distance: float) -> list[Places]:
     """Split where neighbours are farther apart."""
     return np.split(places, np.flatnonzero(np.diff(places) > distance) + 1)
 
 
-def _explained(velocity: Reals, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
+def _explained(velocity: Samples, runs: Sequence[Dropout], flank: int, longest: float) -> tuple[Dropout, ...]:
     """Explain all of these runs of sharp corners by drop-outs, or none of them.
 
     By the fewest, and of those by the ones about which the motion is smoothest: between the edges of two a
@@ -130,14 +132,14 @@ def _explained(velocity: Reals, runs: Sequence[Dropout], flank: int, longest: fl
     return best[-1][2] if best[-1] else ()
 
 
-def _ringing(rings: Flags, longest: int) -> int:
+def _ringing(rings: NDArray[np.bool_], longest: int) -> int:
     """For how many samples from here on the converter's filter is heard, `_SILENT` of them in a row not."""
     heard = np.flatnonzero(rings[:longest])
     breaks = np.flatnonzero(np.diff(heard) > _SILENT)
     return int(heard[breaks[0]] if breaks.size else heard[-1])
 
 
-def _roughness(velocity: Reals, dropout: Dropout, before: int, after: int) -> float:
+def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> float:
     """Say what one smooth motion through both flanks leaves of them, mean square; infinite for no drop-out.
 
     What lies between jumps far from that motion. A clipped peak is far from it too, and gets there at the
@@ -159,7 +161,7 @@ def _roughness(velocity: Reals, dropout: Dropout, before: int, after: int) -> fl
     return rough if is_far else np.inf
 
 
-def bridged(velocity: Reals, dropouts: tuple[Dropout, ...]) -> Reals:
+def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
     """Replace drop-outs by what a linear prediction of the motion makes likeliest there.
 
     Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330: the unknown samples with the smallest
@@ -198,7 +200,7 @@ def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int
         yield group[0].first, group[-1].stop, behind
 
 
-def _likeliest(near: Reals, known: Flags) -> Reals:
+def _likeliest(near: Samples, known: NDArray[np.bool_]) -> Samples:
     """Solve for the samples that are not known, given a predictor from the others, if those are enough."""
     mean = float(np.mean(near[known]))
     values = np.where(known, near - mean, 0.0)
@@ -230,7 +232,7 @@ class BridgedChannel:
     recording: Recording
     role: str
 
-    def read(self, start: int, stop: int) -> Reals:
+    def read(self, start: int, stop: int) -> Samples:
         """Give velocities [m/s], shape (samples,); lost samples are NaN."""
         values = self.recording.read(self.role, start, stop)
         if not self.between(start, stop):
