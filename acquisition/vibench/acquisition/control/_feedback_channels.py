@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import ConfigurationError
 from ..instruments import Samples
-from ..recording import coupling_cut_hz
+from ..recording import bridged, coupling_cut_hz, found_dropouts
 from ..rig import Channel, Role
 from ._control_action import PhaseSamples
 from ._stroboscope import Phasors, Stroboscope
@@ -35,11 +35,15 @@ class FeedbackChannels:
     sample_rate_hz: float
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
-        """Give drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,)."""
+        """Give drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,).
+
+        Where the vibrometer lost its light the motion is bridged.
+        """
+        response = samples.volts[self.response] * self.response_units_per_volt
         return (
             samples.volts[self.drive] * self.drive_units_per_volt,
             samples.volts[self.base] * self.base_units_per_volt,
-            samples.volts[self.response] * self.response_units_per_volt,
+            bridged(response, found_dropouts(response, self.sample_rate_hz)),
         )
 
     def stroboscope(self, near_hz: float, drives: int = 1) -> Stroboscope:

@@ -9,6 +9,7 @@ from ..excitation import Segment, Tone
 from ..plan import HUSH_S, Measurement, Phase, RunState, lowest_setting_vpp, ramp
 from ..recording import FeedbackNote
 from ..rig import Rig
+from ._bridged_rows import BridgedRows
 from ._control_action import ControlAction, Controller, PhaseSamples
 from ._feedback_channels import FeedbackChannels
 from ._stroboscope import Periods, Stroboscope
@@ -30,6 +31,7 @@ class SineLoop:
         self._notes: list[FeedbackNote] = []
         self._scope: Stroboscope
         self._silence = np.zeros(0)
+        self._rows = BridgedRows(channels.sample_rate_hz)
         self.channels = channels
         self.rig = rig
         self.most_vpp = measurement.excitation.amplitude_vpp
@@ -75,6 +77,7 @@ class SineLoop:
         """Play something else from the next move on."""
         if frequency_hz != self.setting.frequency_hz:
             self._scope = self.channels.stroboscope(frequency_hz, self.drives)
+            self._rows.skip()
         self.setting = DriveSetting(frequency_hz, setting_vpp)
         self.forget()
 
@@ -102,7 +105,9 @@ class SineLoop:
         """Play on for a while, and look."""
         samples = yield from self.run_phase(Phase(state, self._tone, duration_s, segment))
         self.elapsed_s += duration_s
-        self._scope.add(samples.first_sample, *self.channels.rows(samples))
+        first_sample, rows = self._rows.take(samples.first_sample, np.stack(self.channels.rows(samples)))
+        if rows.size:
+            self._scope.add(first_sample, *rows)
 
     def say(self) -> Controller[None]:
         """Have everything noted that is still to be noted."""

@@ -14,6 +14,7 @@ from ._dropouts import (
     Dropout as Dropout,
     bridged as bridged,
     found_dropouts as found_dropouts,
+    undecided_from as undecided_from,
 )
 from ._feedback_note import (
     BranchEnd as BranchEnd,

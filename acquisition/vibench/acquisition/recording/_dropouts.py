@@ -74,10 +74,7 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
     flank = round(_FLANK_S * sample_rate_hz)
     if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 4 * flank:
         return ()
-    # Twice differenced, and differenced twice again: nothing of a motion is left but its sharpest corners.
-    sharp = np.zeros(velocity.size)
-    sharp[2:-2] = np.abs(np.diff(velocity, 4))
-    usual = float(np.nanmedian(sharp))
+    sharp, usual = _corners(velocity)
     if usual == 0.0 or not np.any(sharp > _FAR * usual):
         return ()
     rings, far = sharp > _HEARD * usual, np.flatnonzero(sharp > _FAR * usual)
@@ -100,6 +97,38 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
             together += explained(each)
         found += together
     return tuple(found) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+
+
+def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
+    """Say from which sample on only what comes will tell whether a drop-out has begun; else their number.
+
+    Parameters
+    ----------
+    velocity
+        Shape (samples,), of a channel that goes on.
+    sample_rate_hz
+        Of the samples.
+    dropouts
+        Those found in it.
+
+    """
+    if sample_rate_hz < LOWEST_RATE_HZ or velocity.size < 5:
+        return velocity.size
+    sharp, usual = _corners(velocity)
+    far = np.flatnonzero(sharp > _FAR * usual) if usual else np.empty(0, dtype=np.int64)
+    far = far[far >= velocity.size - round(DROPOUTS_TOLD_AFTER_S * sample_rate_hz)]
+    known = np.zeros(velocity.size, dtype=np.bool_)
+    for each in dropouts:
+        known[each.first : each.stop] = True
+    open_ones = far[~known[far]]
+    return max(int(open_ones[0]) - round(_FLANK_S * sample_rate_hz), 0) if open_ones.size else velocity.size
+
+
+def _corners(velocity: Samples) -> tuple[Samples, float]:
+    """Difference twice, and twice again, which leaves a motion's sharpest corners; and give their median."""
+    sharp = np.zeros(velocity.size)
+    sharp[2:-2] = np.abs(np.diff(velocity, 4))
+    return sharp, float(np.nanmedian(sharp))
 
 
 def _apart(places: Places, distance: float) -> list[Places]:
@@ -162,7 +191,7 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
 
 
 def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
-    """Replace drop-outs by what a linear prediction of the motion makes likeliest there.
+    """Give the velocity, shape (samples,), with what a linear prediction makes likeliest in drop-outs.
 
     Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330: the unknown samples with the smallest
     prediction error, for a predictor from the samples about them.
