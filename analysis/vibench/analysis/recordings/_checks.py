@@ -125,7 +125,8 @@ def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
         times = "once" if facts.dropouts == 1 else f"{facts.dropouts} times"
         text = (
             f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in all; m0's motion was "
-            "bridged there from both sides. Refocus the laser, or stick on reflective tape"
+            "bridged there from both sides, which misses what impacts did there. Refocus the laser, or stick "
+            "on reflective tape"
         )
         often = facts.dropout_s > _OFTEN_DARK * facts.duration_s
         yield Check("Drop-outs", Verdict.WARNING if often else Verdict.NOTE, text)
