@@ -1,17 +1,89 @@
-"""Whatever the system ends a program by is a stop, as far as it can be heeded."""
+"""Every signal that would end or stop a program is a stop, as far as it can be caught."""
 
 import signal
+import subprocess
+import sys
 
 import pytest
 
 from vibench.acquisition import StopSwitch, stop_on_signal
-from vibench.acquisition.stopping._stop_on_signal import CAUSES
+from vibench.acquisition.stopping import LEFT_TO_THE_DEAD_MAN, Cause, heeded_signals, signal_name
+
+VALID = sorted(getattr(signal, "valid_signals", set)())
+UNHEEDED = """
+import signal
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+signal.raise_signal({number})
+print("lives")
+"""
 
 
-@pytest.mark.parametrize("name", [each for each in CAUSES if each in signal.Signals.__members__])
-def test_every_signal_that_would_end_the_program_is_a_stop(name, tmp_path, monkeypatch):
+@pytest.fixture
+def default():
+    """Python's own dispositions: pytest has handlers for some signals."""
+    before = {number: signal.getsignal(number) for number in VALID if signal_name(number) not in UNCATCHABLE}
+    python = {"SIGINT": signal.default_int_handler, "SIGPIPE": signal.SIG_IGN, "SIGXFSZ": signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, python.get(signal_name(number), signal.SIG_DFL))
+    yield
+    for number, handler in before.items():
+        if handler is not None:
+            signal.signal(number, handler)
+
+
+UNCATCHABLE = ("SIGKILL", "SIGSTOP")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+@pytest.mark.parametrize("number", VALID, ids=signal_name)
+def test_a_signal_that_would_end_or_stop_the_program_is_an_abort(number, default, tmp_path, monkeypatch):
+    if signal_name(number) in LEFT_TO_THE_DEAD_MAN:
+        assert number not in heeded_signals()
+        return
     monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
     switch = StopSwitch()
     with stop_on_signal(switch, "dwell"):
-        signal.raise_signal(signal.Signals[name])
-    assert switch.request.cause is CAUSES[name]
+        signal.raise_signal(number)
+    if switch.request is None:
+        assert lives_through(number), f"{signal_name(number)} ends or stops a process, and was not heeded"
+    else:
+        is_ctrl_c = number == signal.SIGINT
+        assert switch.request.cause is (Cause.KEYBOARD if is_ctrl_c else Cause.TERMINATED)
+
+
+def lives_through(number):
+    """Whether a Python program goes on after a signal that it does nothing about."""
+    told = subprocess.run(
+        [sys.executable, "-c", UNHEEDED.format(number=number)], capture_output=True, text=True, check=False
+    )
+    return told.stdout == "lives\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+def test_a_second_ctrl_z_does_not_insist(default, tmp_path, monkeypatch):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
+    switch = StopSwitch()
+    with stop_on_signal(switch, "dwell"):
+        signal.raise_signal(signal.SIGTSTP)
+        signal.raise_signal(signal.SIGTSTP)
+    assert switch.request.reason.startswith("SIGTSTP")
+    assert signal.getsignal(signal.SIGTSTP) is signal.SIG_DFL
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+def test_the_run_within_another_takes_the_signal(default, tmp_path, monkeypatch):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
+    outer, inner = StopSwitch(), StopSwitch()
+    with stop_on_signal(outer, "campaign"), stop_on_signal(inner, "dwell"):
+        signal.raise_signal(signal.SIGUSR1)
+    assert (outer.request, inner.request.cause) == (None, Cause.TERMINATED)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
+def test_a_signal_that_the_program_handles_itself_is_left_to_it(default, tmp_path, monkeypatch):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
+    taken, switch = [], StopSwitch()
+    signal.signal(signal.SIGUSR2, lambda number, frame: taken.append(number))
+    with stop_on_signal(switch, "dwell"):
+        signal.raise_signal(signal.SIGUSR2)
+    assert (taken, switch.request) == ([signal.SIGUSR2], None)

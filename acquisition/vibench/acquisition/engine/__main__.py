@@ -7,7 +7,7 @@ import sys
 from threading import Event, Thread
 from types import FrameType
 
-from ..stopping import Cause, heeded_signals
+from ..stopping import Cause, heeded_signals, signal_name
 from ._engine import Engine
 from ._job_queue import JobQueue
 from ._request_handler import RequestHandler
@@ -52,7 +52,7 @@ def _options() -> argparse.Namespace:
 
 def _heed_signals(handler: RequestHandler) -> None:
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
-        handler.shutdown(Cause.TERMINATED, f"{signal.Signals(number).name}: ended by the system")
+        handler.shutdown(Cause.TERMINATED, f"{signal_name(number)}: ended by the system")
 
     for number in heeded_signals():
         signal.signal(number, on_signal)

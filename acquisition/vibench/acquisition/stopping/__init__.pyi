@@ -18,7 +18,9 @@ from ._stop import (
     StopSwitch as StopSwitch,
 )
 from ._stop_on_signal import (
+    LEFT_TO_THE_DEAD_MAN as LEFT_TO_THE_DEAD_MAN,
     heeded_signals as heeded_signals,
+    signal_name as signal_name,
     stop_on_signal as stop_on_signal,
 )
 from ._watchdog import (

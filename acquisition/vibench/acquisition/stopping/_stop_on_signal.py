@@ -1,4 +1,4 @@
-"""Ctrl-C, a polite kill and `vibench stop` end a run softly: the first signal asks, the second insists."""
+"""Every signal that would end or stop a program is a stop of its run: the first asks, the second insists."""
 
 import signal
 import threading
@@ -9,12 +9,14 @@ from types import FrameType
 from ._program import Program, facts_of_this_process, reached
 from ._stop import Cause, StopLevel, StopRequest, StopSwitch
 
-CAUSES = {
-    "SIGINT": Cause.KEYBOARD,
-    # The second last: Ctrl-Break of Windows; the last: no more time of the processor.
-    **dict.fromkeys(("SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU"), Cause.TERMINATED),
-}
-"""By name, since no system has them all: what would end the program at once, and leave the drive on."""
+LEFT_TO_THE_DEAD_MAN = ("SIGKILL", "SIGSTOP", "SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL")
+"""No program can catch the first two; the others repeat the faulty instruction after any handler."""
+_HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
+"""By default these neither end nor stop a process."""
+_PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
+"""Stop a process, as Ctrl-Z does; a terminal sends the last two again and again."""
+_ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
+"""Heeded whatever a program does about them otherwise; the others only where it does nothing."""
 
 
 @contextmanager
@@ -22,13 +24,13 @@ def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]
     """While inside, a stop from outside the program is asked of ``switch``.
 
     ``vibench stop`` finds the program and leaves its stop in the state folder, whatever thread this is;
-    ``what`` is what it is called there. SIGINT, SIGTERM and SIGHUP (the terminal was closed) are stops in
-    the main thread, the only one to which Python delivers signals; so is whatever else would end the program
-    (`CAUSES`). SIGHUP stays ignored where it was ignored before (nohup): such a run is meant to go on.
+    ``what`` is what it is called there. In the main thread, the only one to which Python delivers signals,
+    every signal is a stop that would end or stop the program (`heeded_signals`). SIGHUP stays ignored where it
+    was ignored before (nohup): such a run is meant to go on.
 
     The first ramps down and ends the run as stopped: Ctrl-C as the plan ends, the others faster. A second
     raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones are
-    ignored, so that impatience cannot interrupt the silencing.
+    ignored, so that impatience cannot interrupt the silencing; so is a second Ctrl-Z.
 
     Raises
     ------
@@ -53,13 +55,14 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
     received: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:  # noqa: ARG001 - the signature is Python's
+        name = signal_name(number)
+        if name in _PAUSES:
+            signal.signal(number, signal.SIG_IGN)
         received.append(number)
-        name = signal.Signals(number).name
         match len(received):
             case 1:
-                switch.ask(
-                    StopRequest.by(CAUSES[name], f"{name}: stopped from the keyboard or by the system")
-                )
+                cause = Cause.KEYBOARD if name == "SIGINT" else Cause.TERMINATED
+                switch.ask(StopRequest.by(cause, f"{name}: stopped from the keyboard or by the system"))
             case 2:
                 raise KeyboardInterrupt
 
@@ -71,7 +74,26 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def heeded_signals() -> list[signal.Signals]:
-    """Give what ends a program softly: not a SIGHUP that whoever started it has chosen to ignore."""
-    known = [signal.Signals[name] for name in CAUSES if name in signal.Signals.__members__]
-    return [each for each in known if each.name != "SIGHUP" or signal.getsignal(each) is not signal.SIG_IGN]
+def signal_name(number: int) -> str:
+    """Return the name of a signal; real-time signals have none but their number."""
+    known = {each.value: each.name for each in signal.Signals}
+    return known.get(number, f"signal {number}")
+
+
+def heeded_signals() -> list[int]:
+    """Return the signals that are stops while something drives: those that would end or stop the process.
+
+    A signal that the program handles itself, or ignores, does neither. Those in `LEFT_TO_THE_DEAD_MAN` cannot
+    be heeded.
+    """
+    return [number for number in sorted(signal.valid_signals()) if _is_heeded(number)]
+
+
+def _is_heeded(number: int) -> bool:
+    name, handler = signal_name(number), signal.getsignal(number)
+    if name in LEFT_TO_THE_DEAD_MAN or name in _HARMLESS:
+        return False
+    if name in _ALWAYS:
+        return name != "SIGHUP" or handler is not signal.SIG_IGN
+    # A handler of this module belongs to a run around this one, with another switch.
+    return handler is signal.SIG_DFL or getattr(handler, "__module__", "") == __name__
