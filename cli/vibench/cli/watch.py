@@ -21,6 +21,7 @@ from vibench.acquisition.engine import (
     stop_engine,
     the_engine,
 )
+from vibench.stop_files import SWITCH_OFF
 
 from .engine_bars import INTERVAL_S, EngineBars
 from .output import console, print_json
@@ -106,15 +107,13 @@ def _said(name: str, delivery: StopDelivery, level: StopLevel) -> str:
             )
         case StopDelivery.UNHEEDED:
             raise EngineSilent(
-                f"{name} was told to stop ({level.value}), and goes on driving: an instrument hangs, or the "
-                "computer does. It stops when that ends; in an emergency switch the amplifier off by hand"
+                f"{name} has taken the stop ({level.value}) and has not confirmed that its output is off: an "
+                f"instrument hangs, or the computer does. {SWITCH_OFF}"
             )
-        case StopDelivery.TAKEN:
-            return f"{name}: has taken the stop ({level.value}) that was left for it."
         case StopDelivery.TOLD if level is StopLevel.HOLD:
             return f"{name}: told to hold; 'vibench release' lets it go on."
-        case StopDelivery.TOLD:
-            return f"{name}: told to stop ({level.value})."
+        case StopDelivery.TOLD | StopDelivery.TAKEN:
+            return f"{name}: has taken the stop ({level.value}); its output is off."
 
 
 def release(pid: Pid = None) -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vibench import stop_files
 from vibench.acquisition import Block, StopLevel
 from vibench.acquisition.campaign import CampaignProgress
 from vibench.acquisition.engine import (
@@ -13,7 +14,6 @@ from vibench.acquisition.engine import (
     RequestHandler,
     StopDelivery,
     Supervision,
-    _stop_engine,
     serving,
     stop_engine,
     the_engine,
@@ -21,6 +21,7 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.engine._status import ChannelFacts
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.run import Progress
+from vibench.acquisition.stopping import DRIVES_ON
 
 from .conftest import campaign
 
@@ -33,13 +34,15 @@ BENCH = BenchFacts(
 @pytest.fixture
 def driving(tmp_path, monkeypatch):
     """An engine whose run has told of a block at 1.5 Vpp, and then of nothing more."""
-    monkeypatch.setattr(_stop_engine, "HEEDED_S", 0.3)
+    monkeypatch.setattr(stop_files, "HEEDED_S", 0.3)
     engine = Engine(Supervision.UNATTENDED)
     run = Progress(RunState.RECORDING, None, Block(0, np.zeros((1, 100))), 0.1, 10.0, 1.5, 260.0)
     engine.published.begin(campaign("point"), tmp_path)
     engine.published.tell(CampaignProgress("point", 1, 1, tmp_path / "point.h5", run), BENCH)
     with serving(RequestHandler(engine, JobQueue(engine)), "night"):
+        DRIVES_ON.begin(engine)
         yield engine
+    DRIVES_ON.confirm_silence(engine)
 
 
 def test_where_a_run_hangs_with_the_drive_on_a_stop_is_not_called_done(driving):
@@ -50,11 +53,13 @@ def test_where_a_run_hangs_with_the_drive_on_a_stop_is_not_called_done(driving):
 @pytest.mark.parametrize("state", [EngineState.RAMPING_DOWN, EngineState.READY, EngineState.FAULT])
 def test_a_run_that_ends_has_heeded_it(driving, state):
     driving.published.enter(state)
+    DRIVES_ON.confirm_silence(driving)
     assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD
 
 
 def test_before_the_first_run_of_a_campaign_nothing_plays(driving, tmp_path):
     driving.published.begin(campaign("point"), tmp_path)
+    DRIVES_ON.confirm_silence(driving)
     assert stop_engine(the_engine(None), "abort", "smoke") is StopDelivery.TOLD
 
 

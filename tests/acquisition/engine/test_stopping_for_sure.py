@@ -34,9 +34,9 @@ from vibench.acquisition.engine._server import VIEWERS_MOST
 from vibench.acquisition.engine._state import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
-from vibench.acquisition.stopping import put_down
 from vibench.acquisition.stopping._kept_stops import engines_folder
 from vibench.sim.operating_system import process_start
+from vibench.stop_files import put_down, stop_path
 
 from .conftest import ROOT, campaign, until, until_state, until_there
 
@@ -200,7 +200,9 @@ class TestNoDescriptorIsLeft:
 
     def test_a_stop_is_obeyed_that_was_only_put_down(self, running, tmp_path):
         with without_descriptors(running):
-            put_down(running.pid, process_start(running.pid), StopLevel.ABORT, "put down")
+            put_down(
+                stop_path(str(engines_folder()), running.pid, process_start(running.pid), "abort"), "put down"
+            )
             until_there(tmp_path / "run.h5")
 
 

@@ -109,7 +109,7 @@ class StatusLine(ClosedOnLeaving):
 
     def close(self) -> None:
         """Let the last lines be written. Legal at any time."""
-        self._beside.wait(LEFT_ALONE_S)
+        self._beside.close(LEFT_ALONE_S)
 
     def _write(self, what: str) -> None:
         self._written = monotonic()

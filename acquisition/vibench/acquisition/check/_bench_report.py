@@ -1,6 +1,7 @@
 """The check of a whole bench before a day's work: silence first, then a small sine, then silence again."""
 
 import shutil
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from ..excitation import Dwell, Tone
 from ..instruments import AnalogOutput, IdleOutput, Samples, read_block
 from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState, check_amplitude_vpp
 from ..rig import Channel, calibrations
-from ..run import BLOCK_S, Drive, drive_for
+from ..run import BLOCK_S, Drive, DriveGuard, drive_for
 from ..stopping import StopSwitch
 from ._loop import LoopCheck
 
@@ -91,6 +92,7 @@ class _BlockReader:
         self._bench = bench
         self._switch = switch
         self._due = 0
+        self._advance: Callable[[], None] = lambda: None
 
     def in_silence(self) -> Samples:
         """Read all channels while nothing plays, after couplings have settled."""
@@ -107,18 +109,21 @@ class _BlockReader:
         tone = Tone(CHECK_FREQUENCY_HZ)
         settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
         measuring = Phase(RunState.CHECKING, tone, _READ_S)
-        try:
-            drive.arm((settling, measuring))
-            self._begin()
-            for wait_s in drive.perform(settling):
-                self._read_for(wait_s)
-            blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
-            return np.concatenate(blocks, axis=1)
-        finally:
+        with DriveGuard(drive, self._switch) as guard:
+            self._advance = guard.advance
+            guard.begin()
             try:
-                drive.silence()
+                drive.arm((settling, measuring))
+                self._begin()
+                for wait_s in drive.perform(settling):
+                    self._read_for(wait_s)
+                blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
+                return np.concatenate(blocks, axis=1)
             finally:
-                self._bench.digitizer.stop()
+                try:
+                    guard.silence()
+                finally:
+                    self._bench.digitizer.stop()
 
     def _begin(self) -> None:
         self._bench.digitizer.start()
@@ -135,6 +140,7 @@ class _BlockReader:
                     f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
                 )
             block = read_block(digitizer, min(longest, left))
+            self._advance()
             if block.first_sample != self._due:
                 raise DataLost(
                     f"the converter handed over sample {block.first_sample} where {self._due} was due: it "

@@ -4,6 +4,8 @@ import json
 import socket
 from typing import Any, Literal
 
+from vibench.stop_files import SWITCH_OFF
+
 from .. import errors
 from ..errors import AcquisitionError
 from ..host import FrozenModel
@@ -75,10 +77,7 @@ def exchanged(
         raise _silent(patience_s) from error
     except OSError as error:
         connection.close()
-        raise EngineGone(
-            f"the engine does not answer ({error}); its process has ended or hangs. What it drove is "
-            "silent if it could ramp down: look at the bench"
-        ) from error
+        raise EngineGone(f"the engine was killed, ended or hangs ({error}). {SWITCH_OFF}") from error
     facts = json.loads(answer.text)
     if "refused" in facts:
         raise _refusal(facts["kind"], facts["refused"])

@@ -7,10 +7,11 @@ engine's own thread is at work.
 import json
 import secrets
 import socket
+from _thread import start_new_thread
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
-from threading import Lock, Thread
+from threading import Lock
 from time import monotonic
 
 from pydantic import ValidationError
@@ -87,7 +88,8 @@ class Server:
         if surplus > 0:
             self._make_room()
         try:
-            Thread(target=self._serve, args=(viewer,), name="engine viewer", daemon=True).start()
+            # Does not wait until it runs, as Thread.start does: for ever, where memory is exhausted.
+            start_new_thread(self._serve, (viewer,))
         except RuntimeError:  # the system gives no more threads
             self._leave(viewer)
 

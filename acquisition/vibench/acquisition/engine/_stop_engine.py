@@ -7,17 +7,17 @@ from pathlib import Path
 from threading import Event
 from time import monotonic
 
+from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, put_down, stop_path
+
 from ..host import chosen
-from ..stopping import Program, StopLevel, put_down
+from ..stopping import Program, StopLevel, engines_folder
 from ._announcement import Announcement
 from ._client import EngineClient
 from ._errors import EngineError, EngineGone, EngineSilent
-from ._state import EngineState
+from ._state import SOUNDING, EngineState
 
 PATIENCE_S = 1.0
-"""How long an engine may take to answer, and then to take what was put down; both take milliseconds [s]."""
-HEEDED_S = 5.0
-"""How long an engine that has answered may go on driving; a block and a setting are some tenths [s]."""
+"""How long an engine may take to answer; it takes milliseconds [s]."""
 LOOK_S = 0.02
 
 
@@ -25,13 +25,13 @@ class StopDelivery(StrEnum):
     """How a stop has reached a program."""
 
     TOLD = "told"
-    """It has answered."""
+    """An engine has taken it, and nothing drives there: the output was read back as off."""
     TAKEN = "taken"
-    """It has taken the stop that was put down for it: it is no engine, or one that did not answer."""
+    """The same of a program that is no engine."""
     UNHEEDED = "unheeded"
-    """It has answered, and goes on driving: whatever plays there hangs."""
+    """It has taken it, and has not confirmed that its output is off."""
     KEPT = "kept"
-    """It did neither: its process lives, and obeys as soon as it comes back."""
+    """It has not taken it: its process lives, and obeys as soon as it comes back."""
 
 
 def stop_engine(
@@ -39,9 +39,10 @@ def stop_engine(
 ) -> StopDelivery:
     """Stop what an engine, or another program, drives, and the campaign with it.
 
-    The stop is put down in the state folder before the engine is told, so that it is obeyed within a
-    twentieth of a second even where no connection comes about, and later where the process stands still.
-    A hold is only told: nobody wants one to begin unexpectedly.
+    The stop is put down in the state folder, where it is obeyed within a twentieth of a second, and later
+    where the process stands still. Returns when the program has confirmed that its output is off, or does
+    not. Where nothing can be put down or taken away, an engine is told over its connection. A hold is only
+    told: nobody wants one to begin unexpectedly.
 
     Parameters
     ----------
@@ -70,30 +71,31 @@ def stop_engine(
             )
         _tell(engine, level, reason)
         return StopDelivery.TOLD
-    path, trouble = _put_down(engine, level, reason)
-    if not isinstance(engine, Announcement):
-        if path is None:
-            raise EngineGone(f"no stop could be left in the state folder for process {engine.pid}: {trouble}")
-        return _taken_or_kept(engine, path)
+    stop = stop_path(str(engines_folder()), engine.pid, engine.process_start, level)
     try:
-        delivery = _tell(engine, level, reason)
-    except EngineError as error:
-        if path is not None:
-            return _taken_or_kept(engine, path)
-        raise EngineGone(
-            f"{error}. Nor could a stop be left for it in the state folder: {trouble}"
-        ) from error
-    if path is not None:
-        with suppress(OSError):
-            path.unlink()
-    return delivery
-
-
-def _put_down(engine: Program, level: StopLevel, reason: str) -> tuple[Path | None, str]:
-    try:
-        return put_down(engine.pid, engine.process_start, level, reason), ""
+        put_down(stop, reason)
     except OSError as error:
-        return None, str(error)
+        if isinstance(engine, Announcement):
+            return _tell(engine, level, reason)
+        raise EngineGone(
+            f"no stop could be left in the state folder for process {engine.pid}: {error}. {SWITCH_OFF}"
+        ) from error
+    match fate_of(stop, lambda: engine.is_alive):
+        case Fate.SILENT:
+            return StopDelivery.TOLD if isinstance(engine, Announcement) else StopDelivery.TAKEN
+        case Fate.UNCONFIRMED if engine.is_alive:
+            return StopDelivery.UNHEEDED
+        case Fate.NOT_TAKEN if engine.is_alive:
+            if isinstance(engine, Announcement):
+                with suppress(EngineError):  # it hangs: the stop is kept
+                    return _tell(engine, level, reason)
+            return StopDelivery.KEPT
+    with suppress(OSError):
+        Path(stop).unlink()
+    raise EngineGone(
+        f"process {engine.pid} ({engine.what}) has ended and has not confirmed that its output is off. "
+        f"{SWITCH_OFF}"
+    )
 
 
 def _tell(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:
@@ -104,30 +106,15 @@ def _tell(engine: Announcement, level: StopLevel, reason: str) -> StopDelivery:
                 return StopDelivery.TOLD
         except EngineSilent:
             return StopDelivery.UNHEEDED
-        except EngineGone:  # a command's engine ends with what it drove
-            return StopDelivery.TOLD
     return StopDelivery.UNHEEDED
 
 
 def _heeds(client: EngineClient) -> bool:
     status = client.status()
-    match status.state:
-        case EngineState.CHECKING:
-            return False
-        case EngineState.RUNNING | EngineState.HELD:  # before its first run, and between two, nothing plays
-            return status.run is None or status.run.amplitude_vpp == 0.0
-        case _:
-            return True
-
-
-def _taken_or_kept(engine: Program, path: Path) -> StopDelivery:
-    if _until(lambda: not path.exists(), PATIENCE_S):
-        return StopDelivery.TAKEN
-    if engine.is_alive:
-        return StopDelivery.KEPT
-    with suppress(OSError):
-        path.unlink()
-    raise EngineGone(f"process {engine.pid} ({engine.what}) has ended; look at the bench")
+    is_silent = status.run is not None and status.run.amplitude_vpp == 0.0
+    # Before its first run, and between two, nothing plays.
+    is_between = status.state in (EngineState.RUNNING, EngineState.HELD) and status.run is None
+    return is_silent or is_between or status.state not in SOUNDING
 
 
 def _until(is_so: Callable[[], bool], within_s: float) -> bool:

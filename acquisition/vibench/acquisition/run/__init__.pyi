@@ -5,6 +5,9 @@ from ._drive import (
     Drive as Drive,
     drive_for as drive_for,
 )
+from ._drive_guard import (
+    DriveGuard as DriveGuard,
+)
 from ._ending import (
     Outcome as Outcome,
     Progress as Progress,

@@ -1,7 +1,7 @@
 """From converter to recording without a gap: reads blocks, watches them, keeps them, counts the samples."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Protocol
@@ -37,7 +37,9 @@ class SampleSink(Protocol):
 class AcquisitionLoop:
     """The recording as it runs. Its clock is the number of samples read: to wait is to read."""
 
-    def __init__(self, digitizer: Digitizer, sink: SampleSink) -> None:
+    def __init__(self, digitizer: Digitizer, sink: SampleSink, advance: Callable[[], None]) -> None:
+        """``advance`` is called after every block."""
+        self._advance = advance
         self._digitizer = digitizer
         self._sink = sink
         self._segment: Segment | None = None
@@ -100,6 +102,7 @@ class AcquisitionLoop:
 
     def _next(self, samples: int) -> Block:
         block = read_block(self._digitizer, samples)
+        self._advance()
         self._sink.append(block)
         self._lost += block.first_sample - self._samples
         self._samples = block.first_sample + block.volts.shape[1]

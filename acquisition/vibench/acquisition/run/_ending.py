@@ -11,7 +11,7 @@ from ..plan import RunState
 from ..recording import RecordingState
 from ..stopping import Cause
 from ._acquisition_loop import SampleSink
-from ._drive import Drive
+from ._drive_guard import DriveGuard
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,16 +73,16 @@ class Ending:
         """Tell how it ended."""
         return Outcome(self.state, self.reason, path, self._cause)
 
-    def leave(self, drive: Drive, digitizer: Digitizer, sink: SampleSink) -> None:
+    def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: SampleSink) -> None:
         """Silence, end sampling, finish the recording: each of them, whatever the others do."""
         with ExitStack() as leaving:
             leaving.callback(self._finish, sink)
             leaving.callback(self._stop_listening, digitizer)
-            leaving.callback(self._silence, drive)
+            leaving.callback(self._silence, guard)
 
-    def _silence(self, drive: Drive) -> None:
+    def _silence(self, guard: DriveGuard) -> None:
         try:
-            drive.silence()
+            guard.silence()
         except AcquisitionError as failure:
             self._add(failure)
             raise

@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,10 +28,11 @@ from ..plan import (
 )
 from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, create_recording
 from ..rig import Channel, KnobSheet
-from ..stopping import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
+from ..stopping import LEVELS, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 from ._acquisition_loop import AcquisitionLoop, SampleSink
 from ._command_time import require_time_for_commands
 from ._drive import Drive, drive_for
+from ._drive_guard import DriveGuard
 from ._ending import Ending, Outcome, Progress
 from ._glide_watch import GlideWatch
 from ._limit_monitor import LimitMonitor
@@ -144,6 +146,7 @@ class Run(ClosedOnLeaving):
         self._create = create
         self._drive: Drive  # chosen when the plan is admitted; nothing plays before
         self._silence: SilenceWatch  # made when the plan is admitted: the drive is recorded then
+        self._guard: DriveGuard  # likewise
         self._controller: Controller[None] | None = None
         self._limit_monitor = LimitMonitor(
             bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz
@@ -185,8 +188,7 @@ class Run(ClosedOnLeaving):
 
     def _carry_out(self) -> Generator[Progress, None, None]:
         sink = self._admitted()
-        loop = AcquisitionLoop(self._bench.digitizer, sink)
-        self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
+        loop = AcquisitionLoop(self._bench.digitizer, sink, self._guard.advance)
         self._runner = PhaseRunner(
             self._drive,
             loop,
@@ -204,11 +206,14 @@ class Run(ClosedOnLeaving):
             self._ending.is_stopped("interrupted from the keyboard", Cause.KEYBOARD)
             raise
         except Exception as error:
+            if isinstance(error, MemoryError):
+                MEMORY_RESERVE.release()
             self._ending.is_failed(error, f"{type(error).__name__}: {error}")
             raise
         finally:
             try:
-                self._ending.leave(self._drive, self._bench.digitizer, sink)
+                with self._guard as guard:
+                    self._ending.leave(guard, self._bench.digitizer, sink)
             finally:
                 self._runner.state = self._ending.state
 
@@ -242,7 +247,14 @@ class Run(ClosedOnLeaving):
             self._total_s += self._before_s()
             if self._drive.is_commanded:
                 self._total_s += require_time_for_commands(self._measurement, self._bench.generator)
-            return self._create(self._path, run_header(self._bench, self._measurement, self._total_s))
+            self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
+            with ExitStack() as refused:
+                self._guard = DriveGuard(self._drive, self._switch, lambda: self._silence.is_heard)
+                refused.enter_context(self._guard)
+                header = run_header(self._bench, self._measurement, self._total_s)
+                sink = self._create(self._path, header)
+                refused.pop_all()
+                return sink
         except AcquisitionError as error:
             self._ending.is_failed(error, str(error))
             self._state = RunState.FAILED
@@ -279,6 +291,7 @@ class Run(ClosedOnLeaving):
 
     def _begin(self, coming: Iterable[Phase]) -> None:
         """Start sampling, and with it what plays by the digitizer's trigger."""
+        self._guard.begin()
         self._drive.arm(coming)
         self._bench.digitizer.start()
 

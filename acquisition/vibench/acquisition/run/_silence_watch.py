@@ -37,6 +37,8 @@ class SilenceWatch:
         self._last_loud = -1
         self._residue_v = inf
         self._loudest_v = 0.0
+        self.is_heard = False
+        """Whether the drive was still there when it had been listened to for long enough."""
 
     def learn_hum(self, quiet: Samples) -> None:
         """Take volts (channels, samples) of a time at which nothing played."""
@@ -71,7 +73,8 @@ class SilenceWatch:
 
     def require_silence(self) -> None:
         """Raise InstrumentError when as much is left as no hum is."""
-        if not self.is_silent and self._residue_v > STILL_ON * self._loudest_v:
+        self.is_heard = not self.is_silent and self._residue_v > STILL_ON * self._loudest_v
+        if self.is_heard:
             raise InstrumentError(
                 f"the drive is {self.text()}. It was told to be silent and the recording is kept; THE OUTPUT "
                 "MAY STILL BE ON: switch the amplifier off by hand"

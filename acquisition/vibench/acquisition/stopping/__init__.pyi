@@ -1,5 +1,11 @@
+from ._driving import (
+    DRIVES_ON as DRIVES_ON,
+)
 from ._kept_stops import (
-    put_down as put_down,
+    engines_folder as engines_folder,
+)
+from ._memory_reserve import (
+    MEMORY_RESERVE as MEMORY_RESERVE,
 )
 from ._program import (
     AnyProgram as AnyProgram,

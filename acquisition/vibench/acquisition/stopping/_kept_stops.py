@@ -10,13 +10,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from stat import S_IMODE, S_ISREG
-from threading import get_ident
 
 from vibench.sim.operating_system import process_start, state_folder
+from vibench.stop_files import stop_path, taken_path
 
+from ._driving import DRIVES_ON
 from ._stop import StopLevel
 
-LONGEST_REASON = 500
 SILENT_REASON = "a stop that was left in the state folder"
 
 
@@ -36,10 +36,11 @@ class KeptStops:
         self, pid: int, process_start: str, press: Callable[[StopLevel, str], None], folder: Path
     ) -> None:
         self._paths = {
-            level: folder / f"{pid}.{process_start}.stop-{level.value}" for level in reversed(StopLevel)
+            level: Path(stop_path(str(folder), pid, process_start, level)) for level in reversed(StopLevel)
         }
         self._press = press
         self._obeyed: dict[Path, tuple[int, int]] = {}
+        self._taken: set[Path] = set()
         self._reserve = os.open(os.devnull, os.O_RDONLY)
         """Given back to read a reason by."""
 
@@ -49,7 +50,7 @@ class KeptStops:
         return cls(os.getpid(), process_start(os.getpid()) or "", press, engines_folder())
 
     def obey(self) -> None:
-        """Carry out what was put down since the last look, the hardest first, and take it away."""
+        """Carry out what was put down since the last look, the hardest first; confirm what was obeyed."""
         for level, path in self._paths.items():
             try:
                 found = path.stat()
@@ -61,8 +62,22 @@ class KeptStops:
             self._obeyed[path] = mark  # where it cannot be taken away, it is still obeyed only once
             # Reading a pipe could wait for ever.
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
+            taken = Path(taken_path(str(path)))
             with suppress(OSError):
-                path.unlink()
+                path.replace(taken)
+                self._taken.add(taken)
+        self.confirm()
+
+    def confirm(self) -> None:
+        """Take away what was obeyed once nothing drives any more; until then, show signs of life."""
+        is_advancing = DRIVES_ON.take_advance()
+        for taken in tuple(self._taken):
+            with suppress(OSError):  # somebody has emptied the folder
+                if not DRIVES_ON:
+                    self._taken.discard(taken)
+                    taken.unlink()
+                elif is_advancing:
+                    os.utime(taken)
 
     def close(self) -> None:
         """Look no more."""
@@ -79,17 +94,3 @@ class KeptStops:
         finally:
             with suppress(OSError):
                 self._reserve = os.open(os.devnull, os.O_RDONLY)
-
-
-def put_down(pid: int, process_start: str, level: StopLevel, reason: str) -> Path:
-    """Leave a stop for a process; raises OSError when there is no room for a name."""
-    path = engines_folder() / f"{pid}.{process_start}.stop-{level.value}"
-    coming = path.with_name(f"{path.name}-{os.getpid()}-{get_ident()}")
-    descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-    try:
-        with suppress(OSError):  # a full disk: the name says what matters
-            os.write(descriptor, reason.encode()[:LONGEST_REASON])
-    finally:
-        os.close(descriptor)
-    os.replace(coming, path)  # noqa: PTH105 - the pair of os.open
-    return path

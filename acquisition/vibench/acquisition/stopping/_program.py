@@ -171,6 +171,7 @@ class _Reached:
             watchdog, kept, self._watchdog, self._kept = self._watchdog, self._kept, None, None
         if watchdog is not None and kept is not None:
             watchdog.close()
+            kept.confirm()
             kept.close()
         withdraw(entry[1])
 

@@ -25,8 +25,8 @@ def stop_on_signal(switch: StopSwitch, what: str = "a script") -> Iterator[None]
 
     ``vibench stop`` finds the program and leaves its stop in the state folder, whatever thread this is;
     ``what`` is what it is called there. In the main thread, the only one to which Python delivers signals,
-    every signal is a stop that would end or stop the program (`heeded_signals`). SIGHUP stays ignored where it
-    was ignored before (nohup): such a run is meant to go on.
+    every signal is a stop that would end or stop the program (`heeded_signals`). SIGHUP stays ignored where
+    it was ignored before (nohup): such a run is meant to go on.
 
     The first ramps down and ends the run as stopped: Ctrl-C as the plan ends, the others faster. A second
     raises KeyboardInterrupt, which silences the generator without the measured ramp. Later ones are

@@ -1,0 +1,135 @@
+"""Entry point of the `vibench` command: `vibench stop` acts at once, everything else is loaded first.
+
+The libraries of the other commands take half a second of processor time, in which the drive goes on. Only the
+standard library is imported here. What is not plain, or not as on Linux, is left to the complete command.
+"""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+
+from vibench.stop_files import SWITCH_OFF, Fate, fate_of, put_down, stop_path
+
+LEVELS = ("ramp", "abort", "off")
+
+
+class Announced:
+    """What the name of an announcement says: number and start of a process of this computer."""
+
+    def __init__(self, path: str, pid: str, start: str, *, is_alive: bool) -> None:
+        self.path = path
+        self.pid = pid
+        self.start = start
+        self.is_alive = is_alive
+
+    def name(self) -> str:
+        """Return what it was started for, and its number."""
+        import json  # noqa: PLC0415 - after the stop was put down
+
+        try:
+            with open(self.path, encoding="utf-8") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
+                what = json.load(file)["what"]
+        except (OSError, ValueError, KeyError, TypeError):
+            what = "a program of another user"
+        return f"{what}, process {self.pid}"
+
+
+def main() -> None:
+    """Stop, where that is asked for in plain words; run any other command."""
+    if sys.argv[1:2] == ["stop"] and sys.platform == "linux":
+        asked = asked_of(sys.argv[2:])
+        code = None if asked is None else stopped(*asked)
+        if code is not None:
+            sys.exit(code)
+    from vibench.cli import main as run_command  # noqa: PLC0415 - the libraries that a stop must not wait for
+
+    run_command()
+
+
+def asked_of(words: Sequence[str]) -> tuple[str, str, str] | None:
+    """Read level, reason and number of a process; None where the complete command must answer."""
+    split = [part for word in words for part in (word.split("=", 1) if word[:2] == "--" else [word])]
+    given = dict(zip(split[::2], split[1::2], strict=False))
+    if len(split) != 2 * len(given) or not given.keys() <= {"--level", "--reason", "--pid"}:
+        return None
+    level, reason, pid = (
+        given.get("--level", "ramp"),
+        given.get("--reason", "vibench stop"),
+        given.get("--pid"),
+    )
+    is_plain = level in LEVELS and reason and (pid is None or pid.isdecimal())
+    return (level, reason, pid or "") if is_plain else None
+
+
+def stopped(level: str, reason: str, pid: str) -> int | None:
+    """Stop the programs of this computer that are meant; return the exit code, None to leave it to others."""
+    try:
+        programs = [each for each in announced() if pid in ("", each.pid)]
+        living = [each for each in programs if each.is_alive]
+        stops = [stop_path(os.path.dirname(each.path), each.pid, each.start, level) for each in living]  # noqa: PTH120
+        for stop in stops:
+            put_down(stop, reason)
+    except OSError:
+        return None
+    names = {each.path: each.name() for each in programs}  # before they are withdrawn
+    if not programs or any(fate_of(stop) is not Fate.SILENT for stop in stops):
+        return None
+    for each in living:
+        print(f"{names[each.path]}: has taken the stop ({level}); its output is off.")  # noqa: T201
+    killed = [each for each in programs if not each.is_alive]
+    for each in killed:
+        print(f"error: {names[each.path]}, was killed. {SWITCH_OFF}.", file=sys.stderr)  # noqa: T201
+        os.unlink(each.path)  # noqa: PTH108 - whoever stopped was told
+    return 1 if killed else 0
+
+
+def announced() -> Iterator[Announced]:
+    """Find the programs that announced themselves; raise OSError where another computer's is among them."""
+    folder = os.path.join(_state_folder(), "engines")  # noqa: PTH118
+    boot, space = _own_place()
+    for name in sorted(os.listdir(folder)):  # noqa: PTH208
+        pid, _, rest = name.partition(".")
+        start, _, suffix = rest.rpartition(".")
+        if suffix != "json" or not pid.isdecimal():
+            continue
+        path = os.path.join(folder, name)  # noqa: PTH118
+        place = start.split("_")
+        if len(place) != 3 or place[0] != boot:
+            if _is_locked(path):
+                raise OSError("on another computer")
+        elif place[1] == space:
+            yield Announced(path, pid, start, is_alive=place[2] == _start_of(pid))
+        elif _is_locked(path):  # in a container of this computer
+            yield Announced(path, pid, start, is_alive=True)
+
+
+def _state_folder() -> str:
+    home = os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state")  # noqa: PTH111
+    return os.environ.get("VIBENCH_STATE_DIR") or os.path.join(home, "vibench")  # noqa: PTH118
+
+
+def _own_place() -> tuple[str, str]:
+    with open("/proc/sys/kernel/random/boot_id", encoding="ascii") as file:  # noqa: PTH123
+        return file.read(8), str(os.stat("/proc/self/ns/pid").st_ino)  # noqa: PTH116
+
+
+def _start_of(pid: str) -> str:
+    """Return the start of a process that lives, as proc(5) counts it; empty where there is none."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:  # noqa: PTH123
+            state, *others = file.read().rpartition(")")[2].split()
+    except OSError:
+        return ""
+    return "" if state in "ZX" else others[18]
+
+
+def _is_locked(path: str) -> bool:
+    """Whether the program that announced itself there lives: it holds a lock."""
+    import fcntl  # noqa: PLC0415 - Linux
+
+    try:
+        with open(path, "rb+") as file:  # noqa: PTH123
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    return False
