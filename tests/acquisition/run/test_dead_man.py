@@ -6,11 +6,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.acquisition import ConfigurationError, StopLevel, open_bench, open_recording
-from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep
+from vibench.acquisition import ConfigurationError, StopLevel, open_bench, open_recording, run_campaign
+from vibench.acquisition.bench import Verdict
+from vibench.acquisition.check import bench_report
+from vibench.acquisition.plan import CHECK_FREQUENCY_HZ, Campaign, Dwell, Measurement, RunState
+from vibench.acquisition.plan._schedule import CHECK_LISTEN_S, CHECK_SETTLE_S
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.rig import CalibrationRule, confirm_simulated
-from vibench.acquisition.run._generator_drive import GUARD_S
+from vibench.acquisition.rig import CalibrationRule, OutputUse, confirm_simulated, load_rig
+from vibench.acquisition.run._generator_drive import CHECK_MARGIN_S, GUARD_S
 from vibench.acquisition.run._run import Run
 from vibench.acquisition.stopping import Cause, StopRequest
 
@@ -52,6 +55,47 @@ def test_a_run_that_stands_still_is_silent_after_its_burst(guarded, tmp_path):
     assert run.outcome.state is RunState.STOPPED
 
 
+def test_the_check_at_the_start_of_a_run_is_silent_after_its_burst(guarded, tmp_path):
+    virtual, bench = guarded
+    with Run(bench, PLAN, tmp_path / "run.h5") as run:
+        next(progress for progress in run if progress.state is RunState.CHECKING and progress.amplitude_vpp)
+        volts = terminal(virtual, 3.0)
+        loud = np.flatnonzero(np.abs(volts) > 1e-3)
+        assert loud.size
+        assert loud[-1] * 1e-4 <= CHECK_SETTLE_S + CHECK_LISTEN_S + CHECK_MARGIN_S
+
+
+@pytest.mark.parametrize("dead_man_s", [0.2, 0.5, 5.0])
+def test_the_check_measures_the_same_with_a_dead_man(laboratory, tmp_path, dead_man_s):
+    _, connected = laboratory()
+    found = []
+    for each_s in (None, dead_man_s):
+        generator = connected.generator.model_copy(update={"dead_man_s": each_s})
+        with open_bench(
+            connected.model_copy(update={"generator": generator}), confirm_simulated, CalibrationRule.WAIVED
+        ) as bench:
+            path = tmp_path / f"{each_s}.h5"
+            with Run(bench, PLAN, path) as run:
+                next(progress for progress in run if progress.state is RunState.RAMPING_UP)
+            with open_recording(path) as recording:
+                text = next(each.text for each in recording.events if each.kind == "check")
+            found.append(float(text.split()[1]))
+    assert found[1] == pytest.approx(found[0], rel=0.01)
+
+
+def test_the_check_of_a_bench_ends_with_its_burst(guarded, monkeypatch, tmp_path):
+    _, bench = guarded
+    cycles = []
+    arm, trigger = bench.generator.arm_burst, bench.generator.trigger
+    monkeypatch.setattr(bench.generator, "arm_burst", lambda count: (cycles.append(count), arm(count)))
+    monkeypatch.setattr(bench.generator, "trigger", lambda: (cycles.append("trigger"), trigger()))
+    report = bench_report(bench, tmp_path)
+    assert len(cycles) == 2
+    assert cycles[1] == "trigger"
+    assert 3.5 * CHECK_FREQUENCY_HZ < cycles[0] <= (3.5 + CHECK_MARGIN_S) * CHECK_FREQUENCY_HZ
+    assert report.verdict is Verdict.OK
+
+
 def test_the_bursts_are_whole_periods_with_short_gaps_between(guarded, tmp_path):
     _, bench = guarded
     with Run(bench, PLAN, tmp_path / "run.h5") as run:
@@ -82,12 +126,47 @@ def test_the_generator_plays_on_after_the_run(guarded, tmp_path):
     assert np.max(np.abs(volts[-100:])) > LOUD_V
 
 
-def test_what_is_no_sine_of_one_frequency_is_refused_before_anything_plays(guarded, tmp_path):
-    _, bench = guarded
-    sweep = SineSweep(amplitude_vpp=1.0, start_hz=100, stop_hz=300, duration_s=2)
-    with pytest.raises(ConfigurationError, match="no sine of one frequency"):
-        deque(Run(bench, PLAN.model_copy(update={"excitation": sweep}), tmp_path / "run.h5"), maxlen=0)
+REFUSED = {
+    "sweep": {"kind": "sine_sweep", "amplitude_vpp": 1.0, "start_hz": 100, "stop_hz": 300, "duration_s": 2},
+    "noise": {
+        "kind": "multisine_noise",
+        "amplitude_vpp": 1.0,
+        "band_start_hz": 20,
+        "band_stop_hz": 400,
+    },
+    "held level": {
+        "kind": "held_dwell",
+        "amplitude_vpp": 1.0,
+        "base_level": {"displacement_m": 1e-7},
+        "frequency_hz": 180,
+        "duration_s": 2,
+    },
+    "slow sine": {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 1.5, "duration_s": 2},
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_can_have_no_dead_man_is_refused_before_anything_of_the_campaign_plays(kind, guarded, tmp_path):
+    virtual, bench = guarded
+    before_s = virtual.world.time_s
+    refused = {"name": "second", "excitation": REFUSED[kind]}
+    campaign = Campaign.model_validate({"name": "trial", "measurements": [PLAN.model_dump(), refused]})
+    with pytest.raises(ConfigurationError, match="lets only sines of one frequency play"):
+        run_campaign(bench, campaign, tmp_path)
     assert list(tmp_path.iterdir()) == []
+    assert virtual.world.time_s == before_s
+
+
+def test_an_analogue_output_has_no_dead_man(tmp_path):
+    rig = load_rig("virtual_rig_streaming")
+    generator = rig.generator.model_copy(update={"dead_man_s": DEAD_MAN_S})
+    output = rig.daq.output.model_copy(update={"plays": OutputUse.TONES_AND_STREAMS})
+    guarded = {"generator": generator, "daq": rig.daq.model_copy(update={"output": output})}
+    with (
+        open_bench(rig.model_copy(update=guarded)) as bench,
+        pytest.raises(ConfigurationError, match="is played by the analogue output"),
+    ):
+        deque(Run(bench, PLAN, tmp_path / "run.h5"), maxlen=0)
 
 
 def test_it_needs_the_channel_that_has_bursts(rig):

@@ -32,6 +32,7 @@ from ._notice import (
 from ._opening import (
     make_folder as make_folder,
     planned_recordings as planned_recordings,
+    require_all_within_limits as require_all_within_limits,
 )
 from ._point_outcome import (
     AfterFailure as AfterFailure,

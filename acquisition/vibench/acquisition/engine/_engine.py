@@ -16,6 +16,7 @@ from ..campaign import (
     ignore_event,
     ignore_result,
     make_folder,
+    require_all_within_limits,
     run_campaign,
 )
 from ..check import check_bench, require_fresh
@@ -146,6 +147,8 @@ class Engine:
         if request.twin is TwinSwitch.ON or _may_end_by_change(request.campaign):
             self.turn_twin(TwinSwitch.ON)
         try:
+            # Before the check of the bench: what cannot be played is refused before anything moves.
+            require_all_within_limits(request.campaign.points(), self.bench)
             make_folder(request.folder)
             with stop_on_signal(self.switch):
                 require_fresh(self.bench, request.folder, request.check, switch=self.switch)

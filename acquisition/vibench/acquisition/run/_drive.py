@@ -72,7 +72,10 @@ def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
 
     Raises ConfigurationError when the bench has none.
     """
-    match require_played(measurement, bench.rig), bench.output, bench.controller:
+    source = require_played(measurement, bench.rig)
+    if source is not DriveSource.GENERATOR and bench.rig.generator.dead_man_s is not None:
+        raise _without_dead_man(f"{measurement.name} is played by the {source.value}")
+    match source, bench.output, bench.controller:
         case DriveSource.CONTROLLER, _, controller if controller is not None:
             return LoopDrive(controller, measurement)
         case DriveSource.OUTPUT, output, _ if output is not None:
@@ -87,11 +90,18 @@ def _dead_man(bench: RunBench, measurement: Measurement) -> DeadMan | None:
     if longest_s is None:
         return None
     plays = [phase.play for phase in known_phases(measurement) if phase.play is not None]
-    frequencies = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
-    if None in frequencies or len(frequencies) != 1:  # nothing is known of what is decided while it plays
-        raise ConfigurationError(
-            f"{measurement.name} is no sine of one frequency, and generator.dead_man_s lets only those play, "
-            "as bursts that are triggered while the run lives. Nothing was played; leave dead_man_s out of "
-            "the hardware configuration for this campaign"
-        )
+    frequencies_hz = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
+    frequency_hz = frequencies_hz.pop() if len(frequencies_hz) == 1 else None
+    if frequency_hz is None:  # nothing is known of what is decided while it plays
+        raise _without_dead_man(f"{measurement.name} is no sine of one frequency")
+    if frequency_hz * longest_s < 1:
+        raise _without_dead_man(f"{measurement.name} has a period longer than dead_man_s = {longest_s:g} s")
     return DeadMan(bench.generator, longest_s)
+
+
+def _without_dead_man(what: str) -> ConfigurationError:
+    return ConfigurationError(
+        f"{what}, and generator.dead_man_s lets only sines of one frequency play, as bursts of the generator "
+        "that are triggered while the run lives. Nothing was played; leave dead_man_s out of the hardware "
+        "configuration for this campaign"
+    )

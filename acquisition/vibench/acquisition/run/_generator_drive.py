@@ -3,6 +3,7 @@
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from itertools import takewhile
 
 import numpy as np
 
@@ -19,6 +20,8 @@ setting."""
 GUARD_S = 0.02
 """A burst is triggered so long after the last one must have ended: what a trigger does to one that still
 plays is not documented for every firmware, and the times of reading vary by some milliseconds [s]."""
+CHECK_MARGIN_S = 0.5
+"""A check's burst outlasts the check by this: commands and the reading of samples take their time [s]."""
 LITTLE = 0.98
 """A level is not lowered before the frequency changes where it is lowered by less than this."""
 MOST_CYCLES = 50_000
@@ -39,9 +42,13 @@ class DeadMan:
         self._period_s = 0.0
         self._left_s = 0.0
 
-    def arm(self, frequency_hz: float) -> None:
-        """Get ready for bursts of whole periods; the output is off or quiet."""
-        cycles = max(1, min(MOST_CYCLES, int(self._longest_s * frequency_hz)))
+    def arm(self, frequency_hz: float, check_s: float = 0.0) -> None:
+        """Get ready for bursts of whole periods; the output is off or quiet.
+
+        A check of ``check_s`` is one burst, which may be longer than others: a gap would change its figures.
+        """
+        longest_s = max(self._longest_s, check_s + CHECK_MARGIN_S if check_s else 0.0)
+        cycles = max(1, min(MOST_CYCLES, int(longest_s * frequency_hz)))
         self._period_s = cycles / frequency_hz + GUARD_S
         self._generator.arm_burst(cycles)
 
@@ -82,6 +89,7 @@ class GeneratorDrive:
         self._is_on = False
         self._setting_vpp = 0.0
         self._setting_takes_s = 0.0
+        self._check_s = 0.0
 
     @property
     def can_hold(self) -> bool:
@@ -99,7 +107,9 @@ class GeneratorDrive:
         return self._is_on and self._level > 0.0
 
     def arm(self, coming: Iterable[Phase]) -> None:
-        """Nothing to get ready: the output is off."""
+        """Note how long the check plays that comes first; the output is off."""
+        checking = takewhile(lambda phase: phase.state is RunState.CHECKING, coming)
+        self._check_s = sum(phase.duration_s for phase in checking if phase.play is not None)
 
     def announce(self, coming: Iterable[Phase]) -> None:
         """Nothing to prepare."""
@@ -148,7 +158,7 @@ class GeneratorDrive:
                 if not self._is_on:
                     self._setting_vpp = self._full_vpp(play)
                     self._generator.load_sine(frequency_hz, self._setting_vpp)
-                    self._start()
+                    self._begin_bursts(play, self._check_s)
             case _:
                 if self._is_on:
                     self._stop()
@@ -163,11 +173,11 @@ class GeneratorDrive:
         if not self._is_on:
             self._begin_bursts(play)
 
-    def _begin_bursts(self, play: Play | None) -> None:
+    def _begin_bursts(self, play: Play | None, check_s: float = 0.0) -> None:
         """Turn the output on; where there is a dead man, with the first of its bursts."""
         match play:
             case Tone(frequency_hz, _) if self._dead_man is not None:
-                self._dead_man.arm(frequency_hz)
+                self._dead_man.arm(frequency_hz, check_s)
                 self._start()
                 self._dead_man.trigger()
             case _:
