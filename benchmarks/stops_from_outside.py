@@ -1,0 +1,525 @@
+"""Is the generator's terminal silent after every stop, whatever the state, the condition and the cause?
+
+    python benchmarks/stops_from_outside.py --seed 42 --count 300 --shard 1/2 --save stops_1.jsonl
+    python benchmarks/stops_from_outside.py --dead-man --seed 42 --count 60 --save kills.jsonl
+    python benchmarks/stops_from_outside.py --sum stops_*.jsonl
+
+This process is the laboratory: the virtual rig on the wall's clock, and a witness at the generator's
+terminal. What drives is another process, which reaches the rig as it reaches real instruments: `vibench
+measure` on a terminal of its own, or the engine of a window. A cell is one run of its own process: it is
+brought into a state, the condition is made, the cause happens, and the witness waits for silence. Counted is
+from Enter: `vibench stop` is the installed command. Cells are drawn by the seed and written to ``--save`` one
+by one; those that stand there are not measured again. Linux only; two conditions need a C compiler.
+"""
+
+import argparse
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from itertools import product
+from pathlib import Path
+
+from time_to_silence import (
+    ABORT_S,
+    BLOCK_S,
+    MARGIN_S,
+    PATIENCE_S,
+    PLAN,
+    RAMP_S,
+    STATES,
+    Witness,
+    busy,
+    wall_rig,
+)
+
+from vibench.acquisition import CheckRule, StopLevel, load_toml, save_toml
+from vibench.acquisition.engine import (
+    Announcement,
+    Attendant,
+    CampaignRequest,
+    EngineClient,
+    EngineError,
+    EngineState,
+    announced_engines,
+    start_engine,
+)
+from vibench.acquisition.plan import Campaign
+from vibench.acquisition.rig import KnobSheet, Rig, save_knob_sheet
+from vibench.acquisition.stopping import heeded_signals, signal_name
+from vibench.virtual_rig import VirtualRig
+
+VIBENCH = str(Path(sys.executable).with_name("vibench"))
+ENTER_S = 0.2
+"""A command takes to start on an idle computer [s]."""
+LOADED_S = 3.0
+"""An abort from Enter where other programs ask for many times the cores [s]."""
+STANDSTILL_S = 1.5
+"""Until a run that no longer advances is silenced, once it is stopped [s]."""
+DEAD_MAN_S = 1.0
+LATE_S = 0.3
+"""The witness looks that often on a busy computer [s]."""
+SHIM = Path(__file__).with_name("shim_of_conditions.c")
+ENDED_BY_ITSELF = ("folder gone", "disk full", "memory exhausted")
+"""Conditions that may end a run before its stop does."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One stop."""
+
+    subject: str
+    cause: str
+    condition: str
+    state: str
+
+
+@dataclass(frozen=True)
+class Found:
+    """What became of it."""
+
+    cell: Cell
+    took_s: float
+    within_s: float
+    exits: dict[str, int | None]
+    load: float
+
+    @property
+    def complaint(self) -> str:
+        """Say what is wrong; empty where nothing is."""
+        if self.took_s > self.within_s:
+            return f"silent after {self.took_s:.2f} s, {self.within_s:.2f} s are allowed"
+        may_have_ended = self.cell.condition in ENDED_BY_ITSELF
+        for what, code in self.exits.items():
+            allowed = {0} if what == "stop" else {1, 3, 130} if self.cell.cause == "Ctrl-C twice" else {1, 3}
+            if what == "stop" and may_have_ended:
+                allowed = {0, 1}
+            if what == "measure" and self.cell.cause == "limit passed":
+                allowed = {1}
+            elif what == "measure" and not may_have_ended and self.cell.cause != "Ctrl-C twice":
+                allowed = {3}
+            if code not in allowed:
+                return f"{what} exited with {code}; {sorted(allowed)} are allowed"
+        return ""
+
+
+class Laboratory:
+    """A rig, its witness, and one process that drives it."""
+
+    def __init__(self, virtual: VirtualRig, folder: Path, dead_man_s: float | None) -> None:
+        self.virtual = virtual
+        self.witness = Witness(virtual)
+        self.folder = folder
+        generator = {"resource": virtual.socket_resource, "dead_man_s": dead_man_s}
+        self.served = virtual.rig.model_copy(
+            update={
+                "virtual": None,
+                "daq": virtual.rig.daq.model_copy(update={"server": virtual.daq_address}),
+                "generator": virtual.rig.generator.model_copy(update=generator),
+            }
+        )
+        self.rig_path, self.knobs_path = folder / "rig.json", folder / "knobs.toml"
+        self.rig_path.write_text(self.served.model_dump_json())
+        sheet = KnobSheet(operator="laboratory", confirmed=datetime.now(UTC), knobs=virtual.rig.knobs)
+        save_knob_sheet(sheet, self.knobs_path)
+        self.recordings = folder / "0"
+        self.process: subprocess.Popen[bytes]
+        self.engine: Announcement
+        self.client: EngineClient
+        self._terminal = -1
+        self._said = b""
+
+    def start(self, subject: str) -> None:
+        """Let a process begin to drive."""
+        self.recordings = self.folder / str(int(self.recordings.name) + 1)
+        self._said = b""
+        self._terminal, slave = os.openpty()
+        words = [subject, str(self.rig_path), str(self.knobs_path), str(self.recordings)]
+        script = [sys.executable, __file__, "--as", *words]
+        # The leader of a session gets the terminal that it opens first.
+        shell = f'exec "$@" <{os.ttyname(slave)} >{os.ttyname(slave)} 2>&1'
+        self.process = subprocess.Popen(["/bin/sh", "-c", shell, "sh", *script], start_new_session=True)
+        os.close(slave)
+        threading.Thread(target=self._read, args=(self._terminal,), daemon=True).start()
+        self.until(self._is_announced, "engine")
+        self.client = EngineClient.attach(self.engine.address, patience_s=PATIENCE_S)
+
+    def run_into(self, state: str, after_s: float) -> None:
+        """Wait for a state of the run, and a little more."""
+        first = "recording" if state in ("held", "ramping_down") else state
+        self.until(lambda: self.run_state() == first and self.is_loud(), first)
+        if state == "held":
+            self.client.stop(StopLevel.HOLD)
+        elif state == "ramping_down":
+            self.client.stop(StopLevel.RAMP)
+        self.until(lambda: self.run_state() == state, state)
+        time.sleep(after_s)
+
+    def run_state(self) -> str:
+        """Where the run stands."""
+        run = self.client.status().run
+        return "" if run is None else run.run_state.value
+
+    def is_loud(self) -> bool:
+        """Whether anything was at the terminal a moment ago."""
+        return time.monotonic() - self.witness.last_loud_s < 0.1
+
+    def type(self, keys: bytes) -> None:
+        """Press keys on the terminal of the process."""
+        os.write(self._terminal, keys)
+
+    def until(self, is_so: Callable[[], bool], what: str) -> None:
+        """Wait, or raise TimeoutError."""
+        give_up_s = time.monotonic() + 2 * PATIENCE_S
+        while not is_so():
+            if time.monotonic() > give_up_s or self.process.poll() is not None:
+                raise TimeoutError(f"no {what}: {self._said.decode(errors='replace')[-300:]}")
+            time.sleep(0.005)
+
+    def ended(self) -> int | None:
+        """Wait for the process to end, and return its exit code; None where it goes on."""
+        try:
+            return self.process.wait(PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def close(self) -> str:
+        """End whatever still runs; return the last words on its terminal."""
+        with suppress(EngineError, OSError, AttributeError):
+            self.client.close()
+        self.process.kill()
+        self.process.wait()
+        for each in announced_engines():
+            with suppress(ProcessLookupError):
+                os.kill(each.pid, signal.SIGKILL)
+        with suppress(OSError):
+            os.close(self._terminal)
+        return self._said.decode(errors="replace")[-400:]
+
+    def _is_announced(self) -> bool:
+        for each in announced_engines():
+            self.engine = each
+            return True
+        return False
+
+    def _read(self, terminal: int) -> None:
+        with suppress(OSError):
+            while said := os.read(terminal, 4096):
+                self._said = (self._said + said)[-4000:]
+
+
+def stop_by_command(level: str) -> Callable[[Laboratory], int]:
+    """Type `vibench stop`, and return its exit code."""
+
+    def stop(_: Laboratory) -> int:
+        command = [VIBENCH, "stop", "--level", level, "--reason", "witness"]
+        told = subprocess.run(command, capture_output=True, text=True, check=False)
+        if told.returncode and "switch the amplifier off" not in told.stderr + "no engine is running":
+            raise SystemExit(told.stderr)
+        return told.returncode
+
+    return stop
+
+
+def send(number: int) -> Callable[[Laboratory], None]:
+    """Send a signal to what drives."""
+    return lambda laboratory: os.kill(laboratory.engine.pid, number)
+
+
+def press_twice(laboratory: Laboratory) -> None:
+    """Press Ctrl-C, and again."""
+    laboratory.type(b"\x03")
+    time.sleep(0.1)
+    laboratory.type(b"\x03")
+
+
+SUBJECTS = ("measure", "engine")
+WITHIN_ABORT_S = BLOCK_S + ABORT_S + MARGIN_S
+Happening = Callable[[Laboratory], int | None]
+CAUSES: dict[str, tuple[Happening, float, tuple[str, ...]]] = {
+    "stop --level ramp": (
+        stop_by_command("ramp"), BLOCK_S + RAMP_S + MARGIN_S + ENTER_S, SUBJECTS
+    ),
+    "stop --level abort": (stop_by_command("abort"), WITHIN_ABORT_S + ENTER_S, SUBJECTS),
+    "stop --level off": (stop_by_command("off"), BLOCK_S + MARGIN_S + ENTER_S, SUBJECTS),
+    "Ctrl-C once": (lambda each: each.type(b"\x03"), BLOCK_S + RAMP_S + MARGIN_S, ("measure",)),
+    "Ctrl-C twice": (press_twice, BLOCK_S + RAMP_S + MARGIN_S, ("measure",)),
+    "window killed": (lambda each: each.process.kill(), WITHIN_ABORT_S, ("engine",)),
+    "viewer gone": (
+        lambda each: each.process.send_signal(signal.SIGSTOP), 2.55 + WITHIN_ABORT_S, ("engine",)
+    ),
+    "limit passed": (
+        lambda each: each.virtual.faults.turn_amplifier_gain(40.0), RAMP_S + BLOCK_S + WITHIN_ABORT_S,
+        SUBJECTS,
+    ),
+    **{
+        signal_name(number): (
+            send(number), WITHIN_ABORT_S + (RAMP_S if number == signal.SIGINT else 0.0), SUBJECTS
+        )
+        for number in heeded_signals()
+        if signal_name(number) in signal.Signals.__members__
+    },
+}  # fmt: skip
+
+
+@contextmanager
+def limited(pid: int, what: int, most: int) -> Iterator[None]:
+    """Set a limit of a process."""
+    resource.prlimit(pid, what, (most, resource.prlimit(pid, what)[1]))
+    yield
+
+
+def exhausted(laboratory: Laboratory) -> Iterator[None]:
+    """Let the process have no more memory than it has."""
+    status = Path(f"/proc/{laboratory.engine.pid}/status").read_text()
+    size_kb = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmSize"))
+    with limited(laboratory.engine.pid, resource.RLIMIT_AS, 1024 * size_kb):
+        yield
+
+
+def no_descriptors(laboratory: Laboratory) -> Iterator[None]:
+    """Let the process open nothing more."""
+    highest = max(int(each.name) for each in Path(f"/proc/{laboratory.engine.pid}/fd").iterdir())
+    with limited(laboratory.engine.pid, resource.RLIMIT_NOFILE, highest + 1):
+        yield
+
+
+def disk_full(laboratory: Laboratory) -> Iterator[None]:
+    """Every write to a file is refused."""
+    with limited(laboratory.engine.pid, resource.RLIMIT_FSIZE, 0):
+        yield
+
+
+def folder_gone(laboratory: Laboratory) -> Iterator[None]:
+    """Remove the folder of the recordings."""
+    shutil.rmtree(laboratory.recordings, ignore_errors=True)
+    yield
+
+
+def shimmed(condition: str) -> Callable[[Laboratory], Iterator[None]]:
+    """Begin a condition of the shim."""
+
+    def make(laboratory: Laboratory) -> Iterator[None]:
+        flag = Path(os.environ["SHIM_FOLDER"]) / f"{condition}.{laboratory.engine.pid}"
+        flag.touch()
+        yield
+        flag.unlink()
+
+    return make
+
+
+def nothing(_: Laboratory) -> Iterator[None]:
+    """Leave everything as it is."""
+    yield
+
+
+def both_cores_busy(_: Laboratory) -> Iterator[None]:
+    """Let as many programs calculate as there are cores."""
+    with busy(_):  # type: ignore[arg-type]  # it looks at none of the laboratory
+        yield
+
+
+CONDITIONS: dict[str, Callable[[Laboratory], Iterator[None]]] = {
+    "idle": nothing,
+    "busy": both_cores_busy,
+    "memory exhausted": exhausted,
+    "no descriptors": no_descriptors,
+    "no threads": shimmed("no threads"),
+    "folder gone": folder_gone,
+    "disk full": disk_full,
+    "clock stepped": shimmed("clock stepped"),
+}
+LASTING = ("settling", "recording", "held")
+DEAD_STATES = tuple(each for each in STATES if each != "held")
+
+
+def bound_s(cell: Cell, load: float) -> float:
+    """Return within what time the terminal must be silent [s]."""
+    within_s = CAUSES[cell.cause][1]
+    if cell.condition == "memory exhausted":
+        within_s += STANDSTILL_S
+    return max(within_s, LOADED_S) if load > 2 * (os.cpu_count() or 1) else within_s
+
+
+def measured(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
+    """Carry out one cell."""
+    happen, _, _ = CAUSES[cell.cause]
+    exits: dict[str, int | None] = {}
+    load = os.getloadavg()[0]
+    with ExitStack() as stack:
+        stack.callback(laboratory.virtual.faults.turn_gain_back)
+        stack.callback(laboratory.virtual.faults.heal_daq)
+        laboratory.start(cell.subject)
+        laboratory.run_into(cell.state, after_s)
+        stack.enter_context(contextmanager(CONDITIONS[cell.condition])(laboratory))
+        since_s = time.monotonic()
+        code = happen(laboratory)
+        took_s = max(0.0, laboratory.witness.silent_since_s() - since_s)
+        if code is not None:
+            exits["stop"] = code
+        if cell.subject == "measure":
+            exits["measure"] = laboratory.ended()
+    return Found(cell, took_s, bound_s(cell, load), exits, load)
+
+
+def killed(laboratory: Laboratory, cell: Cell, after_s: float) -> Found:
+    """Kill what drives, where the drive ends by itself."""
+    load = os.getloadavg()[0]
+    laboratory.start(cell.subject)
+    laboratory.run_into(cell.state, after_s)
+    since_s = time.monotonic()
+    os.kill(laboratory.engine.pid, signal.SIGKILL)
+    took_s = max(0.0, laboratory.witness.silent_since_s() - since_s)
+    return Found(cell, took_s, DEAD_MAN_S + LATE_S, {}, load)
+
+
+def stop_cells() -> list[Cell]:
+    """List every stop that there is."""
+    return [
+        Cell(subject, cause, condition, state)
+        for (cause, (_, _, subjects)), condition, state in product(CAUSES.items(), CONDITIONS, STATES)
+        for subject in subjects
+    ]
+
+
+def kill_cells() -> list[Cell]:
+    """List the kills of every state that may have a dead man, many times over: the moment is drawn anew."""
+    return [Cell(subject, "SIGKILL", "idle", state) for subject in SUBJECTS for state in DEAD_STATES] * 20
+
+
+def drive(subject: str, rig_path: str, knobs: str, folder: str) -> None:
+    """Be the process that drives: `vibench measure`, or a window with its engine."""
+    rig = Rig.model_validate_json(Path(rig_path).read_text())
+    campaign = Path(folder).with_suffix(".toml")
+    plan = Campaign.model_validate(PLAN)
+    if subject == "measure":
+        save_toml(plan, campaign)
+        bench = Path(folder).with_suffix(".rig.toml")
+        save_toml(rig, bench)
+        given = ["--bench", str(bench), "--knobs", knobs, "--out", folder, "--check", "waived"]
+        os.execv(VIBENCH, [VIBENCH, "measure", str(campaign), *given])
+    with start_engine() as engine:
+        attendant = Attendant(engine.address)
+        engine.client.open(rig, load_toml(Path(knobs), KnobSheet))
+        while engine.client.status().state is EngineState.OPENING:
+            attendant.live()
+            time.sleep(0.02)
+        engine.client.arm_request(CampaignRequest(campaign=plan, folder=Path(folder), check=CheckRule.WAIVED))
+        engine.client.start()
+        while True:
+            attendant.live()
+            time.sleep(0.02)
+
+
+def compiled_shim(folder: Path) -> Path | None:
+    """Compile the shim; None where there is no compiler."""
+    compiler, shim = shutil.which("cc"), folder / "shim.so"
+    if compiler is None:
+        return None
+    subprocess.run([compiler, "-shared", "-fPIC", "-O2", "-o", shim, SHIM, "-ldl"], check=True)
+    return shim
+
+
+def campaign(options: argparse.Namespace, folder: Path) -> Iterable[Found]:
+    """Measure the cells of a shard that no line of the file holds yet."""
+    number, count = (int(each) for each in options.shard.split("/"))
+    chooser = random.Random(options.seed)
+    cells = kill_cells() if options.dead_man else stop_cells()
+    chooser.shuffle(cells)
+    chosen = [(at, cell, chooser.uniform(0.0, 0.3)) for at, cell in enumerate(cells[: options.count])]
+    done = {json.loads(line)["number"] for line in _lines(options.save)}
+    carry_out = killed if options.dead_man else measured
+    for at, cell, after_s in chosen:
+        if at % count != number - 1 or at in done:
+            continue
+        found, said = None, ""
+        for attempt in range(3):  # on a crowded computer a run may fail its check, or a state pass unseen
+            place = folder / f"{at}-{attempt}"
+            place.mkdir()
+            # A new rig each time: a client that was killed leaves its task behind in the old one.
+            with VirtualRig(wall_rig()) as virtual:
+                laboratory = Laboratory(virtual, place, DEAD_MAN_S if options.dead_man else None)
+                try:
+                    found = carry_out(laboratory, cell, after_s if cell.state in LASTING else 0.0)
+                    break
+                except (TimeoutError, EngineError) as error:
+                    said = str(error)
+                finally:
+                    words = laboratory.close()
+        if found is None:
+            print(f"{at:4d} {cell}: NOT MEASURED {said} {words}", flush=True)
+            continue
+        line = asdict(found) | {"number": at, "complaint": found.complaint}
+        with options.save.open("a") as file:
+            file.write(json.dumps(line | ({"said": words} if found.complaint else {})) + "\n")
+        print(
+            f"{at:4d} {cell.subject:8s} {cell.cause:18s} {cell.condition:17s} {cell.state:13s} "
+            f"{found.took_s:6.2f} s of {found.within_s:.2f} {found.exits} load {found.load:.0f} "
+            f"{found.complaint.upper()}",
+            flush=True,
+        )
+        yield found
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text().splitlines() if path.exists() else []
+
+
+def summed(paths: list[Path]) -> bool:
+    """Print how many stops were silent in time, and the worst of each cause; says whether all held."""
+    found = [json.loads(line) for path in paths for line in _lines(path)]
+    bad = [each for each in found if each["complaint"]]
+    print(f"{len(found) - len(bad)} of {len(found)} stops: silent in time, with the right exit code")
+    for key in ("cause", "condition", "state"):
+        for name in sorted({each["cell"][key] for each in found}):
+            of = [each for each in found if each["cell"][key] == name]
+            worst = max(of, key=lambda each: each["took_s"])
+            print(
+                f"| {name} | {len(of)} | {worst['took_s']:.2f} s of {worst['within_s']:.2f} s "
+                f"({worst['cell']['condition']}, {worst['cell']['state']}, load {worst['load']:.0f}) |"
+            )
+    for each in bad:
+        print(each["cell"], each["complaint"])
+    return not bad
+
+
+def main() -> None:
+    """Measure, and tell by the exit code whether every stop was silent in time."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--shard", default="1/1")
+    parser.add_argument("--save", type=Path, default=Path("stops.jsonl"))
+    parser.add_argument("--dead-man", action="store_true", help="kill runs whose drive ends by itself")
+    parser.add_argument("--sum", type=Path, nargs="+")
+    parser.add_argument("--as", dest="drive", nargs=4, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.drive:
+        drive(*options.drive)
+    if options.sum:
+        raise SystemExit(not summed(options.sum))
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        os.environ |= {"VIBENCH_STATE_DIR": f"{name}/state", "VIBENCH_LOCK_DIR": name, "SHIM_FOLDER": name}
+        shim = compiled_shim(folder)
+        if shim is not None:
+            os.environ["LD_PRELOAD"] = str(shim)
+        else:
+            del CONDITIONS["no threads"], CONDITIONS["clock stepped"]
+        complaints = [each.complaint for each in campaign(options, folder)]
+    raise SystemExit(any(complaints))
+
+
+if __name__ == "__main__":
+    main()
