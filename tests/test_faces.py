@@ -40,11 +40,12 @@ FOR_OUR_PROGRAMS = (
     "vibench.sim.shaker",
     "vibench.sim.hdf5_files",
     "vibench.sim.operating_system",
+    "vibench.stop_files",
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
     "vibench.analysis.reproduction",
 )
-ONE_FILE_ROOMS = ("errors", "tables", "analogue")
+ONE_FILE_ROOMS = ("errors", "tables", "analogue", "command", "stop_files")
 
 
 def sources():

@@ -84,7 +84,10 @@ def test_nothing_of_an_engine_that_was_killed_is_taken_for_the_next_one(window, 
     os.kill(bridge.engine_pid, 9)
     for _ in range(3):
         bridge.order(EngineClient.mark, "here")
-    qtbot.waitUntil(lambda: bridge.engine_pid is None, timeout=PATIENCE_MS)
+    with qtbot.waitSignal(bridge.noticed, timeout=PATIENCE_MS) as told:
+        qtbot.waitUntil(lambda: bridge.engine_pid is None, timeout=PATIENCE_MS)
+    assert told.args[0].what == "The engine was killed."
+    assert told.args[0].next_step.startswith("The generator may still be driving: switch the amplifier off")
     assert not bridge.is_ordering
     for _ in run():
         window.tick()

@@ -19,6 +19,7 @@ from vibench.acquisition.engine import (
     EngineStatus,
     SampleSlice,
     TwinStatus,
+    require_ended,
     the_engine,
 )
 from vibench.acquisition.rig import Rig, specimen_of
@@ -184,6 +185,7 @@ def twin(
             while True:
                 time.sleep(following.look())
         except EngineGone:
+            require_ended(engine)
             console.print("The engine has ended.")
         except KeyboardInterrupt:
             console.print("The engine goes on.")

@@ -18,6 +18,7 @@ from vibench.acquisition.engine import (
     out_of_reach,
     programs_to_stop,
     programs_without_engine,
+    require_ended,
     stop_engine,
     the_engine,
 )
@@ -56,6 +57,7 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
                 time.sleep(INTERVAL_S)
             bars.draw(status)
     except EngineGone:
+        require_ended(engine)
         console.print("The engine has ended.")
     except KeyboardInterrupt:
         console.print("The engine goes on.")

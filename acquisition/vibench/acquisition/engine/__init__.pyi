@@ -4,6 +4,7 @@ from ._announcement import (
     out_of_reach as out_of_reach,
     programs_to_stop as programs_to_stop,
     programs_without_engine as programs_without_engine,
+    require_ended as require_ended,
     the_engine as the_engine,
 )
 from ._attendant import (

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from vibench.sim.operating_system import Place, state_folder
+from vibench.stop_files import SWITCH_OFF
 
 from ..stopping import (
     AnyProgram,
@@ -17,7 +18,7 @@ from ..stopping import (
     withdraw,
 )
 from ._address import EngineAddress
-from ._errors import EngineError
+from ._errors import EngineError, EngineGone
 
 REFUSAL_S = 0.2
 """How long a refusal is waited for; one on this computer comes at once [s]."""
@@ -120,6 +121,12 @@ def out_of_reach() -> str:
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
     return f"Not reached, since it is of another computer: {named}; run 'vibench stop' there" if named else ""
+
+
+def require_ended(engine: Announcement) -> None:
+    """Raise EngineGone where an engine was killed: nobody has confirmed that its output is off."""
+    if engine.was_killed:
+        raise EngineGone(f"The engine was killed. {SWITCH_OFF}")
 
 
 def _only(chosen: list[AnyProgram]) -> AnyProgram:

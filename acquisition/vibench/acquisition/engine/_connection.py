@@ -77,7 +77,9 @@ def exchanged(
         raise _silent(patience_s) from error
     except OSError as error:
         connection.close()
-        raise EngineGone(f"the engine was killed, ended or hangs ({error}). {SWITCH_OFF}") from error
+        raise EngineGone(
+            f"the engine was killed, or has closed this connection ({error}). {SWITCH_OFF}"
+        ) from error
     facts = json.loads(answer.text)
     if "refused" in facts:
         raise _refusal(facts["kind"], facts["refused"])

@@ -48,6 +48,12 @@ class Program(BaseModel):
         return _is_marked(_path(self))
 
 
+    @property
+    def was_killed(self) -> bool:
+        """Whether its process ended without taking back its announcement."""
+        return not self.is_alive and _path(self).exists()
+
+
 AnyProgram = TypeVar("AnyProgram", bound=Program)
 
 

@@ -19,6 +19,7 @@ from vibench.acquisition.engine import (
     EngineClient,
     EngineGone,
     EngineMessage,
+    EngineSilent,
     EngineState,
     EngineStatus,
     SampleSlice,
@@ -28,6 +29,7 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import KnobSheet, Rig
 from vibench.analysis.live import LiveView
+from vibench.stop_files import SWITCH_OFF
 
 from ..widgets import Notice, NoticeKind, notice_of
 from ._engine_line import EngineLine, Starter, Urgency
@@ -284,7 +286,12 @@ class Bridge(QObject):
         self._status, self._last_message, self._ended = None, 0, frozenset()
         self._orders = self._view_run = 0  # another engine counts its runs from 1 again
         line.leave()
-        self.noticed.emit(notice_of(error, "Look at the bench, then open it again on the Rig page."))
+        if isinstance(error, EngineSilent):
+            self.noticed.emit(notice_of(error, "Then open the bench again on the Rig page."))
+        else:
+            code = type(error).__name__
+            what, next_step = "The engine was killed.", f"{SWITCH_OFF}."
+            self.noticed.emit(Notice(NoticeKind.FAULT, what, next_step=next_step, code=code))
 
 
 _ADVANCES = frozenset(

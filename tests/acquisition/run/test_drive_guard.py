@@ -1,0 +1,207 @@
+"""A run that stands still is silenced, whatever holds it up; a stop is confirmed when the output is off."""
+
+import threading
+from pathlib import Path
+from threading import Event
+from time import monotonic
+
+import numpy as np
+import pytest
+
+from vibench.acquisition import AcquisitionError, InstrumentLost, StopLevel, StopSwitch, open_bench
+from vibench.acquisition.host import Beside
+from vibench.acquisition.plan import Dwell, Measurement, RunState
+from vibench.acquisition.rig import CalibrationRule, confirm_simulated
+from vibench.acquisition.run import DriveGuard, _drive_guard as drive_guard
+from vibench.acquisition.run._run import Run
+from vibench.acquisition.stopping import (
+    DRIVES_ON,
+    MEMORY_RESERVE,
+    Cause,
+    Program,
+    StopRequest,
+    engines_folder,
+    facts_of_this_process,
+    reached,
+)
+from vibench.sim.operating_system import process_start
+from vibench.stop_files import Fate, fate_of, put_down, stop_path, taken_path
+
+PLAN = Measurement(
+    name="run",
+    excitation=Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=0.2, duration_s=60.0),
+    ramp_s=0.3,
+    ramp_step_s=0.03,
+)
+SILENT_V = 1e-2
+
+
+def until(is_so, within_s=20.0):
+    give_up_s, pause = monotonic() + within_s, Event()
+    while not is_so():
+        assert monotonic() < give_up_s
+        pause.wait(0.01)
+
+
+def terminal_v(virtual):
+    virtual.world.advance(0.1)
+    return np.max(np.abs(virtual.generator.render(virtual.world.time_s, 1e-4, 1000)))
+
+
+@pytest.fixture
+def recording(laboratory, tmp_path, monkeypatch):
+    """A run in the middle of its dwell, which goes on only when it is asked."""
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path / "state"))
+    virtual, connected = laboratory()
+    with (
+        open_bench(connected, confirm_simulated, CalibrationRule.WAIVED) as bench,
+        Run(bench, PLAN, tmp_path / "run.h5") as run,
+    ):
+        next(progress for progress in run if progress.state is RunState.RECORDING)
+        yield virtual, run
+
+
+def test_a_run_that_stands_still_is_silenced(recording, monkeypatch):
+    virtual, run = recording
+    assert terminal_v(virtual) > 0.5
+    monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 3)
+    until(lambda: terminal_v(virtual) < SILENT_V)
+    assert run.switch.request.cause is Cause.FAULT
+    assert not DRIVES_ON
+
+
+def test_a_run_that_stands_still_is_silenced_sooner_once_it_is_stopped(recording):
+    virtual, run = recording
+    run.switch.ask(StopRequest(Cause.TERMINATED, StopLevel.ABORT, "SIGTERM"))
+    until(lambda: terminal_v(virtual) < SILENT_V, drive_guard.STOPPED_BLOCKS * 0.1 + 3.0)
+
+
+def test_a_run_that_goes_on_is_left_alone(recording, monkeypatch):
+    virtual, run = recording
+    monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 5)
+    began_s = monotonic()
+    for _ in run:
+        if monotonic() - began_s > 1.5:
+            break
+    assert run.switch.request is None
+    assert terminal_v(virtual) > 0.5
+
+
+class Output:
+    """A drive whose output cannot be read back, or not at once."""
+
+    def __init__(self, *failures):
+        self.failures = list(failures)
+        self.is_off = False
+
+    def silence(self):
+        if self.failures:
+            raise self.failures.pop(0)
+        self.is_off = True
+
+    cut = silence
+
+
+@pytest.fixture
+def own_state(tmp_path, monkeypatch):
+    monkeypatch.setenv("VIBENCH_STATE_DIR", str(tmp_path))
+
+
+def stopped(level="abort"):
+    stop = stop_path(str(engines_folder()), *own_process(), level)
+    put_down(stop, "smoke")
+    return stop
+
+
+def own_process():
+    facts = facts_of_this_process("dwell")
+    return facts["pid"], process_start(facts["pid"])
+
+
+@pytest.fixture
+def announced(own_state):
+    with reached(lambda level, reason: None, Program.model_validate(facts_of_this_process("dwell"))):
+        yield
+
+
+def test_a_stop_is_confirmed_when_the_output_is_off_and_not_before(announced):
+    with DriveGuard(Output(), StopSwitch()) as guard:
+        guard.begin()
+        stop = stopped()
+        until(lambda: not Path(stop).exists())
+        assert Path(taken_path(stop)).exists()
+        guard.silence()
+        assert fate_of(stop) is Fate.SILENT
+
+
+def test_a_stop_is_not_confirmed_where_the_output_cannot_be_read_back(announced, monkeypatch):
+    monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
+    guard = DriveGuard(Output(*[InstrumentLost("gone")] * 1000), StopSwitch())
+    with guard:
+        guard.begin()
+        stop = stopped()
+        with pytest.raises(InstrumentLost):
+            guard.silence()
+    assert fate_of(stop) is Fate.UNCONFIRMED
+    DRIVES_ON.confirm_silence(guard)
+
+
+def test_a_stop_is_not_confirmed_while_the_drive_is_still_measured(announced, monkeypatch):
+    monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
+    guard = DriveGuard(Output(), StopSwitch(), is_heard=lambda: True)
+    with guard:
+        guard.begin()
+        stop = stopped()
+        guard.silence()
+    assert fate_of(stop) is Fate.UNCONFIRMED
+    DRIVES_ON.confirm_silence(guard)
+
+
+def test_a_long_ramp_shows_that_it_goes_on(announced, monkeypatch):
+    monkeypatch.setattr("vibench.stop_files.HEEDED_S", 0.5)
+    with DriveGuard(Output(), StopSwitch()) as guard:
+        guard.begin()
+        stop, pause = stopped("ramp"), Event()
+
+        def ramp_down():
+            for _ in range(20):
+                guard.advance()
+                pause.wait(0.1)
+            guard.silence()
+
+        ramp = threading.Thread(target=ramp_down)
+        ramp.start()
+        assert fate_of(stop) is Fate.SILENT
+        ramp.join()
+
+
+def test_where_memory_is_short_the_reserve_is_given_back_and_the_output_goes_off():
+    output = Output(MemoryError())
+    with DriveGuard(output, StopSwitch()) as guard:
+        guard.begin()
+        assert MEMORY_RESERVE._held is not None
+        guard.silence()
+    assert output.is_off
+    assert MEMORY_RESERVE._held is None
+    assert not DRIVES_ON
+
+
+def test_nothing_begins_without_memory_to_hold_back(monkeypatch):
+    MEMORY_RESERVE.release()
+
+    def exhausted(*_):
+        raise OSError(12, "Cannot allocate memory")
+
+    monkeypatch.setattr("mmap.mmap", exhausted)
+    with pytest.raises(AcquisitionError, match="can get no more memory"):
+        DriveGuard(Output(), StopSwitch())
+
+
+def test_what_is_done_beside_starts_no_thread_later(monkeypatch):
+    beside, done = Beside("test"), []
+    monkeypatch.setattr(threading.Thread, "start", lambda self: pytest.fail("a thread was started"))
+    beside.do(lambda: done.append(1))
+    beside.wait(20)
+    beside.do(lambda: done.append(2))
+    beside.close(20)
+    assert done == [1, 2]

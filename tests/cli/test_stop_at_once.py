@@ -1,0 +1,108 @@
+"""`vibench stop` from Enter: it loads the standard library alone, and says what it does not know."""
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vibench.acquisition.stopping import Program, announced_programs
+
+from .test_stop_all import driving, own_state  # noqa: F401 - a fixture
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the complete command stops")
+COMMAND = (
+    "import sys; sys.argv = ['vibench', 'stop', *sys.argv[1:]]; from vibench.command import main; main()"
+)
+LOADED = """
+import sys
+before = set(sys.modules)
+sys.argv = ["vibench", "stop"]
+from vibench.command import main
+try:
+    main()
+finally:
+    new = {each.partition(".")[0] for each in set(sys.modules) - before}
+    print(*sorted(new - sys.stdlib_module_names - {"vibench"}))
+    print(*sorted(each for each in sys.modules if each.startswith("vibench.")))
+"""
+
+
+def vibench_stop(*words, **variables):
+    return subprocess.run(
+        [sys.executable, "-c", COMMAND, *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | variables,
+    )
+
+
+def test_it_loads_the_standard_library_alone():
+    with driving("north"):
+        told = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True)
+    said, others, ours = told.stdout.splitlines()
+    assert "its output is off" in said
+    assert (others, ours) == ("", "vibench.command vibench.stop_files")
+
+
+def test_it_takes_less_than_a_tenth_of_a_second_of_the_processor():
+    with driving("north"):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        assert vibench_stop().returncode == 0
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 0.1
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [(("--level", "off", "--reason", "smoke"), "off smoke"), (("--level=abort",), "abort vibench stop")],
+)
+def test_it_stops_as_the_complete_command_does(words, told):
+    with driving("north") as north:
+        said = vibench_stop(*words)
+        assert said.returncode == 0
+        assert f"north, process {north.pid}: has taken the stop" in said.stdout
+        assert north.communicate(timeout=20)[0] == f"{told}\n"
+
+
+def test_it_stops_the_one_that_is_named():
+    with driving("north") as north, driving("south"):
+        assert vibench_stop("--pid", str(north.pid)).returncode == 0
+        north.wait(20)
+        assert [each.what for each in announced_programs(Program)] == ["south"]
+
+
+@pytest.mark.parametrize("words", [("--level", "loud"), ("--level",), ("--pid", "x"), ("--reason=",)])
+def test_what_is_not_plain_is_answered_by_the_complete_command(words):
+    with driving("north") as north:
+        told = vibench_stop(*words)
+        assert told.returncode == 2, told.stderr
+        assert north.poll() is None
+
+
+def test_of_one_that_was_killed_it_says_what_to_do():
+    with driving("north") as north:
+        north.kill()
+        north.wait()
+        told = vibench_stop()
+        assert told.returncode == 1
+        assert "was killed. The generator may still be driving: switch the amplifier off" in told.stderr
+        assert "no engine is running" in vibench_stop().stderr
+
+
+def test_what_the_system_stopped_is_not_called_silent():
+    with driving("north") as north:
+        os.kill(north.pid, 19)
+        told = vibench_stop("--level", "abort")
+        os.kill(north.pid, 18)
+        assert told.returncode == 1
+        assert "switch the amplifier off" in " ".join(told.stderr.split())
+
+
+def test_without_a_state_folder_it_says_so(tmp_path):
+    told = vibench_stop(VIBENCH_STATE_DIR=str(Path(tmp_path) / "nowhere"))
+    assert told.returncode == 1
+    assert "no engine is running" in told.stderr
