@@ -71,8 +71,8 @@ DEAD_MAN_S = 1.0
 LATE_S = 0.3
 """The witness looks that often on a busy computer [s]."""
 SHIM = Path(__file__).with_name("shim_of_conditions.c")
-ENDED_BY_ITSELF = ("folder gone", "disk full", "memory exhausted")
-"""Conditions that may end a run before its stop does."""
+ENDED_BY_ITSELF = ("folder gone", "disk full", "memory exhausted", "no threads")
+"""Conditions that may end a run before its stop does, or keep its recording from being finished."""
 
 
 @dataclass(frozen=True)
@@ -479,6 +479,9 @@ def _lines(path: Path) -> list[str]:
 def summed(paths: list[Path]) -> bool:
     """Print how many stops were silent in time, and the worst of each cause; says whether all held."""
     found = [json.loads(line) for path in paths for line in _lines(path)]
+    keys = ("took_s", "within_s", "exits", "load")
+    for each in found:
+        each["complaint"] = Found(Cell(**each["cell"]), *(each[key] for key in keys)).complaint
     bad = [each for each in found if each["complaint"]]
     print(f"{len(found) - len(bad)} of {len(found)} stops: silent in time, with the right exit code")
     for key in ("cause", "condition", "state"):

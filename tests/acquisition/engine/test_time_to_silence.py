@@ -12,8 +12,8 @@ ROOT = Path(__file__).resolve().parents[3]
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="stalls and limits as Linux has them")
 
 
-def measured(*options):
-    script = str(ROOT / "benchmarks" / "time_to_silence.py")
+def measured(*options, name="time_to_silence.py"):
+    script = str(ROOT / "benchmarks" / name)
     return subprocess.run(
         [sys.executable, script, *options], capture_output=True, text=True, check=False, env={**os.environ}
     )
@@ -24,6 +24,17 @@ def test_two_cells_of_the_table_are_silent_within_their_bounds():
     told = measured("--cells", "0.007", "--seed", "7")
     assert told.returncode == 0, told.stdout + told.stderr
     assert told.stdout.count(" s\n") == 2
+
+
+@pytest.mark.thorough
+def test_stops_and_kills_seen_from_outside_are_silent_and_are_not_measured_twice(tmp_path):
+    stops, kills = tmp_path / "stops.jsonl", tmp_path / "kills.jsonl"
+    for options in (["--save", stops, "--seed", "3"], ["--save", kills, "--dead-man"]):
+        told = measured(*map(str, options), "--count", "2", name="stops_from_outside.py")
+        assert told.returncode == 0, told.stdout + told.stderr
+        assert told.stdout.count(" s of ") == 2
+    again = measured("--save", str(stops), "--seed", "3", "--count", "2", name="stops_from_outside.py")
+    assert again.stdout == ""
 
 
 @pytest.mark.slow

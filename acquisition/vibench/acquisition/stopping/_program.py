@@ -47,7 +47,6 @@ class Program(BaseModel):
             return is_process(self.pid, self.process_start)
         return _is_marked(_path(self))
 
-
     @property
     def was_killed(self) -> bool:
         """Whether its process ended without taking back its announcement."""
