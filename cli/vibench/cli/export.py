@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from vibench.acquisition import open_recording
+from vibench.acquisition.recording import SealDepth, SealState
 from vibench.analysis import (
     FrequencyResponseRequest,
     InvalidRequest,
@@ -16,7 +17,7 @@ from vibench.analysis import (
 from vibench.analysis.exchange import Format, Results, excerpt, export_functions, export_samples
 
 from .external_data import AllowExternal, external_data
-from .output import console
+from .output import console, print_warnings
 from .paths import file_at
 from .progress_bars import transfer_bar
 
@@ -69,6 +70,9 @@ def export(
         chosen = excerpt(
             opened, tuple(each.strip() for each in channels.split(",")) if channels else (), from_s, to_s
         )
+        seal = opened.check_seal(SealDepth.QUICK)
+        if seal.state not in (SealState.INTACT, SealState.UNFINISHED):
+            print_warnings([f"{recording.name}: {seal.sentence}"])
         path = file_at(out, recording.with_name(f"{chosen.name}.{to.value}"))
         if spectra:
             view = quantities_named(quantity or "displacement", MagnitudeScale.LOG)

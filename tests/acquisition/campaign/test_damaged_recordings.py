@@ -21,6 +21,7 @@ from vibench.acquisition.campaign import (
 )
 from vibench.acquisition.errors import CheckFailed, RecordingError
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
+from vibench.acquisition.recording import SealDepth, SealState
 from vibench.acquisition.stopping import Cause, StopRequest, StopSwitch
 
 
@@ -218,12 +219,36 @@ def test_recordings_from_before_seals_are_kept_and_told_as_such(bench, folder):
     (folder / "c.campaign.sqlite").unlink()
     for path in folder.glob("*.h5"):
         with h5py.File(path, "r+") as file:
-            del file["seal"]
+            del file["seal"], file["overview"], file["view"]
     made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
     assert {each.outcome for each in made} == {PointOutcome.KEPT}
     own = [each for each in verify_recordings(folder) if "/" not in each.path]
     assert {(each.verdict, each.is_bad) for each in own} == {("unsealed", False)}
     assert {each.verdict for each in list_recordings(folder) if "/" not in each.path} == {"no seal"}
+
+
+def test_recordings_whose_seal_was_taken_away_are_made_again(bench, folder):
+    (folder / "c.campaign.sqlite").unlink()
+    for path in folder.glob("*.h5"):
+        with h5py.File(path, "r+") as file:
+            del file["seal"]
+    assert {each.verdict for each in verify_recordings(folder) if each.is_bad} == {"seal_gone"}
+    made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert {each.outcome for each in made} == {PointOutcome.RECORDED}
+
+
+def test_another_recording_under_its_name_is_found_by_whoever_checks_a_seal(folder):
+    shutil.copy(folder / "one.h5", folder / "two.h5")
+    with open_recording(folder / "two.h5") as recording:
+        for depth in SealDepth:
+            found = recording.check_seal(depth)
+            assert found.state is SealState.DAMAGED
+            assert found.sentence.endswith("the campaign noted for two: another recording")
+        assert not recording.is_checked
+    assert [(each.path, each.verdict) for each in verify_recordings(folder) if each.is_bad] == [
+        ("two.h5", "damaged")
+    ]
+    assert [each.path for each in list_recordings(folder) if each.is_bad] == ["two.h5"]
 
 
 def said_by(statement):

@@ -176,9 +176,53 @@ def test_a_recording_without_a_seal_is_told_as_such(recorded):
     with h5py.File(path, "r+") as file:
         del file["seal"]
     with open_recording(path) as recording:
+        for depth in SealDepth:
+            found = recording.check_seal(depth)
+            assert (found.state, recording.seal) == (SealState.SEAL_GONE, "")
+            assert "its seal is gone: vibench" in found.sentence
+    with h5py.File(path, "r+") as file:
+        del file["overview"], file["view"]  # came with seals
+    with open_recording(path) as recording:
         found = recording.check_seal("whole")
-        assert (found.state, recording.seal) == (SealState.UNSEALED, "")
+        assert found.state is SealState.UNSEALED
         assert "before recordings had one" in found.sentence
+
+
+def test_without_a_seal_samples_are_held_against_the_checksum_of_their_channel(recorded):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        del file["seal"]
+        change_sample(file)
+    with open_recording(path) as recording:
+        found = recording.check_seal("whole")
+    assert found.state is SealState.DAMAGED
+    assert found.sentence == "it has no seal, and the samples of m0_velocity do not have their checksum"
+
+
+@pytest.mark.parametrize("change", ["attribute", "dataset", "all but the group"])
+def test_a_seal_of_which_a_part_is_gone_is_none(recorded, change):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        if change != "dataset":
+            del file["seal"].attrs["sha256"]
+        if change != "attribute":
+            del file["seal/manifest_json"]
+    assert state_of(path) is state_of(path, "quick") is SealState.DAMAGED
+
+
+def test_the_seal_of_another_recording_is_none_of_this_one(recorded):
+    path, other = recorded(), recorded("b.h5")
+    with h5py.File(path, "r+") as file, h5py.File(other) as source:
+        del file["seal"]
+        source.copy("seal", file)
+    assert state_of(path) is SealState.DAMAGED
+
+
+def test_a_finished_recording_that_is_called_unfinished_is_held_against_its_seal(recorded):
+    path = recorded()
+    with h5py.File(path, "r+") as file:
+        change_scale(file)
+    assert state_of(path.rename(part_of(path))) is SealState.DAMAGED
 
 
 def test_where_a_key_is_given_no_seal_is_no_excuse(recorded, key_file):
@@ -305,8 +349,16 @@ def test_a_result_of_another_recording_is_refused(with_result, tmp_path, make_he
         assert [each.state for each in recording.check_result_seals().values()] == [SealState.DAMAGED]
 
 
+def test_a_result_whose_seal_was_taken_away_is_refused(with_result):
+    with h5py.File(with_result, "r+") as file:
+        del file["results/spectrum"].attrs["seal_sha256"]
+    with open_recording(with_result) as recording, pytest.raises(RecordingError, match="its seal is gone"):
+        _ = recording.results
+
+
 def test_a_result_that_was_saved_before_results_had_seals_is_read(with_result):
     with h5py.File(with_result, "r+") as file:
+        del file["seal"], file["overview"], file["view"]
         for name in [each for each in file["results/spectrum"].attrs if each.startswith("seal_")]:
             del file["results/spectrum"].attrs[name]
         del file["results/spectrum/H"].attrs["axes_json"]

@@ -16,9 +16,6 @@ from ._event import (
     CampaignListener as CampaignListener,
     ignore_event as ignore_event,
 )
-from ._journal import (
-    JOURNAL_SUFFIX as JOURNAL_SUFFIX,
-)
 from ._journal_point import (
     JournalPointState as JournalPointState,
     read_journal as read_journal,

@@ -1,6 +1,5 @@
 """The files of a point: one an attempt, ``NAME.h5``, ``NAME.2.h5``, ..., none of them ever overwritten."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 from ..errors import RecordingError
@@ -23,18 +22,17 @@ def next_attempt(folder: Path, name: str) -> Path:
 
 
 def complete_attempt(
-    folder: Path, name: str, measurement: Measurement, depth: SealDepth, seals: Mapping[str, str]
+    folder: Path, name: str, measurement: Measurement, depth: SealDepth
 ) -> KeptRecording | None:
     """Find a complete recording of a point; the last damaged one where there is no sound one, or None.
 
-    ``seals`` are those that journals in the folder have of its files. Raises RecordingError when one is
-    complete, but was made by another plan.
+    Raises RecordingError when one is complete, but was made by another plan.
     """
     damaged: KeptRecording | None = None
     for path in attempts_in(folder, name):
         if not path.exists():
             continue
-        found = looked_at(path, measurement, depth, seals.get(path.name, ""))
+        found = looked_at(path, measurement, depth)
         if found.damage:
             damaged = found
         if not found.is_complete:

@@ -18,7 +18,7 @@ from ..recording import PART_SUFFIX, SUFFIX
 from ._catalogue_entry import CatalogueEntry, place_below, read_entry
 
 CATALOGUE_NAME = "catalogue.sqlite"
-VERSION = 2
+VERSION = 3
 """Raised whenever an entry changes; an older catalogue is then made again."""
 WAIT_S = 10.0
 """For another program that is writing the same catalogue."""

@@ -53,7 +53,7 @@ class CatalogueEntry:
     notes: str = ""
     recording_id: str = ""
     seal: str = ""
-    """``intact`` as far as a quick look shows, ``damaged``, ``unsealed`` or ``unfinished``; or empty."""
+    """As in `recording.SealState`, as far as a quick look shows; or empty."""
 
     @property
     def is_bad(self) -> bool:
@@ -130,8 +130,8 @@ def _verdict(recording: Recording, seal: SealCheck) -> str:
     minded = [f"damaged: {seal.sentence}"] if seal.state is SealState.DAMAGED else []
     if recording.state is not RecordingState.COMPLETE:
         minded.append(recording.state.value)
-    if seal.state is SealState.UNSEALED:
-        minded.append("no seal")
+    if seal.state in (SealState.UNSEALED, SealState.SEAL_GONE):
+        minded.append("no seal" if seal.state is SealState.UNSEALED else "seal gone")
     if seal.state is SealState.OTHER_KEY:
         minded.append("not signed with the key given")
     roles = ", ".join(dict.fromkeys(each.channel for each in recording.overloads))

@@ -15,20 +15,18 @@ from typing import Self
 from ..errors import RecordingError
 from ..host import ClosedOnLeaving
 from ..plan import Campaign, Point
+from ..recording import JOURNAL_SUFFIX, closed_on_error
 from ._bench_identity import BenchIdentity
 from ._journal_database import (
     SCHEMA,
     VERSION,
     brought_up,
-    closed_on_error,
     connected,
     require_version,
     sentences,
 )
 from ._journal_point import JournalPoint, JournalPointState, points_of
 from ._point_outcome import ReasonCode
-
-JOURNAL_SUFFIX = ".campaign.sqlite"
 
 
 def journal_path(folder: Path, campaign: str) -> Path:

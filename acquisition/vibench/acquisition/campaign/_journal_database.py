@@ -9,6 +9,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from ..errors import RecordingError
+from ..recording import closed_on_error, opened, opened_to_look
 
 VERSION = 2
 
@@ -80,36 +81,6 @@ def connected(path: Path) -> sqlite3.Connection:
         connection.execute("PRAGMA synchronous = FULL")
         connection.execute("PRAGMA foreign_keys = ON")
         return connection
-
-
-def opened(uri: str) -> sqlite3.Connection:
-    """Open a database as its address says; transactions are begun and ended by hand."""
-    connection = sqlite3.connect(uri, uri=True, isolation_level=None)
-    connection.row_factory = sqlite3.Row
-    return connection
-
-
-@contextmanager
-def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
-    """Let the file go when a new connection is of no use: Windows lets nobody move or delete an open one."""
-    try:
-        yield connection
-    except BaseException:
-        connection.close()
-        raise
-
-
-def opened_to_look(path: Path) -> sqlite3.Connection:
-    """Open a database to read it, also where nothing may be written."""
-    address = path.resolve().as_uri()
-    try:
-        # One that may write tidies up behind itself when it was the last to look.
-        with closed_on_error(opened(f"{address}?mode=rw")) as connection:
-            connection.execute("PRAGMA query_only = ON")
-            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
-            return connection
-    except sqlite3.OperationalError:
-        return opened(f"{address}?mode=ro")
 
 
 def brought_up(connection: sqlite3.Connection) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 
 from ..errors import RecordingError
 from ..plan import Measurement
-from ._journal_database import POINTS, opened_to_look, require_version, sentences
+from ..recording import opened_to_look
+from ._journal_database import POINTS, require_version, sentences
 from ._point_outcome import ReasonCode
 
 

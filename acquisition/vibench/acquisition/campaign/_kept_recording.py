@@ -34,17 +34,14 @@ class KeptRecording:
         return self.state is RecordingState.COMPLETE and not self.damage
 
 
-def looked_at(path: Path, measurement: Measurement, depth: SealDepth, seal: str = "") -> KeptRecording:
-    """Look at a recording that was made for ``measurement``; ``seal`` is what the journal has of it."""
+def looked_at(path: Path, measurement: Measurement, depth: SealDepth) -> KeptRecording:
+    """Look at a recording that was made for ``measurement``."""
     try:
         with open_recording(path) as recording:
             found = recording.check_seal(depth)
             is_made = is_made_by(recording, measurement)
-            damage = ""
-            if found.state is SealState.DAMAGED:
-                damage = f"{path.name} is damaged ({found.sentence})"
-            elif seal and found.seal != seal:
-                damage = f"{path.name} is not the recording that the campaign made (its seal is another one)"
+            is_damaged = found.state in (SealState.DAMAGED, SealState.SEAL_GONE)
+            damage = f"{path.name} is damaged ({found.sentence})" if is_damaged else ""
             return KeptRecording(
                 path,
                 recording.state,

@@ -4,7 +4,6 @@ After a crash, journal and folder are brought together: what is true of the poin
 """
 
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import assert_never
@@ -17,7 +16,7 @@ from ..run import drive_for
 from ..stopping import StopSwitch
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity, differences
-from ._journal import JOURNAL_SUFFIX, Journal, journal_path
+from ._journal import Journal, journal_path
 from ._journal_database import is_begun
 from ._journal_point import JournalPoint, JournalPointState, read_journal
 from ._kept_recording import KeptRecording, looked_at
@@ -44,7 +43,7 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
             case JournalPointState.DONE if not (folder / point.file).exists():
                 journal.requeue(point.name, ReasonCode.GONE, f"{point.file} is no longer in the folder")
             case JournalPointState.DONE:
-                found = looked_at(folder / point.file, point.measurement, SealDepth.WHOLE, point.seal)
+                found = looked_at(folder / point.file, point.measurement, SealDepth.WHOLE)
                 if found.damage:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
 
@@ -58,14 +57,10 @@ def found_recordings(
     found too, and those whose seal is not what any journal of the folder has: the campaign may have got
     another name. Raises RecordingError when a recording is complete, but was made by another plan.
     """
-    seals: dict[str, str] = {}
-    for journal in sorted(folder.glob(f"*{JOURNAL_SUFFIX}")):
-        with suppress(RecordingError):
-            seals |= {each.file: each.seal for each in read_journal(journal) if each.seal}
 
     def looked_for(point: Point) -> KeptRecording | None:
         now = depth if stop is None or stop.request is None else SealDepth.QUICK
-        return complete_attempt(folder, point.name, point.measurement, now, seals)
+        return complete_attempt(folder, point.name, point.measurement, now)
 
     found = {each.name: looked_for(each) for each in points}
     return {name: kept for name, kept in found.items() if kept is not None}
@@ -290,7 +285,7 @@ def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> t
             each.name: folder / each.file
             for each in known
             if each.state is JournalPointState.DONE
-            and not looked_at(folder / each.file, each.measurement, SealDepth.QUICK, each.seal).damage
+            and not looked_at(folder / each.file, each.measurement, SealDepth.QUICK).damage
         }
         wanted = [(each.name, each.measurement) for each in known]
     return tuple(

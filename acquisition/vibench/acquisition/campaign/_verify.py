@@ -4,16 +4,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import RecordingError
-from ..recording import SUFFIX, SealDepth, SealKey, SealState, forget_checks, open_recording
+from ..recording import JOURNAL_SUFFIX, SUFFIX, SealDepth, SealKey, SealState, forget_checks, open_recording
 from ._catalogue import recordings_below
 from ._catalogue_entry import UNREADABLE, place_below
-from ._journal import JOURNAL_SUFFIX
 from ._journal_database import is_begun
 from ._journal_point import JournalPoint, JournalPointState, read_journal
 
 MISSING = "missing"
 """Verdict on a recording that a journal counts on, and that is not there."""
-BAD = frozenset({SealState.DAMAGED.value, SealState.OTHER_KEY.value, UNREADABLE, MISSING})
+BAD = frozenset(
+    {SealState.DAMAGED.value, SealState.SEAL_GONE.value, SealState.OTHER_KEY.value, UNREADABLE, MISSING}
+)
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class VerifiedRecording:
     path: str
     """Below the folder, with ``/``; the name of a single file."""
     verdict: str
-    """``intact``, ``damaged``, ``unsealed``, ``unfinished``, ``other_key``, ``unreadable`` or ``missing``."""
+    """As in `recording.SealState`, ``unreadable`` or ``missing``."""
     sentence: str
     seal: str
     results: dict[str, str]
@@ -74,15 +75,13 @@ def verify_recordings(
         known |= {
             journal.parent / point.file: point for point in points if point.state is JournalPointState.DONE
         }
-    found = [_verified(path, root, known.get(path), SealDepth(depth), key) for path in paths]
+    found = [_verified(path, root, SealDepth(depth), key) for path in paths]
     if is_folder:
         found += [_missing(path, root, point) for path, point in known.items() if not path.exists()]
     return (*found, *broken)
 
 
-def _verified(
-    path: Path, root: Path, point: JournalPoint | None, depth: SealDepth, key: SealKey | None
-) -> VerifiedRecording:
+def _verified(path: Path, root: Path, depth: SealDepth, key: SealKey | None) -> VerifiedRecording:
     where = place_below(root, path)
     try:
         with open_recording(path) as recording:
@@ -90,14 +89,11 @@ def _verified(
             results = {name: each.state.value for name, each in recording.check_result_seals(key).items()}
     except RecordingError as error:
         return VerifiedRecording(where, UNREADABLE, str(error), "", {})
-    state, sentence = found.state, found.sentence
-    if point is not None and point.seal and point.seal != found.seal and state is not SealState.DAMAGED:
-        state = SealState.DAMAGED
-        sentence = f"its seal is not the one that the campaign noted for {point.name}: another recording"
+    sentence = found.sentence
     bad = [name for name, each in results.items() if each in BAD]
     if bad:
         sentence += f"; not as they were saved: results {', '.join(bad)}"
-    return VerifiedRecording(where, state.value, sentence, found.seal, results)
+    return VerifiedRecording(where, found.state.value, sentence, found.seal, results)
 
 
 def _missing(path: Path, root: Path, point: JournalPoint) -> VerifiedRecording:

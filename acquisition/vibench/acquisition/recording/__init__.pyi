@@ -56,6 +56,12 @@ from ._layout import (
     part_of as part_of,
     tmp_of as tmp_of,
 )
+from ._noted_seals import (
+    JOURNAL_SUFFIX as JOURNAL_SUFFIX,
+    closed_on_error as closed_on_error,
+    opened as opened,
+    opened_to_look as opened_to_look,
+)
 from ._opening import (
     name_now as name_now,
 )

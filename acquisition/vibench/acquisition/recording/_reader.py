@@ -21,6 +21,7 @@ from ._counts import Counts
 from ._disk import is_being_recorded
 from ._header import ChannelHeader, require_different
 from ._layout import Origin, RecordingState
+from ._noted_seals import noted_seals
 from ._opening import LONGEST, OpenRecording
 from ._overview import CountOverview, read_overview
 from ._replacing import replace_with_change
@@ -192,7 +193,7 @@ class Recording(RecordingDescription):
         return digest.hexdigest() == read_attributes(self._open.file[role])["sha256"]
 
     def check_seal(self, depth: SealDepth | str, key: SealKey | None = None) -> SealCheck:
-        """Hold the recording against the seal that it got at its end.
+        """Hold the recording against the seal that it got at its end, and the one that a campaign noted.
 
         Parameters
         ----------
@@ -213,22 +214,31 @@ class Recording(RecordingDescription):
             When the key cannot be read.
 
         """
-        if self.path.suffix == layout.PART_SUFFIX:
+        found = self._check_own_seal(SealDepth(depth), key)
+        noted = noted_seals(self.path)
+        if found.state in (SealState.UNFINISHED, SealState.DAMAGED) or not noted or found.seal in noted:
+            return found
+        name = next(iter(noted.values()))
+        sentence = f"its seal is not the one that the campaign noted for {name}: another recording"
+        return SealCheck(SealState.DAMAGED, sentence, found.seal)
+
+    def _check_own_seal(self, depth: SealDepth, key: SealKey | None) -> SealCheck:
+        if self.is_growing and layout.SEAL not in self._open.file:
             return SealCheck(SealState.UNFINISHED, "it is sealed when it is finished or recovered", "")
         states: ChannelStates = {}
-        found = check_seal(self._open.file, SealDepth(depth), seal_key() if key is None else key, states)
+        found = check_seal(self._open.file, depth, seal_key() if key is None else key, states)
         if found.state not in (SealState.INTACT, SealState.OTHER_KEY) or not found.seal:
             return found
         if repr(_read(self._open)) != self._open.described:
             return SealCheck(SealState.DAMAGED, "it was changed after it had been opened", found.seal)
-        if SealDepth(depth) is SealDepth.WHOLE:
+        if depth is SealDepth.WHOLE:
             remember(found.seal, {f"/{role}": states[f"/{role}"] for role in self.roles})
         return found
 
     @property
     def is_checked(self) -> bool:
         """Whether this process found it intact as a whole: what is read of it is held against that since."""
-        return was_checked(self.seal)
+        return was_checked(self.seal) and self.seal in (noted_seals(self.path) or (self.seal,))
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:
         """Hold every saved result against its own seal; the key is that of `check_seal`."""
@@ -327,20 +337,20 @@ def open_recording(path: Path | str) -> Recording:
     try:
         recording = _read(handle)
         handle.described = repr(recording)
-        return _as_it_was_checked(recording)
+        _require_as_checked(handle, recording.seal)
     except (RecordingError, *DAMAGE) as error:
         handle.file.close()
         raise RecordingError(
             f"{path} is damaged, or no recording of vibench: {str(error)[:LONGEST]}."
             " Copy it again from where it was recorded."
         ) from error
-
-
-def _as_it_was_checked(recording: Recording) -> Recording:
-    """Refuse what carries a seal that was checked in this process, and differs from what it was then."""
-    if was_checked(recording.seal) and recording.check_seal(SealDepth.QUICK).state is SealState.DAMAGED:
-        raise RecordingError("it is no longer what it was when its seal was checked")
     return recording
+
+
+def _require_as_checked(handle: OpenRecording, seal: str) -> None:
+    """Refuse what carries a seal that was checked in this process, and differs from what it was then."""
+    if was_checked(seal) and check_seal(handle.file, SealDepth.QUICK, seal_key()).state is SealState.DAMAGED:
+        raise RecordingError("it is no longer what it was when its seal was checked")
 
 
 def _read(handle: OpenRecording) -> Recording:

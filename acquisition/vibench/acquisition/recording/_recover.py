@@ -64,7 +64,7 @@ def _holds(final: Path, recording_id: str, part: Path) -> bool:
             f"{final} is another recording than {part}, and nothing is ever overwritten."
             " Nothing was changed; rename one of the two and try again."
         )
-    if seal.state is SealState.DAMAGED:
+    if seal.state in (SealState.DAMAGED, SealState.SEAL_GONE):
         raise RecordingError(
             f"{final} is damaged ({seal.sentence}), and {part} still holds what it was made of."
             f" Nothing was changed; rename {final.name} and try again."

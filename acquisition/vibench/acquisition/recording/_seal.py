@@ -64,7 +64,9 @@ class SealState(StrEnum):
     DAMAGED = "damaged"
     """Something is not as it was sealed."""
     UNSEALED = "unsealed"
-    """Made before recordings had seals, or its seal is gone."""
+    """Made before recordings had seals: nothing shows whether scales, tables and plan were changed."""
+    SEAL_GONE = "seal_gone"
+    """Written by a version that seals every recording, and without its seal."""
     UNFINISHED = "unfinished"
     """Still being recorded, or cut off: it is sealed when it is finished or recovered."""
     OTHER_KEY = "other_key"
@@ -142,9 +144,12 @@ def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -
 def check_seal(
     file: h5py.File, depth: SealDepth, key: SealKey | None, states: ChannelStates | None = None
 ) -> SealCheck:
-    """Hold a finished recording against its seal; ``states`` is filled with those of rows of numbers."""
+    """Hold a finished recording against its seal; ``states`` is filled with those of rows of numbers.
+
+    Without a seal the samples are held against the checksum of their channel.
+    """
     if layout.SEAL not in file:
-        return _unsealed("it was made before recordings had one", key)
+        return _without_seal(file, depth, key)
     try:
         marks = read_attributes(file[layout.SEAL])
         text = read_text_dataset(file[layout.SEAL], MANIFEST)
@@ -176,6 +181,8 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
     try:
         marks = read_attributes(group)
         said, signature, key_id = (str(marks.get(each, "")) for each in RESULT_MARKS)
+        if not said and is_of_a_sealing_version(group.file):
+            return SealCheck(SealState.DAMAGED, "its seal is gone", "")
         if not said:
             return _unsealed("it was saved before results had one", key)
         text = _result_text(group)
@@ -265,6 +272,31 @@ def _result_text(group: h5py.Group) -> str:
         path: {"attributes": _described(item), "data": _data_sha256(item)} for path, item in walk(group)
     }
     return json.dumps({"recording": seal_of(group.file), "objects": objects}, sort_keys=True)
+
+
+def is_of_a_sealing_version(file: h5py.File) -> bool:
+    """Whether a finished file has what every version writes that seals, and no earlier one."""
+    return not {layout.SEAL, layout.OVERVIEW, layout.VIEW}.isdisjoint(file)
+
+
+def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> SealCheck:
+    """Say what is left to go by: the channels' own checksums, which hold no scale, table or plan."""
+    roles = str(read_attributes(file).get("roles", "")).split() if depth is SealDepth.WHOLE else ()
+    try:
+        other = [role for role in roles if _data_sha256(file[role]) != read_attributes(file[role])["sha256"]]
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        return SealCheck(SealState.DAMAGED, f"it has no seal, and cannot be read ({error})", "")
+    if other:
+        sentence = f"it has no seal, and the samples of {', '.join(other)} do not have their checksum"
+        return SealCheck(SealState.DAMAGED, sentence, "")
+    if key is None and is_of_a_sealing_version(file):
+        version = str(read_attributes(file).get("software_version", ""))
+        sentence = (
+            f"its seal is gone: vibench {version} seals every recording, so scales, tables or plan may have "
+            "been changed; restore it from a copy"
+        )
+        return SealCheck(SealState.SEAL_GONE, sentence, "")
+    return _unsealed("it was made before recordings had one", key)
 
 
 def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[str, str | int | float]:

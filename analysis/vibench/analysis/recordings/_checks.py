@@ -92,10 +92,10 @@ def _seal(facts: RecordingFacts) -> Check:
     match facts.seal.state:
         case SealState.INTACT:
             verdict = Verdict.PASSED
-        case SealState.OTHER_KEY:
-            verdict = Verdict.WARNING
-        case _:
+        case SealState.UNFINISHED:
             verdict = Verdict.NOTE
+        case _:
+            verdict = Verdict.WARNING
     return Check("Seal", verdict, facts.seal.sentence)
 
 

@@ -11,6 +11,7 @@ from ..errors import NotEnoughData
 from ..exchange import Excerpt, FunctionAxis, FunctionType, UniversalFunction
 from ..frequency_response import FrequencyResponseRequest, FrequencyResponseView, NoiseResponse
 from ..kinds import ANALYSES, NOISE_FAMILY
+from ..recordings import require_checked
 from ..signals import Quantity, hop_samples
 from ..spectra import DensitySums
 from ._measurement_analysis import analyse
@@ -42,8 +43,11 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
     ------
     NotEnoughData
         When the excerpt holds no segment of what was played, or its analysis finds nothing.
+    UnusableData
+        When the recording is not as it was sealed.
 
     """
+    require_checked(excerpt.recording)
     played = _played(excerpt)
     densities = tuple(_density(played, channel) for channel in excerpt.channels)
     kind = excerpt.recording.plan.get("excitation", {}).get("kind", "")

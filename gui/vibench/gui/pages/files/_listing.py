@@ -6,13 +6,13 @@ from pathlib import Path
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.campaign import (
-    JOURNAL_SUFFIX,
     UNREADABLE,
     CatalogueEntry,
     JournalPointState,
     list_recordings,
     read_journal,
 )
+from vibench.acquisition.recording import JOURNAL_SUFFIX
 from vibench.analysis.live import OverviewLevel, Thumbnail, overview_levels, thumbnail
 
 Levels = dict[str, tuple[OverviewLevel, ...]]

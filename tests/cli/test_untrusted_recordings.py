@@ -1,0 +1,160 @@
+"""A recording that was altered, robbed of its seal or exchanged passes as intact with no command."""
+
+import hashlib
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+
+from vibench.acquisition import load_toml, open_recording, shipped
+from vibench.acquisition.campaign import JournalPointState, ReasonCode
+from vibench.acquisition.campaign._bench_identity import BenchIdentity
+from vibench.acquisition.campaign._journal import Journal, journal_path
+from vibench.acquisition.plan import Campaign, Measurement
+from vibench.acquisition.recording import _seal
+from vibench.acquisition.rig import Rig
+
+from ..attack.recordings_corpus import good_recordings
+
+LICENCE = ("--license", "https://creativecommons.org/licenses/by/4.0/")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Two recordings, as a campaign has noted them."""
+    folder = tmp_path / "recordings"
+    folder.mkdir()
+    for name in ("dwell.h5", "noise.h5"):
+        (folder / name).write_bytes(good_recordings()[name])
+    return folder
+
+
+def noted(folder):
+    plans, seals = [], {}
+    for name in ("dwell", "noise"):
+        with open_recording(folder / f"{name}.h5") as recording:
+            plans.append(Measurement.model_validate(recording.plan))
+            seals[name] = recording.seal
+    rig = load_toml(shipped("hardware_configs/virtual_rig.toml"), Rig)
+    identity = BenchIdentity(rig=rig, instruments={}, knobs={})
+    campaign = Campaign(name="night", measurements=tuple(plans))
+    with Journal.begin(journal_path(folder, "night"), campaign, identity) as journal:
+        for name, seal in seals.items():
+            journal.start(name, f"{name}.h5")
+            journal.end(name, JournalPointState.DONE, ReasonCode.CARRIED_OUT, "so it was", seal)
+
+
+def halved(file):
+    file["m0_velocity"][...] = file["m0_velocity"][...] // 2
+
+
+def scaled(file):
+    attributes = file["m0_velocity"].attrs
+    for name in ("scale_factor", "physical_per_volt"):
+        attributes[name] = 2 * attributes[name]
+
+
+def in_other_units(file):
+    file["m0_velocity"].attrs["units"] = np.bytes_(b"mm s-1")
+
+
+def at_another_rate(file):
+    file.attrs["sample_rate_hz"] = 2 * file.attrs["sample_rate_hz"]
+
+
+def text_changed(name, old, new):
+    def change(file):
+        text = file[f"configuration/{name}"][()].replace(old, new)
+        del file[f"configuration/{name}"]
+        file[f"configuration/{name}"] = np.bytes_(text)
+
+    return change
+
+
+def shifted(file):
+    file["segments/first_sample"][0] += 1
+
+
+def delayed(file):
+    file["m0_velocity"].attrs["delay_s"] = 1e-4
+
+
+CHANGES = {
+    "nothing": lambda file: None,
+    "samples": halved,
+    "scale": scaled,
+    "units": in_other_units,
+    "rate": at_another_rate,
+    "plan": text_changed("plan_json", b"260.0", b"261.0"),
+    "rig": text_changed("bench_json", b"{", b'{"calibration_valid_days": 9, '),
+    "segment": shifted,
+    "delay": delayed,
+}
+
+
+def said_by_all(vibench_here, folder, name="dwell.h5"):
+    """What each command says of a recording: code, and all its words."""
+    for each in {*folder.parent.iterdir()} - {folder}:
+        shutil.rmtree(each) if each.is_dir() else each.unlink()
+    asked = {
+        "analyse": ("analyse", name, "--no-simulate", "--out", folder.parent / "one"),
+        "analyse folder": ("analyse", ".", "--no-simulate", "--out", folder.parent / "all"),
+        "verify": ("verify", name),
+        "verify folder": ("verify", "."),
+        "catalogue": ("catalogue", "."),
+        "export": ("export", name, "--to", "csv", "--out", folder.parent / "csv"),
+        "spectra": ("export", name, "--to", "uff", "--spectra", "--out", folder.parent / "uff"),
+        "pack": ("pack", ".", *LICENCE, "--out", folder.parent / "crate.zip"),
+    }
+    told = {}
+    for word, arguments in asked.items():
+        ended = vibench_here(*arguments, cwd=folder)
+        told[word] = (ended.returncode, ended.stdout + ended.stderr)
+    return told
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("change", CHANGES)
+def test_without_its_seal_a_recording_is_refused_or_warned_of(vibench_here, folder, change):
+    with h5py.File(folder / "dwell.h5", "r+") as file:
+        del file["seal"]
+        CHANGES[change](file)
+    told = said_by_all(vibench_here, folder)
+    for word in ("verify", "verify folder", "pack"):
+        assert told[word][0] == 1, told[word]
+        assert "error: " in told[word][1]
+    for word in ("analyse", "analyse folder", "export", "spectra"):
+        code, text = told[word]
+        assert code == 1 or "seal is gone" in text, (word, text)
+        assert change != "samples" or (code == 1 and "do not have their checksum" in text), (word, text)
+    (row,) = (line for line in told["catalogue"][1].splitlines() if line.startswith("dwell.h5"))
+    assert not row.endswith("good"), row
+    report = folder.parent / "one" / "report.html"
+    assert change != "nothing" or "its seal is gone" in report.read_text("utf-8")
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("how", ["copied over", "sealed anew"])
+def test_another_recording_under_the_name_is_refused_by_every_command(vibench_here, folder, how):
+    noted(folder)
+    assert {code for code, _ in said_by_all(vibench_here, folder).values()} == {0}
+    if how == "copied over":
+        shutil.copy(folder / "noise.h5", folder / "dwell.h5")
+    else:
+        with h5py.File(folder / "dwell.h5", "r+") as file:
+            del file["seal"], file["m0_velocity"].attrs["sha256"]
+            halved(file)
+            counts = file["m0_velocity"][()].tobytes()
+            file["m0_velocity"].attrs["sha256"] = np.bytes_(hashlib.sha256(counts).hexdigest().encode())
+            _seal.write_seal(file, {}, None)
+    for word, (code, text) in said_by_all(vibench_here, folder).items():
+        assert code == 1, (word, text)
+        assert "the campaign noted for dwell: another recording" in text, (word, text)
+
+
+def test_export_warns_of_a_recording_without_its_seal(vibench_here, folder):
+    with h5py.File(folder / "dwell.h5", "r+") as file:
+        del file["seal"]
+    ended = vibench_here("export", "dwell.h5", "--to", "csv", cwd=folder)
+    assert (ended.returncode, ended.stderr.count("warning: dwell.h5: its seal is gone")) == (0, 1)
