@@ -19,7 +19,7 @@ import typer
 from rich.text import Text
 from typer.core import TyperCommand, TyperGroup
 
-from vibench.acquisition import AcquisitionError, Beside, CheckStopped, shortened
+from vibench.acquisition import AcquisitionError, Beside, CheckStopped, printable, shortened
 from vibench.analysis import AnalysisError
 from vibench.sim import UnreadableTomlError
 from vibench.sim.study import StudyError
@@ -63,6 +63,10 @@ class LateCommand(TyperCommand):
             return command.make_context(info_name, [*args], *given, **named)
 
 
+_USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
+"""What is wrong with a command line: a class of click, or of the copy of click in newer typer."""
+
+
 @contextmanager
 def told_in_full(args: Sequence[str]) -> Iterator[None]:
     """Refuse arguments with nothing in them, and say of an option what stands there and what may."""
@@ -76,8 +80,10 @@ def told_in_full(args: Sequence[str]) -> Iterator[None]:
         )
     try:
         yield
-    except typer.BadParameter as error:
-        _name_what_was_given(error, words)
+    except _USAGE_ERROR as error:
+        if isinstance(error, typer.BadParameter):
+            _name_what_was_given(error, words)
+        error.message = printable(error.message)
         raise
 
 
@@ -282,6 +288,14 @@ class LogLevel(StrEnum):
     """What instruments are told and answer, too."""
 
 
+class OneLine(logging.Formatter):
+    """What is logged may hold names and the words of instruments."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - the library's name
+        """Write a message as one line."""
+        return printable(super().formatMessage(record))
+
+
 class LogBeside(logging.StreamHandler[TextIO]):
     """Writes beside whoever logs: a terminal that is held up, a pipe that nobody reads, hold up no run."""
 
@@ -320,7 +334,7 @@ def vibench(
 ) -> None:
     """Hold the commands."""
     handler = LogBeside()
-    handler.setFormatter(logging.Formatter("%(asctime)s %(name)s: %(message)s"))
+    handler.setFormatter(OneLine("%(asctime)s %(name)s: %(message)s"))
     # Ours alone: other libraries log what a broken message of a client did to them, with a traceback.
     ours = logging.getLogger("vibench")
     ours.handlers = [handler]

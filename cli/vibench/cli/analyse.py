@@ -40,7 +40,7 @@ from vibench.sim.maps import MapResults, open_map
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
-from .output import bold, console, print_json
+from .output import bold, console, errors, print_json
 from .paths import AsJson, room_for_folder, unused
 from .reading_bar import reading_bar
 from .specimen_option import SpecimenOption, described
@@ -312,7 +312,7 @@ def hidden_motions(
                     keep_hidden_motion(recording, motion)
                 yield motion
             except AnalysisError as error:
-                typer.echo(f"error: {facts.name}: no hidden motion: {error}", err=True)
+                errors.print(f"error: {facts.name}: no hidden motion: {error}")
 
 
 def fitted_to(
@@ -327,7 +327,7 @@ def complain_about(results: CampaignResults) -> None:
     """End with a sentence for each recording without a result, or whose result has no simulation."""
     for failure in results.failures:
         word = "error" if failure.what is FailedStep.ANALYSIS else "note"
-        typer.echo(f"{word}: {_named(failure)}", err=True)
+        errors.print(f"{word}: {_named(failure)}")
     if any(failure.what is FailedStep.ANALYSIS for failure in results.failures):
         raise typer.Exit(ExitCode.FAILED)
 

@@ -23,7 +23,7 @@ from vibench.acquisition.rig import Rig, load_rig, save_knob_sheet
 
 from .bench_new import new_bench
 from .exit_code import ExitCode
-from .output import bold, console, print_json
+from .output import bold, console, paragraph, print_json
 from .paths import AsJson, BenchPath, bench_path
 
 bench = typer.Typer(help="Look at the instruments.", no_args_is_help=True, add_completion=False)
@@ -87,7 +87,7 @@ def check(
         print_json(result.model_dump(mode="json"))
     else:
         console.print(f"{result.rig}: {result.verdict.value}, {result.checked:%Y-%m-%d %H:%M %Z}")
-        console.print(result.report.text())
+        console.print(paragraph(result.report.text()))
     if result.verdict is Verdict.FAIL:
         raise typer.Exit(ExitCode.FAILED)
 

@@ -27,7 +27,7 @@ from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import Confirm, KnobSheet, Rig, load_rig
 from vibench.sim import toml_table
 
-from .output import console
+from .output import console, paragraph
 
 _WIRED, _OPERATOR, _KNOBS = "wired", "operator", "knobs"
 _NOT_YET = {"", "no", "n", "not yet", "false", "0"}
@@ -156,11 +156,13 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
         rig = _configured_at_terminal(template, target, seen, note)
     else:
         rig = configured(template, target, seen, given.ask, note, given.questions)
-    console.print(f"\nwritten: {target}\n")
+    console.print()
+    console.print(f"written: {target}")
+    console.print()
     page = _day(rig, target, operator, given)
     kept = _free(target.with_suffix(".first_day.md"))
     kept.write_text(page.text, encoding="utf-8")
-    console.print(page.text)
+    console.print(paragraph(page.text))
     console.print(f"kept: {kept}")
     return page
 

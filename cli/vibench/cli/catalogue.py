@@ -11,7 +11,7 @@ from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recording
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
-from .output import console, print_json
+from .output import console, errors, print_json
 from .paths import AsJson
 
 COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "length", "size", "verdict")
@@ -34,7 +34,7 @@ def show_catalogue(
         _show(entries)
     for each in entries:
         if each.is_bad:
-            typer.echo(f"error: {_named(each)}", err=True)
+            errors.print(f"error: {_named(each)}")
     if any(each.is_bad for each in entries):
         raise typer.Exit(ExitCode.FAILED)
 

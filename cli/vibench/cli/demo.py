@@ -35,9 +35,10 @@ def demo(
     folder = unused(Path("vibench_demo")) if out is None else out
     campaign = load_campaign(shipped("campaigns/paper.toml"))
     console.print(
-        "The experiment of Gong et al. (2025), section 5, on a virtual rig. The first time, the simulation\n"
-        "is compiled: it starts slowly and then runs many times faster than real time.\n"
+        "The experiment of Gong et al. (2025), section 5, on a virtual rig. The first time, the simulation"
     )
+    console.print("is compiled: it starts slowly and then runs many times faster than real time.")
+    console.print()
     with second_process(campaign.name, draws) as analyst:
 
         def recorded(point_result: PointResult) -> None:
@@ -61,5 +62,6 @@ def demo(
         results = analyst.together()
     report = write_report(results, folder / "report.html", folder / "figures")
     write_json(campaign_summary(results), folder / "results.json")
-    console.print("\nThe report:", bold(report.resolve()))
+    console.print()
+    console.print("The report:", bold(report.resolve()))
     complain_about(results)

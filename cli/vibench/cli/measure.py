@@ -46,7 +46,7 @@ from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 
 from .engine_bars import Watching
 from .exit_code import ExitCode
-from .output import console, print_json
+from .output import console, paragraph, print_json
 from .paths import BenchPath, FaultsPath, rig_at
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def tell_estimate(
             told = {name: [each.to_dict() for each in found] for name, found in known.items()}
             print_json(document | {"uncertainty": told})
         case Form.TEXT:
-            console.print(estimate_text(expected))
+            console.print(paragraph(estimate_text(expected)))
             for name, found in known.items():
                 for each in found:
                     console.print(f"{name}: {each.sentence}")

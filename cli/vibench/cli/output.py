@@ -4,15 +4,33 @@ import json
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
-import typer
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import TextColumn
+from rich.segment import Segment
 from rich.text import Text
 
+from vibench.acquisition import printable
+
+
+class PrintableConsole(Console):
+    """Shows control and formatting characters, which any name may hold, as escapes."""
+
+    def print(self, *objects: Any, **settings: Any) -> None:
+        """Print each string as one line; a text of several lines is a `paragraph`."""
+        super().print(*(printable(each) if isinstance(each, str) else each for each in objects), **settings)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Render tables, bars and lines alike."""
+        for segment in super().render(renderable, options):
+            text = "\n".join(map(printable, segment.text.split("\n")))
+            yield segment if segment.control else Segment(text, segment.style)
+
+
 # Neither markup nor emoji: names and paths may hold what looks like some.
-console = Console(highlight=False, soft_wrap=True, markup=False, emoji=False)
-errors = Console(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
+console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=False)
+errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
 def words(text_format: str) -> TextColumn:
@@ -22,13 +40,18 @@ def words(text_format: str) -> TextColumn:
 
 def bold(text: object) -> Text:
     """Make something stand out on a terminal, whatever brackets it has."""
-    return Text(str(text), style="bold")
+    return Text(printable(str(text)), style="bold")
+
+
+def paragraph(text: str) -> Text:
+    """Give a text of several lines to a console."""
+    return Text(text)
 
 
 def print_warnings(sentences: Iterable[str]) -> None:
     """Print what should be looked at on standard error, so that standard output holds only answers."""
     for sentence in sentences:
-        typer.echo(f"warning: {sentence}", err=True)
+        errors.print(f"warning: {sentence}")
 
 
 def print_json(document: Mapping[str, object]) -> None:

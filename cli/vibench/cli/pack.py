@@ -10,7 +10,7 @@ from vibench.acquisition.recording import SealState, seal_key
 from vibench.analysis.exchange import CrateFacts, pack_folder
 
 from .exit_code import ExitCode
-from .output import console
+from .output import console, errors
 from .paths import file_at
 from .progress_bars import transfer_bar
 
@@ -51,9 +51,9 @@ def pack(
         packed = pack_folder(folder, crate, facts, untrusted, observer)
     console.print(f"packed {len(packed)} files into {crate}")
     for name in (each.path for each in found if each.verdict == SealState.UNFINISHED):
-        typer.echo(f"note: {name} is not finished and was left out; vibench recover finishes it", err=True)
+        errors.print(f"note: {name} is not finished and was left out; vibench recover finishes it")
     for name, why in untrusted.items():
         way = "the crate says so; restore it and pack again, or deposit the crate as it is"
-        typer.echo(f"error: {name} cannot be trusted ({why.rstrip('.')}): {way}", err=True)
+        errors.print(f"error: {name} cannot be trusted ({why.rstrip('.')}): {way}")
     if untrusted:
         raise typer.Exit(ExitCode.FAILED)

@@ -28,7 +28,7 @@ from vibench.sim.study import (
 from .found_motions import forgetting_text, motions_table, share_text
 from .frequency_option import frequencies
 from .interruption import told_to_stop
-from .output import console, print_json, print_warnings
+from .output import console, errors, paragraph, print_json, print_warnings
 from .paths import AsJson
 from .progress_bars import study_bar
 from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, described, given_options
@@ -124,7 +124,7 @@ def predict(
     else:
         _tell(results)
     if explain:
-        typer.echo(explanation(results), err=as_json)
+        (errors if as_json else console).print(paragraph(explanation(results)))
     complain_about_points(results)
 
 

@@ -50,13 +50,15 @@ def serve_rig(
     if served.virtual is not None:
         served = served.model_copy(update={"virtual": served.virtual.model_copy(update={"pace": pace.value})})
     with VirtualRig(served, address, scpi_port=scpi_port, disk=DiskFaults.REFUSED) as rig:
-        console.print(bold(rig.rig.name), "is on. Stop it with Ctrl-C.\n")
+        console.print(bold(rig.rig.name), "is on. Stop it with Ctrl-C.")
+        console.print()
         for title, lines in _hints(rig):
             console.print(title)
             for line in lines:
                 console.print(f"  {line}")
         if rig.token is not None:
-            console.print("\nOther computers can reach it; it lets in whoever has the token:")
+            console.print()
+            console.print("Other computers can reach it; it lets in whoever has the token:")
             console.print(
                 f"  export {TOKEN_VARIABLE}={rig.token}  # our own programs; others send it as metadata"
             )

@@ -11,7 +11,7 @@ from vibench.acquisition import schema_line, shipped_folder, toml_text
 from vibench.analysis import InvalidRequest
 from vibench.sim import CONTACT_LAWS, Specimen, shipped_specimens
 
-from .output import bold, console, print_json
+from .output import bold, console, paragraph, print_json
 from .paths import AsJson, room_for_folder
 from .specimen_option import described
 
@@ -53,7 +53,7 @@ def show_specimen(
         gaps_m = [gap_m if math.isfinite(gap_m) else str(gap_m) for gap_m in table.specimen().gaps_m]
         print_json({**table.model_dump(mode="json", exclude_none=True), **facts, "gaps_m": gaps_m})
     elif as_toml:
-        typer.echo(schema_line(table, shipped_folder("schemas")) + toml_text(table), nl=False)
+        console.print(paragraph(schema_line(table, shipped_folder("schemas")) + toml_text(table)), end="")
     else:
         console.print(": ".join(filter(None, (table.name, table.about))))
         for name, value in facts.items():

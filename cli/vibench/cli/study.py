@@ -21,7 +21,7 @@ from vibench.sim.study import (
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
-from .output import console, print_json, print_warnings
+from .output import console, errors, print_json, print_warnings
 from .paths import AsJson
 from .progress_bars import study_bar
 
@@ -123,10 +123,10 @@ def say_failures(results: GridResults[Plan]) -> int:
         # An axis of one value tells no point from another.
         told = [axis for axis in results.axes if len(axis.values) > 1] or [results.axes[-1]]
         place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in told)
-        typer.echo(f"error: {place}: {why}", err=True)
+        errors.print(f"error: {place}: {why}")
     if len(failures) > SHOWN_FAILURES:
         more = len(failures) - SHOWN_FAILURES
-        typer.echo(f"error: {more} more points have no answer: see `failures` with --json", err=True)
+        errors.print(f"error: {more} more points have no answer: see `failures` with --json")
     return len(failures)
 
 
@@ -156,9 +156,8 @@ class KeptStudies:
             )
         self._failed += say_failures(results)
         if not results.is_complete:
-            typer.echo(
-                f"stopped after {results.kept} of {study.grid.size} points; the same command goes on",
-                err=True,
+            errors.print(
+                f"stopped after {results.kept} of {study.grid.size} points; the same command goes on"
             )
             raise typer.Exit(ExitCode.STOPPED)
         return results

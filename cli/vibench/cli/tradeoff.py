@@ -97,7 +97,8 @@ def _tell(found: MotionBenchmark) -> None:
     for solver in found.solvers:
         rows.add_row(f"scipy {solver.name}", f"{1 / solver.cost:.2g}", _number(solver.state_error), "")
     console.print(rows)
-    console.print(f"{found.advice}\n")
+    console.print(found.advice)
+    console.print()
 
 
 def _tell_lotteries(lotteries: tuple[LotteryFigures, ...]) -> None:

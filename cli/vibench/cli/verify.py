@@ -12,7 +12,7 @@ from vibench.acquisition.recording import SealDepth, seal_key
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
-from .output import console, print_json
+from .output import console, errors, print_json
 from .paths import AsJson
 
 MOST_NAMED = 10
@@ -57,5 +57,5 @@ def verify(
     bad = [each for each in found if each.is_bad]
     if bad:
         named = ", ".join(each.path for each in bad[:MOST_NAMED]) + (" and more" if bad[MOST_NAMED:] else "")
-        typer.echo(f"error: {len(bad)} of {len(found)} recordings cannot be trusted: {named}", err=True)
+        errors.print(f"error: {len(bad)} of {len(found)} recordings cannot be trusted: {named}")
         raise typer.Exit(ExitCode.FAILED)

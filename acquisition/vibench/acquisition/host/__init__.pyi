@@ -22,6 +22,9 @@ from ._follow_parent import (
 from ._log import (
     LOG as LOG,
 )
+from ._printable import (
+    printable as printable,
+)
 from ._schema import (
     json_schema as json_schema,
     schema_line as schema_line,

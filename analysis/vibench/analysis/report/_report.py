@@ -9,6 +9,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from vibench.acquisition import printable
 from vibench.acquisition.plan import excitation_text
 from vibench.sim.maps import MapResults
 
@@ -130,10 +131,16 @@ def write_report(
     return path
 
 
+def _shown(content: object) -> object:
+    """Write control characters of names and texts as escapes; Markup is of the template itself."""
+    return printable(content) if type(content) is str else content
+
+
 def _environment() -> Environment:
     return Environment(
         loader=PackageLoader("vibench.analysis.report", "."),
         autoescape=True,
+        finalize=_shown,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

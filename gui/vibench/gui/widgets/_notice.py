@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from vibench.acquisition import printable
+
 
 class NoticeKind(StrEnum):
     """How much it matters."""
@@ -39,7 +41,7 @@ def notice_of(error: BaseException, next_step: str = "") -> Notice:
     """Say an error whose own sentence holds what happened, what was done and what to do."""
     return Notice(
         NoticeKind.FAULT,
-        str(error) or type(error).__name__,
+        printable(str(error)) or type(error).__name__,
         next_step=next_step,
         code=type(error).__name__,
         details="\n".join(getattr(error, "__notes__", ())),

@@ -111,6 +111,24 @@ def test_states_plans_and_troubles_of_all_files_are_listed_in_words(page):
     assert cell(page, "whole", "Length") == "10 s"
 
 
+def test_a_recording_whose_seal_is_gone_is_warned_of(opened):
+    page = opened("old.h5")
+    assert "seal gone" in cell(page, "old", "Verdict")
+    assert page._facts.sentence.startswith("✖ seal gone: its seal is gone")
+
+
+def test_a_name_moves_no_cursor_and_reorders_no_text(page, folder, waited, tmp_path):
+    shutil.copyfile(folder / "whole.h5", tmp_path / "a\x1b[2J\u202eb\n<b>c.h5")
+    page._go_to(tmp_path)
+    waited(lambda: len(page.table.recordings.entries) == 1 and not page.context.background.is_busy)
+    index = page.table.recordings.index(0, HEADINGS.index("Name"))
+    assert index.data() == r"a\x1b[2J\u202eb\n<b>c"
+    assert index.data(Qt.ItemDataRole.ToolTipRole).split("\n")[0].endswith(r"a\x1b[2J\u202eb\n<b>c.h5")
+    page.table.choose(tmp_path / "a\x1b[2J\u202eb\n<b>c.h5")
+    waited(lambda: page._title.text() == r"a\x1b[2J\u202eb\n<b>c.h5")
+    page._go_to(folder)
+
+
 def test_every_readable_recording_has_a_picture(page):
     model = page.table.recordings
     pictures = {

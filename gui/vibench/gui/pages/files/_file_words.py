@@ -1,6 +1,7 @@
 """How sizes, times and states of recordings are written in a list."""
 
-from vibench.acquisition.recording import Recording, RecordingState
+from vibench.acquisition import printable
+from vibench.acquisition.recording import Recording, RecordingState, SealDepth, SealState
 
 _STATE_SYMBOLS: dict[str, str] = {
     RecordingState.COMPLETE: "✔",
@@ -49,9 +50,12 @@ def facts_text(recording: Recording) -> str:
         f"{recording.sample_rate_hz:g} samples/s, {len(recording.roles)} channels",
         f"bench {recording.bench.get('name', 'unnamed')}",
     ]
+    seal = recording.check_seal(SealDepth.QUICK)
+    if seal.state not in (SealState.INTACT, SealState.UNFINISHED):
+        parts.insert(0, f"✖ {seal.state.value.replace('_', ' ')}: {seal.sentence}")
     if recording.overloads:
         parts.append(f"{len(recording.overloads)} overloads (red)")
     if recording.gaps:
         lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
         parts.append(f"{lost} samples lost")
-    return "  ·  ".join(parts)
+    return printable("  ·  ".join(parts))

@@ -13,7 +13,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition import RecordingError, open_recording, printable
 from vibench.acquisition.recording import Recording, name_now
 from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
 
@@ -158,12 +158,12 @@ class FilesPage(Page):
         try:
             recording = open_recording(path)
         except RecordingError as error:
-            self._title.setText(path.name)
-            self._facts.setText(str(error))
+            self._title.setText(printable(path.name))
+            self._facts.setText(printable(str(error)))
             self.context.say(notice_of(error))
             return
         self._opened = recording
-        self._title.setText(recording.path.name)
+        self._title.setText(printable(recording.path.name))
         if recording.path != path:
             # It was finished since it was listed.
             self._wanted = recording.path
@@ -304,6 +304,7 @@ class FilesPage(Page):
 
     def _viewer(self) -> QWidget:
         self._title = QLabel("No recording is open")
+        self._title.setTextFormat(Qt.TextFormat.PlainText)
         self._title.setProperty("rank", "title")
         self._facts = SentenceLabel("Choose one in the list above.", rank="second")
         self._view = QLabel("")

@@ -19,6 +19,7 @@ from PySide6.QtCore import (
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
+from vibench.acquisition import printable
 from vibench.analysis.live import THUMBNAIL_COLUMNS, Thumbnail
 
 from ...forms import Choice
@@ -157,7 +158,8 @@ class RecordingModel(QAbstractTableModel):
             case Qt.ItemDataRole.DecorationRole if column == PICTURE:
                 content = self._picture(entry.path)
             case Qt.ItemDataRole.ToolTipRole:
-                content = f"{entry.path}\n{entry.said.reason}\n{entry.said.notes}".strip()
+                said = (str(entry.path), entry.said.reason, entry.said.notes)
+                content = "\n".join(map(printable, filter(None, said)))
             case Qt.ItemDataRole.TextAlignmentRole if column in _NUMBERS:
                 content = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.AccessibleTextRole:
@@ -270,11 +272,11 @@ def _texts(entry: ListedRecording) -> tuple[str, ...]:
     said = entry.said
     return (
         "",
-        entry.name,
+        printable(entry.name),
         state_text(said.state),
-        said.verdict,
+        printable(said.verdict),
         moment_text(said.started_utc),
-        entry.played,
+        printable(entry.played),
         "" if said.amplitude_vpp is None else f"{said.amplitude_vpp:g} Vpp",
         "" if said.duration_s is None else duration_text(said.duration_s),
         size_text(said.size_bytes),

@@ -1,0 +1,17 @@
+"""Text of a file, a folder or an instrument on its way to a reader."""
+
+from unicodedata import category
+
+
+def printable(text: str) -> str:
+    r"""Write what would move a cursor, reorder text or be invisible as an escape: one line comes of it.
+
+    >>> print(printable("a\x1b[2J\nb"))
+    a\x1b[2J\nb
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        each if each.isprintable() or category(each) == "Zs" else each.encode("unicode_escape").decode()
+        for each in text
+    )
