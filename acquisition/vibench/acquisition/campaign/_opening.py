@@ -4,6 +4,7 @@ After a crash, journal and folder are brought together: what is true of the poin
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import assert_never
@@ -40,9 +41,16 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
         match point.state:
             case JournalPointState.RUNNING:
                 journal.end(point.name, *_ended(point, folder))
+            case JournalPointState.FAILED | JournalPointState.INTERRUPTED if part_of(
+                folder / point.file
+            ).exists():  # the disk refused its end: it may be complete
+                journal.end(point.name, *_ended(point, folder))
             case JournalPointState.DONE if not (folder / point.file).exists():
                 journal.requeue(point.name, ReasonCode.GONE, f"{point.file} is no longer in the folder")
             case JournalPointState.DONE:
+                if part_of(folder / point.file).exists():  # the disk refused to forget it
+                    with suppress(RecordingError):
+                        recover(folder / point.file)
                 found = looked_at(folder / point.file, point.measurement, SealDepth.WHOLE)
                 if found.damage:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)

@@ -20,6 +20,7 @@ import numpy as np
 from vibench.sim.operating_system import sync_file, sync_folder
 
 from ..errors import RecordingError
+from ..host import LOG
 from . import _layout as layout, _tables as tables
 from ._attributes import encoded, read_attributes, write_attributes
 from ._counts import Counts
@@ -104,13 +105,12 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
         claim_room(tmp, room, room)
         _copy(part, tmp, room, key, written)
         sync_file(tmp)
-        os.replace(tmp, final)  # noqa: PTH105 - the pair of os.fsync
-        sync_folder(final.parent)
+        rename(tmp, final)
     except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
         # Incomplete, and made by this call; everything in it is in the .part.
         with suppress(OSError):
             tmp.unlink()
-        raise RecordingError(f"{final} could not be written: {error}. {_whereabouts(part)}") from error
+        raise RecordingError(f"{final} could not be written: {error}. {whereabouts(part, error)}") from error
     except RecordingError:
         with suppress(OSError):
             tmp.unlink()
@@ -118,12 +118,23 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     return final
 
 
-def _whereabouts(part: Path) -> str:
+def rename(unfinished: Path, final: Path) -> None:
+    """Give a whole file its name; network folders report errors of renames that were made."""
+    try:
+        os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
+    except OSError:
+        if unfinished.exists() or not final.exists():
+            raise
+
+
+def whereabouts(part: Path, error: Exception) -> str:
+    """Say where the committed samples are after an error of the disk, and what to do."""
     try:
         is_there = part.exists()
     except OSError:  # the folder does not answer
         is_there = False
-    if is_there:
+    # Another file may have the name of one that was removed.
+    if is_there and not isinstance(error, FileNotFoundError):
         return f"All committed samples are safe in {part}; make room, then recover that file."
     return (
         f"{part} is not there: it or its folder was removed, moved or cut off while it was recorded;"
@@ -132,10 +143,14 @@ def _whereabouts(part: Path) -> str:
 
 
 def discard(part: Path) -> None:
-    """Delete ``NAME.h5.part`` once ``NAME.h5`` is safe; one that stays harms nobody."""
-    with suppress(OSError):
+    """Delete ``NAME.h5.part`` once the name ``NAME.h5`` survives a power cut; one that stays harms nobody."""
+    try:
+        sync_folder(part.parent)
         part.unlink()
         sync_folder(part.parent)
+    except OSError as error:
+        name = part.with_suffix("").name
+        LOG.warning("%s is complete; %s was kept, for the disk refused (%s)", name, part.name, error)
 
 
 def _largest_size(part: Path) -> int:

@@ -7,6 +7,7 @@ closed the file, so that no crash can catch it between two steps.
 import shutil
 import uuid
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -92,7 +93,9 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
         made.rename(part)
         sync_folder(part.parent)
     except OSError as error:
-        made.unlink(missing_ok=True)
+        for each in (made, part):
+            with suppress(OSError):
+                each.unlink()
         raise RecordingError(
             f"{part} cannot be prepared for {reserved} samples of {len(header.channels)} channels: {error}."
             " Nothing was recorded; make room, or choose another folder or a shorter measurement."

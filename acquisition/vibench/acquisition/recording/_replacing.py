@@ -5,6 +5,7 @@ import shutil
 import tempfile
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TypeVar
 
@@ -15,6 +16,7 @@ from vibench.sim.operating_system import sync_file, sync_folder
 from ..errors import RecordingError
 from . import _layout as layout
 from ._disk_room import extend_room, release_room
+from ._finalise import rename
 
 Answer = TypeVar("Answer")
 
@@ -37,8 +39,9 @@ def replace_with_change(path: Path, room: int, change: Callable[[h5py.File], Ans
                 before = _fingerprint(path)
                 tmp, answer = _changed_copy(path, room, change)
                 if _fingerprint(path) == before:
-                    os.replace(tmp, path)  # noqa: PTH105 - the pair of os.fsync
-                    sync_folder(path.parent)
+                    rename(tmp, path)
+                    with suppress(OSError):  # after a power cut either file is there, and both are whole
+                        sync_folder(path.parent)
                     return answer
                 tmp.unlink()
     except RecordingError:

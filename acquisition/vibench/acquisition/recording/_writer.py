@@ -28,7 +28,7 @@ from ._counts import Counts, CountScale
 from ._descriptor_reserve import DescriptorReserve
 from ._disk import Disk
 from ._disk_trouble import open_disk
-from ._finalise import discard, finalise
+from ._finalise import discard, finalise, whereabouts
 from ._header import RecordingHeader
 from ._journal import Journal, Number
 from ._layout import RecordingState
@@ -289,6 +289,6 @@ class RecordingWriter:
             self._disk.sync()
         except OSError as error:
             raise RecordingError(
-                f"The disk refused the end of the recording: {error}. The {self.committed_samples} samples"
-                f" committed before are in {layout.part_of(self._path)}; recover it when the disk is well."
+                f"The disk refused the end of the recording: {error}."
+                f" {whereabouts(layout.part_of(self._path), error)}"
             ) from error
