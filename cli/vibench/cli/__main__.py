@@ -6,6 +6,7 @@ Commands by name only: what a command needs is imported when it is called, not t
 import errno
 import importlib
 import logging
+import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -356,13 +357,37 @@ def main() -> None:
         name = shortened(name, NAME_SHOWN)
         complain(OSError(f"{name} holds bytes that are no text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
-    except OSError as error:
-        if error.errno not in DISK_ERRORS:
-            raise
+    except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
         # Whoever looks at a path first meets it: here is the one place that all paths have behind them.
-        name = shortened(str(error.filename or "a file"), NAME_SHOWN)
-        complain(OSError(DISK_ERRORS[error.errno].format(name=name)))
+        sentence = _shortage(error) or _disk_trouble(error)
+        if not sentence:
+            raise
+        complain(OSError(sentence))
         sys.exit(ExitCode.FAILED)
+
+
+def _disk_trouble(error: Exception) -> str:
+    if not isinstance(error, OSError) or error.errno not in DISK_ERRORS:
+        return ""
+    return DISK_ERRORS[error.errno].format(name=shortened(str(error.filename or "a file"), NAME_SHOWN))
+
+
+def _shortage(error: BaseException | None) -> str:
+    """Say which limit is behind an error, which libraries may have wrapped; empty if none is."""
+    if error is None:
+        return ""
+    text = str(error)
+    if isinstance(error, MemoryError) or any(said in text for said in _NO_MEMORY):
+        return (
+            "there is no memory left for this process; what was written before is kept. Close other "
+            "programs, or raise its limit (ulimit -v)"
+        )
+    if isinstance(error, OSError | ImportError) and os.strerror(errno.EMFILE) in text:
+        return (
+            "this process may open no more files; what was written before is kept. Raise its limit (ulimit "
+            "-n), or close other programs"
+        )
+    return _shortage(error.__cause__ or error.__context__)
 
 
 _PLACE = "{name} may not be written or read here; what was written before is kept. Give another place"
@@ -373,6 +398,14 @@ DISK_ERRORS = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EFBIG), _ROOM),
 }
 """What a person can do something about."""
+_NO_MEMORY = (
+    os.strerror(errno.ENOMEM),
+    "can't start new thread",
+    "failed to map segment from shared object",
+    "without setting an exception",
+    "without exception set",
+)
+"""What the system, Python and the loader of libraries say where memory has run out."""
 
 
 LONGEST_SENTENCE = 1800

@@ -187,7 +187,8 @@ def _calibrated(bench: Bench) -> list[Finding]:
 
 def _room(bench: Bench, folder: Path) -> Finding:
     bytes_per_s = bench.digitizer.sample_rate_hz * len(bench.channels) * _BYTES_PER_SAMPLE
-    hours = shutil.disk_usage(folder).free / bytes_per_s / _SECONDS_PER_HOUR
+    there = next(each for each in (folder, *folder.resolve().parents) if each.exists())
+    hours = shutil.disk_usage(there).free / bytes_per_s / _SECONDS_PER_HOUR
     return judged(
         "room on the disk",
         hours,

@@ -1,0 +1,75 @@
+"""Where files or memory run out, a command ends with one sentence and no traceback."""
+
+import subprocess
+import sys
+
+import pytest
+
+from .conftest import ENVIRONMENT
+
+resource = pytest.importorskip("resource", reason="limits on a process exist on POSIX only")
+
+TONE = """
+name = "tiny"
+[[measurements]]
+name = "tone"
+ramp_s = 0.1
+ramp_step_s = 0.02
+excitation = { kind = "dwell", amplitude_vpp = 0.1, frequency_hz = 150, settle_s = 0, duration_s = 0.2 }
+"""
+
+
+def limited(folder, name, most, *arguments):
+    """Run ``vibench`` with a limit on what its process may have."""
+    number = getattr(resource, name)
+    return subprocess.run(
+        [sys.executable, "-m", "vibench.cli", *arguments],
+        cwd=folder,
+        env=ENVIRONMENT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=110,
+        preexec_fn=lambda: resource.setrlimit(number, (most, resource.getrlimit(number)[1])),
+    )
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("most", [8, 12, 16, 20, 24, 32])
+def test_a_measurement_with_few_files_ends_with_a_sentence(tmp_path, most):
+    (tmp_path / "tiny.toml").write_text(TONE, encoding="utf-8")
+    ended = limited(
+        tmp_path, "RLIMIT_NOFILE", most, "measure", "tiny.toml", "--out", "out", "--check", "waived"
+    )
+    assert "Traceback" not in ended.stderr
+    assert (ended.returncode, ended.stderr.count("error: ")) in ((0, 0), (1, 1))
+
+
+@pytest.mark.parametrize(
+    ("wrapped", "said"),
+    [
+        (MemoryError(), "no memory left"),
+        (RuntimeError("can't start new thread"), "no memory left"),
+        (ImportError("libllvmlite.so: failed to map segment from shared object"), "no memory left"),
+        (SystemError("<built-in> returned NULL without setting an exception"), "no memory left"),
+        (OSError(24, "Too many open files"), "open no more files"),
+        (ImportError("x.so: cannot open shared object file: Too many open files"), "open no more files"),
+    ],
+)
+def test_a_shortage_is_told_however_it_is_wrapped(vibench_here, tmp_path, monkeypatch, wrapped, said):
+    def short(*_arguments, **_named):
+        try:
+            raise wrapped
+        except Exception as error:
+            raise OSError("could not find a library") from error
+
+    monkeypatch.setattr("vibench.cli.verify.verify_recordings", short)
+    ended = vibench_here("verify", ".", cwd=tmp_path)
+    assert (ended.returncode, ended.stderr.count("\n")) == (1, 1)
+    assert said in ended.stderr
+
+
+def test_a_bench_is_checked_for_a_folder_that_is_not_there_yet(vibench, tmp_path):
+    ended = vibench("bench", "check", "--out", "later/on", cwd=tmp_path)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert not (tmp_path / "later").exists()
