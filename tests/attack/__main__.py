@@ -31,6 +31,7 @@ TARGETS: dict[str, Attack] = {
     "recordings": recordings_mutants.attack,
     "flips": recordings_flips.attack,
     "kills": recordings_kills.attack,
+    "calls": recordings_kills.attack_calls,
 }
 """What can be attacked, each by its own file."""
 

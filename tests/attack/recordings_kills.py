@@ -2,8 +2,11 @@
 
 Each number is one campaign of short points, dwells and streamed noise in turn, killed up to `KILLS` times
 and then left to its end. One process imports everything and forks itself for each run: a kill ends a fork.
+With a preloaded library (`system_calls.c`) exact system calls kill, or fail, before, inside and after.
 """
 
+import ctypes
+import errno
 import json
 import os
 import random
@@ -32,6 +35,12 @@ ROOT = Path(__file__).resolve().parents[2]
 KILLS = 10
 """Of one campaign."""
 KINDS = ("moment", "write", "torn write", "sync", "rename", "commit")
+CALLS = {"pwrite": 150, "fsync": 60, "rename": 8, "ftruncate": 12, "unlink": 8}
+"""System calls, and about as many as a run of these campaigns makes of each."""
+WHEN = ("before", "inside", "after")
+FAULTS = {"kill": 0, "EIO": errno.EIO, "ENOSPC": errno.ENOSPC}
+CALL_KINDS = tuple(f"{call} {when} {fault}" for call in CALLS for when in WHEN for fault in FAULTS)
+LIBRARY = "VIBENCH_SYSTEM_CALLS"
 LONGEST_S = 120.0
 """A campaign of a few points that has not ended by then hangs [s]."""
 RATE = ("sample_rate_hz = 51200", "sample_rate_hz = 5120")
@@ -68,8 +77,10 @@ POINTS = {"virtual_rig": 4, "virtual_rig_streaming": 2}
 class KilledCampaigns:
     """Runs campaigns in forks of one process; use it in a ``with``."""
 
-    def __init__(self) -> None:
+    def __init__(self, library: Path | None = None) -> None:
         environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+        if library is not None:
+            environment |= {"LD_PRELOAD": str(library), LIBRARY: str(library)}
         self._server = subprocess.Popen(
             [sys.executable, "-m", f"{__package__}.{Path(__file__).stem}"],
             stdin=subprocess.PIPE,
@@ -180,7 +191,13 @@ def at_the_end(out: Path, points: int) -> list[str]:
     return said
 
 
-def attacked(runs: KilledCampaigns, chance: random.Random, tally: Tally, kills: int = KILLS) -> list[str]:
+def attacked(
+    runs: KilledCampaigns,
+    chance: random.Random,
+    tally: Tally,
+    kills: int = KILLS,
+    kinds: tuple[str, ...] = KINDS,
+) -> list[str]:
     """Kill one campaign up to ``kills`` times, let it end, and say what was lost or wrong."""
     bench = chance.choice(tuple(CAMPAIGNS))
     with tempfile.TemporaryDirectory(prefix="vibench_kills_") as name:
@@ -189,15 +206,19 @@ def attacked(runs: KilledCampaigns, chance: random.Random, tally: Tally, kills: 
         out, said = folder / "out", []
         for attempt in range(kills):
             kept = kept_in(out) if out.exists() else Kept({}, {})
-            kind = chance.choice(KINDS)
+            kind = chance.choice(kinds)
+            most = CALLS[kind.split()[0]] if kind in CALL_KINDS else MOST_OPERATIONS[kind]
             ended = runs.run(
                 folder,
                 *(("--resume",) if out.exists() else ()),
                 kind=kind,
-                number=1 + int(MOST_OPERATIONS[kind] * chance.random() ** 2),
+                number=1 + int(most * chance.random() ** 2),
                 moment_s=chance.uniform(0.0, LATEST_S),
             )
             said += [f"kill {attempt} ({kind}): {each}" for each in lost(kept, out)] if out.exists() else []
+            if kind in CALL_KINDS and ended["code"] == 1 and "Traceback" not in ended["err"]:
+                tally.count(kind, ended["took_s"])
+                continue
             if ended["code"] != -signal.SIGKILL:
                 tally.count(f"not reached, exit {ended['code']}")
                 said += [ended["err"]] if ended["code"] else []
@@ -217,6 +238,20 @@ def attack(shard: Shard) -> Tally:
         for number, chance in shard.chances():
             if said := attacked(runs, chance, tally):
                 tally.findings.append(Finding("kills", shard.seed, number, tuple(said[:5]), ""))
+    return tally
+
+
+def attack_calls(shard: Shard) -> Tally:
+    """Let exact system calls kill or fail; each number is one campaign, and what is counted are faults."""
+    tally = Tally("calls")
+    with tempfile.TemporaryDirectory(prefix="vibench_calls_") as folder:
+        library = Path(folder) / "system_calls.so"
+        source = Path(__file__).with_name("system_calls.c")
+        subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl", "-lpthread"], check=True)
+        with KilledCampaigns(library) as runs:
+            for number, chance in shard.chances():
+                if said := attacked(runs, chance, tally, kinds=CALL_KINDS):
+                    tally.findings.append(Finding("calls", shard.seed, number, tuple(said[:5]), ""))
     return tally
 
 
@@ -261,6 +296,10 @@ def _become_run(order: dict[str, Any], err: int) -> None:
     os.chdir(order["folder"])
     if order["kind"]:
         _prepare_to_die(order["kind"], order["number"], order["s"])
+    if order["kind"] in CALL_KINDS:
+        call, when, fault = order["kind"].split()
+        arguments = (list(CALLS).index(call), order["number"], WHEN.index(when), FAULTS[fault])
+        ctypes.CDLL(os.environ[LIBRARY]).arm(*arguments, os.path.realpath("out").encode())
     paths = ["campaign.toml", "--bench", "bench.toml", "--out", "out", "--check", "waived"]
     sys.argv = ["vibench", "measure", *paths, *order["options"]]
     code = 1
