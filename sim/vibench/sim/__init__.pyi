@@ -16,6 +16,7 @@ from .model import (
     DampingTime as DampingTime,
     Drive as Drive,
     Elasticity as Elasticity,
+    FrozenModel as FrozenModel,
     Harmonic as Harmonic,
     Hertz as Hertz,
     HuntCrossley as HuntCrossley,

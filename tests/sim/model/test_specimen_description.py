@@ -182,3 +182,37 @@ def test_a_random_specimen_survives_its_file(tmp_path):
         described = load_specimen(written(tmp_path, text))
         again = SpecimenTable.model_validate_json(described.model_dump_json())
         assert again.specimen() == described.specimen()
+
+
+@pytest.mark.parametrize(
+    ("given", "instead"),
+    [
+        ("masses_kg = [6e-3, 2e-3, 2e-3]", "masses_kg = [true, 2e-3, 2e-3]"),
+        ("masses_kg = [6e-3, 2e-3, 2e-3]", 'masses_kg = [6e-3, "2e-3", 2e-3]'),
+        ("stiffnesses_n_per_m = [2e4, 800.0, 1.2e4]", "single_frequencies_hz = [322.0, true, 390.6]"),
+        ("dampings_ns_per_m = [0.5, 0.02, 0.2]", "damping_time_s = true"),
+        ("dampings_ns_per_m = [0.5, 0.02, 0.2]", 'damping_time_s = "2e-5"'),
+        ("gap_m = [30e-6, inf]", "gap_m = true"),
+        ("gap_m = [30e-6, inf]", 'gap_m = "45e-6"'),
+        ("gap_m = [30e-6, inf]", "gap_m = [30e-6, true]"),
+        ("hertz_stiffness = 4.9e9", "hertz_stiffness = true"),
+        ("hertz_stiffness = 4.9e9", 'hertz_stiffness = "4.9e9"'),
+        (
+            "hertz_stiffness = 4.9e9",
+            f"hertz_stiffness = {BODIES.replace('4e-3', 'true').replace('0.7', '0.3')}",
+        ),
+    ],
+)
+def test_a_truth_value_or_a_text_is_no_number_in_a_file_or_in_one_that_it_starts_from(
+    tmp_path, given, instead
+):
+    file = written(tmp_path, WHOLE.replace(given, instead))
+    written(tmp_path, f'model = "{file.name}"\nname = "heir"\n', "heir.toml")
+    for each in (file, tmp_path / "heir.toml"):
+        with pytest.raises(UnknownSpecimenError, match=rf"{instead.split(' = ')[0]}.*number"):
+            load_specimen(each)
+
+
+def test_an_infinite_gap_is_read_back_from_json(tmp_path):
+    one_sided = load_specimen(written(tmp_path, WHOLE))
+    assert SpecimenDescription.model_validate_json(one_sided.model_dump_json()) == one_sided

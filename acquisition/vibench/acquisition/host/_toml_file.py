@@ -8,20 +8,18 @@ from itertools import compress
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ValidationError
 
-from vibench.sim import UnreadableTomlError, fault_in_words, toml_table
+from vibench.sim import (
+    FrozenModel as FrozenModel,  # noqa: PLC0414 - every model of a file is validated like a specimen
+    UnreadableTomlError,
+    fault_in_words,
+    toml_table,
+)
 
 from ..errors import ConfigurationError
 from ._schema import FORMAT, VERSION, schema_line
 from ._shipped import shipped_folder
-
-
-class FrozenModel(BaseModel):
-    """What crosses a file: immutable, complete, and deaf to keys it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -92,44 +90,13 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
 
     """
     try:
-        # pydantic takes true for 1 where a number is asked for, but not the word.
-        in_words = _in_words(content)
-        if in_words != content:
-            _read_as(in_words, model, origin, folder)
-        return _read_as(content, model, origin, folder)
+        return model.model_validate(content, context={"folder": folder})
+    except ValidationError as error:
+        raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
     except ArithmeticError as error:
         raise ConfigurationError(
             f"{origin}: a number is too large, or too small, to be computed with ({error}); correct it"
         ) from error
-
-
-def _read_as(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None) -> Model:
-    try:
-        return model.model_validate(content, context={"folder": folder})
-    except ValidationError as error:
-        raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
-
-
-class _TruthWord(str):
-    """``true`` or ``false`` as a word, which stands where a truth value may, but not where a number must."""
-
-    __slots__ = ()
-
-    def __repr__(self) -> str:
-        return str(self)
-
-
-def _in_words(content: Any) -> Any:
-    """Give the same content with truth values as words."""
-    match content:
-        case bool():
-            return _TruthWord("true" if content else "false")
-        case dict():
-            return {key: _in_words(value) for key, value in content.items()}
-        case list() | tuple():
-            return [_in_words(value) for value in content]
-        case _:
-            return content
 
 
 MOST_CLAUSES = 5
@@ -273,6 +240,8 @@ def _shown(value: object) -> str:
     match value:
         case list() | tuple() | dict():
             text = reprlib.repr(value)
+        case bool():
+            text = str(value).lower()
         case date():
             text = value.isoformat()
         case _:

@@ -7,10 +7,19 @@ from functools import lru_cache
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, NonNegativeFloat, PositiveFloat, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ..branches import random_state
-from ..model import Accuracy, ContactWord, Harmonic, Specimen, SpecimenTable, Triple, usual_specimen
+from ..model import (
+    Accuracy,
+    ContactWord,
+    FrozenModel,
+    Harmonic,
+    Specimen,
+    SpecimenTable,
+    Triple,
+    usual_specimen,
+)
 from ..scene import AutomaticDuration, Given, Observable, Rest, Scene
 from ..study import Column, GridPlan, Start, StudyAxis
 from ._columns import SECTION_COLUMNS, columns_with
@@ -33,10 +42,8 @@ class Spacing(StrEnum):
     LOGARITHMIC = "logarithmic"
 
 
-class Range(BaseModel):
+class Range(FrozenModel):
     """Values from one number to another."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     start: float
     stop: float

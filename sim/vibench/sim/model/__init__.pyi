@@ -30,6 +30,9 @@ from ._elasticity import (
     Elasticity as Elasticity,
     hertz_stiffness as hertz_stiffness,
 )
+from ._frozen_model import (
+    FrozenModel as FrozenModel,
+)
 from ._hertz import (
     Hertz as Hertz,
 )

@@ -17,7 +17,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import (
     AfterValidator,
-    BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     NonNegativeFloat,
@@ -32,6 +32,7 @@ from pydantic import (
 
 from ._contact_law import model_named
 from ._elasticity import Elasticity, hertz_stiffness
+from ._frozen_model import FrozenModel
 from ._specimen import Gaps, Specimen, Triple
 from ._toml_table import fault_in_words, toml_table
 
@@ -60,13 +61,8 @@ class UnknownSpecimenError(ValueError):
     """A specimen that is not shipped, or a file that describes none."""
 
 
-class _Described(BaseModel):
-    model_config = ConfigDict(
-        frozen=True,
-        extra="forbid",
-        allow_inf_nan=False,
-        ser_json_inf_nan="strings",
-    )
+class _Described(FrozenModel):
+    model_config = ConfigDict(ser_json_inf_nan="strings")
 
 
 class Material(_Described):
@@ -104,7 +100,14 @@ def _known_law(word: str) -> str:
 
 ContactWord = Annotated[str, AfterValidator(_known_law)]
 """A contact law as `CONTACT_LAWS` spells it: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
-Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True)]
+
+
+def _infinity(said: object) -> object:
+    """Read the word that stands for an infinite gap in JSON, which has no such number."""
+    return math.inf if said in ("inf", "Infinity") else said
+
+
+Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True), BeforeValidator(_infinity)]
 DampingTime = Annotated[float, Field(ge=0.0, le=1.0)]
 """Damping over stiffness [s]; the longest is 300 times critical in the paper's first mode. Far beyond, runs
 take minutes, or their numbers leave those of a computer."""
@@ -138,7 +141,7 @@ class SpecimenDescription(_Described):
     """Law of the stops: hertz, linear (no stops), linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, ..."""
     hertz_stiffness: PositiveFloat | SphereOnPlane
     """k of F = k d^(3/2) at a stop [N/m^1.5], or the bodies that touch; what other laws are fitted to."""
-    sources: dict[str, str] = {}
+    sources: dict[str, str] = Field(default={})
     """Where a number comes from, by its key."""
     _meant: ClassVar[Mapping[str, str]] = {}
     """What a table says that does not say it."""

@@ -59,6 +59,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
     "datetime_parsing": _TIME,
     "datetime_from_date_parsing": _TIME,
     "timezone_aware": _TIME,
+    "bool_type": "give true or false",
     "union_tag_not_found": "{discriminator} is missing: it says what this is",
     "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
 }

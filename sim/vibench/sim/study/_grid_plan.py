@@ -3,16 +3,13 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict
-
+from ..model import FrozenModel
 from ._axes import Grid, StudyAxis, grid_of
 from ._columns import Column
 
 
-class GridPlan(BaseModel, ABC):
+class GridPlan(FrozenModel, ABC):
     """What is to be computed, completely: two equal plans have equal answers."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     called: ClassVar[str]
     """How messages call such a plan."""

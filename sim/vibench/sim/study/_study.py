@@ -7,9 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import (
     AfterValidator,
     AliasChoices,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     NonNegativeFloat,
     PositiveFloat,
@@ -19,6 +17,7 @@ from pydantic import (
 from ..model import (
     Accuracy,
     ContactWord,
+    FrozenModel,
     Harmonic,
     SpecimenTable,
     usual_specimen,
@@ -46,10 +45,8 @@ class Start(StrEnum):
     """The end of the point at the next higher frequency; the highest begins at rest."""
 
 
-class GivenStart(BaseModel):
+class GivenStart(FrozenModel):
     """A state of one's own, for every point the same."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     label: Annotated[str, Field(min_length=1, max_length=60)]
     """How the start is called in the file and in results."""

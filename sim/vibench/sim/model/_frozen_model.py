@@ -1,0 +1,47 @@
+"""The base of every model that a TOML or JSON file describes."""
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+
+def _number(given: object) -> object:
+    if isinstance(given, bool | str):
+        raise PydanticCustomError("number_type", "give a number")
+    return given
+
+
+def _with_numbers_only(schema: Any) -> Any:
+    """Return a core schema in which nothing but a number is read as a number, nor as a truth value."""
+    match schema:
+        case {"type": "float" | "int"} | {"type": "literal", "expected": [int(), *_]}:
+            # pydantic's own strict mode would also refuse 1e3 for an integer, and numpy's numbers.
+            return core_schema.no_info_before_validator_function(_number, {**schema})
+        case {"type": "bool"}:
+            return {**schema, "strict": True}
+        case {"type": "dict", "values_schema": values}:
+            # Keys of a table are text, also where they count.
+            return {**schema, "values_schema": _with_numbers_only(values)}
+        case dict():
+            return {key: _with_numbers_only(value) for key, value in schema.items()}
+        case list():
+            return [_with_numbers_only(value) for value in schema]
+        case _:
+            return schema
+
+
+class FrozenModel(BaseModel):
+    """Immutable, without unknown keys, and with numbers only where numbers are asked for.
+
+    pydantic reads ``true`` as 1 and ``"45e-6"`` as a number. In a file both are slips of the pen, and
+    would become a mass of 1 kg. So every number of every field, however deep, must be a number.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the schema of the model, in which numbers are numbers."""
+        schema: CoreSchema = _with_numbers_only(handler(source))
+        return schema
