@@ -35,3 +35,11 @@ def test_each_portion_of_the_namespace_comes_from_its_own_folder(portion):
     assert Path(package.__file__).parent == ROOT / portion / "vibench" / portion
     assert (Path(package.__file__).parent / "py.typed").is_file()
     assert not (ROOT / portion / "vibench" / "__init__.py").exists()  # it would hide the other portions
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is a copy, not a checkout")
+def test_a_checkout_contains_nothing_that_a_program_generated():
+    """A folder of results in a checkout would rename the results of a newcomer's first demo."""
+    command = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert listed.stdout.splitlines() == []
