@@ -48,7 +48,7 @@ def run(*arguments, path=None, folder=ROOT):
 def contract(name, *options, path=None, folder=ROOT):
     return run(
         *("-m", "pytest", "-p", "no:cacheprovider", "-p", "vibench.acquisition.contract._options"),
-        *("--pyargs", "vibench.acquisition.contract", "--instrument", name, *options),
+        *("--pyargs", "vibench.acquisition.contract", "--vibench-instrument", name, *options),
         path=path,
         folder=folder,
     )
@@ -134,7 +134,7 @@ def test_a_stranger_s_instruments_measure_without_an_edit_of_ours(installed, tmp
 @pytest.mark.parametrize("name", ["plain_scpi", "charge_amplifier"])
 def test_a_stranger_s_instruments_keep_the_contract(installed, tmp_path, name):
     """Wherever it is asked for: outside of our folder pytest knows none of our settings."""
-    done = contract(name, f"--bench={BENCH}", path=installed, folder=tmp_path)
+    done = contract(name, f"--vibench-bench={BENCH}", path=installed, folder=tmp_path)
     assert done.returncode == 0, done.stdout
     assert "passed" in done.stdout
 
@@ -146,7 +146,9 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
         '"OUTP1:STAT OFF"', '"*WAI"'
     )
     (tmp_path / "example_instruments.py").write_text(broken)
-    done = contract("plain_scpi", f"--bench={BENCH}", path=os.pathsep.join((str(tmp_path), str(installed))))
+    done = contract(
+        "plain_scpi", f"--vibench-bench={BENCH}", path=os.pathsep.join((str(tmp_path), str(installed)))
+    )
     assert done.returncode == 1
     for promise in ("test_a_waveform_is_played_point_by_point", "test_stop_is_silence_at_any_time"):
         assert promise in done.stdout
@@ -155,12 +157,24 @@ def test_a_generator_that_breaks_its_promises_is_found_out(tmp_path, installed):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ((), "--instrument NAME is missing: the name of an entry point, such as afg1022x"),
-        (("--instrument=unknown",), "'unknown' is no installed instrument; install its package first"),
-        (("--instrument=afg1022x", "--bench=nowhere.toml"), "nowhere.toml: cannot be read"),
-        (("--instrument=file",), "no shipped virtual bench names 'file' as one of vibench.generators"),
-        (("--instrument=plain_python", "--bench=BENCH"), "'plain_python' is no installed instrument"),
-        (("--instrument=file", "--bench=BENCH"), "virtual_rig.toml does not name 'file' as one of"),
+        ((), "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"),
+        (
+            ("--vibench-instrument=unknown",),
+            "'unknown' is no installed instrument; install its package first",
+        ),
+        (("--vibench-instrument=afg1022x", "--vibench-bench=nowhere.toml"), "nowhere.toml: cannot be read"),
+        (
+            ("--vibench-instrument=file",),
+            "no shipped virtual bench names 'file' as one of vibench.generators",
+        ),
+        (
+            ("--vibench-instrument=plain_python", "--vibench-bench=BENCH"),
+            "'plain_python' is no installed instrument",
+        ),
+        (
+            ("--vibench-instrument=file", "--vibench-bench=BENCH"),
+            "virtual_rig.toml does not name 'file' as one of",
+        ),
     ],
 )
 def test_the_contract_says_once_what_is_wrong_with_its_command(tmp_path, options, sentence):
@@ -174,6 +188,19 @@ def test_the_contract_says_once_what_is_wrong_with_its_command(tmp_path, options
     assert done.returncode == pytest.ExitCode.USAGE_ERROR, done.stdout + done.stderr
     assert (done.stdout + done.stderr).count(sentence) == 1
     assert "no tests ran" in done.stdout
+
+
+def test_a_project_may_define_options_of_the_names_that_benches_suggest(tmp_path):
+    (tmp_path / "conftest.py").write_text(
+        "def pytest_addoption(parser):\n"
+        "    for name in ('--bench', '--instrument', '--rig'):\n"
+        "        parser.addoption(name)\n"
+    )
+    (tmp_path / "test_theirs.py").write_text(
+        "def test_theirs(pytestconfig):\n    assert pytestconfig.getoption('--bench') == 'mine'\n"
+    )
+    done = run("-m", "pytest", "-p", "no:cacheprovider", "--bench=mine", folder=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
 
 
 OUR_INSTRUMENTS = sorted({row.name for row in OURS} - {"file", "none", "soundcard"})

@@ -42,7 +42,9 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
     """Give a bench for each kind of plug-in that bears the name, or refuse what no test could use."""
     if name is None:
-        raise pytest.UsageError("--instrument NAME is missing: the name of an entry point, such as afg1022x")
+        raise pytest.UsageError(
+            "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
+        )
     kinds = [each for each in PlugInKind if name in plug_in_names(each)]
     if not kinds:
         raise pytest.UsageError(f"{name!r} is no installed instrument; install its package first")
@@ -59,24 +61,26 @@ def unnamed(name: str, given: str | None, kinds: list[PlugInKind]) -> str:
     """Say that no bench names the instrument."""
     who = "no shipped virtual bench names" if given is None else f"{given} does not name"
     kinds_in_words = " or ".join(each.value for each in kinds)
-    return f"{who} {name!r} as one of {kinds_in_words}; give a hardware configuration that does with --bench"
+    return f"{who} {name!r} as one of {kinds_in_words}; give a bench that does with --vibench-bench"
 
 
 def pytest_collection_modifyitems(config: pytest.Config) -> None:
     """Say once, and before the first test, what is wrong with the command."""
-    config.stash[_RIGS] = chosen_rigs(config.getoption("--instrument"), config.getoption("--bench"))
+    config.stash[_RIGS] = chosen_rigs(
+        config.getoption("--vibench-instrument"), config.getoption("--vibench-bench")
+    )
 
 
 @pytest.fixture(scope="module")
 def rig(request: pytest.FixtureRequest) -> Rig:
     """Give the bench's configuration; the module under way says of which kind its instrument is."""
-    name, kind = request.config.getoption("--instrument"), request.module.KIND
+    name, kind = request.config.getoption("--vibench-instrument"), request.module.KIND
     rigs = request.config.stash[_RIGS]
     if kind not in rigs:
         pytest.skip(f"{name} is none of {kind.value}")
     found = rigs[kind]
     if found is None:
-        raise ConfigurationError(unnamed(name, request.config.getoption("--bench"), [kind]))
+        raise ConfigurationError(unnamed(name, request.config.getoption("--vibench-bench"), [kind]))
     return found
 
 
