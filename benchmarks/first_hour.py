@@ -22,7 +22,7 @@ CAMPAIGN = """name = "levels"
 [[measurements]]
 name = "noise"
 [measurements.excitation]
-kind = "multisine_noise"
+kind = "white_noise"
 amplitude_vpp = 0.05
 band_start_hz = 20
 band_stop_hz = 800

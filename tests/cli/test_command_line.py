@@ -83,7 +83,7 @@ def test_a_stop_does_not_hide_that_a_point_has_failed(tmp_path):
         ("amplitude_vpp = 1.5", "amplitude_v = 1.5", "amplitude_v is not a known key"),
         ("amplitude_vpp = 1.5", "amplitude_vpp = 15", "at most 10 Vpp"),
         ("amplitude_vpp = 1.5", 'amplitude_vpp = "1.5 V"', "give a number"),
-        ('kind = "dwell"', 'kind = "dwel"', "multisine_noise"),
+        ('kind = "dwell"', 'kind = "dwel"', "white_noise"),
         ("[[measurements]]", "[[measurements]", "not valid TOML"),
     ],
 )

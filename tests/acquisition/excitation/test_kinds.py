@@ -4,6 +4,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from vibench.acquisition.excitation import (
     EXCITATION_KINDS,
@@ -20,7 +21,6 @@ from vibench.acquisition.excitation import (
     HeldResponse,
     HeldSweep,
     LeadIn,
-    MultisineNoise,
     OddMultisine,
     RelativeSetting,
     ResonanceTracking,
@@ -31,7 +31,9 @@ from vibench.acquisition.excitation import (
     SteppedLevel,
     SteppedSine,
     StreamedNoise,
+    WhiteNoise,
     excitation_text,
+    present_word,
 )
 from vibench.acquisition.recording import SegmentLabel
 
@@ -40,7 +42,7 @@ MOVE = {"start_hz": 220, "stop_hz": 310, "duration_s": 6}
 HELD = BaseLevel(displacement_m=5e-6)
 WAY = (LeadIn(frequency_hz=250, amplitude_vpp=1),)
 EXAMPLES = (
-    MultisineNoise(amplitude_vpp=1, realisations=2, **BAND),
+    WhiteNoise(amplitude_vpp=1, realisations=2, **BAND),
     StreamedNoise(amplitude_vpp=1, duration_s=2, **BAND),
     SineSweep(amplitude_vpp=1, hold="displacement", **MOVE),
     Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=2, lead_in=WAY),
@@ -69,6 +71,14 @@ def test_the_union_and_the_rows_name_the_same_plans_in_the_same_order():
     assert list(EXCITATION_KINDS) == list(by_kind)
 
 
+@pytest.mark.parametrize("word", ["white_noise", "multisine_noise"])
+def test_white_noise_is_read_by_its_name_and_by_the_name_of_version_0_1(word):
+    read = TypeAdapter(Excitation).validate_python({"kind": word, "amplitude_vpp": 1, **BAND})
+    assert read == WhiteNoise(amplitude_vpp=1, **BAND)
+    assert (read.kind, present_word(word)) == ("white_noise", "white_noise")
+    assert read.model_dump()["kind"] == "white_noise"
+
+
 @every_kind
 def test_every_segment_that_is_recorded_is_one_that_results_are_taken_from_or_the_way_there(excitation):
     labels = {step.segment.label for step in excitation.steps()}
@@ -91,7 +101,7 @@ def test_a_resonance_is_sought_in_the_whole_range_of_its_plan():
 @pytest.mark.parametrize(
     ("kind", "level"),
     [
-        ("multisine_noise", RmsSetting()),
+        ("white_noise", RmsSetting()),
         ("odd_multisine", RmsSetting()),
         ("streamed_noise", RmsSetting()),
         ("dwell", RelativeSetting(1.0)),
@@ -141,7 +151,7 @@ def test_what_goes_through_frequencies_comes_to_each_from_the_side_it_is_turned_
         assert turned.turned(Direction.UP) == by_kind[kind].turned(Direction.UP)
 
 
-@pytest.mark.parametrize("kind", ["dwell", "held_dwell", "multisine_noise", "resonance_tracking"])
+@pytest.mark.parametrize("kind", ["dwell", "held_dwell", "white_noise", "resonance_tracking"])
 def test_what_has_no_direction_cannot_be_turned(kind):
     assert by_kind[kind].turned(Direction.UP) is None
     assert by_kind[kind].approach is Approach.REST

@@ -36,7 +36,7 @@ def test_a_key_named_as_a_kind_of_value_is_told_by_its_name(tmp_path, key):
 @pytest.mark.parametrize(
     ("excitation", "told"),
     [
-        ('{ kind = "dwel" }', "'kind' = 'dwel' is not known; allowed are 'multisine_noise', "),
+        ('{ kind = "dwel" }', "'kind' = 'dwel' is not known; allowed are 'white_noise', "),
         ("{ amplitude_vpp = 1.0 }", "'kind' is missing"),
         ("3", "give a table"),
     ],

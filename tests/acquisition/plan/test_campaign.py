@@ -1,10 +1,12 @@
 """Campaign files: defaults, refusals, exact round trips, and the two that are shipped."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
 from hypothesis import given, strategies as st
+from pydantic import ValidationError
 
 from vibench.acquisition import ConfigurationError, load_campaign, toml_text
 from vibench.acquisition.excitation import EXCITATION_KINDS
@@ -198,11 +200,21 @@ def test_a_shipped_campaign_keeps_the_limits_of_the_virtual_rig(path):
         require_within_limits(measurement, rig)
 
 
+def test_a_campaign_of_version_0_1_is_the_same_with_the_present_name_of_white_noise():
+    text = (ROOT / "campaigns" / "paper.toml").read_text("utf-8")
+    former = tomllib.loads(text.replace("white_noise", "multisine_noise"))
+    present = tomllib.loads(text)
+    assert Campaign.model_validate(former) == Campaign.model_validate(present)
+    both = {**present, "defaults": {**present["defaults"], **former["defaults"]}}
+    with pytest.raises(ValidationError, match="into one table"):
+        Campaign.model_validate(both)
+
+
 def test_the_paper_s_campaign_has_its_levels_band_and_times():
     plans = {
         each.name: each.excitation for each in load_campaign(ROOT / "campaigns" / "paper.toml").measurements
     }
-    noise = [plan.amplitude_vpp for plan in plans.values() if plan.kind == "multisine_noise"]
+    noise = [plan.amplitude_vpp for plan in plans.values() if plan.kind == "white_noise"]
     dwells = [plan for plan in plans.values() if plan.kind == "dwell"]
     sweep = plans["sweep_moderate"]
     assert noise == [0.05, 1.5, 10]

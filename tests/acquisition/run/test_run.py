@@ -534,7 +534,7 @@ class TestRefusals:
         text = self.refused(
             bench, tmp_path, DWELL.model_copy(update={"excitation": noise}), ConfigurationError
         )
-        assert "use multisine_noise with more realisations" in text
+        assert "use white_noise with more realisations" in text
 
     def test_a_bench_without_a_recorded_drive_is_refused(self, bench, tmp_path):
         bench.channels = bench.channels[1:]

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import RecordingError
+from ..plan import present_word
 from ..recording import (
     Recording,
     RecordingState,
@@ -90,7 +91,7 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         verdict=_verdict(recording, seal),
         started_utc=recording.started_utc,
         origin=recording.origin.value,
-        kind=str(excitation.get("kind", "")),
+        kind=present_word(str(excitation.get("kind", ""))),
         amplitude_vpp=_number(excitation.get("amplitude_vpp")),
         frequency_low_hz=low_hz,
         frequency_high_hz=high_hz,

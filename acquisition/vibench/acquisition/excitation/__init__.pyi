@@ -37,14 +37,12 @@ from ._kinds import (
     Excitation as Excitation,
     ExcitationKind as ExcitationKind,
     excitation_text as excitation_text,
+    present_word as present_word,
     rows_by_kind as rows_by_kind,
 )
 from ._multisine import (
     held_lines as held_lines,
     shaped_period as shaped_period,
-)
-from ._multisine_noise import (
-    MultisineNoise as MultisineNoise,
 )
 from ._odd_multisine import (
     OddMultisine as OddMultisine,
@@ -89,4 +87,8 @@ from ._steps import (
 )
 from ._streamed_noise import (
     StreamedNoise as StreamedNoise,
+)
+from ._white_noise import (
+    MultisineNoise as MultisineNoise,
+    WhiteNoise as WhiteNoise,
 )

@@ -13,7 +13,6 @@ from ._held_dwell import HeldDwell
 from ._held_noise import HeldNoise
 from ._held_response import HeldResponse
 from ._held_sweep import HeldSweep
-from ._multisine_noise import MultisineNoise
 from ._odd_multisine import OddMultisine
 from ._plan import AbstractExcitation, AbstractFeedback, Family
 from ._resonance_tracking import ResonanceTracking
@@ -22,9 +21,10 @@ from ._sine_sweep import SineSweep
 from ._stepped_level import SteppedLevel
 from ._stepped_sine import SteppedSine
 from ._streamed_noise import StreamedNoise
+from ._white_noise import WhiteNoise
 
 Excitation: TypeAlias = Annotated[
-    MultisineNoise
+    WhiteNoise
     | StreamedNoise
     | SineSweep
     | Dwell
@@ -74,6 +74,16 @@ EXCITATION_KINDS: Mapping[str, ExcitationKind] = MappingProxyType(
     {kind.word: kind for kind in map(ExcitationKind, get_args(get_args(Excitation)[0]))}
 )
 """A row for each plan of the union, which is written out for whoever checks types."""
+_PRESENT_WORDS = {
+    word: kind.word
+    for kind in EXCITATION_KINDS.values()
+    for word in get_args(kind.plan.model_fields["kind"].annotation)
+}
+
+
+def present_word(word: str) -> str:
+    """Return the present name of a kind for a name in a file; an unknown name is returned unchanged."""
+    return _PRESENT_WORDS.get(word, word)
 
 
 def rows_by_kind(of_family: Mapping[Family, Row], of_kind: Mapping[str, Row]) -> Mapping[str, Row]:

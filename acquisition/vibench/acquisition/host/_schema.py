@@ -45,7 +45,8 @@ def _with_defaults(schema: Json) -> None:
         of_kind = {**parts[name], "required": []}
         del of_kind["required"]
         parts[f"Shared{name}"] = of_kind
-        shared[parts[name]["properties"]["kind"]["enum"][0]] = {"$ref": f"#/definitions/Shared{name}"}
+        for word in parts[name]["properties"]["kind"]["enum"]:
+            shared[word] = {"$ref": f"#/definitions/Shared{name}"}
     schema["properties"]["defaults"] = {"type": "object", "properties": shared, "additionalProperties": False}
     template = {"anyOf": [{"$ref": f"#/definitions/Shared{name}"} for name in kinds]}
     parts["Template"] = {

@@ -42,7 +42,9 @@ from ..excitation import (
     SteppedLevel,
     SteppedSine,
     StreamedNoise,
+    WhiteNoise,
     excitation_text,
+    present_word,
     rows_by_kind,
 )
 from ._axis import (
@@ -158,6 +160,7 @@ __all__ = [
     "SteppedSine",
     "StreamedNoise",
     "SweepAxis",
+    "WhiteNoise",
     "base_motion",
     "check_amplitude_vpp",
     "check_phases",
@@ -179,6 +182,7 @@ __all__ = [
     "phases",
     "played_alike",
     "predicted_loads",
+    "present_word",
     "preview_measurement",
     "ramp",
     "require_played",

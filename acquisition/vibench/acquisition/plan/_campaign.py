@@ -11,7 +11,7 @@ from typing import Any, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
 
-from ..excitation import EXCITATION_KINDS
+from ..excitation import EXCITATION_KINDS, present_word
 from ..host import FrozenModel, load_toml, named
 from ._measurement import Measurement, Name, Point
 from ._schedule import measured_s
@@ -69,7 +69,13 @@ class Campaign(FrozenModel):
     @classmethod
     def _fill_in_defaults(cls, content: Any) -> Any:
         match content:
-            case {"defaults": dict(defaults), **rest}:
+            case {"defaults": dict(given), **rest}:
+                defaults = {present_word(str(key)): value for key, value in given.items()}
+                if len(defaults) < len(given):
+                    raise ValueError(
+                        "[defaults] has one kind of excitation by its present name and by its former name; "
+                        "put their values into one table"
+                    )
                 measurements = [_filled(each, defaults) for each in _listed(rest, "measurements")]
                 sweeps = [_filled_sweep(each, defaults) for each in _listed(rest, "sweeps")]
                 return {**rest, "measurements": measurements, "sweeps": sweeps}
@@ -164,7 +170,7 @@ def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
 
 def _of_kind(defaults: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
     """Give what excitations of a kind share; ValueError when it is no table."""
-    match defaults.get(str(kind), {}):
+    match defaults.get(present_word(str(kind)), {}):
         case dict(shared):
             return shared
         case _:

@@ -38,7 +38,7 @@ def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
             raise ConfigurationError(
                 f"{measurement.name} needs an analogue output, and this bench has none: its function "
                 "generator repeats one waveform. Nothing was played; add [daq.output] to the hardware "
-                "configuration, or use multisine_noise with more realisations"
+                "configuration, or use white_noise with more realisations"
             )
     return source
 

@@ -16,6 +16,7 @@ from typing import Any
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.plan import present_word
 from vibench.acquisition.recording import Recording
 
 from ..errors import InvalidRequest, NotEnoughData
@@ -206,7 +207,7 @@ def _file_entity(path: Path, folder: Path, untrusted: Mapping[str, str]) -> Enti
 
 
 def _recording_facts(recording: Recording) -> Entity:
-    kind = recording.plan.get("excitation", {}).get("kind", "recording")
+    kind = present_word(recording.plan.get("excitation", {}).get("kind", "recording"))
     measured = "; ".join(f"{each.role} [{each.unit}]" for each in recording.channels)
     return {
         "encodingFormat": HDF5_TYPE,

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from vibench.acquisition.plan import MultisineNoise, OddMultisine, StreamedNoise
+from vibench.acquisition.plan import OddMultisine, StreamedNoise, WhiteNoise
 from vibench.acquisition.recording import SegmentLabel
 
 from ..errors import InvalidRequest, NotEnoughData
@@ -25,7 +25,7 @@ from ._resonance import resonances, scattered_resonances
 from ._results import Estimator, FrequencyResponse, converted_frequency_response
 from ._transmissibility import FrequencyResponseSums
 
-Noise = MultisineNoise | OddMultisine | StreamedNoise
+Noise = WhiteNoise | OddMultisine | StreamedNoise
 _BLOCK = 1 << 19
 """Samples of a record that are looked at together."""
 _LEVEL_SEGMENT_S = 1.0
@@ -59,7 +59,7 @@ class NoiseResponse(Labelled):
 
 def repeated_response(
     channels: Channels,
-    noise: MultisineNoise | OddMultisine,
+    noise: WhiteNoise | OddMultisine,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
     *,
     repetitions: Sequence[Repetition] = (),

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.plan import present_word
 from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
 
@@ -239,7 +240,7 @@ def _shared_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedSh
                     continue
                 needed = True
                 plan = recording.plan.get("excitation") or {}
-                if ANALYSES[plan["kind"]].family == NOISE_FAMILY:
+                if ANALYSES[present_word(plan["kind"])].family == NOISE_FAMILY:
                     unknown.append((float(plan["amplitude_vpp"]), path))
         except (RecordingError, LookupError, TypeError, ValueError, AttributeError):
             continue  # its own analysis says what is wrong with it

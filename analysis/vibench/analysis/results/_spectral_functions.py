@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vibench.acquisition.plan import present_word
 from vibench.acquisition.recording import ChannelHeader, SegmentLabel
 from vibench.acquisition.rig import Role
 
@@ -50,7 +51,7 @@ def spectral_functions(excerpt: Excerpt, request: FrequencyResponseRequest) -> t
     require_checked(excerpt.recording)
     played = _played(excerpt)
     densities = tuple(_density(played, channel) for channel in excerpt.channels)
-    kind = excerpt.recording.plan.get("excitation", {}).get("kind", "")
+    kind = present_word(excerpt.recording.plan.get("excitation", {}).get("kind", ""))
     if kind not in ANALYSES or ANALYSES[kind].family != NOISE_FAMILY:
         return densities
     return (*_responses(analyse(excerpt.recording, request).response, request.view), *densities)

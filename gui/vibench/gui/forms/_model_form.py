@@ -61,7 +61,7 @@ class ModelForm(QWidget):
             if name in hidden:
                 continue
             plain, _ = unwrapped(field.annotation)
-            if get_origin(plain) is Literal and len(get_args(plain)) == 1:
+            if get_origin(plain) is Literal and (name == "kind" or len(get_args(plain)) == 1):
                 self._fixed[name] = get_args(plain)[0]
             else:
                 self._add(name, field)

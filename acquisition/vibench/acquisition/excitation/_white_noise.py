@@ -2,11 +2,13 @@
 
 from typing import Literal
 
+from pydantic import field_validator
+
 from ._multisine import Lines
 from ._periodic_noise import PeriodicNoise
 
 
-class MultisineNoise(PeriodicNoise):
+class WhiteNoise(PeriodicNoise):
     """White noise between two frequencies, as whole periods of flat lines with random phases.
 
     A periodic signal needs no window and has no leakage, but averaging its periods averages the
@@ -15,9 +17,19 @@ class MultisineNoise(PeriodicNoise):
     section 4.3).
     """
 
-    kind: Literal["multisine_noise"] = "multisine_noise"
+    kind: Literal["white_noise", "multisine_noise"] = "white_noise"
+    """``multisine_noise`` is the name of version 0.1; it is read as ``white_noise``."""
+
+    @field_validator("kind")
+    @classmethod
+    def _present_name(cls, _: str) -> Literal["white_noise"]:
+        return "white_noise"
 
     @property
     def lines(self) -> Lines:
         """All harmonics of ``repetition_hz`` in the band."""
         return self.candidates
+
+
+MultisineNoise = WhiteNoise
+"""Name of version 0.1, for scripts that use it."""
