@@ -14,6 +14,7 @@ from packaging.utils import canonicalize_name
 
 from vibench.acquisition import shipped_folder
 from vibench.acquisition.host._extras import EXTRAS
+from vibench.cli.__main__ import COMMANDS
 from vibench.cli.doctor import VARIABLES, libraries
 from vibench.cli.exit_code import ExitCode
 from vibench.sim.lanes import lanes_pay
@@ -189,6 +190,24 @@ def test_what_draws_nothing_needs_the_core_alone(tmp_path, arguments):
     told = without([*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], *arguments, cwd=tmp_path)
     assert told.returncode == 0, told.stderr
     assert json.loads(told.stdout)
+
+
+@pytest.mark.parametrize("words", [*((name,) for name in COMMANDS), ("bench", "list"), ("bench", "check")])
+def test_every_command_explains_itself_on_the_base_installation(tmp_path, words):
+    told = without([*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]], *words, "--help", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert f"vibench {' '.join(words)}" in told.stdout
+
+
+@pytest.mark.parametrize(
+    ("missing", "extra"), [(EXTRAS["bench"], "bench"), (EXTRAS["figures"], "figures"), (None, "bench")]
+)
+def test_the_demo_names_the_missing_extra_before_it_begins(tmp_path, missing, extra):
+    left_out = [*INSTRUMENTS_AND_WINDOW, *EXTRAS["figures"]] if missing is None else missing
+    told = without(left_out, "demo", cwd=tmp_path)
+    assert (told.returncode, told.stdout) == (1, "")
+    assert f"pip install 'vibench[{extra}]'" in told.stderr
+    assert not (tmp_path / "vibench_demo").exists()
 
 
 @pytest.mark.parametrize(

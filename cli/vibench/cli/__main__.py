@@ -20,7 +20,14 @@ import typer
 from rich.text import Text
 from typer.core import TyperCommand, TyperGroup
 
-from vibench.acquisition import AcquisitionError, Beside, CheckStopped, printable, shortened
+from vibench.acquisition import (
+    AcquisitionError,
+    Beside,
+    CheckStopped,
+    need_extra,
+    printable,
+    shortened,
+)
 from vibench.analysis import AnalysisError
 from vibench.sim import UnreadableTomlError
 from vibench.sim.study import StudyError
@@ -28,6 +35,17 @@ from vibench.sim.study import StudyError
 from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
 from .exit_code import ExitCode
 from .output import errors
+
+
+class Panel(StrEnum):
+    """Headings of the list of commands."""
+
+    MEASURE = "Measure"
+    ANALYSE = "Analyse"
+    PREDICT = "Predict"
+    BENCH = "Bench"
+    FILES = "Files"
+    INSTALLATION = "Installation"
 
 
 @dataclass(frozen=True)
@@ -38,6 +56,9 @@ class Place:
     function: str
     summary: str
     """First line of the function's docstring."""
+    panel: Panel
+    extras: tuple[str, ...] = ()
+    """Extras that it needs before it does anything, the one that brings the others first."""
 
     def load(self) -> typer.Typer:
         """Import the command, alone in an application of its own."""
@@ -53,7 +74,7 @@ class LateCommand(TyperCommand):
     """Stands in the list for a command, and hands over to it once it is called."""
 
     def __init__(self, name: str, place: Place) -> None:
-        super().__init__(name, help=place.summary)
+        super().__init__(name, help=place.summary, rich_help_panel=place.panel)
         self._place = place
 
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
@@ -61,7 +82,11 @@ class LateCommand(TyperCommand):
         command = typer.main.get_command(self._place.load())
         command.name = self.name
         with told_in_full([] if named.get("resilient_parsing") else args):
-            return command.make_context(info_name, [*args], *given, **named)
+            context = command.make_context(info_name, [*args], *given, **named)
+        if not named.get("resilient_parsing"):
+            for extra in self._place.extras:
+                need_extra(extra)
+        return context
 
 
 _USAGE_ERROR: Any = typer.BadParameter.__mro__[1]
@@ -129,136 +154,198 @@ COMMANDS = {
         "demo",
         "demo",
         "Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report.",
+        Panel.MEASURE,
+        ("bench", "figures"),
     ),
     "measure": Place(
         "measure",
         "measure",
         "Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign.",
+        Panel.MEASURE,
     ),
     "watch": Place(
         "watch",
         "watch",
         "Watch what an engine carries out, from any terminal of the same user; Ctrl-C leaves it be.",
+        Panel.MEASURE,
     ),
     "twin": Place(
         "twin",
         "twin",
         "Follow the hidden motion of what an engine measures, and note when the specimen changes.",
+        Panel.MEASURE,
     ),
     "stop": Place(
         "watch",
         "stop",
         "Stop all that engines, scripts and checks drive on this computer, campaigns and all.",
+        Panel.MEASURE,
     ),
     "release": Place(
-        "watch", "release", "Let a run go on that was held with vibench stop --level hold, or in the window."
+        "watch",
+        "release",
+        "Let a run go on that was held with vibench stop --level hold, or in the window.",
+        Panel.MEASURE,
+    ),
+    "gui": Place(
+        "gui",
+        "gui",
+        "Open the window: connect, check, choose, preview, run, watch, compare.",
+        Panel.MEASURE,
+        ("gui",),
     ),
     "analyse": Place(
         "analyse",
         "analyse",
         "Analyse recordings, complete, interrupted or still growing, and write one HTML report.",
+        Panel.ANALYSE,
+        ("figures",),
     ),
     "catalogue": Place(
         "catalogue",
         "show_catalogue",
         "List the recordings of a folder and the folders in it: what, when, how they ended, how large.",
-    ),
-    "specimen": Place(
-        "specimen",
-        "show_specimen",
-        "List the specimens and contact laws that there are, or say what one specimen amounts to.",
-    ),
-    "predict": Place("predict", "predict", "Predict the responses of m0 and of p over frequency."),
-    "branches": Place(
-        "branches",
-        "branches",
-        "Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations.",
-    ),
-    "spectrum": Place(
-        "spectrum",
-        "spectrum",
-        "Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension.",
-    ),
-    "chain": Place(
-        "chain",
-        "chain",
-        "Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell.",
-    ),
-    "study": Place(
-        "study", "study", "Predict responses over every combination of what a file lists, longest first."
-    ),
-    "map": Place(
-        "map_motions",
-        "map_motions",
-        "Map the motions over two parameters or two coordinates of the start, or along one parameter.",
+        Panel.ANALYSE,
     ),
     "figure": Place(
         "figure",
         "figure",
         "Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped.",
+        Panel.ANALYSE,
+        ("figures",),
     ),
-    "gui": Place("gui", "gui", "Open the window: connect, check, choose, preview, run, watch, compare."),
     "reproduce": Place(
         "reproduce",
         "reproduce",
         "Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped.",
+        Panel.ANALYSE,
+        ("figures",),
+    ),
+    "specimen": Place(
+        "specimen",
+        "show_specimen",
+        "List the specimens and contact laws that there are, or say what one specimen amounts to.",
+        Panel.PREDICT,
+    ),
+    "predict": Place(
+        "predict",
+        "predict",
+        "Predict the responses of m0 and of p over frequency.",
+        Panel.PREDICT,
+    ),
+    "branches": Place(
+        "branches",
+        "branches",
+        "Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations.",
+        Panel.PREDICT,
+        ("figures",),
+    ),
+    "spectrum": Place(
+        "spectrum",
+        "spectrum",
+        "Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension.",
+        Panel.PREDICT,
+        ("figures",),
+    ),
+    "chain": Place(
+        "chain",
+        "chain",
+        "Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell.",
+        Panel.PREDICT,
+        ("figures",),
+    ),
+    "study": Place(
+        "study",
+        "study",
+        "Predict responses over every combination of what a file lists, longest first.",
+        Panel.PREDICT,
+    ),
+    "map": Place(
+        "map_motions",
+        "map_motions",
+        "Map the motions over two parameters or two coordinates of the start, or along one parameter.",
+        Panel.PREDICT,
+        ("figures",),
     ),
     "tradeoff": Place(
         "tradeoff",
         "tradeoff",
         "Measure what each accuracy costs and what error it makes, with and without impacts and in chaos.",
+        Panel.PREDICT,
+        ("figures",),
+    ),
+    "bench": Place(
+        "bench",
+        "bench",
+        "Look at the instruments.",
+        Panel.BENCH,
+    ),
+    "serve-rig": Place(
+        "serve_rig",
+        "serve_rig",
+        "Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C.",
+        Panel.BENCH,
+        ("bench",),
     ),
     "export": Place(
         "export",
         "export",
         "Write a recording's samples or spectra, with units, as a file that other programs read.",
+        Panel.FILES,
+    ),
+    "import": Place(
+        "import_recording",
+        "import_file",
+        "Make a recording of another program's file, or say what is in it.",
+        Panel.FILES,
     ),
     "pack": Place(
         "pack",
         "pack",
         "Pack a folder of recordings as a Research Object Crate, described for a repository.",
-    ),
-    "import": Place(
-        "import_recording", "import_file", "Make a recording of another program's file, or say what is in it."
+        Panel.FILES,
     ),
     "recover": Place(
         "recover",
         "recover_recording",
         "Finish a recording that was cut off: all that was committed becomes NAME.h5.",
+        Panel.FILES,
     ),
     "verify": Place(
         "verify",
         "verify",
         "Hold every recording of a folder against its seal, samples and all, and against journals.",
+        Panel.FILES,
     ),
-    "serve-rig": Place(
-        "serve_rig", "serve_rig", "Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."
-    ),
-    "bench": Place("bench", "bench", "Look at the instruments."),
     "examples": Place(
         "examples",
         "examples",
         "List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them.",
+        Panel.INSTALLATION,
     ),
     "docs": Place(
         "docs",
         "docs",
         "Build the documentation site from what is installed, if it is not there, and say where it lies.",
+        Panel.INSTALLATION,
     ),
     "schema": Place(
         "schema",
         "schema",
         "Print the JSON Schema (draft 4) of a kind of TOML file, for an editor that checks as one types.",
+        Panel.INSTALLATION,
     ),
     "warm": Place(
         "warm",
         "warm",
         "Compile the simulation, and the virtual rig where it is installed, before the first use.",
+        Panel.INSTALLATION,
     ),
     "doctor": Place(
         "doctor",
         "doctor",
         "Say what this installation consists of, for a question to others: data only, nothing is changed.",
+        Panel.INSTALLATION,
     ),
 }
 

@@ -34,7 +34,6 @@ from vibench.analysis import (
 )
 from vibench.analysis.dynamics import BranchDiagram, read_diagram
 from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion, tracked_specimen
-from vibench.analysis.report import check_warnings, findings, write_report
 from vibench.sim import Specimen
 from vibench.sim.maps import MapResults, open_map
 
@@ -267,6 +266,8 @@ def _analyse(
         motions = list(hidden_motions(results, laid, observer, hidden))
     if updated is not None:
         results = replace(results, model_said=updated.sentences)
+    from vibench.analysis.report import check_warnings, findings, write_report
+
     if as_json:
         fitted = {} if updated is None else {"specimen_fit": updated.to_dict()}
         told = (

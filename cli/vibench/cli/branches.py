@@ -25,7 +25,6 @@ from vibench.analysis.dynamics import (
     branch_lines,
     write_diagram,
 )
-from vibench.analysis.report import branches_figure
 from vibench.sim import Parameter, PhaseReference
 
 from .dynamics_answer import computed, keep, leave, print_answer, room_for
@@ -133,6 +132,8 @@ def branches(
         rig = load_rig(holdable)
         loop_s = loop_time_s(rig, lowest_hz) if rig.controller is None else fast_loop_time_s(rig.controller)
         asked = asked.model_copy(update={"loop_time_s": loop_s})
+    from vibench.analysis.report import branches_figure
+
     room_for(FILE, out)
     if not as_json:
         console.print("Looking for motions; each branch is told as it is found.")

@@ -15,7 +15,6 @@ from vibench.analysis.dynamics import (
     chain_runs,
     write_chain,
 )
-from vibench.analysis.report import chain_figure
 from vibench.sim import USUAL_SPECIMEN, Accuracy, Parameter
 from vibench.sim.chain import MOST_CELLS
 
@@ -94,6 +93,8 @@ def chain(
         exponent_s=exponent,
         accuracy=accuracy,
     )
+    from vibench.analysis.report import chain_figure
+
     room_for(FILE, out)
 
     def tell(_number: int, run: ChainRun) -> None:

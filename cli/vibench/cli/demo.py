@@ -10,7 +10,6 @@ from vibench.acquisition.campaign import PointOutcome, PointResult
 from vibench.acquisition.engine import CampaignRequest
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import DRAWS, FEWEST_DRAWS, campaign_summary
-from vibench.analysis.report import write_report
 
 from .analyse import complain_about
 from .analyst import second_process
@@ -32,6 +31,8 @@ def demo(
     ] = DRAWS,
 ) -> None:
     """Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report."""
+    from vibench.analysis.report import write_report
+
     folder = unused(Path("vibench_demo")) if out is None else out
     campaign = load_campaign(shipped("campaigns/paper.toml"))
     console.print(

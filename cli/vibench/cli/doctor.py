@@ -124,7 +124,7 @@ def instruments() -> Iterator[tuple[str, str]]:
     except MissingLibrary as error:
         yield "libraries", str(error)
         return
-    from vibench.acquisition import list_instruments  # noqa: PLC0415 - loads the instruments' libraries
+    from vibench.acquisition import list_instruments
 
     found = list_instruments()
     yield "VISA", ", ".join(found.visa_resources) or "no instrument"

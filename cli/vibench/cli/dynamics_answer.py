@@ -3,18 +3,21 @@
 import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import typer
 
 from vibench.analysis import InvalidRequest
-from vibench.analysis.report import DrawnFigure, ImageKind
+from vibench.analysis.figures import ImageKind
 from vibench.sim.study import software
 
 from .exit_code import ExitCode
 from .interruption import told_to_stop
 from .output import bold, console, print_json
 from .paths import room_for_folder
+
+if TYPE_CHECKING:
+    from vibench.analysis.report import DrawnFigure
 
 Part = TypeVar("Part")
 SHOWN = 24
@@ -57,7 +60,7 @@ def computed(
 
 
 def keep(
-    out: Path | None, write: Callable[[Path], object], draw: Callable[[], DrawnFigure], *, is_told: bool
+    out: Path | None, write: Callable[[Path], object], draw: "Callable[[], DrawnFigure]", *, is_told: bool
 ) -> None:
     """Write the file, its figure and its tables into a folder, if one was asked for."""
     if out is None:

@@ -11,6 +11,7 @@ from rich.progress import BarColumn, Progress, TaskID, TimeElapsedColumn, TimeRe
 from vibench.acquisition.engine import DRIVING, EngineMessage, EngineStatus, MessageKind, RowStatus, RunStatus
 
 from .output import console, words
+from .progress_bars import shown
 
 INTERVAL_S = 0.1
 """How often the terminal is drawn [s]."""
@@ -29,6 +30,7 @@ class EngineBars:
 
     def __init__(self, on: Console = console) -> None:
         self._bars = Progress(*COLUMNS, console=on, speed_estimate_period=10)
+        self._shown = shown(self._bars)
         self._whole: TaskID | None = None
         self._one: TaskID | None = None
         self._name = ""
@@ -36,13 +38,13 @@ class EngineBars:
         self._messages = 0
 
     def __enter__(self) -> Self:
-        self._bars.start()
+        self._shown.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._bars.stop()
+        self._shown.__exit__(kind, error, trace)
 
     def draw(self, status: EngineStatus) -> None:
         """Draw what is new."""

@@ -2,26 +2,22 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vibench.analysis import CampaignResults, InvalidRequest, analyse_files, recordings_in
-from vibench.analysis.report import (
-    PAPER_FIGURES,
-    DrawnFigure,
-    FigureOptions,
-    FrequencyGrid,
-    ImageKind,
-    recording_figures,
-    result_figures,
-)
+from vibench.analysis.figures import ImageKind
+from vibench.analysis.paper_figures import FigureOptions, FrequencyGrid
 from vibench.sim import Accuracy
 
 from .analyse import complain_about
 from .output import bold, console
 from .paths import room_for_folder
 from .study import KeptStudies, Workers
+
+if TYPE_CHECKING:
+    from vibench.analysis.report import DrawnFigure
 
 ALL = "all"
 EXPERIMENT = (12, 13, 14)
@@ -55,6 +51,8 @@ def figure(
     ] = [ImageKind.PNG, ImageKind.SVG],  # noqa: B006 - typer copies it
 ) -> None:
     """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
+    from vibench.analysis.report import PAPER_FIGURES
+
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
     # Whoever asks for all of them learns before the first what one of them cannot be drawn with.
@@ -63,7 +61,7 @@ def figure(
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     studies = KeptStudies(out / "studies", workers)
 
-    def simulated(each: int) -> Iterator[DrawnFigure]:
+    def simulated(each: int) -> "Iterator[DrawnFigure]":
         yield PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))
 
     for each in numbers:
@@ -74,6 +72,8 @@ def figure(
 
 
 def _numbers(asked: str) -> tuple[int, ...]:
+    from vibench.analysis.report import PAPER_FIGURES
+
     known = (*PAPER_FIGURES, *EXPERIMENT)
     if asked == ALL:
         return tuple(PAPER_FIGURES)
@@ -82,7 +82,7 @@ def _numbers(asked: str) -> tuple[int, ...]:
     raise InvalidRequest(f"figure {asked!r} was asked for; the paper has 1 to {known[-1]}, or say all")
 
 
-def _experiment(folder: Path | None, wanted: list[int]) -> Callable[[int], Iterator[DrawnFigure]]:
+def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iterator[DrawnFigure]]":
     """Give what draws the figures of the experiment; the recordings are analysed once."""
     if not wanted:
         return lambda _: iter(())
@@ -96,7 +96,9 @@ def _experiment(folder: Path | None, wanted: list[int]) -> Callable[[int], Itera
     return lambda number: _measured(number, results)
 
 
-def _measured(number: int, results: CampaignResults) -> Iterator[DrawnFigure]:
+def _measured(number: int, results: CampaignResults) -> "Iterator[DrawnFigure]":
+    from vibench.analysis.report import recording_figures, result_figures
+
     match number:
         case 12:
             for each in results.results[:1]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition import named, need_extra
+from vibench.acquisition import named
 
 from .paths import BenchPath
 
@@ -23,7 +23,6 @@ def gui(
     ] = None,
 ) -> None:
     """Open the window: connect, check, choose, preview, run, watch, compare."""
-    need_extra("gui")
     command = [sys.executable, "-m", WINDOW]
     if bench is not None:
         command += ["--bench", str(named(bench, "hardware_configs"))]

@@ -8,7 +8,7 @@ import typer
 from vibench.acquisition import load_toml, named
 from vibench.analysis import InvalidRequest, recorded_response
 from vibench.analysis.dynamics import map_caption, motion_words, read_diagram
-from vibench.analysis.report import SHOWN, ImageKind, map_figure
+from vibench.analysis.figures import SHOWN, ImageKind
 from vibench.sim import Observable
 from vibench.sim.maps import (
     KickStability,
@@ -110,6 +110,8 @@ def map_motions(
     ):
         results = solve_map(asked, out / FILE, existing, workers, cluster, observer, is_stopped)
     stability = kick_stability(results, kicks=kicks, workers=workers) if kicks and results.is_complete else ()
+    from vibench.analysis.report import map_figure
+
     drawn = map_figure(results, show, diagram, levels).save(out, (ImageKind.PNG, ImageKind.SVG))
     if as_json:
         print_json(document(results, stability, out / FILE))

@@ -1,7 +1,8 @@
-"""Progress bars on standard error, so that standard output stays what was asked for."""
+"""Progress bars on standard error, so that standard output stays what was asked for; lines without a terminal."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from threading import Event, Thread
 
 from rich.progress import (
     BarColumn,
@@ -16,12 +17,46 @@ from vibench.sim.study import StudyObserver, StudyProgress
 
 from .output import console, errors, words
 
+LINE_INTERVAL_S = 10.0
+"""Time between two lines of progress where there is no terminal to draw bars on [s]."""
+
+
+@contextmanager
+def shown(bars: Progress, interval_s: float = LINE_INTERVAL_S) -> Iterator[Progress]:
+    """Draw progress bars on a terminal; print a line of them every few seconds into anything else."""
+    if bars.console.is_terminal:
+        with bars:
+            yield bars
+        return
+    ending = Event()
+
+    def print_lines() -> None:
+        while not ending.wait(interval_s):
+            bars.console.print("progress:", progress_line(bars))
+
+    thread = Thread(target=print_lines, name="progress lines", daemon=True)
+    thread.start()
+    try:
+        yield bars
+    finally:
+        ending.set()
+
+
+def progress_line(bars: Progress) -> str:
+    """Put all bars into one line of text."""
+    return "; ".join(
+        each.description
+        if each.total is None
+        else f"{each.description} {each.completed:.0f} of {each.total:.0f} ({each.percentage:.0f} %)"
+        for each in bars.tasks
+    )
+
 
 @contextmanager
 def analysis_bar(recordings: int) -> Iterator[Callable[[], None]]:
     """Show how many of the recordings are analysed; call what it gives after each."""
     columns = (words("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
-    with Progress(*columns, TimeElapsedColumn(), console=console) as bars:
+    with shown(Progress(*columns, TimeElapsedColumn(), console=console)) as bars:
         bar = bars.add_task("analysis and simulation", total=recordings)
         yield lambda: bars.advance(bar)
 
@@ -40,7 +75,7 @@ def study_bar(points: int) -> Iterator[StudyObserver]:
         TimeElapsedColumn(),
         words("{task.fields[left]}"),
     )
-    with Progress(*columns, console=errors) as bars:
+    with shown(Progress(*columns, console=errors)) as bars:
         bar = bars.add_task("points", total=points, left="")
 
         def watch(progress: StudyProgress) -> None:
@@ -67,6 +102,6 @@ def _duration(seconds: float) -> str:
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
     """Show the bar while inside; what it gives is told how many values came since the last call."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
-    with Progress(*columns, TimeRemainingColumn(), console=errors) as bars:
+    with shown(Progress(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)
         yield lambda done: bars.advance(bar, done)

@@ -8,6 +8,7 @@ from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TimeE
 from vibench.analysis import ProgressObserver
 
 from .output import errors, words
+from .progress_bars import shown
 
 
 class ReadingBar:
@@ -28,12 +29,12 @@ class ReadingBar:
 
 @contextmanager
 def reading_bar() -> Iterator[ProgressObserver]:
-    """Show the bar while inside, on a terminal only; it leaves nothing behind."""
+    """Show the bar while inside; on a terminal it leaves nothing behind."""
     columns = (
         words("{task.description}"),
         BarColumn(bar_width=30),
         TaskProgressColumn(),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=errors, transient=True, disable=not errors.is_terminal) as bars:
+    with shown(Progress(*columns, console=errors, transient=True)) as bars:
         yield ReadingBar(bars, bars.add_task("opening", total=None))

@@ -3,31 +3,22 @@
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
-from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind, levels_figure
-from vibench.analysis.reproduction import (
-    OPTIONS,
-    SECTIONS,
-    Case,
-    Evidence,
-    Picture,
-    Reproduction,
-    case_with,
-    damping_score_figure,
-    levels_asked,
-    reproduction,
-    reproduction_document,
-    verdict_text,
-)
+from vibench.analysis.figures import ImageKind
+from vibench.analysis.paper_figures import FigureOptions, FrequencyGrid
+from vibench.analysis.reproduction import OPTIONS, Case, case_with
 from vibench.sim import Accuracy
 
 from .output import bold, console
 from .paths import room_for_folder, room_for_page
 from .study import KeptStudies, Workers
+
+if TYPE_CHECKING:
+    from vibench.analysis.reproduction import Evidence, Picture, Reproduction
 
 PAGE = "reproduction.md"
 _FORMS = ", ".join(f"{name}={option.example} ({option.about})" for name, option in OPTIONS.items())
@@ -56,6 +47,8 @@ def reproduce(
     workers: Workers = None,
 ) -> None:
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
+    from vibench.analysis.reproduction import SECTIONS, Evidence, reproduction, reproduction_document
+
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
     case = case_with(options, said or ())
     room_for_folder(out)
@@ -72,15 +65,20 @@ def reproduce(
     studies.complain()
 
 
-def _pictures(found: Reproduction, evidence: Evidence, case: Case, page: Path) -> Iterator[Picture]:
+def _pictures(found: "Reproduction", evidence: "Evidence", case: Case, page: Path) -> "Iterator[Picture]":
     """Draw what the page shows into a folder beside it."""
+    from vibench.analysis.report import levels_figure
+    from vibench.analysis.reproduction import Picture, damping_score_figure, levels_asked
+
     curves = evidence.study(levels_asked(case))
     for drawn in (damping_score_figure(found.scores), levels_figure(case.options, curves)):
         image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
         yield Picture(drawn.title, Path(os.path.relpath(image, page.parent)).as_posix())
 
 
-def _tell(found: Reproduction) -> None:
+def _tell(found: "Reproduction") -> None:
+    from vibench.analysis.reproduction import verdict_text
+
     rows = Table(title="What of the paper holds", title_justify="left")
     rows.add_column("claim")
     rows.add_column("verdict")

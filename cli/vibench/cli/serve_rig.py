@@ -4,15 +4,17 @@ import signal
 import threading
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
-from vibench.virtual_rig import DiskFaults, VirtualRig
 
 from .output import bold, console
 from .paths import FaultsPath, rig_at
+
+if TYPE_CHECKING:
+    from vibench.virtual_rig import VirtualRig
 
 
 class ServedPace(StrEnum):
@@ -43,6 +45,8 @@ def serve_rig(
     faults: FaultsPath = None,
 ) -> None:
     """Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C."""
+    from vibench.virtual_rig import DiskFaults, VirtualRig
+
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
@@ -67,7 +71,7 @@ def serve_rig(
     console.print("The virtual rig is off.")
 
 
-def _hints(rig: VirtualRig) -> tuple[tuple[str, tuple[str, ...]], ...]:
+def _hints(rig: "VirtualRig") -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Say how other programs reach it, in lines that work when they are pasted."""
     opened = 'pyvisa.ResourceManager("@py").open_resource'
     usb = f"from vibench.virtual_rig import plug_in_remote; plug_in_remote({rig.daq_address!r})"

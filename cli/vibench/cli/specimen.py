@@ -75,7 +75,7 @@ def figures_of(specimen: Specimen) -> dict[str, object]:
 
 
 def _draw(specimen: str | None, folder: Path) -> None:
-    from vibench.analysis.report import contact_forces_figure  # noqa: PLC0415 - a list needs no pictures
+    from vibench.analysis.report import contact_forces_figure
 
     table = described(specimen)
     laws = [each.example for each in CONTACT_LAWS.values()] if specimen is None else [table.contact]

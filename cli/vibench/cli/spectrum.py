@@ -12,7 +12,6 @@ from vibench.analysis.dynamics import (
     spectrum_points,
     write_spectrum,
 )
-from vibench.analysis.report import exponent_spectrum_figure
 from vibench.sim import Accuracy, Parameter
 
 from .dynamics_answer import SHOWN, computed, keep, leave, print_answer, room_for
@@ -64,6 +63,8 @@ def spectrum(
         settle_s=settle,
         confidence=confidence,
     )
+    from vibench.analysis.report import exponent_spectrum_figure
+
     room_for(FILE, out)
     points, elapsed_s, _ = computed(spectrum_points(asked), lambda _number, _point: None)
     is_complete = len(points) == len(asked.values)

@@ -10,7 +10,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedCo
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
-from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark import (
     LOTTERIES,
@@ -25,6 +24,7 @@ from vibench.sim.accuracy_benchmark import (
 
 from .output import console, errors, print_json, words
 from .paths import AsJson, room_for_folder, room_for_page
+from .progress_bars import shown
 
 _SHORTEST_S = 0.05
 _LONGEST_S = 60.0
@@ -53,7 +53,7 @@ def tradeoff(
     if markdown is not None:
         room_for_page(markdown)
     columns = (words("{task.description:<28}"), BarColumn(bar_width=30), MofNCompleteColumn())
-    with Progress(*columns, TimeElapsedColumn(), console=errors) as bars:
+    with shown(Progress(*columns, TimeElapsedColumn(), console=errors)) as bars:
         bar = bars.add_task("", total=_STEPS)
 
         def step(name: str) -> None:
@@ -77,6 +77,8 @@ def _folder(out: Path | None, markdown: Path | None) -> Path | None:
 
 
 def _save(benchmark: AccuracyBenchmark, folder: Path, markdown: Path | None) -> None:
+    from vibench.analysis.report import accuracy_document, tradeoff_figure
+
     paths = tradeoff_figure(benchmark).save(folder)
     if markdown is not None:
         picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()
@@ -123,6 +125,8 @@ def _number(value: float | None) -> str:
 
 
 def _document(benchmark: AccuracyBenchmark) -> dict[str, object]:
+    from vibench.analysis.report import worst_error
+
     return {
         "machine": benchmark.machine,
         "software": benchmark.software,

@@ -22,7 +22,6 @@ from ._distortion import (
 )
 from ._drawn import (
     DrawnFigure as DrawnFigure,
-    ImageKind as ImageKind,
 )
 from ._dwells import (
     dwells_figure as dwells_figure,
@@ -46,8 +45,13 @@ from ._hidden_motion import (
 from ._hysteresis import (
     hysteresis_figure as hysteresis_figure,
 )
-from ._maps import (
+from ._image_kind import (
+    ImageKind as ImageKind,
+)
+from ._map_quantities import (
     SHOWN as SHOWN,
+)
+from ._maps import (
     map_figure as map_figure,
 )
 from ._portraits import (

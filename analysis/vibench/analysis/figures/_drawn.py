@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -10,19 +9,12 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from ..tables import Table, write_tables
+from ._image_kind import ImageKind
 from ._style import PNG_DPI, styled
 
 _NO_DATE = {"Date": None}
 _NO_PDF_DATE = {"CreationDate": None}
 """Two figures of the same data are the same file."""
-
-
-class ImageKind(StrEnum):
-    """Formats that a figure is written in; the value is the files' suffix."""
-
-    PNG = "png"
-    SVG = "svg"
-    PDF = "pdf"
 
 
 SCREEN = (ImageKind.PNG, ImageKind.SVG)

@@ -26,6 +26,7 @@ from ..signals import Reals
 from ..tables import Table, table
 from ._branches import draw_line
 from ._drawn import DrawnFigure
+from ._map_quantities import SHOWN
 from ._style import (
     LEVELS,
     MEASURED,
@@ -39,18 +40,6 @@ from ._style import (
 
 _PANEL_IN = 3.6
 _STRIP_IN = 2.6
-SHOWN = {
-    "response_i": "Response I of m0 over A0",
-    "response_ii": "Response II of m0 over A0",
-    "relative_i": "Response I of p over A0",
-    "relative_ii": "Response II of p over A0",
-    "impact_rate": "impacts a second",
-    "contact_energy": "largest energy in a stop [J]",
-    "lyapunov": "largest Lyapunov exponent [1/s]",
-    "duration": "followed for [s]",
-    "motions": "motions that the starts came to",
-}
-"""Quantities that a map may show beside the kinds of motion."""
 MICRO = 1e6
 _LINEAR = ("lyapunov", "motions", "duration")
 _COLOURS = (*LEVELS, "#f0e442", "#1b1b1b")

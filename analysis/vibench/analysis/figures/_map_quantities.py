@@ -1,0 +1,14 @@
+"""Quantities of a map; options of commands name them where matplotlib is not installed."""
+
+SHOWN = {
+    "response_i": "Response I of m0 over A0",
+    "response_ii": "Response II of m0 over A0",
+    "relative_i": "Response I of p over A0",
+    "relative_ii": "Response II of p over A0",
+    "impact_rate": "impacts a second",
+    "contact_energy": "largest energy in a stop [J]",
+    "lyapunov": "largest Lyapunov exponent [1/s]",
+    "duration": "followed for [s]",
+    "motions": "motions that the starts came to",
+}
+"""Quantities that a map may show beside the kinds of motion."""

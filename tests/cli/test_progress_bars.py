@@ -1,0 +1,40 @@
+"""Progress: bars on a terminal, whole lines of text in anything else."""
+
+import io
+from threading import Event
+
+from rich.console import Console
+from rich.progress import Progress
+
+from vibench.cli.progress_bars import LINE_INTERVAL_S, shown
+
+
+class Log(io.StringIO):
+    """A file that says when it was written to."""
+
+    def __init__(self):
+        super().__init__()
+        self.written = Event()
+
+    def write(self, text):
+        count = super().write(text)
+        if "\n" in text:
+            self.written.set()
+        return count
+
+
+def test_without_a_terminal_progress_is_one_line_each_time():
+    log = Log()
+    with shown(Progress(console=Console(file=log, width=200)), interval_s=0.01) as bars:
+        bars.update(bars.add_task("noise", total=60), completed=15)
+        bars.add_task("opening", total=None)
+        log.written.clear()
+        assert log.written.wait(10.0)
+    assert log.getvalue().splitlines()[-1] == "progress: noise 15 of 60 (25 %); opening"
+
+
+def test_what_ends_before_ten_seconds_leaves_no_line():
+    log = Log()
+    with shown(Progress(console=Console(file=log))) as bars:
+        bars.add_task("noise", total=60)
+    assert (LINE_INTERVAL_S, log.getvalue()) == (10.0, "")
