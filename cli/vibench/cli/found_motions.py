@@ -14,7 +14,7 @@ def share_text(point: ScenePrediction) -> str:
     """Say how many starts came to the motion of a point, of how many; nothing where the start decides."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
-            return f"{ensemble.motions[ensemble.asked].starts} of {ensemble.starts}"
+            return f"{ensemble.motions[ensemble.asked].starts}/{ensemble.starts}"
         case ScenePrediction(memory=StartMemory.LOST):
             return "forgotten"
         case _:
@@ -30,7 +30,7 @@ def motions_table(points: Sequence[ScenePrediction]) -> Table | None:
         title="Where the start is forgotten: the motions that starts a millionth of a gap apart came to",
         caption=f"{len(several) - _SHOWN} more are in the JSON" if len(several) > _SHOWN else None,
     )
-    for heading in ("f [Hz]", "I", "II", "p: I", "p: II", "motion", "error", "share"):
+    for heading in ("f [Hz]", "I", "II", "I of p", "II of p", "motion", "error", "share"):
         rows.add_column(heading, justify="right")
     for point, motion in several[:_SHOWN]:
         responses = (motion.response_i, motion.response_ii, motion.relative_i, motion.relative_ii)

@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.progress import TextColumn
 from rich.segment import Segment
+from rich.table import Table
 from rich.text import Text
 
 from vibench.acquisition import printable
@@ -46,6 +47,14 @@ def bold(text: object) -> Text:
 def paragraph(text: str) -> Text:
     """Give a text of several lines to a console."""
     return Text(text)
+
+
+def print_table(rows: Table) -> None:
+    """Print a table that no terminal and no file is too narrow for: words wrap, a number is never cut."""
+    for column in rows.columns:
+        words_of = [word for text in (column.header, *column.cells) for word in str(text).split()]
+        column.min_width = max((len(word) for word in words_of), default=0)
+    console.print(rows)
 
 
 def print_warnings(sentences: Iterable[str]) -> None:

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 import numpy as np
 import typer
 from pydantic import ValidationError
+from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
@@ -28,7 +29,7 @@ from vibench.sim.study import (
 from .found_motions import forgetting_text, motions_table, share_text
 from .frequency_option import frequencies
 from .interruption import told_to_stop
-from .output import console, errors, paragraph, print_json, print_warnings
+from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
 from .progress_bars import study_bar
 from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, described, given_options
@@ -228,9 +229,14 @@ def _cost(points: Sequence[_Planned]) -> str:
 
 
 def _tell(results: StudyResults) -> None:
-    rows = Table(title="Responses I and II of m0 and of p = y - z, over the base amplitude")
+    rows = Table(
+        title="Responses I and II of m0 and of p = y - z, over the base amplitude [-]",
+        box=SIMPLE_HEAD,
+        padding=0,
+        show_edge=False,
+    )
     has_exponents = Observable.LYAPUNOV in results.study.observe
-    headings = ["f [Hz]", "I", "II", "p: I", "p: II", "impacts", "motion", "error", "starts"]
+    headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
     for heading in headings + ["exponent [1/s]"] * has_exponents:
         rows.add_column(heading, justify="right")
     points = list(results.predictions())
@@ -248,12 +254,12 @@ def _tell(results: StudyResults) -> None:
             share_text(each),
             *([_number(each.lyapunov_per_s)] if has_exponents else []),
         )
-    console.print(rows)
+    print_table(rows)
     if step > 1:
         console.print(f"every {step}th of {len(points)} points; --json or --out gives all")
     motions = motions_table(points)
     if motions is not None:
-        console.print(motions)
+        print_table(motions)
 
 
 def _number(value: float | None) -> str:

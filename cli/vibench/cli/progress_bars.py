@@ -1,4 +1,4 @@
-"""Progress bars on standard error, so that standard output stays what was asked for; lines without a terminal."""
+"""Progress bars on standard error; without a terminal, a line every ten seconds."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

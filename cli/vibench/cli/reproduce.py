@@ -13,7 +13,7 @@ from vibench.analysis.paper_figures import FigureOptions, FrequencyGrid
 from vibench.analysis.reproduction import OPTIONS, Case, case_with
 from vibench.sim import Accuracy
 
-from .output import bold, console
+from .output import bold, console, print_table
 from .paths import room_for_folder, room_for_page
 from .study import KeptStudies, Workers
 
@@ -84,4 +84,4 @@ def _tell(found: "Reproduction") -> None:
     rows.add_column("verdict")
     for each in found.judgements:
         rows.add_row(each.claim.says, verdict_text(each).strip("*"))
-    console.print(rows)
+    print_table(rows)

@@ -22,7 +22,7 @@ from vibench.sim.accuracy_benchmark import (
     measure_accuracy,
 )
 
-from .output import console, errors, print_json, words
+from .output import console, errors, print_json, print_table, words
 from .paths import AsJson, room_for_folder, room_for_page
 from .progress_bars import shown
 
@@ -98,7 +98,7 @@ def _tell(found: MotionBenchmark) -> None:
         rows.add_row(level.accuracy.value, f"{1 / level.cost:.0f}", _number(level.state_error), first)
     for solver in found.solvers:
         rows.add_row(f"scipy {solver.name}", f"{1 / solver.cost:.2g}", _number(solver.state_error), "")
-    console.print(rows)
+    print_table(rows)
     console.print(found.advice)
     console.print()
 
@@ -117,7 +117,7 @@ def _tell_lotteries(lotteries: tuple[LotteryFigures, ...]) -> None:
                 f"{stated.of_many:.0%} of {each.starts}",
                 f"{each.cost:.1f}",
             )
-    console.print(rows)
+    print_table(rows)
 
 
 def _number(value: float | None) -> str:
