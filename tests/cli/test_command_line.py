@@ -50,6 +50,18 @@ def test_a_measured_campaign_is_recorded_and_a_second_run_overwrites_nothing(vib
 
 
 @pytest.mark.thorough
+def test_a_campaign_a_file_and_a_page_are_results_as_json(vibench, tmp_path):
+    measured = vibench("measure", campaign(tmp_path), "--out", "recordings", "--json", cwd=tmp_path)
+    (row,) = json.loads(measured.stdout)["recordings"]
+    assert (row["name"], row["outcome"]) == ("dwell", "recorded")
+    recording = tmp_path / row["path"]
+    exported = vibench("export", recording, "--to", "csv", "--until", "0.1", "--json", cwd=tmp_path)
+    assert all((tmp_path / each).is_file() for each in json.loads(exported.stdout)["files"])
+    packed = vibench("pack", "recordings", "--license", "https://example.org/l", "--json", cwd=tmp_path)
+    assert json.loads(packed.stdout)["untrusted"] == {}
+
+
+@pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
 def test_a_stop_does_not_hide_that_a_point_has_failed(tmp_path):
     text = QUICK + QUICK.split("\n", 2)[2].replace('"dwell"\nramp', '"long"\nramp').replace(
@@ -275,7 +287,7 @@ def test_a_page_that_is_a_folder_is_refused_before_anything_is_computed(vibench_
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(("--json",), "add --estimate"), (("--notify", "no-such-program --now"), "is no program")],
+    [(("--notify", "no-such-program --now"), "is no program")],
 )
 def test_options_that_make_no_sense_play_nothing(vibench_here, tmp_path, words, said):
     result = vibench_here("measure", campaign(tmp_path), "--out", "recordings", *words, cwd=tmp_path)

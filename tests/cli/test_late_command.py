@@ -23,6 +23,16 @@ def test_the_line_of_a_command_is_the_first_of_its_help(name):
     assert told.splitlines()[0] == place.summary
 
 
+WITHOUT_A_RESULT = {"twin", "stop", "release", "gui", "serve-rig", "bench", "schema", "warm"}
+"""What they do is done elsewhere; ``bench`` is a group, and ``schema`` prints JSON alone."""
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS.keys() - WITHOUT_A_RESULT))
+def test_a_command_with_a_result_prints_it_as_json(name):
+    command = typer.main.get_command(COMMANDS[name].load())
+    assert "--json" in {option for each in command.params for option in each.opts}
+
+
 def test_the_list_of_commands_needs_none_of_the_large_libraries():
     loaded = "import vibench.cli.__main__, sys; print(*sys.modules)"
     process = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)

@@ -15,8 +15,8 @@ from .analyse import complain_about
 from .analyst import second_process
 from .exit_code import ExitCode
 from .measure import the_bench
-from .output import bold, console, write_json
-from .paths import unused
+from .output import bold, console, leave_output_to_json, print_json, write_json
+from .paths import AsJson, unused
 from .progress_bars import analysis_bar
 
 
@@ -29,10 +29,13 @@ def demo(
         int,
         typer.Option(metavar="N", min=FEWEST_DRAWS, help="Runs of each test's simulation, from near starts."),
     ] = DRAWS,
+    as_json: AsJson = False,
 ) -> None:
     """Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report."""
     from vibench.analysis.report import write_report
 
+    if as_json:
+        leave_output_to_json()
     folder = unused(Path("vibench_demo")) if out is None else out
     campaign = load_campaign(shipped("campaigns/paper.toml"))
     console.print(
@@ -62,7 +65,10 @@ def demo(
                 step()
         results = analyst.together()
     report = write_report(results, folder / "report.html", folder / "figures")
-    write_json(campaign_summary(results), folder / "results.json")
+    summary = campaign_summary(results)
+    write_json(summary, folder / "results.json")
     console.print()
     console.print("The report:", bold(report.resolve()))
+    if as_json:
+        print_json({**summary, "report": str(report)})
     complain_about(results)

@@ -15,8 +15,8 @@ import typer
 from vibench.acquisition import MissingLibrary, built_site, documentation_page, shipped_folder
 
 from .exit_code import ExitCode
-from .output import console
-from .paths import room_for_folder
+from .output import console, print_json
+from .paths import AsJson, room_for_folder
 
 NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")
 
@@ -31,13 +31,17 @@ def docs(
         bool, typer.Option("--notebooks", help="Run the tutorials for their figures.")
     ] = False,
     show: Annotated[bool, typer.Option("--open", help="Open its first page in the browser.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Build the documentation site from what is installed, if it is not there, and say where it lies."""
     target = built_site() if out is None else out
     if rebuild or notebooks or not (target / "index.html").is_file():
         build(target, "notebooks" if notebooks else "pages")
     first = documentation_page() if out is None else target / "index.html"
-    console.print(str(first))
+    if as_json:
+        print_json({"page": str(first)})
+    else:
+        console.print(str(first))
     if show:
         webbrowser.open(first.resolve().as_uri())
 

@@ -17,8 +17,8 @@ from vibench.analysis import (
 from vibench.analysis.exchange import Format, Results, excerpt, export_functions, export_samples
 
 from .external_data import AllowExternal, external_data
-from .output import console, print_warnings
-from .paths import file_at
+from .output import console, leave_output_to_json, print_json, print_warnings
+from .paths import AsJson, file_at
 from .progress_bars import transfer_bar
 
 
@@ -60,12 +60,15 @@ def export(
         ),
     ] = None,
     allow_external: AllowExternal = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a recording's samples or spectra, with units, as a file that other programs read."""
     if quantity is not None and not spectra:
         raise InvalidRequest(
             "--quantity was given without --spectra, and samples are of every channel; give both"
         )
+    if as_json:
+        leave_output_to_json()
     with external_data(allow_external), open_recording(recording) as opened:
         chosen = excerpt(
             opened, tuple(each.strip() for each in channels.split(",")) if channels else (), from_s, to_s
@@ -77,14 +80,12 @@ def export(
         if spectra:
             view = quantities_named(quantity or "displacement", MagnitudeScale.LOG)
             functions = spectral_functions(chosen, FrequencyResponseRequest(view=view))
-            _tell(export_functions(chosen, functions, to, path))
-            return
-        included = Results.INCLUDED if results else Results.LEFT_OUT
-        with transfer_bar(f"export as {to.value}", chosen.values) as observer:
-            written = export_samples(chosen, to, path, included, observer)
-    _tell(written)
-
-
-def _tell(written: tuple[Path, ...]) -> None:
+            written = export_functions(chosen, functions, to, path)
+        else:
+            included = Results.INCLUDED if results else Results.LEFT_OUT
+            with transfer_bar(f"export as {to.value}", chosen.values) as observer:
+                written = export_samples(chosen, to, path, included, observer)
     for each in written:
         console.print(f"wrote {each}")
+    if as_json:
+        print_json({"files": [str(each) for each in written]})

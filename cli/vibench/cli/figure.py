@@ -12,8 +12,8 @@ from vibench.analysis.paper_figures import FigureOptions, FrequencyGrid
 from vibench.sim import Accuracy
 
 from .analyse import complain_about
-from .output import bold, console
-from .paths import room_for_folder
+from .output import bold, console, leave_output_to_json, print_json
+from .paths import AsJson, room_for_folder
 from .study import KeptStudies, Workers
 
 if TYPE_CHECKING:
@@ -49,10 +49,13 @@ def figure(
     kinds: Annotated[
         list[ImageKind], typer.Option("--format", help="Image formats; give it several times for several.")
     ] = [ImageKind.PNG, ImageKind.SVG],  # noqa: B006 - typer copies it
+    as_json: AsJson = False,
 ) -> None:
     """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
     from vibench.analysis.report import PAPER_FIGURES
 
+    if as_json:
+        leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
     # Whoever asks for all of them learns before the first what one of them cannot be drawn with.
@@ -64,10 +67,14 @@ def figure(
     def simulated(each: int) -> "Iterator[DrawnFigure]":
         yield PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))
 
+    written: list[dict[str, object]] = []
     for each in numbers:
         for one in experiment(each) if each in EXPERIMENT else simulated(each):
             paths = one.save(out, kinds)
             console.print(f"figure {each}:", bold(paths[0]), f"({one.title})")
+            written.append({"figure": each, "title": one.title, "files": [str(path) for path in paths]})
+    if as_json:
+        print_json({"figures": written})
     studies.complain()
 
 

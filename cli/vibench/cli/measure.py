@@ -15,7 +15,6 @@ import vibench.analysis
 from vibench.acquisition import (
     AcquisitionError,
     CheckRule,
-    ConfigurationError,
     load_campaign,
     load_toml,
     stop_on_signal,
@@ -46,8 +45,8 @@ from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 
 from .engine_bars import Watching
 from .exit_code import ExitCode
-from .output import console, paragraph, print_json
-from .paths import BenchPath, FaultsPath, rig_at
+from .output import console, leave_output_to_json, paragraph, print_json
+from .paths import AsJson, BenchPath, FaultsPath, rig_at
 
 if TYPE_CHECKING:
     from vibench.analysis import Expected
@@ -158,9 +157,7 @@ def measure(
             help="Say how long it takes, how large it becomes, and how well results will be known.",
         ),
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="With --estimate: print one JSON document and nothing else.")
-    ] = False,
+    as_json: AsJson = False,
     twin: Annotated[
         bool,
         typer.Option("--twin", help="Follow the hidden motion beside it; note when the specimen changes."),
@@ -170,14 +167,15 @@ def measure(
 ) -> None:
     """Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign."""
     if as_json and not only_estimate:
-        raise ConfigurationError(
-            "--json prints an estimate, and none was asked for. Nothing was played; add --estimate, or leave "
-            "--json out"
-        )
+        leave_output_to_json()
     plan, rig = load_campaign(campaign), rig_at(bench, faults)
     existing = ExistingRecordings.RESUME if resume else ExistingRecordings.REFUSE
     known = expected_of(plan, rig) if only_estimate else {}
-    tell_estimate(estimate_campaign(plan, rig, out, existing), Form.JSON if as_json else Form.TEXT, known)
+    tell_estimate(
+        estimate_campaign(plan, rig, out, existing),
+        Form.JSON if as_json and only_estimate else Form.TEXT,
+        known,
+    )
     if only_estimate:
         return
     messengers = messengers_of(notify, mail)
@@ -192,6 +190,12 @@ def measure(
     )
     with the_bench(rig, plan.name, None if knobs is None else confirm_by_sheet(knobs)) as engine:
         point_results = engine.measure(request, messengers=messengers)
+    if as_json:
+        rows = [
+            {"name": each.name, "outcome": each.outcome.value, "path": str(each.path), "reason": each.reason}
+            for each in point_results
+        ]
+        print_json({"recordings": rows})
     if any(point_result.outcome is PointOutcome.FAILED for point_result in point_results):
         raise typer.Exit(ExitCode.FAILED)
     if engine.switch.request is not None:

@@ -63,6 +63,11 @@ def print_warnings(sentences: Iterable[str]) -> None:
         errors.print(f"warning: {sentence}")
 
 
+def leave_output_to_json() -> None:
+    """Write text for people to standard error, so that standard output holds one JSON document."""
+    console.file = sys.stderr
+
+
 def print_json(document: Mapping[str, object]) -> None:
     """Print one JSON document on standard output, and nothing else."""
     json.dump(document, sys.stdout, indent=2, allow_nan=False)

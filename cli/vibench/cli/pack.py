@@ -10,8 +10,8 @@ from vibench.acquisition.recording import SealState, seal_key
 from vibench.analysis.exchange import CrateFacts, pack_folder
 
 from .exit_code import ExitCode
-from .output import console, errors
-from .paths import file_at
+from .output import console, errors, leave_output_to_json, print_json
+from .paths import AsJson, file_at
 from .progress_bars import transfer_bar
 
 
@@ -36,8 +36,11 @@ def pack(
         str,
         typer.Option("--organisation-url", metavar="URL", help="Of its home page, or https://ror.org/..."),
     ] = "",
+    as_json: AsJson = False,
 ) -> None:
     """Pack a folder of recordings as a Research Object Crate, described for a repository."""
+    if as_json:
+        leave_output_to_json()
     here = folder.resolve()
     # Not with_suffix: a folder may be called after a level, "0.5Vpp".
     crate = file_at(out, here.parent / f"{here.name}.zip")
@@ -50,7 +53,12 @@ def pack(
     with transfer_bar("pack", size) as observer:
         packed = pack_folder(folder, crate, facts, untrusted, observer)
     console.print(f"packed {len(packed)} files into {crate}")
-    for name in (each.path for each in found if each.verdict == SealState.UNFINISHED):
+    unfinished = [each.path for each in found if each.verdict == SealState.UNFINISHED]
+    if as_json:
+        print_json(
+            {"crate": str(crate), "files": len(packed), "unfinished": unfinished, "untrusted": untrusted}
+        )
+    for name in unfinished:
         errors.print(f"note: {name} is not finished and was left out; vibench recover finishes it")
     for name, why in untrusted.items():
         way = "the crate says so; restore it and pack again, or deposit the crate as it is"

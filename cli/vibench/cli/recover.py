@@ -8,13 +8,19 @@ import typer
 from vibench.acquisition.recording import recover
 
 from .external_data import AllowExternal, external_data
-from .output import console
+from .output import console, print_json
+from .paths import AsJson
 
 
 def recover_recording(
     recording: Annotated[Path, typer.Argument(metavar="NAME.h5.part", help="What was left of it.")],
     allow_external: AllowExternal = False,
+    as_json: AsJson = False,
 ) -> None:
     """Finish a recording that was cut off: all that was committed becomes NAME.h5."""
     with external_data(allow_external):
-        console.print(f"recovered {recover(recording)}")
+        path = recover(recording)
+    if as_json:
+        print_json({"recording": str(path)})
+    else:
+        console.print(f"recovered {path}")

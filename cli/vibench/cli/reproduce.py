@@ -13,8 +13,8 @@ from vibench.analysis.paper_figures import FigureOptions, FrequencyGrid
 from vibench.analysis.reproduction import OPTIONS, Case, case_with
 from vibench.sim import Accuracy
 
-from .output import bold, console, print_table
-from .paths import room_for_folder, room_for_page
+from .output import bold, console, leave_output_to_json, print_json, print_table
+from .paths import AsJson, room_for_folder, room_for_page
 from .study import KeptStudies, Workers
 
 if TYPE_CHECKING:
@@ -45,10 +45,13 @@ def reproduce(
         typer.Option("--with", metavar="NAME=VALUE", help=f"What else the paper leaves open: {_FORMS}."),
     ] = None,
     workers: Workers = None,
+    as_json: AsJson = False,
 ) -> None:
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
     from vibench.analysis.reproduction import SECTIONS, Evidence, reproduction, reproduction_document
 
+    if as_json:
+        leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, accuracy=accuracy, grid=grid)
     case = case_with(options, said or ())
     room_for_folder(out)
@@ -62,6 +65,9 @@ def reproduce(
     page.write_text(reproduction_document(found, pictures), encoding="utf-8")
     _tell(found)
     console.print("The page:", bold(page.resolve()))
+    if as_json:
+        judged = [{"claim": each.claim.says, "verdict": each.verdict.value} for each in found.judgements]
+        print_json({"page": str(page), "claims": judged})
     studies.complain()
 
 
