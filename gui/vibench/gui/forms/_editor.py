@@ -69,7 +69,15 @@ class Choice(QComboBox):
     """A choice that a turning wheel changes only while it has the focus, and that Space leaves alone.
 
     Space belongs to the page: the Run page freezes its picture. F4 and Alt+Down open the list.
+    Its width does not follow its longest entry.
     """
+
+    LETTERS = 10
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(self.LETTERS)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Hand Space on."""
@@ -143,7 +151,6 @@ class SuggestionEditor:
         self._box = Choice()
         self._box.setEditable(True)
         self._box.setInsertPolicy(Choice.InsertPolicy.NoInsert)
-        self._box.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self._box.addItems(examples)
         self._shown = self._box.currentText()
         self._changed = changed

@@ -1,6 +1,6 @@
 """What all pages share: the bridge, what is meant, settings, background work, and the way to the window."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
@@ -48,6 +48,8 @@ class AppContext(QObject):
         self.settings = settings
         self.first_bench: Path | None = None
         """Named on the command line; remembered only when it can be used."""
+        self.is_armed_read: Callable[[], bool] = lambda: True
+        """Whether somebody could read to the end what is armed; the page that shows it answers."""
         self.selection = Selection(self)
         self.bridge = Bridge(start, self)
         self.bridge.noticed.connect(self.noticed)

@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QScrollArea, QSplitter, QWidget
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QLayout, QSplitter, QWidget
 
-from ..widgets import Theme, column, title_of
+from ..widgets import Scrolled, Theme, column, title_of
 from ._app_context import AppContext
 from ._file_kind import FileKind
 from ._settings import Remembered
@@ -78,34 +79,69 @@ class Page(QWidget):
 
 
 class SideAndPicture(QSplitter):
-    """Keeps for each page where the line between its parts was put."""
+    """A page in two parts, each of which scrolls by itself; keeps where the line between them was put.
 
-    def __init__(self, context: AppContext, page: str, side: QWidget, picture: QWidget) -> None:
+    Parameters
+    ----------
+    context
+        Of the page.
+    page
+        Its name, which is the title of the left part.
+    side
+        Scrolled below the title.
+    picture
+        The right part.
+    foot
+        What stays in sight below the left part: the buttons that act on it.
+
+    """
+
+    WIDEST_SIDE = 0.55
+    """Part of the width that the left part may take by itself."""
+
+    def __init__(
+        self,
+        context: AppContext,
+        page: str,
+        side: QWidget,
+        picture: QWidget,
+        foot: QWidget | QLayout | None = None,
+    ) -> None:
         super().__init__(Qt.Orientation.Horizontal)
         self._settings, self._page = context.settings, page
+        self._was_moved = False
         self.setAccessibleName(f"Parts of the {page} page")
-        self.addWidget(_scrolled(page, side))
-        self.addWidget(picture)
+        self.side = Scrolled(f"Choices of the {page} page", side)
+        feet = () if foot is None else (foot,)
+        self.addWidget(column(title_of(page), (self.side, 1), *feet))
+        self.addWidget(Scrolled(f"Pictures of the {page} page", picture))
         self.setStretchFactor(1, 1)
         self.setChildrenCollapsible(False)
+        self.splitterMoved.connect(self._move)
         kept = self._settings.state(Remembered.SPLITTERS, page)
-        if not kept.isEmpty():
-            self.restoreState(kept)
+        self._was_moved = not kept.isEmpty() and self.restoreState(kept)
 
     def keep(self) -> None:
-        """Keep how the page is divided, for next time."""
-        self._settings.keep_state(Remembered.SPLITTERS, self.saveState(), self._page)
+        """Keep how the page is divided, for next time, where somebody has divided it."""
+        if self._was_moved:
+            self._settings.keep_state(Remembered.SPLITTERS, self.saveState(), self._page)
 
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Give the left part the width that it needs, unless somebody has chosen another."""
+        super().resizeEvent(event)
+        self._divide()
 
-def _scrolled(page: str, side: QWidget) -> QScrollArea:
-    """Put the title of the page above its left part, and let both be scrolled upright only."""
-    whole = column(title_of(page), (side, 1))
-    area = QScrollArea()
-    area.setAccessibleName(f"Choices of the {page} page")
-    area.setWidgetResizable(True)
-    area.setFrameShape(QScrollArea.Shape.NoFrame)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setWidget(whole)
-    bar = area.verticalScrollBar().sizeHint().width()
-    area.setMinimumWidth(whole.minimumSizeHint().width() + bar + area.fontMetrics().height() // 2)
-    return area
+    def event(self, event: QEvent) -> bool:
+        """Follow the font at once, also where it changed while the page was out of sight."""
+        if event.type() in (QEvent.Type.FontChange, QEvent.Type.Show):
+            # Afterwards: what is inside has not been told yet.
+            QTimer.singleShot(0, self, self._divide)
+        return super().event(event)
+
+    def _move(self, *_: object) -> None:
+        self._was_moved = True
+
+    def _divide(self) -> None:
+        if not self._was_moved:
+            wanted = min(self.side.sizeHint().width(), round(self.WIDEST_SIDE * self.width()))
+            self.setSizes([wanted, self.width() - wanted])

@@ -9,7 +9,7 @@ from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState, Supervision
 from vibench.acquisition.plan import Campaign, Measurement
 
-from ..widgets import Notice, NoticeKind
+from ..widgets import RUN, Notice, NoticeKind
 from ._app_context import AppContext
 
 OPERATOR_STOP = "stopped by the operator, in the window"
@@ -78,8 +78,16 @@ class UserActions(QObject):
 
     def start(self) -> None:
         """Start what is armed."""
-        if self._may("start", EngineState.ARMED):
+        if not self._may("start", EngineState.ARMED):
+            return
+        if self._context.is_armed_read():
             self._context.bridge.order(EngineClient.start)
+        else:
+            self._warn(
+                "Cannot start: the end of what will happen has not been in sight.",
+                "Read it on the Run page (Ctrl+3); PgDn scrolls.",
+            )
+            self._context.page_wanted.emit(RUN)
 
     def stop(self) -> None:
         """Ramp down as planned; asked again while ramping down: as fast as the shaker bears."""

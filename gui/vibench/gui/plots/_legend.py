@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from html import escape
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QPalette
+from PySide6.QtGui import QFont, QPalette
 from PySide6.QtWidgets import QLabel, QWidget
 
 _ROOM = 4
@@ -32,7 +32,11 @@ class LegendLine(QLabel):
         self.setBackgroundRole(QPalette.ColorRole.Base)
         self.setAutoFillBackground(True)
         self.setAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        font = self.font()
+        self.follow_font()
+
+    def follow_font(self) -> None:
+        """Write a little smaller than the rest."""
+        font = QFont(self.parentWidget().font())
         font.setPointSizeF(0.85 * font.pointSizeF())
         self.setFont(font)
 

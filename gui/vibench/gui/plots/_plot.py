@@ -51,8 +51,6 @@ OUT_OF_DATE = "of earlier inputs"
 _FIRST = -1000
 _RIGHT_EM = 0.6
 """Room for half of the last number across."""
-_UP_EM = 5
-"""Room for the upright axis: the same in all plots, so that those above one another are aligned."""
 
 
 class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
@@ -61,6 +59,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
     Keys while it has the focus, and the context menu, are in `add_actions`. While it is disabled a veil says
     that it belongs to earlier inputs.
     """
+
+    up_em = 5.0
+    """Room for the upright axis: the same in all plots, so that those above one another are aligned."""
 
     def __init__(
         self, name: str, across: PlotAxis, up: PlotAxis, theme: Theme, parent: QWidget | None = None
@@ -79,9 +80,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             axis.setZValue(_FIRST)
         # A number that does not fit below the upper end of its axis would be cut in two.
         self.up.setStyle(hideOverlappingLabels=True)
-        self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * self.fontMetrics().height()), 1)
-        # A width that followed the numbers would be known after painting, and everything painted again.
-        self.up.setWidth(_UP_EM * self.fontMetrics().height())
+        self.follow_font()
         self.getPlotItem().hideButtons()
         self._grid = Grid(self.across, self.up)
         self.addItem(self._grid, ignoreBounds=True)
@@ -104,6 +103,13 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.getViewBox().sigRangeChangedManually.connect(self._let_be)
         UNITS.on_change(self._tell_anew)
         self.retheme(theme)
+
+    def follow_font(self) -> None:
+        """Give axes and margins the room that the font needs."""
+        em = self.fontMetrics().height()
+        self.getPlotItem().layout.setContentsMargins(1, 1, round(_RIGHT_EM * em), 1)
+        # A width that followed the numbers would be known after painting, and everything painted again.
+        self.up.setWidth(self.up_em * em)
 
     def with_legend(self) -> "Plot":
         """Show names of the curves that have one, above the axes."""
@@ -275,10 +281,15 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             paint_hint(painter, inside, OUT_OF_DATE, self.theme.text)
 
     def changeEvent(self, event: QEvent) -> None:
-        """Lay a veil over what belongs to other inputs, or take it away."""
+        """Lay a veil over what belongs to other inputs, or take it away; follow the font."""
         super().changeEvent(event)
         if event.type() == QEvent.Type.EnabledChange:
             self.viewport().update()
+        elif event.type() == QEvent.Type.FontChange and getattr(self, "theme", None) is not None:
+            self.follow_font()
+            if self._legend is not None:
+                self._legend.follow_font()
+                self._place_legend()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Leave keys to the page: what it does with one it does while a plot has the focus too."""

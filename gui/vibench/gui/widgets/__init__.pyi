@@ -1,4 +1,5 @@
 from ._boxes import (
+    Scrolled as Scrolled,
     boxed as boxed,
     column as column,
     filled as filled,
@@ -8,6 +9,9 @@ from ._boxes import (
 from ._clock import (
     clock as clock,
     moment_text as moment_text,
+)
+from ._elided_label import (
+    ElidedLabel as ElidedLabel,
 )
 from ._hint import (
     paint_hint as paint_hint,

@@ -2,7 +2,17 @@
 
 from typing import TypeVar
 
-from PySide6.QtWidgets import QBoxLayout, QGroupBox, QHBoxLayout, QLabel, QLayout, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QGroupBox,
+    QHBoxLayout,
+    QLabel,
+    QLayout,
+    QScrollArea,
+    QVBoxLayout,
+    QWidget,
+)
 
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
@@ -53,3 +63,36 @@ def title_of(page: str) -> QLabel:
     title = QLabel(page)
     title.setProperty("rank", "title")
     return title
+
+
+class Scrolled(QScrollArea):
+    """A part of a page that scrolls where it finds too little room, so that it never widens the window.
+
+    Parameters
+    ----------
+    name
+        For screen readers.
+    content
+        What is scrolled.
+
+    """
+
+    LEAST_EM = 7, 3
+
+    def __init__(self, name: str, content: QWidget) -> None:
+        super().__init__()
+        self.setAccessibleName(name)
+        self.setWidgetResizable(True)
+        self.setFrameShape(QScrollArea.Shape.NoFrame)
+        self.setWidget(content)
+
+    def minimumSizeHint(self) -> QSize:
+        """Small, whatever is inside."""
+        em = self.fontMetrics().height()
+        return QSize(self.LEAST_EM[0] * em, self.LEAST_EM[1] * em)
+
+    def sizeHint(self) -> QSize:
+        """As wide as the content needs with a scroll bar beside it."""
+        bar = self.verticalScrollBar().sizeHint().width() + self.fontMetrics().height() // 2
+        least = self.widget().minimumSizeHint()
+        return QSize(least.width() + bar, least.height())

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from PySide6.QtGui import QColor, QPalette
+from PySide6.QtWidgets import QApplication
 
+_TITLE = 1.4
+"""Height of a title, in heights of the other letters."""
 Colour = str
 """``"#rrggbb"``."""
 
@@ -145,7 +148,7 @@ QListWidget#rail::item {{ padding: 0.55em 0.8em; border-left: 4px solid transpar
 QListWidget#rail::item:selected {{ background: {theme.base}; border-left: 4px solid {theme.accent};
     color: {theme.text}; font-weight: bold; }}
 QLabel[rank="second"] {{ color: {theme.muted}; }}
-QLabel[rank="title"] {{ font-size: 14pt; font-weight: bold; }}
+QLabel[rank="title"] {{ font-size: {round(_TITLE * QApplication.font().pointSize())}pt; font-weight: bold; }}
 QLabel[rank="complaint"] {{ color: {complaint_colour(theme)}; }}
 QPushButton[rank="first"] {{ background: {theme.accent}; color: {theme.base};
     border: 2px solid {theme.accent}; border-radius: 4px; padding: 0.35em 1.2em; font-weight: bold; }}

@@ -38,6 +38,9 @@ _QUANTITY = re.compile(
     rf"({'|'.join(sorted((*_SI_OF, *_SPELLED), key=len, reverse=True))})(?![\w/²·-])"
 )
 _LEAST_DIGITS = 3
+_LONG_WORD = re.compile(r"[^\s\u200b]{25,}")
+_BREAK = "\u200b"
+"""A place where a word may be broken, without a sign."""
 _LONG_FROM, _LONG_TO = Decimal("1e-6"), Decimal("1e7")
 
 
@@ -151,6 +154,10 @@ def _written(number: Decimal) -> str:
     return f"{float(number):g}"
 
 
+def _with_breaks(word: re.Match[str]) -> str:
+    return _BREAK.join(re.findall(r".{1,12}?[/\\_.-]|.{1,12}", word[0]))
+
+
 UNITS = DisplayUnits()
 """Of the whole program, as its font and its palette are: a person reads one unit on all pages."""
 
@@ -182,6 +189,11 @@ class SentenceLabel(QLabel):
         self._tip = text
         self._tell()
 
+    def text(self) -> str:
+        """Give what is shown."""
+        return super().text().replace(_BREAK, "")
+
     def _tell(self) -> None:
-        super().setText(UNITS.told(self._sentence))
+        # A path is one word to Qt: unbroken it would be as wide as a window, or cut.
+        super().setText(_LONG_WORD.sub(_with_breaks, UNITS.told(self._sentence)))
         super().setToolTip(UNITS.told(self._tip))

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QAccessible, QAccessibleEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QPushButton, QSizePolicy
 
-from ..widgets import Tone, filled
+from ..widgets import ElidedLabel, Tone, filled
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Banner(QFrame):
         self._indicator = CLOSED
         self._label = QLabel()
         self._label.setObjectName("engine_state")
-        self._detail = QLabel()
+        self._detail = ElidedLabel()
         self._detail.setAccessibleName("Details of the state")
         self._detail.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Preferred)
         self._stop = QPushButton(STOP_TEXT)
@@ -50,9 +50,6 @@ class Banner(QFrame):
             "This is not an emergency stop: in an emergency, switch the amplifier off."
         )
         self._stop.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        # As wide as it ever gets: it must not move under the hand.
-        widest = max((STOP_TEXT, AT_ONCE_TEXT), key=self._stop.fontMetrics().horizontalAdvance)
-        self._stop.setMinimumWidth(round(1.4 * self._stop.fontMetrics().horizontalAdvance(widest)))
         self._stop.clicked.connect(self.stop_wanted)
         layout = filled(QHBoxLayout(self), self._label, (self._detail, 1), self._stop)
         layout.setContentsMargins(10, 6, 10, 6)
@@ -62,6 +59,21 @@ class Banner(QFrame):
     def indicator(self) -> StateIndicator:
         """What is shown."""
         return self._indicator
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow font and style sheet at once."""
+        super().changeEvent(event)
+        if event.type() in (QEvent.Type.FontChange, QEvent.Type.StyleChange):
+            self._fit()
+
+    def _fit(self) -> None:
+        """Keep STOP as wide as it ever gets: it must not move under the hand."""
+        shown, widths = self._stop.text(), []
+        for text in (STOP_TEXT, AT_ONCE_TEXT):
+            self._stop.setText(text)
+            widths.append(self._stop.sizeHint().width())
+        self._stop.setText(shown)
+        self._stop.setMinimumWidth(max(widths))
 
     def show_indicator(self, indicator: StateIndicator) -> None:
         """Show a state; nothing is repainted while nothing changes."""

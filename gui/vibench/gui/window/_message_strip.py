@@ -1,6 +1,6 @@
 """The strip under the banner: it keeps its place; messages stay until they are read, and block nothing."""
 
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QEvent, QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QResizeEvent
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QPlainTextEdit, QPushButton, QSizePolicy
 
@@ -49,8 +49,7 @@ class MessageStrip(QFrame):
             policy = button.sizePolicy()
             policy.setRetainSizeWhenHidden(True)
             button.setSizePolicy(policy)
-        room = max(_LINES * self.fontMetrics().lineSpacing(), self._more.sizeHint().height())
-        self.setFixedHeight(room + 6)
+        self._fit()
         self.dismiss()
 
     @property
@@ -91,6 +90,16 @@ class MessageStrip(QFrame):
         self._show(self._hint, "")
         self._text.setAccessibleName("What can be done next")
         self._text.setToolTip("")
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the font at once."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange:
+            self._fit()
+
+    def _fit(self) -> None:
+        room = max(_LINES * self.fontMetrics().lineSpacing(), self._more.sizeHint().height())
+        self.setFixedHeight(room + 6)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Keep Details as wide as the strip."""

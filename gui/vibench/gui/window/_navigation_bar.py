@@ -1,6 +1,6 @@
 """The navigation bar: the job in order, page by page, with ticks; no page is ever locked."""
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtWidgets import QListWidget, QListWidgetItem, QSizePolicy
 
 DONE = "✔"
@@ -46,6 +46,12 @@ class NavigationBar(QListWidget):
             spoken = f"{name}, done" if done.get(name) else name
             self.item(row).setData(Qt.ItemDataRole.AccessibleTextRole, spoken)
         self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the font at once."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange and self.count():
+            self._fit()
 
     def _fit(self) -> None:
         """As wide as its longest name in bold with a tick: bold is what the chosen one is."""

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from enum import StrEnum
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QSizePolicy
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtWidgets import QFrame, QHBoxLayout, QSizePolicy
 
-from ..widgets import Tone
+from ..widgets import ElidedLabel, Tone
 
 
 class StatusField(StrEnum):
@@ -30,20 +30,30 @@ class StatusLine(QFrame):
         layout = QHBoxLayout(self)
         layout.setContentsMargins(10, 3, 10, 3)
         layout.setSpacing(18)
-        self._labels: dict[StatusField, QLabel] = {}
+        self._labels: dict[StatusField, ElidedLabel] = {}
         for field in StatusField:
-            label = QLabel()
+            label = ElidedLabel()
             label.setAccessibleName(f"Status: {field.value}")
             label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
             self._labels[field] = label
             layout.addWidget(label)
         frames = self._labels[StatusField.FRAMES]
-        # As wide as it ever gets: numbers that change twenty times a second move nothing.
-        frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
         frames.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self._fit()
         # The file takes what is left, and gives way first.
         self._labels[StatusField.FILE].setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         layout.setStretchFactor(self._labels[StatusField.FILE], 1)
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the font at once."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange and self._labels:
+            self._fit()
+
+    def _fit(self) -> None:
+        """Keep the last field as wide as it ever gets: numbers that change all the time move nothing."""
+        frames = self._labels[StatusField.FRAMES]
+        frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
 
     def text_of(self, field: str) -> str:
         """Give what a field shows."""

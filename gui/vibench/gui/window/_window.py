@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from time import monotonic
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
@@ -257,6 +257,12 @@ class Window(QMainWindow):
         super().showEvent(event)
         self.navigation.setFocus()
         self.page.entered()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the font: parts with a style sheet take another one only with the sheet."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange and self.isVisible():
+            self._retheme(self.context.theme)
 
     def undo(self) -> None:
         """Take back the last edit of the plan in sight."""

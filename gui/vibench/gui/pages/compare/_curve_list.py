@@ -170,7 +170,6 @@ class PairBox(QGroupBox):
             label = QLabel(text)
             label.setBuddy(choice)
             choice.setAccessibleName(f"Difference: {text.replace('&', '').lower()}")
-            choice.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
             choice.setMinimumContentsLength(16)
             choice.currentIndexChanged.connect(lambda _index: self.changed.emit())
             form.addRow(label, choice)

@@ -23,8 +23,10 @@ from ...page import AppContext, FileKind, Page, Remembered, Shown
 from ...widgets import (
     COMPARE,
     FILES,
+    ElidedLabel,
     Notice,
     NoticeKind,
+    Scrolled,
     SentenceLabel,
     Theme,
     column,
@@ -255,8 +257,8 @@ class FilesPage(Page):
     def _build(self) -> None:
         self._splitter = QSplitter(Qt.Orientation.Vertical)
         self._splitter.setAccessibleName("List and recording")
-        self._splitter.addWidget(self._browser())
-        self._splitter.addWidget(self._viewer())
+        for name, part in (("List of recordings", self._browser()), ("Recording in sight", self._viewer())):
+            self._splitter.addWidget(Scrolled(name, part))
         self._splitter.setSizes([200, 600])
         self._splitter.setStretchFactor(1, 1)
         self._splitter.setChildrenCollapsible(False)
@@ -280,9 +282,9 @@ class FilesPage(Page):
         search.setClearButtonEnabled(True)
         search.textChanged.connect(self.table.search)
         search_label.setBuddy(search)
-        self._goes_to = QLabel("")
+        self._goes_to = ElidedLabel()
         self._goes_to.setProperty("rank", "second")
-        self._count = QLabel("")
+        self._count = ElidedLabel()
         self._count.setProperty("rank", "second")
         self._compare = push_button(
             "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
@@ -303,11 +305,11 @@ class FilesPage(Page):
         return browser
 
     def _viewer(self) -> QWidget:
-        self._title = QLabel("No recording is open")
+        self._title = ElidedLabel("No recording is open")
         self._title.setTextFormat(Qt.TextFormat.PlainText)
         self._title.setProperty("rank", "title")
         self._facts = SentenceLabel("Choose one in the list above.", rank="second")
-        self._view = QLabel("")
+        self._view = ElidedLabel()
         self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
         self._markers.setCheckable(True)
         self._markers.toggled.connect(self.time_histories.show_markers)

@@ -40,7 +40,6 @@ class CampaignChoice(Choice):
         super().__init__()
         self.setAccessibleName("Campaign")
         self.setToolTip("List the recordings of one campaign")
-        self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.setMinimumContentsLength(22)
         self._campaigns: tuple[ListedCampaign, ...] = ()
         self.currentIndexChanged.connect(lambda _index: self._choose())

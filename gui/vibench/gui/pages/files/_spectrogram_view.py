@@ -23,7 +23,7 @@ from ...background import Background, LatestRequest
 from ...forms import Choice
 from ...page import Shown
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
-from ...widgets import Theme, filled, plain_unit
+from ...widgets import ElidedLabel, Theme, filled, plain_unit
 from ._file_words import role_text
 from ._hidden_motion_view import HiddenMotionView
 from ._time_histories import RecordingTimeHistories
@@ -55,7 +55,7 @@ class SpectrogramView(QWidget):
         self.line_width = Choice()
         for width_hz in _WIDTHS_HZ:
             self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
-        self.said = QLabel("")
+        self.said = ElidedLabel()
         self.said.setProperty("rank", "second")
         self._theme = theme
         self._view_s = (0.0, 0.0)

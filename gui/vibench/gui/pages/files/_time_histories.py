@@ -18,7 +18,7 @@ from ._file_words import role_text
 LEAST_SAMPLES = 8
 """The closest look."""
 _STEP, _ZOOM = 0.2, 0.6
-_LEFT_EM, _TIME_AXIS_EM, _LEAST_EM = 5, 3, 3
+_TIME_AXIS_EM, _LEAST_EM = 3, 3
 MARKER = LineStyle(lambda theme: theme.accent)
 SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
 _MOST_KEPT = 12
@@ -178,13 +178,11 @@ class RecordingTimeHistories(QWidget):
             plot = Plot(f"{role_text(channel.role)} over time", TIME, up, self._theme)
             plot.setMouseEnabled(x=True, y=False)
             plot.setFocusProxy(self)
-            left = _LEFT_EM * self.fontMetrics().height()
-            plot.getPlotItem().getAxis("left").setWidth(left)
             title = QLabel(role_text(channel.role), plot)
             title.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
             title.setBackgroundRole(QPalette.ColorRole.Base)
             title.setAutoFillBackground(True)
-            title.move(left + self.fontMetrics().height(), 2)
+            title.move(round((plot.up_em + 1) * self.fontMetrics().height()), 2)
             plot.getViewBox().sigXRangeChanged.connect(self._ranged)
             self._kept[kind] = _TimeHistory(channel.role, plot, plot.curve(curve_style(0)))
         return self._kept[kind]

@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QLabel, QSplitter, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLabel, QLayout, QSplitter, QVBoxLayout, QWidget
 
 from vibench.analysis import recorded_response
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
@@ -214,17 +214,18 @@ class MapsPage(Page):
             self.context.page_wanted.emit(SIMULATE)
 
     def _build(self) -> None:
-        self._parts = SideAndPicture(self.context, MAPS, self._side(), self._answer())
+        self._parts = SideAndPicture(
+            self.context, MAPS, boxed("Map", self.form), self._answer(), self._buttons()
+        )
         QVBoxLayout(self).addWidget(self._parts)
 
-    def _side(self) -> QWidget:
-        scene = boxed("Map", self.form)
+    def _buttons(self) -> QLayout:
         self._begin = push_button("&Map", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._finer = push_button("Fi&ner", "Compute only what the axes show now", self.begin_in_sight)
         self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
         self._cancel.setEnabled(False)
-        return column(scene, row((self._begin, 1), (self._finer, 1), (self._cancel, 1)), 1)
+        return row((self._begin, 1), (self._finer, 1), (self._cancel, 1))
 
     def _answer(self) -> QWidget:
         self.quantity = Choice()

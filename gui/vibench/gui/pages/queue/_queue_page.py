@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
     QGridLayout,
-    QHBoxLayout,
     QProgressBar,
     QVBoxLayout,
 )
@@ -29,7 +28,7 @@ from vibench.acquisition.rig import Rig
 
 from ...background import LatestRequest
 from ...forms import Choice
-from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
+from ...page import AppContext, FileKind, History, Page, Remembered, Shown, SideAndPicture, UserActions
 from ...widgets import (
     QUEUE,
     Notice,
@@ -38,11 +37,11 @@ from ...widgets import (
     SentenceLabel,
     boxed,
     clock,
+    column,
     filled,
     notice_of,
     push_button,
     row,
-    title_of,
 )
 from ._draft import moved_up, with_measurement, with_sweep, without
 from ._row_words import CampaignPreview, point_rows, preview_campaign
@@ -88,7 +87,7 @@ class QueuePage(Page):
             "Keep what is complete in its folder, make the rest",
             self._arm_missing,
         )
-        self.left_alone = QCheckBox("Left alone: goes on when the window freezes or is closed")
+        self.left_alone = QCheckBox("Left alone")
         self.left_alone.setToolTip(
             "Limits, ramps and recordings are the engine's. 'vibench watch' and 'vibench stop' reach it "
             "from a terminal.\nWithout the tick the drive is brought down when the window does not answer."
@@ -149,7 +148,8 @@ class QueuePage(Page):
         return tuple(Shown(each, self._of, wanted) for each in (self.summary, self.entries))
 
     def left(self) -> None:
-        """Keep the campaign for next time."""
+        """Keep the campaign for next time, and how the page is divided."""
+        self._parts.keep()
         campaign = self.context.selection.campaign
         self.context.settings.keep_text(Remembered.CAMPAIGN, "" if campaign is None else toml_text(campaign))
 
@@ -321,13 +321,16 @@ class QueuePage(Page):
             push_button("&Remove", "Remove the chosen entry", self._remove),
         )
         campaign = boxed("Campaign", self.entries, edits)
-        left = filled(QVBoxLayout(), title_of(QUEUE), self.choice, files, (campaign, 1), self.sweep)
-        right = filled(
-            QVBoxLayout(),
+        attended = SentenceLabel("goes on when the window freezes or is closed", rank="second")
+        left = column(self.choice, files, (campaign, 1), self.sweep)
+        right = column(
             self.summary,
-            row(self.arm_button, self.resume_button, self.hold_button),
-            self.left_alone,
+            self.arm_button,
+            self.resume_button,
+            self.hold_button,
+            row(self.left_alone, (attended, 1)),
             self.progress,
             (boxed("Recordings", self.rows), 1),
         )
-        filled(QHBoxLayout(self), (left, 1), (right, 1))
+        self._parts = SideAndPicture(self.context, QUEUE, left, right)
+        filled(QVBoxLayout(self), self._parts)

@@ -9,7 +9,6 @@ from vibench.acquisition import ConfigurationError, all_shipped
 from vibench.acquisition.rig import Rig, load_rig
 
 from ...forms import Choice
-from ...widgets import row
 
 PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
 """How fast a simulated bench runs."""
@@ -41,12 +40,13 @@ class RigChoice(QWidget):
         self._form = QFormLayout(self)
         self._form.setContentsMargins(0, 0, 0, 0)
         for text, line, buddy in (
-            ("Configuration", row((self._box, 1), own), self._box),
+            ("Configuration", self._box, self._box),
             ("Runs", self.pace, self.pace),
         ):
             label = QLabel(text)
             label.setBuddy(buddy)
             self._form.addRow(label, line)
+        self._form.addRow(own)
         for path in sorted(all_shipped("hardware_configs"), key=lambda each: "virtual" not in each.stem):
             self._add(path)
         self._box.currentIndexChanged.connect(self._load)

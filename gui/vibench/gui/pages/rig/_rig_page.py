@@ -4,19 +4,12 @@ from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import (
-    QHBoxLayout,
-    QScrollArea,
-    QSizePolicy,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, list_rig_instruments, shipped
 from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
 
-from ...page import AppContext, FileKind, Page, Remembered, UserActions
+from ...page import AppContext, FileKind, Page, Remembered, SideAndPicture, UserActions
 from ...widgets import (
     RIG,
     Notice,
@@ -24,12 +17,12 @@ from ...widgets import (
     ReadTable,
     SentenceLabel,
     boxed,
+    column,
     filled,
     fitted_unit,
     moment_text,
     notice_of,
     push_button,
-    title_of,
 )
 from ._knob_sheet import KnobSheetForm
 from ._rig_choice import RigChoice
@@ -132,6 +125,10 @@ class RigPage(Page):
         if self.open_button.isEnabled():
             self.open_button.setFocus()
 
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
+
     @property
     def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
         """Hardware configurations; while a bench is open, none."""
@@ -230,20 +227,12 @@ class RigPage(Page):
     def _lay_out(self) -> None:
         buttons = self.open_button, self.check_button, self.find_button, self.close_button
         side = QWidget()
-        left = filled(QVBoxLayout(side), title_of(RIG), self.choice, self.about, self.knobs, *buttons)
+        left = filled(QVBoxLayout(side), self.choice, self.about, self.knobs, *buttons)
         left.addSpacing(self.fontMetrics().height())
         filled(left, self.first_steps, 1)
-        scroll = QScrollArea()
-        scroll.setWidget(side)
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QScrollArea.Shape.NoFrame)
-        scroll.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        bar = scroll.verticalScrollBar().sizeHint().width()
-        scroll.setMinimumWidth(side.minimumSizeHint().width() + bar)
-        scroll.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
-        right = filled(
-            QVBoxLayout(),
+        right = column(
             (boxed("Instruments", self.instruments), 1),
             (boxed("Check", self.verdict, self.findings), 3),
         )
-        filled(QHBoxLayout(self), (scroll, 2), (right, 3))
+        self._parts = SideAndPicture(self.context, RIG, side, right)
+        filled(QVBoxLayout(self), self._parts)

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeAlias
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QHBoxLayout, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import EngineClient, EngineState, TwinSwitch
 from vibench.acquisition.plan import EXCITATION_KINDS
@@ -15,8 +15,8 @@ from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
-from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, Shown, UserActions
-from ...widgets import FILES, RUN, SentenceLabel, Theme, filled, title_of
+from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, Shown, SideAndPicture, UserActions
+from ...widgets import FILES, RUN, SentenceLabel, Theme, column, filled
 from ._arm_card import ArmCard
 from ._hidden_motion_plot import HiddenMotionPlot
 from ._portrait_plot import PortraitPlot
@@ -26,8 +26,6 @@ from ._time_histories import TimeHistoryPlots
 from ._transmissibility_plot import TransmissibilityPlot
 from ._watch_card import WatchCard
 
-LEFT_LETTERS = 44
-"""Width of the column on the left: it must not move when its words change."""
 LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
@@ -60,6 +58,10 @@ class RunPage(Page):
         self._lay_out()
         self._connect()
         self._show_channels()
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
 
     @property
     def is_done(self) -> bool:
@@ -121,8 +123,12 @@ class RunPage(Page):
             part.retheme(theme)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Space freezes, M marks; both are left to fields and buttons that use them themselves."""
+        """Space freezes, M marks, PgDn reads on; all are left to fields and buttons that use them."""
+        bar = self._parts.side.verticalScrollBar()
         match event.key():
+            case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp:
+                step = bar.pageStep() if event.key() == Qt.Key.Key_PageDown else -bar.pageStep()
+                bar.setValue(bar.value() + step)
             case Qt.Key.Key_Space:
                 self.watch_card.freeze.toggle()
             case Qt.Key.Key_M if event.modifiers() == Qt.KeyboardModifier.NoModifier:
@@ -198,11 +204,19 @@ class RunPage(Page):
         if switch is TwinSwitch.ON:
             self.right_tabs.setCurrentWidget(self.hidden_motion)
 
+    def _is_armed_read(self) -> bool:
+        """Look now: what was armed a moment ago may not have been laid out yet."""
+        self.refresh()
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        return self.arm_card.is_read
+
     def _connect(self) -> None:
         self.arm_card.arm_wanted.connect(self._actions.arm_test)
         self.arm_card.start_wanted.connect(self._actions.start)
         self.arm_card.cancel_wanted.connect(self._actions.disarm)
         self.arm_card.hold_wanted.connect(self._actions.hold_or_resume)
+        self.arm_card.news.connect(lambda: self._parts.side.verticalScrollBar().setValue(0))
+        self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
         # Until the next tick the picture of a run that has ended meanwhile would pass for that of this one.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
@@ -212,9 +226,7 @@ class RunPage(Page):
         self.context.selection.rig_changed.connect(self._show_channels)
 
     def _lay_out(self) -> None:
-        left = QWidget()
-        cards = self.arm_card, self.watch_card, self.summary, self.look_button
-        filled(QVBoxLayout(left), title_of(RUN), *cards, 1)
+        left = column(self.arm_card, self.watch_card, self.summary, self.look_button, 1)
         self.look_button.hide()
         for tabs, name, pictures in (
             (self.left_tabs, "Pictures on the left", (self.frequency_response, self.history, self.envelope)),
@@ -235,5 +247,5 @@ class RunPage(Page):
         right.setSizes([600, 400])
         right.setStretchFactor(0, 3)
         right.setStretchFactor(1, 2)
-        left.setFixedWidth(LEFT_LETTERS * self.fontMetrics().averageCharWidth())
-        filled(QHBoxLayout(self), left, (right, 1), margin=0)
+        self._parts = SideAndPicture(self.context, RUN, left, right, self.arm_card.buttons)
+        filled(QVBoxLayout(self), self._parts)

@@ -33,8 +33,7 @@ AGO = PlotAxis("Time before now", "s")
 """An axis that stands still: one that scrolls would be painted anew in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
 """Of a plot: as many as there are lines side by side; between fewer, room would stay empty."""
-AXIS_LETTERS = 9
-TIME_AXIS_EM = 3
+AXIS_EM, TIME_AXIS_EM = 4.0, 3
 USUAL_SPAN_S = 2.0
 """What a plot shows at first."""
 
@@ -93,7 +92,8 @@ class TimeHistoryPlots(QWidget):
         for row in range(len(self.plots), len(channels)):
             plot = Plot("Time history", AGO, channel_axis(*channels[row]), self._theme)
             plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
-            plot.up.setWidth(AXIS_LETTERS * self.fontMetrics().averageCharWidth())
+            plot.up_em = AXIS_EM
+            plot.follow_font()
             self._curves.append(plot.curve(curve_style(row)))
             self._layout.addWidget(plot, 1)
             self.plots.append(plot)

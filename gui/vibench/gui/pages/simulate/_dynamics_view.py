@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar
 
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtWidgets import QLayout, QVBoxLayout, QWidget
 
 from vibench.analysis import Curve
 from vibench.analysis.dynamics import SpecimenChoice
@@ -166,16 +166,21 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
             self.context.page_wanted.emit(COMPARE)
 
     def _build(self) -> None:
-        self._parts = SideAndPicture(self.context, self.kind.name.capitalize(), self._side(), self._right())
+        self._parts = SideAndPicture(
+            self.context, self.kind.name.capitalize(), self._side(), self._right(), self._buttons()
+        )
         QVBoxLayout(self).addWidget(self._parts)
 
     def _side(self) -> QWidget:
         scene, before = boxed("Scene", self.form), SentenceLabel(self.kind.before, rank="second")
+        return column(scene, before, 1)
+
+    def _buttons(self) -> QLayout:
         self._begin = push_button("Find", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._cancel = push_button("Cancel", "Want no more; what has been found stays", self.cancel)
         self._cancel.setEnabled(False)
-        return column(scene, before, row((self._begin, 1), self._cancel), 1)
+        return row((self._begin, 1), self._cancel)
 
     def _right(self) -> QWidget:
         self._state = SentenceLabel("Nothing has been asked yet.")

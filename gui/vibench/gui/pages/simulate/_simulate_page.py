@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from PySide6.QtWidgets import (
-    QLabel,
+    QLayout,
     QTabWidget,
     QVBoxLayout,
     QWidget,
@@ -201,7 +201,7 @@ class SimulatePage(Page):
             self.context.page_wanted.emit(COMPARE)
 
     def _build(self) -> None:
-        self._parts = SideAndPicture(self.context, SIMULATE, self._side(), self._answer())
+        self._parts = SideAndPicture(self.context, SIMULATE, self._side(), self._answer(), self._buttons())
         self.tabs = QTabWidget()
         self.tabs.setAccessibleName("What is simulated")
         self._parts.setAccessibleName("Responses")
@@ -216,16 +216,19 @@ class SimulatePage(Page):
         self._cost = SentenceLabel()
         self._cost.setAccessibleName("Cost and error of this accuracy")
         cost = boxed("Cost and error of this accuracy", self._cost)
+        return column(scene, cost, 1)
+
+    def _buttons(self) -> QLayout:
         self._begin = push_button("&Simulate", "Compute what the form says, in another process", self.begin)
         self._begin.setProperty("rank", "first")
         self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
-        return column(scene, cost, row((self._begin, 1), self._cancel), 1)
+        return row((self._begin, 1), self._cancel)
 
     def _answer(self) -> QWidget:
         self._bar = TimedBar("Points simulated", "points")
         letters = "20000 of 20000 points, 0:00:00 left  "
         self._bar.setMinimumWidth(self._bar.fontMetrics().horizontalAdvance(letters))
-        self._state = QLabel("")
+        self._state = SentenceLabel()
         self._compare = push_button(
             "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
         )

@@ -1,11 +1,10 @@
 """The form of one test, judged by the plan at every change."""
 
-from PySide6.QtWidgets import QGroupBox, QScrollArea, QSizePolicy, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QGroupBox
 
 from vibench.acquisition.plan import Measurement
 
 from ...forms import GroupEditor, JudgedForm
-from ...widgets import filled
 
 USUAL = {
     "amplitude_vpp": 1.0,
@@ -39,15 +38,3 @@ class TestForm(JudgedForm[Measurement]):
         excitation = self.form.editors["excitation"]
         assert isinstance(excitation, GroupEditor)
         excitation.know(USUAL)
-        inner = QWidget()
-        filled(QVBoxLayout(inner), self.form, 1).setContentsMargins(0, 0, 8, 0)
-        scroll = QScrollArea()
-        scroll.setWidget(inner)
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QScrollArea.Shape.NoFrame)
-        scroll.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Expanding)
-        bar = scroll.verticalScrollBar().sizeHint().width()
-        scroll.setMinimumWidth(inner.minimumSizeHint().width() + bar)
-        layout = self.layout()
-        assert isinstance(layout, QVBoxLayout)
-        layout.insertWidget(0, scroll, 1)

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
-    QHBoxLayout,
     QSizePolicy,
-    QSplitter,
     QVBoxLayout,
     QWidget,
 )
@@ -21,7 +19,7 @@ from vibench.acquisition.rig import BaseQuantity, Rig
 
 from ...background import LatestRequest
 from ...forms import Choice
-from ...page import AppContext, FileKind, History, Page, Remembered, Shown, UserActions
+from ...page import AppContext, FileKind, History, Page, Remembered, Shown, SideAndPicture, UserActions
 from ...widgets import (
     TEST,
     Notice,
@@ -30,12 +28,12 @@ from ...widgets import (
     Theme,
     boxed,
     clock,
+    column,
     filled,
     fitted_unit,
     notice_of,
     push_button,
     row,
-    title_of,
 )
 from ._library import NamedTest, load_test, own_tests, shipped_tests
 from ._limit_table import LimitTable
@@ -172,7 +170,8 @@ class TestPage(Page):
         self.prediction.retheme(theme)
 
     def left(self) -> None:
-        """Keep the test for next time."""
+        """Keep the test for next time, and how the page is divided."""
+        self._parts.keep()
         measurement = self.form.value
         if measurement is not None:
             self.context.settings.keep_text(Remembered.TEST, toml_text(measurement))
@@ -310,8 +309,7 @@ class TestPage(Page):
             push_button("Open…", "Open a test from a TOML file", self._open),
             push_button("Save as…", "Save this test as a TOML file", self._save),
         )
-        left = QWidget()
-        filled(QVBoxLayout(left), title_of(TEST), self.choice, files, (self.form, 1), self.arm_button)
+        left = column(self.choice, files, self.form, 1)
         grid = QWidget()
         cells = QGridLayout(grid)
         cells.addWidget(self.summary, 0, 0, 1, 2)
@@ -333,12 +331,8 @@ class TestPage(Page):
         for table in (self.limits, self.prediction):
             # Neither asks for more height than the preview: they share what is there.
             table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
-        splitter = QSplitter()
-        splitter.addWidget(left)
-        splitter.addWidget(grid)
-        splitter.setStretchFactor(1, 1)
-        splitter.setChildrenCollapsible(False)
-        filled(QHBoxLayout(self), splitter, margin=0)
+        self._parts = SideAndPicture(self.context, TEST, left, grid, self.arm_button)
+        filled(QVBoxLayout(self), self._parts)
 
 
 def _kept_test(text: str) -> Measurement | None:

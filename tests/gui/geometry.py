@@ -1,0 +1,170 @@
+"""What of a window is out of reach at a size, a font and a scale, with the longest texts in every place."""
+
+import json
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PySide6.QtCore import QPoint, QRect
+from PySide6.QtGui import QFont
+from PySide6.QtWidgets import (
+    QAbstractButton,
+    QAbstractScrollArea,
+    QApplication,
+    QComboBox,
+    QLabel,
+    QLineEdit,
+    QProgressBar,
+    QScrollArea,
+    QTabWidget,
+)
+
+from vibench.gui.page import AppContext, Settings
+from vibench.gui.widgets import Notice, NoticeKind, Tone
+from vibench.gui.window import StateIndicator
+from vibench.gui.window._open_window import application
+from vibench.gui.window._page_catalogue import PAGES
+from vibench.gui.window._status_line import StatusField
+from vibench.gui.window._window import Window
+
+SENTENCE = "Simulating; the first answer waits for the program to be made ready, and says so at length. " * 4
+NAME = "a_recording_whose_name_was_chosen_by_somebody_who_likes_to_say_everything_in_it_" * 2
+"""A word without a place to break it."""
+
+
+def fill_with_longest_texts(window):
+    """Put long texts wherever a text changes: frame, labels, bars, fields and lists."""
+    window._timer.stop()
+    window.banner.show_indicator(StateIndicator("▼", "RAMPING DOWN", Tone.CAUTION, SENTENCE))
+    window.strip.say(Notice(NoticeKind.FAULT, SENTENCE, NAME, SENTENCE))
+    window.status_line.show_fields(dict.fromkeys(StatusField, NAME), frozenset(StatusField))
+    for page in window.pages.values():
+        buddies = {each.buddy() for each in page.findChildren(QLabel)} - {None}
+        for label in page.findChildren(QLabel):
+            is_changing = label.buddy() is None and label.property("rank") != "title"
+            if is_changing and not isinstance(label.parent(), QAbstractButton):
+                label.setText(SENTENCE + NAME)
+        for bar in page.findChildren(QProgressBar):
+            bar.setFormat(SENTENCE)
+        for box in page.findChildren(QComboBox):
+            blocked = box.blockSignals(True)
+            box.setItemText(box.currentIndex(), SENTENCE)
+            box.blockSignals(blocked)
+        for line in page.findChildren(QLineEdit):
+            blocked = line.blockSignals(True)
+            line.setText(NAME)
+            line.blockSignals(blocked)
+        assert buddies or not page.findChildren(QLineEdit)
+
+
+def place_in(widget, window):
+    """Where a widget lies, in the coordinates of the window."""
+    return QRect(widget.mapTo(window, QPoint(0, 0)), widget.size())
+
+
+def is_whole(widget, window):
+    """Whether all of a widget lies inside the window and inside everything that could cut it."""
+    place, parent = place_in(widget, window), widget.parentWidget()
+    while parent is not None and parent is not window:
+        if not place_in(parent, window).contains(place):
+            return False
+        parent = parent.parentWidget()
+    return window.rect().contains(place)
+
+
+def scrolls_to(button, window):
+    """How many areas have to be scrolled until a button is in sight; None where none of them helps."""
+    moved = 0
+    area = button.parentWidget()
+    while area is not None and area is not window:
+        if isinstance(area, QScrollArea):
+            before = area.horizontalScrollBar().value(), area.verticalScrollBar().value()
+            area.ensureWidgetVisible(button, 0, 0)
+            moved += before != (area.horizontalScrollBar().value(), area.verticalScrollBar().value())
+        area = area.parentWidget()
+    return moved if is_whole(button, window) else None
+
+
+def buttons_of(page):
+    """Everything of a page that can be pressed, as far as it is shown."""
+    return [
+        each
+        for each in page.findChildren(QAbstractButton)
+        if each.isVisible()
+        and not isinstance(each.parent(), (QAbstractScrollArea, QLineEdit))
+        and each.parent().metaObject().className() != "QTabBar"
+    ]
+
+
+def scroll_home(page):
+    for area in page.findChildren(QScrollArea):
+        area.verticalScrollBar().setValue(0)
+        area.horizontalScrollBar().setValue(0)
+
+
+def troubles_of(window, width, height, points):
+    """Every page at a size and a font: what is out of sight, in words."""
+    font = QFont(QApplication.font())
+    font.setPointSize(points)
+    QApplication.setFont(font)
+    QApplication.processEvents()
+    while not window.is_themed:
+        QApplication.processEvents()
+    window.resize(width, height)
+    found = []
+    for name, page in window.pages.items():
+        window.show_page(name)
+        for tab in tabs_of(page):
+            QApplication.processEvents()
+            QApplication.processEvents()
+            where = f"{name}{tab} at {width} x {height}, {points} pt"
+            if (window.width(), window.height()) != (width, height):
+                found.append(f"{where}: the window is {window.width()} x {window.height()}")
+                window.resize(width, height)
+            frame = (window.banner._stop, window.banner._label, window.status_line, window.strip)
+            found += [
+                f"{where}: {each.objectName() or each.accessibleName()} is cut, {place_in(each, window)}"
+                for each in frame
+                if not is_whole(each, window) or not window.isVisible()
+            ]
+            wanted = window.banner._stop.sizeHint().width()
+            if window.banner._stop.width() < wanted:
+                found.append(f"{where}: STOP is narrower than its words")
+            for button in buttons_of(page):
+                scroll_home(window)
+                QApplication.processEvents()
+                moved = scrolls_to(button, window)
+                if moved is None or moved > 1:
+                    said = button.accessibleName() or button.text()
+                    found.append(f"{where}: {said!r} takes {moved} scrolls, {place_in(button, window)}")
+    return found
+
+
+def tabs_of(page):
+    """Turn to each tab of a page that is made of tabs; yields its name."""
+    tabs = next((each for each in page.findChildren(QTabWidget) if each.parent() is page), None)
+    if tabs is None:
+        yield ""
+        return
+    for number in range(tabs.count()):
+        tabs.setCurrentIndex(number)
+        yield f", {tabs.tabText(number)}"
+
+
+def main(cases):
+    """Print what is out of sight; scale is that of QT_SCALE_FACTOR."""
+    app = application(["vibench"])
+    with TemporaryDirectory() as folder:
+        context = AppContext(Settings(Path(folder) / "window.ini"))
+        context.choose_folder(Path(folder) / "recordings")
+        window = Window(context, PAGES)
+        window.show()
+        app.processEvents()
+        fill_with_longest_texts(window)
+        found = [each for case in cases for each in troubles_of(window, *case)]
+        window.close()
+    print(json.dumps(found))  # noqa: T201 - its word to the test
+
+
+if __name__ == "__main__":
+    main(json.loads(sys.argv[1]))
