@@ -2,9 +2,13 @@
 
 import pytest
 from hypothesis import given, strategies as st
+from PySide6.QtCore import Qt
 
 from vibench.acquisition import ConfigurationError
-from vibench.gui.forms._quantity_edit import parsed_quantity, quantity_text
+from vibench.acquisition.plan import Dwell
+from vibench.gui.forms import JudgedForm
+from vibench.gui.forms._editor import ListEditor
+from vibench.gui.forms._quantity_edit import QuantityEdit, parsed_quantity, quantity_text
 
 
 @pytest.mark.parametrize(
@@ -41,3 +45,76 @@ def test_what_is_shown_reads_back_as_the_same_number(value, unit):
 
 def test_a_gap_is_shown_in_micrometres():
     assert quantity_text(45e-6, "m") == "45 µm"
+
+
+def typed(qtbot, edit, text, *keys):
+    edit.setFocus()
+    edit.lineEdit().setText(text)
+    for key in keys or (Qt.Key.Key_Return,):
+        qtbot.keyClick(edit, key)
+    return edit.value()
+
+
+@pytest.fixture
+def field(qtbot):
+    def made(unit, value, kind=float):
+        edit = QuantityEdit(unit, kind)
+        qtbot.addWidget(edit)
+        edit.show()
+        edit.set_value(value)
+        return edit
+
+    return made
+
+
+@pytest.mark.parametrize(
+    ("unit", "value", "taken"),
+    [
+        ("m", 5e-6, 7e-6),
+        ("m", 2e-3, 7e-3),
+        ("m", 1e-6 / 3, 7e-9),
+        ("s", 5e-3, 7e-3),
+        ("s", 0.5, 7.0),
+        ("Vpp", 2e-3, 7e-3),
+        ("V", 1.5, 7.0),
+        ("Hz", 260.0, 7.0),
+        ("m/s²", 0.3, 7.0),
+        ("m", None, 7e-6),
+    ],
+)
+def test_a_plain_number_takes_the_unit_that_is_displayed(qtbot, field, unit, value, taken):
+    edit = field(unit, value)
+    assert typed(qtbot, edit, "7") == taken
+    assert edit.complaint == ""
+
+
+def test_a_plain_number_in_a_list_takes_the_unit_that_is_displayed(qtbot):
+    editor = ListEditor("m", lambda: None)
+    qtbot.addWidget(editor.widget)
+    editor.show_content([5e-6, 2e-3])
+    editor.widget.setText("7, 3, 4")
+    assert editor.content() == [7e-6, 3e-3, 4e-3]
+
+
+def test_a_value_a_thousand_times_the_old_one_is_asked_about(qtbot, field):
+    edit = field("m", 5e-6)
+    assert typed(qtbot, edit, "7 mm") == 5e-6
+    assert "1.4e+03 times" in edit.complaint
+    assert "Return" in edit.complaint
+    typed(qtbot, edit, "7 mm", Qt.Key.Key_Tab)
+    edit.clearFocus()
+    assert edit.value() == 5e-6, "to leave the field is no yes"
+    assert typed(qtbot, edit, "8 mm") == 5e-6, "another value is asked about again"
+    assert typed(qtbot, edit, "8 mm") == 8e-3
+    assert edit.complaint == ""
+
+
+def test_a_value_that_is_asked_about_is_not_taken_by_the_form(qtbot, field):
+    form = JudgedForm(Dwell, "dwell")
+    qtbot.addWidget(form)
+    form.show_value(Dwell(amplitude_vpp=1.0, frequency_hz=260, duration_s=8.0))
+    typed(qtbot, form.form.editors["duration_s"].widget, "9000")
+    assert form.value is None
+    assert "press Return again" in form.complaint
+    typed(qtbot, form.form.editors["duration_s"].widget, "9000")
+    assert form.value.duration_s == 9000.0

@@ -204,7 +204,7 @@ def test_an_axis_says_the_number_of_its_unit(filled):
         ("m", "mm", "45 µm", 45e-6),
         ("m", "µm", "45", 45e-6),
         ("m", "m", "45e-6", 45e-6),
-        ("m", "automatic", "45e-6", 45e-6),
+        ("m", "automatic", "45", 45e-6),
         ("m/s²", "g", "0.5", 0.5 * 9.80665),
         ("m/s²", "g", "3 m/s²", 3.0),
         ("m/s²", "m/s²", "1 g", 9.80665),

@@ -15,7 +15,7 @@ from vibench.acquisition import ConfigurationError
 from ..widgets import CHOICES
 from ._field_edge import LineField, draw_edge
 from ._field_facts import FieldFacts
-from ._quantity_edit import QuantityEdit, parsed_quantity, quantity_text
+from ._quantity_edit import QuantityEdit, parsed_quantity, quantity_text, unit_of
 
 
 class Editor(Protocol):
@@ -46,8 +46,7 @@ class QuantityEditor:
     def __init__(
         self, facts: FieldFacts, kind: type[float] | type[int], changed: Callable[..., None], empty: str
     ) -> None:
-        self._edit = QuantityEdit(facts.unit, kind)
-        self._edit.lineEdit().setPlaceholderText(empty)
+        self._edit = QuantityEdit(facts.unit, kind, empty)
         self._edit.changed.connect(changed)
         self.widget = self._edit
 
@@ -205,7 +204,12 @@ class ListEditor:
             return self._shown[1]
         try:
             if self._unit:
-                return [parsed_quantity(each, self._unit) for each in text.split(",") if text.strip()]
+                shown = self._shown[0].split(",")
+                return [
+                    parsed_quantity(each, self._unit, unit_of(shown[min(place, len(shown) - 1)], self._unit))
+                    for place, each in enumerate(text.split(","))
+                    if text.strip()
+                ]
             return json.loads(f"[{text}]")
         except json.JSONDecodeError as error:
             self._complaint = f"{text!r} is not a list ({error.msg}); write for example 95, 266, 500"

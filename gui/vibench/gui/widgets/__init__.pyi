@@ -54,6 +54,7 @@ from ._timed_bar import (
     TimedBar as TimedBar,
 )
 from ._units import (
+    AUTOMATIC as AUTOMATIC,
     CHOICES as CHOICES,
     POWERS as POWERS,
     STANDARD_GRAVITY as STANDARD_GRAVITY,

@@ -113,9 +113,8 @@ class DisplayUnits:
         return fitted_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
 
     def in_field(self, unit: str) -> str:
-        """Give the unit of a plain number that is typed into a field of this SI unit."""
-        name = self._chosen.get(unit, unit)
-        return unit if name == AUTOMATIC else name
+        """Give the unit of a plain number that is typed into an empty field of this SI unit."""
+        return self.on_axis(unit).name
 
     def told(self, sentence: str) -> str:
         """Write a sentence with its displacements, velocities and accelerations in the chosen units."""
