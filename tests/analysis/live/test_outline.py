@@ -67,3 +67,20 @@ def test_lost_samples_and_silence_are_drawn_as_they_are():
     low, high = outline(half, COLUMNS)
     assert np.isnan(low[:490]).all()
     assert high[510:-4] == pytest.approx(1.3, abs=0.03)
+
+
+@pytest.mark.parametrize(("start_hz", "stop_hz", "span_s"), [(150, 350, 8.2), (20, 600, 8.2), (350, 60, 4.0)])
+@pytest.mark.parametrize("columns", [500, 1000, 1800, 1960])
+def test_the_edges_of_a_steady_sweep_have_no_notches(start_hz, stop_hz, span_s, columns):
+    """The period of its middle was taken for that of its slow end: there the edges fell to half."""
+    time_s = np.arange(round(span_s * RATE_HZ)) / RATE_HZ
+    hz = start_hz + (stop_hz - start_hz) * time_s / span_s
+    phase = 2 * np.pi * (start_hz * time_s + 0.5 * (stop_hz - start_hz) * time_s**2 / span_s)
+    low, high = outline(np.cos(phase).astype(np.float32), columns)
+    plain = envelope(np.cos(phase).astype(np.float32), columns)
+    column_hz = hz[(np.arange(columns) + 0.5).astype(int) * time_s.size // columns]
+    hidden = column_hz * span_s / columns > 1 / 5.0
+    assert high[hidden].min() > 0.97
+    assert low[hidden].max() < -0.97
+    assert (low <= plain[0]).all()
+    assert (high >= plain[1]).all()

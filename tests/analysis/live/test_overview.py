@@ -91,3 +91,20 @@ def test_a_file_without_an_overview_looks_the_same(recording, tmp_path):
 def test_a_picture_of_nothing_is_refused(recording, start, stop, columns):
     with pytest.raises(InvalidRequest, match="were asked for"):
         overview_of(recording).picture(CHANNELS, start, stop, columns)
+
+
+@pytest.mark.parametrize("frequency_hz", [4.0, 9.0, 11.5])
+def test_a_steady_sine_has_straight_edges_where_bins_are_shorter_than_its_period(
+    tmp_path, synthetic_module, frequency_hz
+):
+    time_s = np.arange(SAMPLES) / RATE
+    motion = synthetic_module.Motion(np.zeros(SAMPLES), np.cos(time_s))
+    plan = Dwell(amplitude_vpp=1.0, frequency_hz=50.0, settle_s=1.0, duration_s=20.0)
+    velocity = 0.01 * np.sin(2 * np.pi * frequency_hz * time_s)
+    path = synthetic_module.write_recording(tmp_path, plan, motion, velocity, [])
+    with open_recording(path) as opened:
+        for columns in (390, 350, 300):
+            picture = overview_of(opened).picture(("m0_velocity",), 0, SAMPLES, columns)
+            assert picture.samples_per_column >= BIN_SAMPLES
+            assert picture.high[0].min() > 0.0095
+            assert picture.low[0].max() < -0.0095

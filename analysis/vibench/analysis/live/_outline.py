@@ -7,10 +7,14 @@ Where a period is many columns long its waveform is drawn, and where a column ho
 extremes are: both are left alone, and nowhere is an extreme lost.
 """
 
-from math import ceil
+from collections.abc import Iterator
+from itertools import pairwise
+from math import inf
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..signals import Reals
 from ._envelope import Samples, envelope
 
 LEGIBLE_COLUMNS = 6.0
@@ -19,8 +23,8 @@ _MARGIN = 1.25
 """Periods around a column: those of a sweep are not all alike."""
 _CLEAR = 0.25
 """Share of the usual height that a sample must be away from the middle to tell its side."""
-_BLOCKS, _EVERY = 32, 4
-"""Periods are counted in every fourth of so many stretches: that is enough, and costs a quarter."""
+_BLOCKS, _LEAST_COLUMNS = 32, 24
+"""Periods are counted in so many stretches, each of so many columns or more."""
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
@@ -42,31 +46,67 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     low, high = envelope(samples, columns)
     if samples.shape[-1] <= columns:
         return low, high
+    edges = [widened(*each, columns_around(one, each)) for one, each in _rows(samples, low, high)]
+    shape = low.shape
+    return np.stack([one for one, _ in edges]).reshape(shape), np.stack([one for _, one in edges]).reshape(
+        shape
+    )
+
+
+def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[np.int64]:
+    """Count the columns that hold a period, around each column; 1 where the edges are to be left alone.
+
+    The period is that of the stretch around the column: a sweep has many.
+    """
+    low, high = edges
+    count = low.size
+    blocks = max(1, min(_BLOCKS, count // _LEAST_COLUMNS))
+    borders = np.arange(blocks + 1) * count // blocks
+    places = borders * samples.size // count
+    periods = [
+        period_of(samples[places[each] : places[each + 1]], low[start:stop], high[start:stop])
+        for each, (start, stop) in enumerate(pairwise(borders))
+    ]
+    return reach_of(np.array(periods), borders)
+
+
+def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Spread periods of stretches [columns] over their columns; next to a longer one it is that."""
+    is_short = (periods > 1.0 / _MARGIN) & (periods < LEGIBLE_COLUMNS)
+    reach = np.where(is_short, np.ceil(_MARGIN * np.where(is_short, periods, 1.0)), 1.0).astype(np.int64)
+    beside = np.pad(reach, 1, mode="edge")
+    longest = np.max([beside[:-2], reach, beside[2:]], axis=0)
+    return np.repeat(longest, np.diff(borders))
+
+
+def period_of(samples: Samples, low: Samples, high: Samples) -> float:
+    """Measure a period in columns; infinite where the signal never goes there and back.
+
+    Noise around the middle does not count.
+    """
+    known = np.isfinite(low)
+    if not known.any():
+        return inf
+    middle, height = np.median(0.5 * (low + high)[known]), np.median((high - low)[known])
+    moved = samples - middle
+    sides = np.signbit(moved[np.abs(moved) > _CLEAR * height])
+    turns = np.count_nonzero(sides[1:] != sides[:-1]) / 2
+    return low.size / turns if turns else inf
+
+
+def widened(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samples, Samples]:
+    """Give every column the extremes of so many columns around it."""
     lowest, highest = low.copy(), high.copy()
-    for row in np.ndindex(samples.shape[:-1]):
-        reach = columns_around(samples[row], low[row], high[row])
-        if reach > 1:
-            lowest[row] = _widened(low[row], reach, np.fmin)
-            highest[row] = _widened(high[row], reach, np.fmax)
+    for each in np.unique(reach[reach > 1]):
+        here = reach == each
+        lowest[here] = _widened(low, int(each), np.fmin)[here]
+        highest[here] = _widened(high, int(each), np.fmax)[here]
     return lowest, highest
 
 
-def columns_around(samples: Samples, low: Samples, high: Samples) -> int:
-    """Give the number of columns that hold a period; 1 where the edges are to be left alone."""
-    known = np.isfinite(low)
-    if not known.any():
-        return 1
-    period = low.size / max(_periods(samples, low[known], high[known]), 1e-9)
-    return ceil(_MARGIN * period) if 1.0 / _MARGIN < period < LEGIBLE_COLUMNS else 1
-
-
-def _periods(samples: Samples, low: Samples, high: Samples) -> float:
-    """Count how often the signal goes there and back; noise around its middle does not count."""
-    middle, height = np.median(0.5 * (low + high)), np.median(high - low)
-    size = samples.size // _BLOCKS
-    looked_at = samples[: size * _BLOCKS].reshape(_BLOCKS, size)[::_EVERY].ravel() - middle
-    sides = np.signbit(looked_at[np.abs(looked_at) > _CLEAR * height])
-    return _EVERY * np.count_nonzero(sides[1:] != sides[:-1]) / 2
+def _rows(samples: Samples, low: Samples, high: Samples) -> Iterator[tuple[Samples, tuple[Samples, Samples]]]:
+    for row in np.ndindex(samples.shape[:-1]):
+        yield samples[row], (low[row], high[row])
 
 
 def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:

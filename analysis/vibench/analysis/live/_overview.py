@@ -28,12 +28,14 @@ from ..errors import InvalidRequest
 from ..recordings import RESPONSE
 from ..signals import Reals
 from ._envelope import Samples, column_starts, envelope
-from ._outline import outline
+from ._outline import outline, period_of, reach_of, widened
 
 _COARSER = 16
 """Bins of one level in one bin of the next."""
 _LEAST_BINS = 20_000
 """A level with fewer bins than this needs no coarser one: reducing it takes a tenth of a millisecond."""
+_STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
+"""Where periods are counted in a long recording: so many places, each of so many columns, no more samples."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
@@ -111,13 +113,35 @@ class RecordingOverview:
         highs: list[Samples] = []
         for role in roles:
             level = next(each for each in self.levels[role] if each.bin_samples == bin_samples)
-            lows.append(envelope(level.low[first:last], columns)[0])
-            highs.append(envelope(level.high[first:last], columns)[1])
+            low, high = (
+                envelope(level.low[first:last], columns)[0],
+                envelope(level.high[first:last], columns)[1],
+            )
+            reach = self._reach(role, first * bin_samples, last * bin_samples, low.size)
+            for edges, edge in zip((lows, highs), widened(low, high, reach), strict=True):
+                edges.append(edge)
         starts = first + column_starts(last - first, columns)
         time_s = starts.astype(np.float64) * (bin_samples / self.recording.sample_rate_hz)
         per_column = (last - first) * bin_samples / starts.size
         low, high = np.asarray(lows, dtype=np.float32), np.asarray(highs, dtype=np.float32)
         return Picture(time_s, low, high, per_column)
+
+    def _reach(self, role: str, begin: int, end: int, columns: int) -> NDArray[np.int64]:
+        """Count the columns that hold a period, from a piece of each of some stretches.
+
+        The file keeps no bin shorter than a column, and samples alone tell a period of less than two columns.
+        """
+        borders = np.linspace(0, columns, _STRETCHES + 1).astype(np.int64)
+        wide = (end - begin) / columns
+        size = round(_LOOKED_AT * wide)
+        periods = np.full(_STRETCHES, np.inf)
+        if size <= _MOST_LOOKED_AT:
+            for number, place in enumerate((borders[:-1] + borders[1:]) / 2):
+                first = begin + round(place * wide)
+                piece = self.recording.read(role, first, min(first + size, self.recording.samples))
+                if piece.size:
+                    periods[number] = period_of(piece, *envelope(piece, max(1, round(piece.size / wide))))
+        return reach_of(periods, borders)
 
 
 def has_overview(recording: Recording) -> bool:
