@@ -106,5 +106,5 @@ def test_a_steady_sine_has_straight_edges_where_bins_are_shorter_than_its_period
         for columns in (390, 350, 300):
             picture = overview_of(opened).picture(("m0_velocity",), 0, SAMPLES, columns)
             assert picture.samples_per_column >= BIN_SAMPLES
-            assert picture.high[0].min() > 0.0095
-            assert picture.low[0].max() < -0.0095
+            assert picture.high[0, 4:-4].min() > 0.0095
+            assert picture.low[0, 4:-4].max() < -0.0095

@@ -26,6 +26,8 @@ from ._time_histories import TimeHistoryPlots
 from ._transmissibility_plot import TransmissibilityPlot
 from ._watch_card import WatchCard
 
+LAYOUT_ROUNDS = 4
+"""A scroll bar that comes makes the words narrower, and longer."""
 LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
 
 
@@ -207,7 +209,8 @@ class RunPage(Page):
     def _is_armed_read(self) -> bool:
         """Look now: what was armed a moment ago may not have been laid out yet."""
         self.refresh()
-        QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        for _ in range(LAYOUT_ROUNDS):
+            QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
         return self.arm_card.is_read
 
     def _connect(self) -> None:

@@ -1,0 +1,95 @@
+"""What will happen is read to its end before it can be started, however small the window is."""
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QFont
+
+from vibench.acquisition.engine import ArmedPlan, EngineState, EngineStatus, Supervision
+from vibench.gui.pages.run._arm_card import UNREAD
+from vibench.gui.widgets import RUN
+
+LINES = tuple(
+    f"Line {number}: what is played, how loud, and under which limits it is stopped." for number in range(20)
+)
+
+
+def armed_status(campaign, lines):
+    armed = ArmedPlan(
+        campaign=campaign,
+        folder="recordings",
+        lines=lines,
+        expires_in_s=60.0,
+        attendance=Supervision.ATTENDED,
+        patience_s=2.0,
+    )
+    return EngineStatus(state=EngineState.ARMED, attendance=Supervision.ATTENDED, armed=armed)
+
+
+@pytest.fixture
+def small(window, qapp, qtbot):
+    """The Run page of a small window with large letters, with something armed that fills more than it."""
+    font = QFont(qapp.font())
+    large = QFont(font)
+    large.setPointSize(14)
+    qapp.setFont(large)
+    window._timer.stop()
+    window.resize(1024, 700)
+    window.show_page(RUN)
+    qtbot.waitUntil(lambda: window.is_themed)
+    page, status = window.pages[RUN], armed_status("night", LINES)
+    page.arm_card.show_status(status, "", "")
+    yield page, status
+    qapp.setFont(font)
+
+
+def show(page, status, qapp):
+    for _ in range(4):
+        qapp.processEvents()
+    page.arm_card.show_status(status, "", "")
+
+
+def test_it_cannot_be_started_before_its_end_was_in_sight(small, qapp, qtbot):
+    page, status = small
+    show(page, status, qapp)
+    card, bar = page.arm_card, page._parts.side.verticalScrollBar()
+    assert card._words.height() >= card._words.heightForWidth(card._words.width()), "no line is cut"
+    assert bar.value() == 0
+    assert not card.is_read
+    assert not card.start_button.isEnabled()
+    assert card.start_button.text() == UNREAD
+    assert all(each.isVisible() for each in (card.cancel_button, card.start_button))
+    presses = 0
+    while not card.is_read:
+        qtbot.keyClick(page, Qt.Key.Key_PageDown)
+        show(page, status, qapp)
+        presses += 1
+        assert presses < 10
+    assert presses >= 1
+    assert card.start_button.isEnabled()
+    bar.setValue(0)
+    show(page, status, qapp)
+    assert card.is_read, "it has been read once"
+
+
+def test_another_plan_is_to_be_read_again_from_its_beginning(small, qapp):
+    page, status = small
+    show(page, status, qapp)
+    bar = page._parts.side.verticalScrollBar()
+    page._parts.side.ensureVisible(0, page.arm_card.geometry().bottom())
+    show(page, status, qapp)
+    assert page.arm_card.is_read
+    other = status.model_copy(update={"armed": status.armed.model_copy(update={"campaign": "another"})})
+    page.arm_card.show_status(other, "", "")
+    assert bar.value() == 0
+    show(page, other, qapp)
+    assert not page.arm_card.is_read
+
+
+def test_what_fits_into_the_window_can_be_started_at_once(window, qapp):
+    window._timer.stop()
+    window.resize(1280, 800)
+    window.show_page(RUN)
+    page, status = window.pages[RUN], armed_status("short", LINES[:5])
+    page.arm_card.show_status(status, "", "")
+    show(page, status, qapp)
+    assert page.arm_card.is_read
