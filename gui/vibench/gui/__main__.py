@@ -9,6 +9,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.rig import load_rig
+
 from .window import display_trouble
 
 if TYPE_CHECKING:
@@ -28,6 +31,12 @@ def main(arguments: list[str] | None = None) -> int:
     if trouble:
         sys.stderr.write(f"The window cannot be opened: {trouble}.\n")
         return NO_WINDOW
+    if options.bench is not None:
+        try:
+            load_rig(options.bench)
+        except ConfigurationError as error:
+            sys.stderr.write(f"{error}\n")
+            return NO_WINDOW
     starting = _sign_of_life()
     from .window import open_window  # noqa: PLC0415
 
@@ -46,6 +55,7 @@ def _sign_of_life() -> "QLabel":
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     application = QApplication.instance() or QApplication(sys.argv[:1])
     label = QLabel("vibench is starting…", None, Qt.WindowType.SplashScreen)
+    label.setWindowTitle("vibench")
     label.setMargin(2 * label.fontMetrics().height())
     label.show()
     application.processEvents()

@@ -47,6 +47,10 @@ class Consequence(StrEnum):
     """It is said beforehand, and marked in the recording if it comes true."""
 
 
+_DIGITS = 6
+"""Of a value beside its limit: 8200 points and 8192 must not look alike."""
+
+
 @dataclass(frozen=True)
 class LimitCheck:
     """One predicted value beside its limit."""
@@ -86,8 +90,8 @@ class LimitCheck:
     def complaint(self) -> str:
         """Say the violation in one clause."""
         return (
-            f"{self.what} would be {self.value:.4g} {self.unit}, allowed is {self.side.value} "
-            f"{self.limit:.4g} {self.unit} ({self.source}): {self.remedy}"
+            f"{self.what} would be {self.value:.{_DIGITS}g} {self.unit}, allowed is {self.side.value} "
+            f"{self.limit:.{_DIGITS}g} {self.unit} ({self.source}): {self.remedy}"
         )
 
 

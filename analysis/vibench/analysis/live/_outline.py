@@ -7,7 +7,6 @@ Where a period is many columns long its waveform is drawn, and where a column ho
 extremes are: both are left alone, and nowhere is an extreme lost.
 """
 
-from collections.abc import Iterator
 from itertools import pairwise
 from math import inf
 
@@ -46,11 +45,11 @@ def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
     low, high = envelope(samples, columns)
     if samples.shape[-1] <= columns:
         return low, high
-    edges = [widened(*each, columns_around(one, each)) for one, each in _rows(samples, low, high)]
-    shape = low.shape
-    return np.stack([one for one, _ in edges]).reshape(shape), np.stack([one for _, one in edges]).reshape(
-        shape
-    )
+    lowest, highest = low.copy(), high.copy()
+    for row in np.ndindex(samples.shape[:-1]):
+        reach = columns_around(samples[row], (low[row], high[row]))
+        lowest[row], highest[row] = widened(low[row], high[row], reach)
+    return lowest, highest
 
 
 def columns_around(samples: Samples, edges: tuple[Samples, Samples]) -> NDArray[np.int64]:
@@ -102,11 +101,6 @@ def widened(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samp
         lowest[here] = _widened(low, int(each), np.fmin)[here]
         highest[here] = _widened(high, int(each), np.fmax)[here]
     return lowest, highest
-
-
-def _rows(samples: Samples, low: Samples, high: Samples) -> Iterator[tuple[Samples, tuple[Samples, Samples]]]:
-    for row in np.ndindex(samples.shape[:-1]):
-        yield samples[row], (low[row], high[row])
 
 
 def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:

@@ -26,6 +26,7 @@ class LegendLine(QLabel):
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
+        self._of = parent
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
         self.setTextFormat(Qt.TextFormat.RichText)
         self.setWordWrap(True)
@@ -36,7 +37,7 @@ class LegendLine(QLabel):
 
     def follow_font(self) -> None:
         """Write a little smaller than the rest."""
-        font = QFont(self.parentWidget().font())
+        font = QFont(self._of.font())
         font.setPointSizeF(0.85 * font.pointSizeF())
         self.setFont(font)
 

@@ -85,6 +85,7 @@ class Scrolled(QScrollArea):
         self.setWidgetResizable(True)
         self.setFrameShape(QScrollArea.Shape.NoFrame)
         self.setWidget(content)
+        self._content = content
 
     def minimumSizeHint(self) -> QSize:
         """Small, whatever is inside."""
@@ -94,5 +95,5 @@ class Scrolled(QScrollArea):
     def sizeHint(self) -> QSize:
         """As wide as the content needs with a scroll bar beside it."""
         bar = self.verticalScrollBar().sizeHint().width() + self.fontMetrics().height() // 2
-        least = self.widget().minimumSizeHint()
+        least = self._content.minimumSizeHint()
         return QSize(least.width() + bar, least.height())

@@ -53,7 +53,10 @@ class ShownUnit:
 
     def text(self, value: float, digits: int = 3) -> str:
         """Write a value given in SI."""
-        return f"{_written(Decimal(f'{value * self.per_si:.{digits}g}'))} {self.name}".strip()
+        shown = value * self.per_si
+        # A count is written whole: 8192 points are not 8190.
+        number = f"{shown:.0f}" if self.name == "points" else f"{shown:.{digits}g}"
+        return f"{_written(Decimal(number))} {self.name}".strip()
 
 
 def plain_unit(unit: str) -> str:

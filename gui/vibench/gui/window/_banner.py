@@ -53,6 +53,7 @@ class Banner(QFrame):
         self._stop.clicked.connect(self.stop_wanted)
         layout = filled(QHBoxLayout(self), self._label, (self._detail, 1), self._stop)
         layout.setContentsMargins(10, 6, 10, 6)
+        self._fit()
         self._paint()
 
     @property

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QTextDocument
+from PySide6.QtGui import QTextCursor, QTextDocument, QTextOption
 from PySide6.QtWidgets import QDialog, QDialogButtonBox, QTextBrowser, QVBoxLayout, QWidget
 
 from vibench.acquisition import ConfigurationError, shipped_folder
@@ -26,11 +26,22 @@ class Reader(QDialog):
         self.browser = QTextBrowser()
         self.browser.setAccessibleName(title)
         self.browser.setOpenExternalLinks(False)
+        self.browser.setWordWrapMode(QTextOption.WrapMode.WrapAtWordBoundaryOrAnywhere)
+        self.browser.sourceChanged.connect(self._fit)
         self.buttons = QDialogButtonBox(QDialogButtonBox.StandardButton.Close)
         self.buttons.rejected.connect(self.reject)
         filled(QVBoxLayout(self), self.browser, self.buttons)
         em = self.fontMetrics().height()
         self.resize(50 * em, 38 * em)
+
+    def _fit(self, *_: object) -> None:
+        """Break lines of code too: a manual is not read sideways."""
+        block = self.browser.document().begin()
+        while block.isValid():
+            wrapped = block.blockFormat()
+            wrapped.setNonBreakableLines(False)
+            QTextCursor(block).setBlockFormat(wrapped)
+            block = block.next()
 
 
 def show_manual(parent: QWidget) -> Reader:

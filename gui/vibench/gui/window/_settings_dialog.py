@@ -28,7 +28,7 @@ class Preferences(FrozenModel):
     theme: Literal["light", "dark"]
     """Colours of the window; figures of exports are light."""
     font_pt: Annotated[int, Field(ge=7, le=24)]
-    """Height of the letters; what is open already takes it as far as it goes, all of it the next start."""
+    """Height of the letters."""
     displacements_in: Literal["automatic", "µm", "mm", "m"]
     """On axes, in fields, tables and sentences; files and reports keep their own. A field takes any unit."""
     velocities_in: Literal["mm/s", "m/s"]

@@ -326,3 +326,18 @@ def test_a_name_that_no_system_allows_is_no_folder(page, typed):
     page._folder_line.setText(typed)
     page._typed_folder()
     assert page._folder_line.text() == str(page._folder)
+
+
+def test_a_file_that_was_deleted_leaves_the_list(shared_context, record, tmp_path, waited, qtbot):
+    gone, kept = record(tmp_path, "gone"), record(tmp_path, "kept")
+    shared_context.choose_folder(tmp_path)
+    page = FilesPage(shared_context)
+    qtbot.addWidget(page)
+    page.list_folder()
+    assert page.table.is_listing
+    waited(lambda: len(page.table.recordings.entries) == 2)
+    assert not page.table.is_listing
+    gone.unlink()
+    page._looked_s = 0.0
+    page.refresh()
+    waited(lambda: [each.path for each in page.table.recordings.entries] == [kept])

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from time import monotonic
 
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
@@ -40,6 +41,9 @@ from ._listing import Levels, Listing, listed, made_levels, thumbnails
 from ._recording_table import CampaignChoice, RecordingTable
 from ._spectrogram_view import Pictures
 
+LOOK_S = 2.0
+"""From one look for files that have gone to the next."""
+
 
 class FilesPage(Page):
     """A browser above, the chosen recording below."""
@@ -58,6 +62,7 @@ class FilesPage(Page):
         self._making: Job | None = None
         self._wanted: Path | None = None
         self._folder = context.folder
+        self._looked_s = 0.0
         self._build()
         self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
         context.recording_wanted.connect(self.open_path)
@@ -86,6 +91,14 @@ class FilesPage(Page):
         self.list_folder()
         self.table.setFocus()
 
+    def refresh(self) -> None:
+        """List anew when a listed file has gone."""
+        now_s = monotonic()
+        if now_s - self._looked_s > LOOK_S:
+            self._looked_s = now_s
+            if not all(each.path.exists() for each in self.table.recordings.entries):
+                self.list_folder()
+
     def left(self) -> None:
         """Keep how the page is divided."""
         self.context.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
@@ -103,6 +116,7 @@ class FilesPage(Page):
         self._goes_to.setText(f"new recordings go to {self.context.folder}" if elsewhere else "")
         if self._listing is not None:
             self._listing.drop()
+        self.table.is_listing = True
         self._listing = self.context.background.ask(listed, self._listed, self._failed, folder)
 
     def open_path(self, path: Path) -> None:
@@ -123,6 +137,7 @@ class FilesPage(Page):
 
     def _listed(self, found: Listing) -> None:
         entries = found.recordings
+        self.table.is_listing = False
         self.campaigns.offer(found.campaigns)
         # A list that comes late must not take back what somebody has chosen meanwhile.
         chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)

@@ -201,6 +201,8 @@ class RecordingTable(QTableView):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.setAccessibleName("Recordings")
+        self.is_listing = False
+        """Whether somebody is still looking at what the folder holds."""
         self.recordings = RecordingModel(theme)
         self._sorted = _ChosenRows(self)
         self._sorted.setSourceModel(self.recordings)
@@ -236,6 +238,8 @@ class RecordingTable(QTableView):
             words = (
                 "No recording fits the search and the campaign that are chosen."
                 if self.recordings.entries
+                else "The folder is being read."
+                if self.is_listing
                 else "No recordings in this folder yet: choose another folder, or run a test (Ctrl+3)."
             )
             colour = self.palette().placeholderText().color()

@@ -101,7 +101,7 @@ class SpectrogramView(QWidget):
         self._latest_request.drop()
         self._asked = self._of = None
         for image in self._images.values():
-            image.clear("Choose a recording in the list above.")
+            image.clear("Choose a recording in the list above." if recording is None else "Working it out…")
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
             blocked = self.channel.blockSignals(True)

@@ -198,10 +198,12 @@ class QueuePage(Page):
         self._say_summary(campaign, seen)
 
     def _say_summary(self, campaign: Campaign, seen: CampaignPreview) -> None:
+        count = len(seen.levels)
         size = "" if seen.size_bytes is None else f"   ·   {seen.size_bytes / 1e9:.2f} GB"
         end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
         self.summary.setText(
-            f"{campaign.name}: {len(seen.levels)} recordings   ·   takes {clock(seen.duration_s)}   ·   "
+            f"{campaign.name}: {count} recording{'' if count == 1 else 's'}   ·   "
+            f"takes {clock(seen.duration_s)}   ·   "
             f"started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
         )
 

@@ -180,7 +180,14 @@ class RunPage(Page):
         self._ended = path
         status = self.context.bridge.status
         rows = () if status is None else status.rows
-        told = next((f"{row.state}: {row.reason}" for row in rows if row.file == str(path)), "")
+        told = next(
+            (
+                row.reason if row.reason.startswith(row.state) else f"{row.state}: {row.reason}"
+                for row in rows
+                if row.file == str(path)
+            ),
+            "",
+        )
         self.summary.setText(f"Last run: {path.name}, {told}")
         self.look_button.show()
 

@@ -150,7 +150,8 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         self._say("It broke off.")
 
     def _say(self, text: str) -> None:
-        cost = "" if self.answer is None else self.kind.cost(self.answer)
+        has_nothing = self.simulator.is_busy and (self._course is None or not self._course.parts)
+        cost = "" if self.answer is None or has_nothing else self.kind.cost(self.answer)
         self._state.setText(f"{text} {cost}")
         self._cancel.setEnabled(self.simulator.is_busy)
         self._compare.setEnabled(self.answer is not None and bool(self.kind.curves(self.answer)))

@@ -74,7 +74,8 @@ def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
     if not broken:
         return f"✔ within all limits   ·   {said}"
     sign = "✖" if broken[0].forbids else "⚠"
-    return f"{sign} {broken[0].complaint()}   ·   {said}"
+    reasons = "   ·   ".join(check.complaint() for check in broken)
+    return f"{sign} {reasons}   ·   {said}"
 
 
 def _load(check: LimitCheck, name: str) -> str:
@@ -178,6 +179,8 @@ class TestPage(Page):
 
     def _changed(self) -> None:
         measurement, rig = self.form.value, self.context.selection.rig
+        if self._is_renamed(measurement, rig):
+            return
         self.context.selection.choose_measurement(measurement)
         self._preview, self._refusal = None, ""
         if measurement is not None:
@@ -193,6 +196,21 @@ class TestPage(Page):
             self.summary.setText(f"✖ {what}")
             return
         self._look_at(measurement, rig)
+
+    def _is_renamed(self, measurement: Measurement | None, rig: Rig | None) -> bool:
+        """Take over another name alone: what is predicted of the test stays."""
+        before, seen = self.context.selection.measurement, self.context.selection.prediction
+        if measurement is None or before is None or self._preview is None or seen is None:
+            return False
+        if measurement == before or measurement.model_copy(update={"name": before.name}) != before:
+            return False
+        if not self._of == self._summary_of == self._predicted_of == (before, rig):
+            return False
+        self.context.selection.choose_measurement(measurement)
+        self.context.selection.keep_prediction(seen)
+        self._history.note(measurement)
+        self._of = self._summary_of = self._predicted_of = (measurement, rig)
+        return True
 
     def _look_at(self, measurement: Measurement, rig: Rig) -> None:
         self.summary.setText("…")
