@@ -42,7 +42,7 @@ _OUTSTANDING = 8.0
 """Largest distance from the bridge, over what the bridge's fit leaves of the flanks."""
 _JUMP = 4.0
 """Change from sample to sample where light goes, over the fastest of the flanks."""
-_MOST_PER_S = 40.0
+_MOST_PER_S = 400.0
 """What comes more often is made by the motion."""
 _ORDER = 48
 _CONTEXT = 12 * _ORDER
@@ -96,7 +96,19 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
         for each in [] if together else _apart(edges, flank):
             together += explained(each)
         found += together
-    return tuple(found) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+    joined = _joined(found, flank)
+    return joined if len(joined) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+
+
+def _joined(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
+    """Join drop-outs that leave less than a flank between them: what lies there may be dark as well."""
+    joined: list[Dropout] = []
+    for each in found:
+        if joined and each.first - joined[-1].stop < flank:
+            joined[-1] = Dropout(joined[-1].first, each.stop)
+        else:
+            joined.append(each)
+    return tuple(joined)
 
 
 def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:

@@ -1,4 +1,5 @@
 from ._period import (
+    STEADY as STEADY,
     Points as Points,
     shortest_period as shortest_period,
 )

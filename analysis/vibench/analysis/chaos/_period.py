@@ -56,13 +56,16 @@ class Points(Labelled):
 def shortest_period(points: Points, longest: int = LONGEST_PERIOD) -> int | None:
     """Find the fewest drive periods after which all points repeat within noise; None if they do not.
 
-    Two draws differ by sqrt(2) of their standard deviation; a scatter of 0.2 % of the orbit is granted to
-    the drive.
+    The points of each phase of the period are compared over the whole record: what changes slowly differs
+    little from one period to the next. A scatter of 0.2 % of the orbit is granted to the drive.
     """
-    allowed = 2 * ((_NOISE_MARGIN * points.noise) ** 2 + STEADY**2)
-    for period in range(1, min(longest, len(points.value) // 4) + 1):
-        change = points.value[period:] - points.value[:-period]
-        if np.all(np.mean(change**2, axis=0) <= allowed):
+    allowed = (_NOISE_MARGIN * points.noise) ** 2 + STEADY**2
+    count = len(points.value)
+    for period in range(1, min(longest, count // 4) + 1):
+        whole = np.full((-(-count // period) * period, _TABLE), np.nan)
+        whole[:count] = points.value
+        scatter = np.nanvar(whole.reshape(-1, period, _TABLE), axis=0, ddof=1)
+        if np.all(np.mean(scatter, axis=0) <= allowed):
             return period
     return None
 
@@ -85,6 +88,13 @@ def drift(points: Points) -> float:
         variance = np.sum(left**2, axis=0) / (_BLOCKS - 2) + STEADY**2 / _BLOCKS
         worst = max(worst, float(np.max(np.abs(slope) / np.sqrt(variance / (place @ place)))))
     return worst
+
+
+def slow_share(points: Points) -> float:
+    """Return the part of the points' variance that the means of tenths of the record show."""
+    means = np.array([block.mean(axis=0) for block in np.array_split(points.value, _BLOCKS)])
+    whole = float(np.sum(np.var(points.value, axis=0)))
+    return float(np.sum(np.var(means, axis=0))) / whole if whole > 0.0 else 0.0
 
 
 def is_settled(points: Points) -> bool:

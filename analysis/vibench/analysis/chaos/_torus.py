@@ -11,6 +11,12 @@ _HARMONICS = 8
 _EXPLAINED = 0.02
 """Part of the spread that the harmonics of one rotation may leave unexplained on a smooth closed curve."""
 _NOISE_MARGIN = 1.5
+_CLEAR = 0.8
+"""Left over, at most, where one rotation stands out of noise that could explain all the rest."""
+_MAINS_HZ = (50.0, 60.0)
+_MAINS_HARMONICS = 3
+_MAINS_WITHIN = 1e-3
+"""Relative deviation of a grid's frequency."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +55,18 @@ def rotation(points: Reals) -> Rotation:
 
 def is_torus(found: Rotation, noise_over_spread: float) -> bool:
     """Whether the closed curve explains all but noise."""
-    return found.left_over <= max(_EXPLAINED, _NOISE_MARGIN * noise_over_spread)
+    return found.left_over <= min(max(_EXPLAINED, _NOISE_MARGIN * noise_over_spread), _CLEAR)
+
+
+def mains_hz(found: Rotation, drive_hz: float, periods: int) -> float | None:
+    """Return the frequency of the mains, or of its harmonic, that makes points turn so fast; else None."""
+    for mains in _MAINS_HZ:
+        for hum_hz in mains * np.arange(1, _MAINS_HARMONICS + 1):
+            turns = hum_hz / drive_hz
+            seen = abs(turns - round(turns))
+            if abs(seen - found.turns_per_period) <= _MAINS_WITHIN * turns + 0.5 / periods:
+                return float(hum_hz)
+    return None
 
 
 def _residual(centred: Reals, turns: float) -> float:

@@ -15,9 +15,9 @@ from ..signals import Reals
 from ..tables import Labelled
 from ._divergence import Divergence, divergence
 from ._embedding import embedded
-from ._period import Points, is_settled, shortest_period
+from ._period import Points, is_settled, shortest_period, slow_share
 from ._surrogates import SurrogateTest, surrogate_test
-from ._torus import Rotation, is_torus, rotation
+from ._torus import Rotation, is_torus, mains_hz, rotation
 from ._zero_one import FEWEST, ZeroOne, zero_one
 
 _BLOCKS = 10
@@ -49,13 +49,21 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""The last so many drive periods are judged: more would only cost time."""
+"""The shape of the last so many points is judged: more would only cost time."""
 ABOVE_NOISE = 5.0
 """Scatter of the points over their noise below which its shape says nothing."""
 LARGEST_NOISE = 0.1
 """Noise over the size of the orbit, beyond which points that repeat within it may hide any other motion."""
 SMALL = 0.05
 """Scatter, as part of the orbit, up to which linear noise about a fixed point leaves a motion periodic."""
+SLOW = 0.5
+"""Part of the points' variance between tenths of the record, beyond which slow change explains it."""
+_FEWEST_TURNS = 3.0
+"""Of a closed curve in a record, below which it is no more than a slow change."""
+_LARGEST_HUM = 0.1
+"""Part of the orbit that mains hum may reach; more may be a motion at its frequency."""
+_LOW_PERIOD = 4
+"""Period doublings reach it; a drive of twice the mains' frequency makes hum repeat as soon."""
 CHAOTIC_K = 0.9
 _DELAYS = 3
 _STEPS = 8
@@ -120,7 +128,8 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     Parameters
     ----------
     points
-        As many drive periods as there are; the last 3000 are judged.
+        As many drive periods as there are; whether they repeat is judged over all, their shape over the last
+        3000.
     drive_hz
         Turns exponents per period into exponents per second.
     seed
@@ -134,18 +143,17 @@ def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionV
     """
     if not 0.0 < drive_hz < math.inf:
         raise InvalidRequest(f"a drive of {drive_hz} Hz is none; give a positive frequency")
-    last = Points(points.value[-MOST_POINTS:], points.noise)
-    count = len(last.value)
+    count = len(points.value)
     if count < FEWEST:
         return _too_few(
             f"{count} drive periods were recorded clear of the ends, and {FEWEST} are needed; dwell longer",
-            last,
+            points,
             drive_hz,
         )
-    before = begin_of_last_motion(last)
+    before = begin_of_last_motion(points)
     if before == 0:
-        return _of_one_motion(last, drive_hz, seed)
-    rest = Points(last.value[before:], last.noise)
+        return _of_one_motion(points, drive_hz, seed)
+    rest = Points(points.value[before:], points.noise)
     too_late = "before the end, too late to judge what it became; dwell longer"
     if count - before < FEWEST:
         return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
@@ -170,11 +178,31 @@ def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
             evidence,
         )
     period = shortest_period(last)
-    if period is not None:
-        every = "drive period" if period == 1 else f"{period} drive periods"
-        why = f"the points repeat every {every} to within their noise"
-        return MotionVerdict(MotionKind.PERIODIC, why, evidence, period)
-    return _aperiodic(last, evidence, seed)
+    if period is None:
+        return _aperiodic(Points(last.value[-MOST_POINTS:], last.noise), evidence, seed)
+    if period > 1:
+        found = rotation(last.value)
+        hum_hz = mains_hz(found, drive_hz, len(last.value))
+        if hum_hz is not None and (period > _LOW_PERIOD or last.spread <= _LARGEST_HUM):
+            return _humming(replace(evidence, rotation=found), hum_hz, period)
+    every = "drive period" if period == 1 else f"{period} drive periods"
+    why = f"the points repeat every {every} to within their noise"
+    return MotionVerdict(MotionKind.PERIODIC, why, evidence, period)
+
+
+def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVerdict:
+    """Mains hum on a motion that repeats every drive period, unless it may be a motion at its frequency."""
+    if evidence.spread <= _LARGEST_HUM and (period is None or period > _LOW_PERIOD):
+        why = (
+            f"the points repeat every drive period, except for {100 * evidence.spread:.2g} % of the orbit at "
+            f"{hum_hz:g} Hz, which is mains hum"
+        )
+        return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
+    return _undecided(
+        f"{100 * evidence.spread:.2g} % of the orbit is at {hum_hz:g} Hz, which may be mains hum or motion; "
+        "dwell at another frequency",
+        evidence,
+    )
 
 
 def _too_few(why: str, points: Points, drive_hz: float) -> MotionVerdict:
@@ -190,6 +218,20 @@ def _undecided(why: str, evidence: Evidence) -> MotionVerdict:
 def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     found = rotation(points.value)
     evidence = replace(so_far, rotation=found)
+    is_curve = is_torus(found, evidence.noise / evidence.spread)
+    turns = found.turns_per_period * len(points.value)
+    if slow_share(points) > SLOW or (is_curve and turns < _FEWEST_TURNS):
+        return _undecided(
+            f"the motion changes slowly, by {100 * evidence.spread:.2g} % of the orbit, and less than "
+            f"{_FEWEST_TURNS:g} times in the record; record longer",
+            evidence,
+        )
+    if is_curve:
+        hum_hz = mains_hz(found, so_far.drive_hz, len(points.value))
+        if hum_hz is not None:
+            return _humming(evidence, hum_hz, None)
+        why = f"the points run round a closed curve, {found.turns_per_period:.4f} turns a drive period"
+        return MotionVerdict(MotionKind.QUASI_PERIODIC, why, evidence)
     if evidence.spread < ABOVE_NOISE * evidence.noise:
         if evidence.spread <= SMALL:
             why = (
@@ -201,9 +243,6 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
             f"{ABOVE_NOISE:g} times its shape says nothing; raise the level or use a finer vibrometer range",
             evidence,
         )
-    if is_torus(found, evidence.noise / evidence.spread):
-        why = f"the points run round a closed curve, {found.turns_per_period:.4f} turns a drive period"
-        return MotionVerdict(MotionKind.QUASI_PERIODIC, why, evidence)
     line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
     test, noise_test = zero_one(line, seed=seed), surrogate_test(line, seed=seed)
     parting = _parting(points)

@@ -91,7 +91,7 @@ def _measured(analysis: DwellAnalysis) -> Json:
         "drive_distortion": found.drive.distortion,
         **named(found, "window_s", "response_i", "noise_bias_i", "noise_error_i"),
         **named(found, "noise_source", "response_ii"),
-        **named(found, "sd_response_ii", "phase_rad", "sd_phase_rad"),
+        **named(found, "sd_response_ii", "slow_change", "phase_rad", "sd_phase_rad"),
         "lines": [
             {
                 **named(each, "label", "frequency_hz", "amplitude_m", "sd_amplitude_m"),

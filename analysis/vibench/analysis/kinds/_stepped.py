@@ -32,7 +32,8 @@ def _measured(analysis: SteppedSineAnalysis) -> Json:
     found = analysis.response
     return {
         **named(found, "frequency_hz", "direction", "drive_amplitude_m", "response_i"),
-        **named(found, "noise_bias_i", "noise_error_i", "response_ii", "sd_response_ii", "left_out"),
+        **named(found, "noise_bias_i", "noise_error_i", "response_ii", "sd_response_ii"),
+        **named(found, "slow_change", "left_out"),
     }
 
 

@@ -172,6 +172,9 @@ class _VoltageAndBase:
     def overloaded(self, start: int, stop: int) -> Flags:
         return self.recorded.overloaded(start, stop)
 
+    def bridged(self, start: int, stop: int) -> Flags:
+        return np.zeros(stop - start, dtype=np.bool_)
+
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
     """Give s times the base's acceleration over the voltage: the estimators take it for displacements."""

@@ -135,6 +135,10 @@ class SimulatedChannels:
         """Where the recording was overloaded: what is compared must rest on the same samples."""
         return self.recorded.overloaded(start, stop)
 
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Where the recording was bridged: what is compared must rest on the same samples."""
+        return self.recorded.bridged(start, stop)
+
     def played_impacts(self, label: str) -> tuple[float, float]:
         """Count impacts inside the stretches of one label, and give the time those took [s]."""
         rate = self.sample_rate_hz

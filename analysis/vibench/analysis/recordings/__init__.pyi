@@ -12,6 +12,7 @@ from ._channels import (
     RecordedChannels as RecordedChannels,
     Stretch as Stretch,
     Unobserved as Unobserved,
+    far_from as far_from,
     only_stretch as only_stretch,
     read_whole as read_whole,
 )

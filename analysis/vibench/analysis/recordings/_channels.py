@@ -61,6 +61,9 @@ class Channels(Protocol):
     def overloaded(self, start: int, stop: int) -> Flags:
         """Say at which samples one of the channels was near its full scale, shape (samples,)."""
 
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedChannels:
@@ -124,6 +127,21 @@ class RecordedChannels:
         for dropout in self._response.between(start, stop):
             marks[max(0, dropout.first - start) : dropout.stop - start] = False
         return marks
+
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
+        marks = np.zeros(stop - start, dtype=np.bool_)
+        for dropout in self._response.between(start, stop):
+            marks[max(0, dropout.first - start) : dropout.stop - start] = True
+        return marks
+
+
+def far_from(marks: Flags, reach: int) -> Flags:
+    """Return which samples lie more than ``reach`` samples from any that is marked, shape (samples,)."""
+    total = np.concatenate(([0], np.cumsum(marks)))
+    places = np.arange(marks.size)
+    low, high = np.maximum(places - reach, 0), np.minimum(places + reach + 1, marks.size)
+    return np.asarray(total[high] == total[low])
 
 
 def only_stretch(channels: Channels, label: str) -> Stretch:
@@ -207,3 +225,7 @@ class ObservedChannels:
     def overloaded(self, start: int, stop: int) -> Flags:
         """Say at which samples one of the channels was near its full scale."""
         return self.channels.overloaded(start, stop)
+
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Return at which samples the response is a bridge over a drop-out."""
+        return self.channels.bridged(start, stop)

@@ -6,8 +6,17 @@ from typing import ClassVar, Self
 import numpy as np
 
 from ..chaos import LARGEST_NOISE
-from ..errors import InvalidRequest, NotEnoughData
-from ..signals import Complexes, ConvertedSignal, Quantity, Reals, converted_signal, standard_uncertainty
+from ..errors import InvalidRequest, NotEnoughData, UnusableData
+from ..recordings import far_from
+from ..signals import (
+    Complexes,
+    ConvertedSignal,
+    Flags,
+    Quantity,
+    Reals,
+    converted_signal,
+    standard_uncertainty,
+)
 from ..spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
 from ..tables import Labelled
 from ..tones import (
@@ -33,6 +42,7 @@ from ._background import (
     left_between,
     louder,
 )
+from ._slow_change import demodulated, slow_change
 
 _LOWEST_ORDER = 0.1
 """Displacement is kept down to this part of the drive frequency, where drift and hum begin to matter."""
@@ -42,6 +52,9 @@ _SCATTER_BLOCKS = 10
 _NOISE_BAND = (0.2, 0.4)
 """Part of the sample rate where a vibrometer shows its own noise: no mode and no impact reaches there."""
 _NOISE_SEGMENT = 4096
+LEAST_CLEAR = 0.2
+"""Part of a window that must lie clear of drop-outs."""
+_NONE: Flags = np.zeros(0, dtype=np.bool_)
 
 
 @dataclass(frozen=True)
@@ -87,6 +100,9 @@ class DwellResponse(Labelled):
     response_ii: float
     """Amplitude of x at the drive frequency, divided by the drive amplitude."""
     sd_response_ii: float
+    """NaN where the response still changes and nothing tells how far."""
+    slow_change: float
+    """Relative standard uncertainty that slow change of base or response adds to Response I; NaN likewise."""
     phase_rad: float
     """Of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
     sd_phase_rad: float
@@ -99,6 +115,8 @@ class DwellResponse(Labelled):
     """What that is in displacement, root mean square within its band; or what was heard in silence [m]."""
     displacement: ConvertedSignal
     """x over the record [m]; its settled part holds the window."""
+    is_clear: Flags
+    """Samples of the window that are far from any drop-out, shape (samples,)."""
     spectrum: AmplitudeSpectrum
     """Displacement amplitudes over the window [m]."""
     lines: tuple[Line, ...]
@@ -131,6 +149,7 @@ def dwell_response(
     delay_s: float = 0.0,
     sensors: complex = 1.0,
     silence: Reals = NOTHING,
+    bridged: Flags = _NONE,
 ) -> DwellResponse:
     """Analyse the last seconds of a dwell.
 
@@ -154,6 +173,8 @@ def dwell_response(
         Gain of the response's sensor over that of the base's at the drive frequency, without their delays.
     silence
         Response velocity before anything played, where it was recorded [m/s].
+    bridged
+        Samples at which the response is a bridge over a drop-out; empty where there is none.
 
     """
     displacement = converted_signal(
@@ -165,6 +186,7 @@ def dwell_response(
         high_hz=_BAND_ABOVE * sample_rate_hz,
     )
     window = _window(displacement, window_s)
+    is_clear = _clear(bridged, displacement, near_hz, window)
     level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
     phase = steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
     motion = displacement.samples[window]
@@ -174,7 +196,10 @@ def dwell_response(
     turn = 1j * omega * np.exp(1j * omega * delay_s) / sensors
     ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
     each = turn * parts.order(1.0) / base_parts.order(1.0) / ratio
-    scatter = standard_uncertainty(each)
+    base_change, change = _slow_changes(base, response, displacement, level.frequency_hz, window_s)
+    scatter = float(np.hypot(standard_uncertainty(each), change))
+    of_base_m = float(np.hypot(level.sd_amplitude_m, base_change * level.amplitude_m))
+    level = replace(level, sd_amplitude_m=of_base_m)
     noise_density, sensor = _sensor_noise(response, displacement)
     silent = heard_in(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
     repeated = _repeated(motion, phase, orders)
@@ -189,7 +214,7 @@ def dwell_response(
     return DwellResponse(
         drive=level,
         window_s=window_s,
-        response_i=float(np.max(np.abs(motion))) / level.amplitude_m,
+        response_i=float(np.max(np.abs(motion[is_clear]))) / level.amplitude_m,
         noise_bias_i=lift.bias / level.amplitude_m,
         noise_error_i=lift.error / level.amplitude_m,
         noise_source=noise.source,
@@ -198,6 +223,7 @@ def dwell_response(
         rest_displacement_m=rest.rms_m,
         response_ii=abs(ratio),
         sd_response_ii=abs(ratio) * scatter,
+        slow_change=float(np.hypot(change, base_change)),
         phase_rad=float(np.angle(ratio)),
         sd_phase_rad=scatter,
         orders=orders,
@@ -205,6 +231,7 @@ def dwell_response(
         noise_density=noise_density,
         noise_displacement_m=louder(silent, sensor).rms_m,
         displacement=displacement,
+        is_clear=is_clear,
         spectrum=spectrum,
         lines=_order_lines(whole, parts, level.frequency_hz)
         + _peak_lines(spectrum, towards_hz, abs(whole.order(1.0)[0]) / omega),
@@ -225,6 +252,24 @@ def _window(displacement: ConvertedSignal, window_s: float) -> slice:
     return slice(stop - length, stop)
 
 
+def clear_of_dropouts(bridged: Flags, sample_rate_hz: float, near_hz: float) -> Flags:
+    """Return which samples no bridge reaches: what it misses decays within the slowest period kept."""
+    return far_from(bridged, round(sample_rate_hz / (_LOWEST_ORDER * near_hz)))
+
+
+def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window: slice) -> Flags:
+    """Return which samples of the window no bridge reaches; raises UnusableData where they are too few."""
+    if not bridged.any():
+        return np.ones(window.stop - window.start, dtype=np.bool_)
+    clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]
+    if np.mean(clear) < LEAST_CLEAR:
+        raise UnusableData(
+            f"the vibrometer lost its light often: {100 * np.mean(clear):.0f} % of the window are clear "
+            f"of drop-outs, and {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser and measure again"
+        )
+    return clear
+
+
 def _whole_and_parts(
     samples: Reals, phase: Reals, orders: tuple[float, ...]
 ) -> tuple[TrackedOrders, TrackedOrders]:
@@ -237,6 +282,18 @@ def _whole_and_parts(
     whole = tracked_orders(samples, phase, interval_samples=samples.size, orders=orders)
     parts = tracked_orders(samples, phase, interval_samples=samples.size // blocks, orders=orders)
     return whole, parts
+
+
+def _slow_changes(
+    base: Reals, response: Reals, displacement: ConvertedSignal, drive_hz: float, window_s: float
+) -> tuple[float, float]:
+    """Return what slow change of the base, and of the response over it, adds over the whole record."""
+    settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
+    rate = displacement.sample_rate_hz
+    moved, shook = (
+        demodulated(each[settled], drive_hz / rate, round(window_s * rate)) for each in (response, base)
+    )
+    return slow_change(np.abs(shook)), slow_change(moved / shook)
 
 
 def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float, Background]:

@@ -75,6 +75,7 @@ def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([dwell.frequency_hz]))[0]),
         silence=silence_before(channels),
+        bridged=channels.bridged(stretch.start, stretch.stop),
     )
 
 

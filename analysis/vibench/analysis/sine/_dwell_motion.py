@@ -3,24 +3,28 @@
 The motion once per drive period: Poincare points, and the orbit they lie on.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vibench.acquisition.recording import SegmentLabel
 
-from ..chaos import MotionVerdict, Points, begin_of_last_motion, motion_verdict, shortest_period
+from ..chaos import MotionKind, MotionVerdict, Points, begin_of_last_motion, motion_verdict, shortest_period
 from ..errors import InvalidRequest, NotEnoughData
 from ..recordings import Channels, only_stretch, read_whole
 from ..signals import REACH, Quantity, Reals, converted_signal, interpolated
 from ..tables import Labelled
 from ..tones import fitted_sine
-from ._dwell import DwellResponse
+from ._dwell import DwellResponse, clear_of_dropouts
 
 _LOWEST_ORDER = 0.1
 """Both signals are kept down to this part of the drive frequency."""
 BAND_ABOVE = 0.25
 """... and up to this part of the sample rate, whose cosine edge ends within what interpolation trusts."""
+
+
+_CLEAR_MOTION = 0.8
+"""Part of a dwell that must lie clear of drop-outs where its motion does not repeat."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,16 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     """
     section = _section(channels, response)
     verdict = motion_verdict(_points(section, response, channels.sample_rate_hz), section.drive_hz)
+    stretch = only_stretch(channels, SegmentLabel.DWELL)
+    bridged = channels.bridged(stretch.start, stretch.stop)
+    clear = np.mean(clear_of_dropouts(bridged, channels.sample_rate_hz, section.drive_hz))
+    # Bridges make no motion repeat, but one that repeats irregular.
+    if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
+        why = (
+            f"drop-outs of the vibrometer touch {100 * (1 - clear):.0f} % of the dwell, and may make it look "
+            f"{verdict.kind.value}; refocus the laser"
+        )
+        verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why)
     return DwellMotion(section, verdict)
 
 

@@ -21,10 +21,10 @@ from ..recordings import (
     Channels,
     Stretch,
 )
-from ..signals import Reals
+from ..signals import Integers, Reals
 from ..tables import Labelled
 from ._background import silence_before
-from ._dwell import DwellResponse, dwell_response
+from ._dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | BranchContinuation | HeldResponse
 """What is recorded frequency by frequency, or level by level."""
@@ -50,9 +50,12 @@ class SteppedResponse(Labelled):
     """Root mean square error that noise makes of Response I; NaN, as its lift is, where not determined."""
     response_ii: Reals
     sd_response_ii: Reals
+    """NaN where the response still changed during the step."""
+    slow_change: Reals
+    """Relative standard uncertainty that slow change adds to Response I; NaN likewise."""
     phase_rad: Reals
     left_out: int
-    """Steps that were cut short or lost samples."""
+    """Steps that were cut short, or lost samples or light."""
 
 
 def stepped_response(
@@ -90,6 +93,7 @@ def stepped_response(
         noise_error_i=np.array([each.noise_error_i for each in steps]),
         response_ii=np.array([each.response_ii for each in steps]),
         sd_response_ii=np.array([each.sd_response_ii for each in steps]),
+        slow_change=np.array([each.slow_change for each in steps]),
         phase_rad=np.array([each.phase_rad for each in steps]),
         left_out=len(stretches) - len(steps),
     )
@@ -103,7 +107,11 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
     rate = channels.sample_rate_hz
     edge = int(np.ceil(_EDGE_PERIODS / near_hz * rate)) + 1
     # What came before and after was at another frequency or level, and integration would bring it in.
-    drive, base, response = _continued(data, rate / near_hz, edge)
+    places = _continued(data, rate / near_hz, edge)
+    drive, base, response = data[:, places]
+    bridged = channels.bridged(stretch.start, stretch.stop)[places]
+    if np.mean(clear_of_dropouts(bridged, rate, near_hz)[edge:-edge]) < LEAST_CLEAR:
+        return None
     return dwell_response(
         drive,
         base,
@@ -114,21 +122,21 @@ def _step(channels: Channels, stretch: Stretch, plan: Steps) -> DwellResponse | 
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([near_hz]))[0]),
         silence=silence_before(channels),
+        bridged=bridged,
     )
 
 
-def _continued(data: Reals, period_samples: float, edge: int) -> Reals:
-    """Go on at both ends with what was so many samples further inside; shape (3, samples + 2 edge).
+def _continued(data: Reals, period_samples: float, edge: int) -> Integers:
+    """Return the samples with which to go on at both ends, shape (samples + 2 edge,).
 
     The last row, the response, tells how far: whole drive periods, those after which it repeats best.
     """
     before = _repeats_after(data[-1], period_samples)
     after = _repeats_after(data[-1, ::-1], period_samples)
     inside, outside = data.shape[1], np.arange(edge)
-    places = np.concatenate(
+    return np.concatenate(
         [(before - 1 - outside % before)[::-1], np.arange(inside), inside - after + outside % after]
     )
-    return data[:, places]
 
 
 def _repeats_after(motion: Reals, period_samples: float) -> int:

@@ -107,8 +107,9 @@ def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[B
             (
                 *_ratio(stated),
                 noise,
+                *_of_change(found.slow_change),
                 *((_of_base(drive.sd_amplitude_m, drive.amplitude_m),) if is_steady else ()),
-                *(() if is_steady else _one_draw(analysis, laid)),
+                *(() if is_steady or np.isnan(found.slow_change) else _one_draw(analysis, laid)),
             ),
         ),
         Budget(
@@ -137,6 +138,13 @@ def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
     return scattered(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
 
 
+def _of_change(relative: float) -> tuple[Contribution, ...]:
+    """Give what slow change over the record adds to a maximum; nothing where there is none."""
+    if relative == 0.0:
+        return ()
+    return (scattered(Cause.CHANCE, relative, 1.0, "slow change over the record"),)
+
+
 def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
     """Scatter of the largest |x| over equal windows: that of the draws, else of the window's parts."""
     drawn = _drawn(laid, RESPONSE_I, 0)
@@ -146,12 +154,15 @@ def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contr
 def of_one_draw(found: DwellResponse) -> Contribution:
     """Scatter of the largest |x| of a window, as its parts tell it."""
     motion = found.displacement.settled
-    window = motion[-round(found.window_s * found.displacement.sample_rate_hz) :]
+    window = np.where(found.is_clear, np.abs(motion[-found.is_clear.size :]), 0.0)
     blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
     if blocks < _FEWEST_BLOCKS:
         return Contribution(Cause.CHANCE, None, "the window is too short to tell")
-    largest = np.max(np.abs(window[: window.size // blocks * blocks].reshape(blocks, -1)), axis=1)
-    source = f"largest |x| of {blocks} parts of the window"
+    largest = np.max(window[: window.size // blocks * blocks].reshape(blocks, -1), axis=1)
+    largest = largest[largest > 0.0]
+    if largest.size < _FEWEST_BLOCKS:
+        return Contribution(Cause.CHANCE, None, "drop-outs leave too little of the window to tell")
+    source = f"largest |x| of {largest.size} parts of the window"
     return scattered(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source)
 
 
@@ -221,7 +232,9 @@ def _largest(
             is_long = name == RESPONSE_II and isinstance(found, SteppedResponse)
             of_window = replace(own[0], cause=Cause.CHANCE) if is_long else _UNTOLD
             own = [_drawn(laid, name, top) or of_window]
-        elif name == RESPONSE_I:
+        elif name == RESPONSE_I and isinstance(found, SteppedResponse):
+            own += _of_change(float(found.slow_change[top]))
+        if not collides[top] and name == RESPONSE_I:
             own.append(_of_base(float(found.sd_drive_amplitude_m[top]), float(found.drive_amplitude_m[top])))
             if isinstance(found, SweepResponse) and not _ENDS <= top < values.size - _ENDS:
                 own.append(Contribution(Cause.CHANCE, None, "where intervals begin decides at a sweep's end"))

@@ -1,0 +1,99 @@
+"""Motions that change slowly are not periodic, and the bound of a maximum holds for another record."""
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.plan import Dwell
+from vibench.analysis import Simulation, analyse_files, budgets_of
+from vibench.analysis.chaos import MotionKind
+from vibench.analysis.sine._slow_change import slow_change
+
+A0_M, GAIN, HZ, SECONDS = 1e-6, 5.0, 260.0, 12.5
+
+
+@pytest.fixture
+def dwell(synthetic_module, tmp_path):
+    """Analyse a dwell at 260 Hz whose complex envelope is given."""
+
+    def analysed(envelope, seed=0):
+        module = synthetic_module
+        motion, time_s = module.sine(SECONDS + 1, HZ, A0_M), module.times(SECONDS + 1)
+        moved = A0_M * GAIN * np.real(envelope(time_s) * np.exp(2j * np.pi * HZ * time_s - 0.5j * np.pi))
+        velocity = np.gradient(moved) * module.RATE
+        velocity += 1e-6 * np.random.default_rng(seed).standard_normal(velocity.size)
+        plan = Dwell(
+            amplitude_vpp=2 * module.VOLTS_PER_METRE * A0_M,
+            frequency_hz=HZ,
+            settle_s=1.0,
+            duration_s=SECONDS,
+        )
+        part = module.Part("dwell", 1.0, 1.0 + SECONDS, {"frequency_hz": HZ})
+        module.write_recording(tmp_path, plan, motion, velocity, [part], name=f"s{seed}")
+        (result,) = analyse_files([tmp_path / f"s{seed}.h5"], "slow", Simulation.LEFT_OUT).results
+        return result
+
+    return analysed
+
+
+def told(result, name):
+    """Return value and expanded uncertainty; None where noise or chance is not stated."""
+    (budget,) = (each for each in budgets_of(result) if each.quantity == name)
+    is_told = not any(each.relative is None and each.cause.value == "chance" for each in budget.contributions)
+    return (budget.value, budget.expanded) if is_told else None
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_slow_beat_is_not_periodic_and_its_maximum_holds_for_another_record(dwell, seed):
+    """30 % at 260.2 Hz was "periodic, Response I 6.373591 +- 0.000023"."""
+    rng = np.random.default_rng(seed)
+    beat_hz, share = (0.2, 0.3) if seed == 0 else (10 ** rng.uniform(-1.5, 0.5), rng.uniform(0.02, 0.5))
+    start = rng.uniform(0, 2 * np.pi)
+    result = dwell(lambda time_s: 1 + share * np.exp(1j * (2 * np.pi * beat_hz * time_s + start)), seed)
+    kind = result.analysis.motion.verdict.kind
+    assert kind in {MotionKind.QUASI_PERIODIC, MotionKind.UNDECIDED}
+    found = told(result, "Response I")
+    scale = result.analysis.response.response_i / GAIN
+    assert scale < 1.1 * (1 + share)
+    if found is not None:
+        # A record that begins elsewhere in the beat: largest envelope of any window of 5 s.
+        window_s = np.linspace(0, 5, 200)
+        again = [
+            np.max(np.abs(1 + share * np.exp(1j * (2 * np.pi * beat_hz * window_s + phase))))
+            for phase in np.linspace(0, 2 * np.pi, 40)
+        ]
+        assert abs(found[0] - 0.989 * GAIN * np.median(again)) <= found[1]
+
+
+@pytest.mark.parametrize("rate_hz", [0.1, 0.35, 1.1])
+def test_slow_modulation_of_amplitude_or_phase_is_not_periodic(dwell, rate_hz):
+    for number, envelope in enumerate(
+        (
+            lambda time_s: 1 + 0.05 * np.cos(2 * np.pi * rate_hz * time_s + 1),
+            lambda time_s: np.exp(0.1j * np.sin(2 * np.pi * rate_hz * time_s)),
+        )
+    ):
+        kind = dwell(envelope, number).analysis.motion.verdict.kind
+        assert kind in {MotionKind.QUASI_PERIODIC, MotionKind.UNDECIDED}
+
+
+def test_mains_hum_is_named(dwell):
+    """It was "every 26" drive periods: 260 Hz and 50 Hz meet so often."""
+    verdict = dwell(lambda time_s: 1 + 0.02 * np.exp(2j * np.pi * (50 - HZ) * time_s)).analysis.motion.verdict
+    assert (verdict.kind, verdict.period) == (MotionKind.PERIODIC, 1)
+    assert "mains hum" in verdict.why
+
+
+def test_a_transient_that_decays_has_no_long_period(dwell):
+    """It was "every 11 periods"."""
+    verdict = dwell(lambda time_s: 1 + 0.02 * np.exp((-0.2 + 2j * np.pi * 23.6) * time_s)).analysis.motion
+    assert verdict.verdict.period in {None, 1}
+
+
+def test_random_scatter_of_parts_is_no_slow_change_and_a_trend_is():
+    rng = np.random.default_rng(1)
+    found = [
+        slow_change(1 + 1e-3 * (rng.standard_normal(10) + 1j * rng.standard_normal(10))) for _ in range(400)
+    ]
+    assert np.mean(np.array(found) == 0.0) > 0.97
+    assert np.isnan(slow_change(1 - 0.1 * np.exp(-np.linspace(0, 0.6, 10))))
+    assert slow_change(1 - 1e-3 * np.exp(-np.linspace(0, 0.6, 10))) > 0
