@@ -20,8 +20,10 @@ from vibench.analysis.exchange import (
 from vibench.analysis.results import spectral_functions
 from vibench.analysis.spectra import spectral_density
 from vibench.cli.__main__ import app
+from vibench.sim import gong2025
 
 pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
+ema = pytest.importorskip("sdypy.EMA", reason="pip install vibench[test] brings sdypy-EMA")
 RESPONSE = FunctionAxis("m0_velocity", "m0 velocity", "velocity", "m/s")
 REFERENCE = FunctionAxis("drive_voltage", "base acceleration", "acceleration", "m/s2")
 
@@ -165,3 +167,47 @@ def test_an_import_passes_spectra_over(known, tmp_path):
     mixed.write_bytes(path.read_bytes() + mixed.read_bytes())
     with opened_source(mixed) as source:
         assert [each.label for each in source.channels] == ["drive_voltage", "m0_velocity"]
+
+
+def velocity_of_m0(hz):
+    """Velocity of m0 over that of the base, of the paper's specimen without contact."""
+    specimen = gong2025(contact="linear")
+    found = []
+    for s in 2j * np.pi * hz:
+        forces = np.asarray(specimen.stiffness_matrix) + s * np.asarray(specimen.damping_matrix)
+        motion = np.linalg.solve(forces + s**2 * np.asarray(specimen.mass_matrix), forces.sum(axis=1))
+        found.append(motion[0])
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    "spacing_hz", [1.0, 1.0000175, 0.99998333, 0.5 * 1.000049, 0.25, 1.0666667, 0.9765625]
+)
+def test_modal_programs_find_the_modes_whatever_the_band_and_the_clock(known, tmp_path, spacing_hz):
+    wanted = gong2025(contact="linear").natural_frequencies_hz
+    for number, start_hz in enumerate((10, 20, 25, 30, 37, 40, 50, 60, 73, 80)):
+        hz = spacing_hz * np.arange(np.ceil(start_hz / spacing_hz), 605 / spacing_hz)
+        given = [
+            function(hz, velocity_of_m0(hz)),
+            function(hz, np.full(hz.size, 0.99), FunctionType.COHERENCE),
+        ]
+        path, _ = export_functions(excerpt(known), given, Format.UFF, tmp_path / f"{number}.uff")
+        model = ema.Model(lower=start_hz + 1, upper=600, pol_order_high=30)
+        model.read_uff(str(path))
+        first, step = model.freq[:2] - (0.0, model.freq[0])
+        assert abs(first / step - round(first / step)) < 1e-3
+        assert np.abs(model.freq - hz[: model.freq.size]).max() < 0.02 * spacing_hz
+        np.testing.assert_allclose(model.frf[0], velocity_of_m0(model.freq), atol=5e-3)
+        model.get_poles(show_progress=False)
+        model.select_closest_poles(list(wanted))
+        np.testing.assert_allclose(model.nat_freq, wanted, rtol=0, atol=0.03)
+        _, coherence = pyuff.UFF(str(path)).read_sets([1, 2])
+        np.testing.assert_allclose(coherence["x"], hz, atol=0.02 * spacing_hz)
+
+
+def test_a_response_with_lines_left_out_keeps_the_frequency_of_each(known, tmp_path):
+    hz = 1.0000175 * np.array([31, 33, 37, 39, 41])
+    path, _ = export_functions(excerpt(known), [function(hz, hz * 1j)], Format.UFF, tmp_path / "a.uff")
+    read = pyuff.UFF(str(path)).read_sets(1)
+    assert read["abscissa_spacing"] == 0
+    np.testing.assert_allclose(read["data"], hz * 1j, rtol=1e-11)

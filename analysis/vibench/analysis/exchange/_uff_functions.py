@@ -2,15 +2,18 @@
 
 Layout: SDRC universal dataset 58, records 1 to 12, function types 4 (frequency response function), 6
 (coherence) and 9 (power spectral density), double precision. Text holds frequencies to six digits: lines that
-begin and step in six digits are written evenly spaced, all others with the frequency of each.
+begin and step in six digits are written evenly spaced. A frequency response and its coherence at consecutive
+multiples of another spacing are moved to the nearest spacing of six digits; all other lines are written with
+the frequency of each. Modal programs expect even lines that begin at a multiple of their spacing.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from ..signals import Complexes, Reals
 from ._excerpt import Excerpt
@@ -32,6 +35,10 @@ _FREQUENCY_AXIS = 18
 _PER_LINE = 4
 _LEAST_STEP = 1e-9
 """Relative error of a frequency up to which lines count as evenly spaced."""
+_LARGEST_OFFSET = 1e-3
+"""Of a written first line from its multiple of the spacing, in spacings."""
+_SPACINGS_TRIED = 100
+"""On either side of the nearest one of six digits; about every second one serves."""
 
 
 class FunctionType(IntEnum):
@@ -79,31 +86,74 @@ def write_uff_functions(excerpt: Excerpt, functions: Sequence[UniversalFunction]
 
 
 def _dataset(excerpt: Excerpt, function: UniversalFunction, number: int) -> Iterator[str]:
-    recording, hz = excerpt.recording, function.frequency_hz
+    recording = excerpt.recording
+    lines_hz = function.frequency_hz
+    function, first, step = _spaced(function)
+    hz = function.frequency_hz
     response, reference = function.response, function.reference
-    first, step = _six_digits(hz[0]), _six_digits(hz[1] - hz[0]) if hz.size > 1 else 0.0
-    is_even = bool(np.all(np.abs(first + step * np.arange(hz.size) - hz) <= _LEAST_STEP * hz[-1]))
     yield DELIMITER
     yield f"{58:6d}"
     yield id_line(f"{response.label} over {reference.label}" if reference.role else response.label)
     yield id_line(f"{excerpt.name} {recording.recording_id}")
     yield id_line(date_line(recording.started_utc))
     yield id_line(function.note)
-    yield id_line(f"origin={recording.origin.value}")
+    moved = "" if hz is lines_hz else f" moved from lines every {lines_hz[1] - lines_hz[0]:.10g} Hz"
+    yield id_line(f"origin={recording.origin.value}{moved}")
     roles = recording.roles
     point, other = (roles.index(each.role) + 1 if each.role in roles else 0 for each in (response, reference))
     names = f" {'NONE':<10}{point:10d}{SCALAR:4d} {'NONE':<10}{other:10d}{SCALAR:4d}"
     yield f"{function.kind:5d}{number:10d}{0:5d}{0:10d}{names}"
     ordinate = _COMPLEX_DOUBLE if np.iscomplexobj(function.values) else REAL_DOUBLE
-    spacing = (EVENLY_SPACED, first, step) if is_even else (0, 0.0, 0.0)
+    spacing = (EVENLY_SPACED, first, step) if step else (0, 0.0, 0.0)
     yield f"{ordinate:10d}{hz.size:10d}{spacing[0]:10d}{spacing[1]:13.5E}{spacing[2]:13.5E}{0:13.5E}"
     yield axis_record(_FREQUENCY_AXIS, (0, 0, 0), "frequency", "Hz")
     for axis in (response, reference):
         kind, *exponents = QUANTITIES.get(axis.quantity, UNKNOWN)
         yield axis_record(kind, exponents, axis.label, axis.unit)
     yield axis_record(0, (0, 0, 0), "NONE", "NONE")
-    yield from _numbers(function.values, None if is_even else hz)
+    yield from _numbers(function.values, None if step else hz)
     yield DELIMITER
+
+
+def _spaced(function: UniversalFunction) -> tuple[UniversalFunction, float, float]:
+    """Return the function, its first line, and its spacing as six digits hold it (0: uneven)."""
+    hz = function.frequency_hz
+    if hz.size < 2:
+        return function, 0.0, 0.0
+    index = np.arange(hz.size)
+    spacing = float(hz[-1] - hz[0]) / (hz.size - 1)
+    lowest = round(float(hz[0]) / spacing)
+    is_response = function.kind is not FunctionType.DENSITY
+    if is_response and np.all(np.abs((lowest + index) * spacing - hz) <= _LEAST_STEP * hz[-1]):
+        first, step = _multiples(lowest, spacing)
+    else:
+        first, step = _six_digits(hz[0]), _six_digits(hz[1] - hz[0])
+        is_response = False
+    even_hz = first + step * index
+    if np.all(np.abs(even_hz - hz) <= _LEAST_STEP * hz[-1]):
+        return function, first, step
+    if not (is_response and step):
+        return function, 0.0, 0.0
+    if np.iscomplexobj(function.values):
+        values = CubicSpline(hz, function.values)(even_hz)
+    else:
+        values = np.interp(even_hz, hz, function.values)  # a spline of a coherence may rise above 1
+    return replace(function, frequency_hz=even_hz, values=values), first, step
+
+
+def _multiples(lowest: int, spacing: float) -> tuple[float, float]:
+    """Return a first line and a spacing of six digits with exactly `lowest` lines from 0 Hz to the first.
+
+    pyEMA and sdypy-EMA count them by ``numpy.arange``, which a rounding error makes one line more.
+    """
+    digit = 10.0 ** (np.floor(np.log10(spacing)) - 5)
+    for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
+        step = _six_digits(spacing + number * digit)
+        first = _six_digits(lowest * step)
+        is_near = abs(first - lowest * step) <= _LARGEST_OFFSET * step
+        if is_near and np.arange(0.0, first, (first + step) - first).size == lowest:
+            return first, step
+    return 0.0, 0.0
 
 
 def _numbers(values: Reals | Complexes, frequency_hz: Reals | None) -> Iterator[str]:
