@@ -37,7 +37,7 @@ _LEAST_STEP = 1e-9
 """Relative error of a frequency up to which lines count as evenly spaced."""
 _LARGEST_OFFSET = 1e-3
 """Of a written first line from its multiple of the spacing, in spacings."""
-_SPACINGS_TRIED = 100
+_SPACINGS_TRIED = 1000
 """On either side of the nearest one of six digits; about every second one serves."""
 
 
@@ -122,18 +122,15 @@ def _spaced(function: UniversalFunction) -> tuple[UniversalFunction, float, floa
         return function, 0.0, 0.0
     index = np.arange(hz.size)
     spacing = float(hz[-1] - hz[0]) / (hz.size - 1)
-    lowest = round(float(hz[0]) / spacing)
-    is_response = function.kind is not FunctionType.DENSITY
-    if is_response and np.all(np.abs((lowest + index) * spacing - hz) <= _LEAST_STEP * hz[-1]):
-        first, step = _multiples(lowest, spacing)
+    multiples = (round(float(hz[0]) / spacing) + index) * spacing
+    if function.kind is not FunctionType.DENSITY and _agree(multiples, hz):
+        first, step = _multiples(float(hz[0]), spacing)
     else:
         first, step = _six_digits(hz[0]), _six_digits(hz[1] - hz[0])
-        is_response = False
-    even_hz = first + step * index
-    if np.all(np.abs(even_hz - hz) <= _LEAST_STEP * hz[-1]):
+        return (function, first, step) if _agree(first + step * index, hz) else (function, 0.0, 0.0)
+    even_hz = first + step * np.arange(round((hz[-1] - first) / step) + 1 if step else 0)
+    if not step or (even_hz.size == hz.size and _agree(even_hz, hz)):
         return function, first, step
-    if not (is_response and step):
-        return function, 0.0, 0.0
     if np.iscomplexobj(function.values):
         values = CubicSpline(hz, function.values)(even_hz)
     else:
@@ -141,19 +138,28 @@ def _spaced(function: UniversalFunction) -> tuple[UniversalFunction, float, floa
     return replace(function, frequency_hz=even_hz, values=values), first, step
 
 
-def _multiples(lowest: int, spacing: float) -> tuple[float, float]:
-    """Return a first line and a spacing of six digits with exactly `lowest` lines from 0 Hz to the first.
+def _agree(lines_hz: Reals, hz: Reals) -> bool:
+    return bool(np.all(np.abs(lines_hz - hz) <= _LEAST_STEP * hz[-1]))
 
-    pyEMA and sdypy-EMA count them by ``numpy.arange``, which a rounding error makes one line more.
+
+def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
+    """Return a first line and a spacing of six digits that divides it; 0 and 0 where none was found.
+
+    pyEMA and sdypy-EMA count the lines below the first by ``numpy.arange``, as here: a rounding error adds one.
     """
-    digit = 10.0 ** (np.floor(np.log10(spacing)) - 5)
     for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
-        step = _six_digits(spacing + number * digit)
-        first = _six_digits(lowest * step)
-        is_near = abs(first - lowest * step) <= _LARGEST_OFFSET * step
-        if is_near and np.arange(0.0, first, (first + step) - first).size == lowest:
-            return first, step
+        step = _six_digits(spacing + number * _last_digit(spacing))
+        lowest = round(lowest_hz / step)
+        nearest = _six_digits(lowest * step)
+        for first in (nearest, _six_digits(nearest - _last_digit(nearest))):
+            is_near = abs(first - lowest * step) <= _LARGEST_OFFSET * step
+            if is_near and np.ceil(first / ((first + step) - first)) == lowest:
+                return first, step
     return 0.0, 0.0
+
+
+def _last_digit(value: float) -> float:
+    return float(10.0 ** (np.floor(np.log10(value)) - 5)) if value > 0 else 0.0
 
 
 def _numbers(values: Reals | Complexes, frequency_hz: Reals | None) -> Iterator[str]:
