@@ -8,15 +8,16 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
 
-from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
-from ._source_channel import SourceChannel, TableSource, rate_bounds
+from ._source_channel import SourceChannel, TableSource
+from ._time_axis import told_rate_hz
 
 TIME_FORMAT = "%.9f"
 """Nanoseconds since the recording's first sample."""
@@ -44,10 +45,48 @@ LONGEST_HEAD = 200
 DELIMITERS = (";", "\t", ",", None)
 """In the order in which they are tried; None stands for blanks. A comma beside another is a decimal one."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")
-TIME = re.compile(r"(time|zeit|temps)|t$", re.IGNORECASE)
-"""What a column of times is called."""
-UNEVEN = 1e-3
-"""How far a sample may lie from its place on an even axis of time, in sample intervals."""
+UNIT_CELL = re.compile(
+    r"[\[(].*[\])]|-|%|(?:[mu\u00b5\u03bck]?(?:s|V|g|N|A|m|Pa|Hz|m/s|m s-1)|sec|\u00b0C|rad|deg"
+    r"|[mk]?m(?:/s| s-?)(?:2|\^2|\*\*2|\u00b2))?"
+)
+"""One cell of a row of units."""
+NAME_AND_UNIT = re.compile(r"[^\s\[\]()]+(?:\s*[\[(][^\[\]()]*[\])])?")
+STATEMENT = re.compile(
+    r"\W*([A-Za-z][^:=;,\t]*?)[\s\"]*[:=;,\t][\s\":=]*([-+.\d]+(?:[,.]\d+)?(?:[eE][-+]?\d+)?)\s*([\w/]*)"
+)
+"""A name, a number and its unit in a line of a heading: ``"Sample rate: 51.2 kHz"``."""
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """How the numbers of a text are written."""
+
+    delimiter: str | None
+    columns: int
+    empty: int
+    """Cells behind the last number of each line, as spreadsheets write them."""
+
+    @property
+    def width(self) -> int:
+        """Number of all cells of a line."""
+        return self.columns + self.empty
+
+    def cells(self, line: str) -> list[str]:
+        """Split a line."""
+        found = _cells(line, self.delimiter)
+        while len(found) > self.columns and len(found) > 1 and not found[-1].strip():
+            found.pop()
+        return found
+
+    def plain(self, line: str) -> str:
+        """Write a line as blanks and points; empty where no cell is filled."""
+        if '"' not in line and not self.empty and line.strip(BLANK + (self.delimiter or "")):
+            return line if self.delimiter == "," else line.replace(",", ".")
+        cells = [each.strip().replace(",", ".") for each in self.cells(line)]
+        return (self.delimiter or " ").join(cells) if any(cells) else ""
+
+
+BLANK = " \t\r\n"
 
 
 @contextmanager
@@ -57,27 +96,22 @@ def opened_csv(path: Path) -> Iterator[TableSource]:
     ValueError when no line of numbers begins within the first 200, or a later line has others.
     """
     encoding = _encoding(path)
-    head, first, delimiter = _beginning(path, encoding)
+    head, first, layout = _beginning(path, encoding)
     with path.open(encoding=encoding, errors="replace") as file:
-        lines = (_with_points(line, delimiter) for line in islice(file, first, None))
+        lines = (layout.plain(line) for line in islice(file, first, None))
         try:
-            table = np.loadtxt(lines, delimiter=delimiter, ndmin=2, comments=None)
+            table = np.loadtxt(lines, delimiter=layout.delimiter, ndmin=2, comments=None)
         except ValueError as error:
             file.seek(0)
-            raise ValueError(_what_is_wrong(file, first, delimiter) or str(error)) from error
-    labels = _labels(head, delimiter, table.shape[1])
-    rate, bounds = _sample_rate_hz(labels[0], table[:, 0])
+            raise ValueError(_what_is_wrong(file, first, layout) or str(error)) from error
+    labels, units = _headings(head, layout)
+    rate, trouble = told_rate_hz(_statements(head))
     yield TableSource(
         {
             SourceChannel(
-                str(number),
-                len(table),
-                UNIT.sub("", label).strip(),
-                rate,
-                _unit(label),
-                rate_bounds_hz=bounds,
+                str(number), len(table), label, rate, unit, time_trouble=trouble
             ): np.ascontiguousarray(column)
-            for number, (label, column) in enumerate(zip(labels, table.T, strict=True), start=1)
+            for number, (label, unit, column) in enumerate(zip(labels, units, table.T, strict=True), start=1)
         }
     )
 
@@ -95,18 +129,16 @@ def _encoding(path: Path) -> str:
     return "utf-8-sig"
 
 
-def _what_is_wrong(file: TextIO, first: int, delimiter: str | None) -> str:
+def _what_is_wrong(file: TextIO, first: int, layout: _Layout) -> str:
     """Name the first line that does not belong to a table of numbers; empty where all do."""
-    columns = 0
     for number, line in enumerate(file, start=1):
-        cells = _with_points(line, delimiter).split(delimiter)
-        if number <= first or not line.strip():
+        if number <= first or not layout.plain(line).strip():
             continue
-        columns = columns or len(cells)
-        if len(cells) != columns:
+        cells = layout.cells(line)
+        if len(cells) != layout.columns:
             return (
                 f"line {number} has another number of columns than line {first + 1}: "
-                f"{len(cells)} instead of {columns}"
+                f"{len(cells)} instead of {layout.columns}"
             )
         for cell in cells:
             if not _are_numbers([cell]):
@@ -114,48 +146,78 @@ def _what_is_wrong(file: TextIO, first: int, delimiter: str | None) -> str:
     return ""
 
 
-def _beginning(path: Path, encoding: str) -> tuple[list[str], int, str | None]:
-    """Find the lines before the numbers, how many they are, and what stands between the numbers."""
+def _beginning(path: Path, encoding: str) -> tuple[list[str], int, _Layout]:
+    """Find the lines before the numbers, how many they are, and how the numbers are written.
+
+    A line of numbers whose next line has another number of them belongs to the heading.
+    """
+    found: tuple[list[str], int, _Layout] | None = None
     with path.open(encoding=encoding, errors="replace") as file:
         head: list[str] = []
-        for number, line in enumerate(islice(file, LONGEST_HEAD)):
-            delimiter = next((each for each in DELIMITERS if each is None or each in line), None)
-            if _are_numbers(_with_points(line, delimiter).split(delimiter)):
-                return head, number, delimiter
+        for number, line in enumerate(islice(file, LONGEST_HEAD + 1)):
+            layout = _layout(line)
+            if found is not None and (layout is None or layout.width == found[2].width) and line.strip():
+                return found
+            if layout is not None and number < LONGEST_HEAD:
+                found = head.copy(), number, layout
             head.append(line)
-    raise ValueError(f"no line of numbers among its first {LONGEST_HEAD}")
+    if found is None:
+        raise ValueError(f"no line of numbers among its first {LONGEST_HEAD}")
+    return found
 
 
-def _with_points(line: str, delimiter: str | None) -> str:
-    return line if delimiter == "," else line.replace(",", ".")
+def _layout(line: str) -> _Layout | None:
+    """Return how a line of numbers is written; None where it is none."""
+    for delimiter in DELIMITERS:
+        cells = _cells(line, delimiter)
+        filled = len(cells)
+        while filled and not cells[filled - 1].strip():
+            filled -= 1
+        if (delimiter is None or delimiter in line) and filled and _are_numbers(cells[:filled]):
+            return _Layout(delimiter, filled, len(cells) - filled)
+    return None
+
+
+def _cells(line: str, delimiter: str | None) -> list[str]:
+    if delimiter is None:
+        return [each.strip('"') for each in line.split()]
+    return next(csv.reader([line.rstrip("\r\n")], delimiter=delimiter), [])
 
 
 def _are_numbers(cells: Sequence[str]) -> bool:
     try:
-        return bool([float(each) for each in cells])
+        return bool([float(each.replace(",", ".")) for each in cells])
     except ValueError:
         return False
 
 
-def _labels(head: Sequence[str], delimiter: str | None, columns: int) -> list[str]:
-    found = [each.strip().strip('"') for each in head[-1].split(delimiter)] if head else []
-    return found if len(found) == columns else [""] * columns
+def _headings(head: Sequence[str], layout: _Layout) -> tuple[list[str], list[str]]:
+    """Return labels and units, from one row, or from two of which one holds only units; else empty ones."""
+    rows = [row for line in head if (row := _row(line, layout))]
+    labels, units = (rows or [[""] * layout.columns])[-1], [""] * layout.columns
+    if len(rows) > 1:
+        above = rows[-2]
+        if all(UNIT_CELL.fullmatch(each) for each in labels):
+            labels, units = above, labels
+        elif all(UNIT_CELL.fullmatch(each) for each in above):
+            units = above
+    said = [UNIT.search(each) for each in labels]
+    return (
+        [UNIT.sub("", each).strip() for each in labels],
+        [other.strip("[]() ") if own is None else own[1] for own, other in zip(said, units, strict=True)],
+    )
 
 
-def _unit(label: str) -> str:
-    found = UNIT.search(label)
-    return "" if found is None else found[1]
+def _row(line: str, layout: _Layout) -> list[str]:
+    """Split a line of a heading into as many cells as there are columns; empty where that cannot be."""
+    line = line.strip().lstrip("#% ")
+    tries = [layout.cells(line), *(_Layout(each, layout.columns, 0).cells(line) for each in DELIMITERS)]
+    tries += [re.split(r"\s{2,}|\t", line), NAME_AND_UNIT.findall(line)]
+    found = next((each for each in tries if len(each) == layout.columns), [])
+    return [each.strip().strip('"') for each in found]
 
 
-def _sample_rate_hz(label: str, values: Reals) -> tuple[float | None, tuple[float, float] | None]:
-    """Take the rate from a first column that is called time: exact where it is even, else bounds of it."""
-    if not TIME.match(UNIT.sub("", label).strip()) or len(values) < 2:
-        return None, None
-    with np.errstate(invalid="ignore", over="ignore"):
-        interval = float(values[-1] - values[0]) / (len(values) - 1)
-        off = float(np.max(np.abs(values - values[0] - interval * np.arange(len(values)))))
-    exact = rate_bounds(interval, 0.0, _unit(label))
-    if exact is not None and off < UNEVEN * interval:
-        return exact[0], None
-    # Each end may be as far off as any sample is.
-    return None, rate_bounds(interval, 2 * off / (len(values) - 1), _unit(label))
+def _statements(head: Sequence[str]) -> Iterator[tuple[str, float]]:
+    for line in head:
+        if (found := STATEMENT.match(line)) and _are_numbers([found[2]]):
+            yield f"{found[1].strip()} {found[3]}".strip(), float(found[2].replace(",", "."))

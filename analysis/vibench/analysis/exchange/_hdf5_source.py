@@ -4,8 +4,8 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -16,12 +16,16 @@ from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5, walk
 from ..errors import UnusableData
 from ..signals import Reals
 from ._source_channel import SourceChannel, text_of
+from ._time_axis import told_rate_hz
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
 """What HDF5 says of a file that lost its end."""
 EXACT_KINDS = {"i": 4, "u": 2}
 """Integers of at most so many bytes fit the recording's own."""
+
+
+Facts = tuple[tuple[str, Any], ...]
 
 
 @dataclass(frozen=True)
@@ -86,15 +90,18 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
 
 
 def _places(file: h5py.File) -> Iterator[tuple[SourceChannel, _Place]]:
+    known: dict[str, Facts] = {}
     for dataset in (item for _, item in walk(file) if _holds_samples(item)):
+        rate_hz, trouble = told_rate_hz((*dataset.attrs.items(), *_facts(dataset.parent, known)))
+        said = {"sample_rate_hz": rate_hz, "time_trouble": trouble}
         if dataset.ndim == 1:
-            yield _channel(dataset, dataset.name, dataset.shape[0]), _Place(dataset.name, None)
+            yield _channel(dataset, dataset.name, dataset.shape[0], said), _Place(dataset.name, None)
             continue
         has_time_first = dataset.shape[0] >= dataset.shape[1]
         samples, rows = dataset.shape if has_time_first else dataset.shape[::-1]
         for row in range(rows):
             name = dataset.name if rows == 1 else f"{dataset.name}#{row + 1}"
-            yield _channel(dataset, name, samples), _Place(dataset.name, row, has_time_first)
+            yield _channel(dataset, name, samples, said), _Place(dataset.name, row, has_time_first)
 
 
 def _holds_samples(item: h5py.HLObject) -> bool:
@@ -107,7 +114,7 @@ def _holds_samples(item: h5py.HLObject) -> bool:
     )
 
 
-def _channel(dataset: h5py.Dataset, name: str, samples: int) -> SourceChannel:
+def _channel(dataset: h5py.Dataset, name: str, samples: int, said: Mapping[str, Any]) -> SourceChannel:
     scale = abs(_number(dataset, "scale_factor", 1.0))
     is_exact = dataset.dtype.itemsize <= EXACT_KINDS.get(dataset.dtype.kind, 0)
     is_exact = is_exact and _number(dataset, "add_offset", 0.0) == 0.0
@@ -121,7 +128,7 @@ def _channel(dataset: h5py.Dataset, name: str, samples: int) -> SourceChannel:
         unit=unit,
         step=scale if is_exact else None,
         origin=_origin(dataset.file),
-        sample_rate_hz=_rate_hz(dataset.file),
+        **said,
     )
 
 
@@ -131,10 +138,15 @@ def _origin(file: h5py.File) -> Origin | None:
     return Origin(said) if said in set(Origin) else None
 
 
-def _rate_hz(file: h5py.File) -> float | None:
-    """Read what a recording says of itself."""
-    said = np.ravel(file.attrs.get("sample_rate_hz", 0.0))
-    return float(said[0]) if said.size == 1 and said.dtype.kind in "iuf" and 0 < said[0] < inf else None
+def _facts(group: h5py.Group, known: dict[str, Facts]) -> Facts:
+    """Name what a group and those around it say in single numbers, the nearest first."""
+    if group.name not in known:
+        hard = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
+        items = [(name, group[name]) for name in hard]
+        single = [(name, one[()]) for name, one in items if isinstance(one, h5py.Dataset) and one.size == 1]
+        around = () if group.name == "/" else _facts(group.parent, known)
+        known[group.name] = (*group.attrs.items(), *single, *around)
+    return known[group.name]
 
 
 def _number(dataset: h5py.Dataset, name: str, otherwise: float) -> float:

@@ -5,6 +5,7 @@ Where in a file the parts of a plan lie: told by the mapping, or one after the o
 
 import hashlib
 import json
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
@@ -29,10 +30,12 @@ from vibench.acquisition.recording import (
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals import Flags, Reals
+from ._alignment import align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, unobserved
 from ._mapping import ChannelMapping, ImportMapping
-from ._source import Source, find_channel, opened_source
+from ._source import Source, channel_blocks, find_channel, opened_source
 from ._source_channel import SourceChannel
+from ._time_axis import Piece
 
 
 @dataclass(frozen=True)
@@ -113,8 +116,6 @@ def _told(mapping: ImportMapping, planned: Sequence[_Planned]) -> Iterator[tuple
 
 FARTHEST = 2.0**62
 """A sample beyond the end of every file."""
-RATE_TOLERANCE = 1e-4
-"""How far a mapping's sample rate may lie from the file's: clocks differ less."""
 LEAST_PEAK, MOST_PEAK = 1e-100, 1e100
 """Between these a channel's numbers, their squares and their steps are all numbers of a computer."""
 NEAR_FULL_SCALE = 0.95
@@ -127,6 +128,20 @@ class _Wanted:
 
     mapped: ChannelMapping
     source: SourceChannel
+    pieces: tuple[Piece, ...]
+    late_s: float
+
+    def read(self, source: Source, start: int, stop: int) -> Reals:
+        """Read a stretch of the common time axis; places without a sample are NaN."""
+        values = np.full(stop - start, np.nan)
+        begin = bisect_right(self.pieces, start, key=lambda piece: piece.end)
+        for piece in self.pieces[begin:]:
+            if piece.place >= stop:
+                break
+            first, last = max(start, piece.place), min(stop, piece.end)
+            shift = piece.first - piece.place
+            values[first - start : last - start] = source.read(self.source, first + shift, last + shift)
+        return values
 
 
 def import_recording(
@@ -134,7 +149,8 @@ def import_recording(
 ) -> Path:
     """Make the recording ``out`` from a file, a block at a time.
 
-    Values that are no finite numbers count as lost samples, of all channels. The stored "volts" are the
+    Channels are aligned by what the file says of time; places without a sample, and values that are no finite
+    numbers, count as lost samples of all channels. The stored "volts" are the
     numbers of the file: integers of up to 31 bits are kept exactly, others to 2^-30 of the next power of
     two above their largest.
 
@@ -154,17 +170,18 @@ def import_recording(
 
     """
     with opened_source(path) as source:
-        wanted = tuple(_Wanted(each, find_channel(source, each.source, path)) for each in mapping.channels)
-        samples = _common_length(wanted, path)
-        rate = _sample_rate_hz(wanted, mapping, path)
+        found = [find_channel(source, each.source, path) for each in mapping.channels]
+        aligned = align(found, mapping, path)
+        samples, rate = aligned.places, aligned.rate_hz
+        wanted = tuple(map(_Wanted, mapping.channels, found, aligned.pieces, aligned.late_s))
         parts = laid_parts(mapping, rate, samples)
         header = RecordingHeader(
-            channels=tuple(_header(source, each, samples) for each in wanted),
+            channels=tuple(_header(source, each) for each in wanted),
             sample_rate_hz=rate,
             expected_samples=samples,
             origin=_origin(wanted, mapping, path),
             plan_json=mapping.measurement.model_dump_json(),
-            bench_json=json.dumps(_bench(path, mapping, wanted)),
+            bench_json=json.dumps(_bench(path, mapping, wanted, aligned.remarks)),
             confirmations=mapping.confirmations,
             provenance=replace(
                 collect_provenance(),
@@ -193,37 +210,7 @@ def _origin(wanted: tuple[_Wanted, ...], mapping: ImportMapping, path: Path) -> 
     return Origin.SIMULATED if Origin.SIMULATED in {*told, mapping.origin} else Origin.REAL
 
 
-def _common_length(wanted: Sequence[_Wanted], path: Path) -> int:
-    lengths = {each.source.samples for each in wanted}
-    if len(lengths) > 1:
-        said = ", ".join(f"{each.source.name} {each.source.samples}" for each in wanted)
-        raise InvalidRequest(
-            f"the channels of {path.name} differ in their numbers of samples ({said}), and those of a "
-            "recording share one clock; choose channels of one length"
-        )
-    return lengths.pop()
-
-
-def _sample_rate_hz(wanted: Sequence[_Wanted], mapping: ImportMapping, path: Path) -> float:
-    """Give the mapping's rate, or the file's where it has none."""
-    said = {each.source.sample_rate_hz for each in wanted} - {None}
-    given = mapping.sample_rate_hz
-    if given is None and len(said) != 1:
-        why = "does not say its sample rate exactly" if not said else "says several sample rates"
-        raise InvalidRequest(f"{path.name} {why}; give sample_rate_hz in the mapping")
-    rate = given if given is not None else next(each for each in said if each is not None)
-    for exact, (low, high) in ((each.source.sample_rate_hz, each.source.rates_hz) for each in wanted):
-        if not low * (1 - RATE_TOLERANCE) <= rate <= high * (1 + RATE_TOLERANCE):
-            told = f"about {(low + high) / 2:.5g}" if exact is None else f"{exact:.9g}"
-            way = "export the file again" if exact is None else "leave its sample_rate_hz out"
-            raise InvalidRequest(
-                f"{path.name} says {told} samples/s, and the mapping {rate:.9g}; correct the mapping, "
-                f"or {way}"
-            )
-    return rate
-
-
-def _header(source: Source, each: _Wanted, samples: int) -> ChannelHeader:
+def _header(source: Source, each: _Wanted) -> ChannelHeader:
     mapped, found = each.mapped, each.source
     quantity, unit = mapped.kind
     full_scale = mapped.full_scale or found.full_scale
@@ -234,22 +221,22 @@ def _header(source: Source, each: _Wanted, samples: int) -> ChannelHeader:
         unit=unit,
         physical_per_volt=mapped.scale,
         physical_offset=mapped.offset,
-        range_v=_power_of_two_above(_peak(source, found, samples)) if full_scale is None else full_scale,
+        range_v=_power_of_two_above(_peak(source, found)) if full_scale is None else full_scale,
         volts_per_count=found.step,
         coupling=mapped.coupling,
         sensitivity=mapped.sensitivity,
         sensitivity_unit=mapped.sensitivity_unit,
         serial=mapped.serial,
         calibration_date="" if mapped.calibration_date is None else mapped.calibration_date.isoformat(),
-        delay_s=mapped.delay_s,
+        delay_s=mapped.delay_s - each.late_s,
         long_name=mapped.long_name or found.label,
     )
 
 
-def _peak(source: Source, channel: SourceChannel, samples: int) -> float:
+def _peak(source: Source, channel: SourceChannel) -> float:
     peak = 0.0
-    for start in range(0, samples, BLOCK_SAMPLES):
-        values = np.abs(source.read(channel, start, min(start + BLOCK_SAMPLES, samples)))
+    for block in channel_blocks(source, channel):
+        values = np.abs(block)
         peak = max(peak, float(values[np.isfinite(values)].max(initial=0.0)))
     return peak
 
@@ -270,7 +257,9 @@ def _power_of_two_above(peak: float) -> float:
     return 2.0 ** (exponent - 1 if mantissa == 0.5 else exponent)
 
 
-def _bench(path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted]) -> dict[str, Any]:
+def _bench(
+    path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], remarks: Sequence[str]
+) -> dict[str, Any]:
     """Say what is known of the bench, and where the samples came from."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
@@ -283,6 +272,7 @@ def _bench(path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted]) -> dic
             "imported_utc": datetime.now(UTC).isoformat(timespec="seconds"),
             "mapping": mapping.model_dump(mode="json"),
             "channels": [asdict(each.source) for each in wanted],
+            "time": list(remarks),
         },
     }
     if mapping.specimen is not None:
@@ -309,7 +299,7 @@ def _write(
             writer.end_segment()
         if start in starts:
             writer.begin_segment(starts[start].label, **starts[start].numbers)
-        values = np.stack([source.read(each.source, start, stop) for each in wanted])
+        values = np.stack([each.read(source, start, stop) for each in wanted])
         for block in _blocks(values, start, wanted):
             writer.append(block)
         observer(values.size)

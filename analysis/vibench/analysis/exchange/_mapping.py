@@ -95,6 +95,10 @@ class ImportMapping(FrozenModel):
     """When it was measured, with its time zone: ``2026-03-01T12:00:00Z``."""
     sample_rate_hz: PositiveFloat | None = None
     """Needed where the file does not say it exactly: HDF5, universal files."""
+    time: Literal["file", "even"] = "file"
+    """``"even"``: samples are even, simultaneous, at ``sample_rate_hz``, whatever the file says of time."""
+    time_unit: Literal["s", "ms", "us"] | None = None
+    """Of the file's times, where the file states none or a wrong one."""
     origin: Origin | None = None
     """``"real"`` or ``"simulated"``; as the file says where it is left out, and real if that is silent."""
     measurement: Measurement
@@ -109,6 +113,12 @@ class ImportMapping(FrozenModel):
     calibration_valid_days: PositiveInt | None = None
     confirmations: dict[str, str | float] = Field(default_factory=dict)
     """What else is known, for the report."""
+
+    @model_validator(mode="after")
+    def _has_a_rate(self) -> Self:
+        if self.time == "even" and self.sample_rate_hz is None:
+            raise ValueError('time = "even" ignores the times of the file; give sample_rate_hz too')
+        return self
 
     @model_validator(mode="after")
     def _roles_differ(self) -> Self:

@@ -8,7 +8,6 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, replace
-from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +25,7 @@ from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, opened_hdf5
 from ._mat_elements import require_whole
 from ._source_channel import SourceChannel, TableSource
+from ._time_axis import told_rate_hz
 
 LARGEST_BYTES = 2**31
 """A MATLAB 5 file counts the bytes of a variable with 31 bits, and many a reader those of the file."""
@@ -137,26 +137,26 @@ def opened_mat(path: Path) -> Iterator[Hdf5Source | TableSource]:
     except (MatReadError, zlib.error) as error:  # neither is a kind of ValueError
         raise ValueError(str(error)) from error
     own = {name: value for name, value in content.items() if not name.startswith("__")}
-    rate_hz = _rate_hz(own)
-    yield TableSource({replace(each, sample_rate_hz=rate_hz): values for each, values in _numbers(own, "")})
+    # What was exported here says its rate beside its channels.
+    about = own.get("recording")
+    yield TableSource(dict(_numbers(own, "", tuple(about.items()) if isinstance(about, dict) else ())))
 
 
-def _rate_hz(own: Mapping[str, Any]) -> float | None:
-    """Read what a recording that was exported says of itself."""
-    match own:
-        case {"recording": {"sample_rate_hz": float() | int() as rate_hz}} if 0 < rate_hz < inf:
-            return float(rate_hz)
-    return None
-
-
-def _numbers(struct: Mapping[str, Any], prefix: str) -> Iterator[tuple[SourceChannel, Any]]:
+def _numbers(
+    struct: Mapping[str, Any], prefix: str, around: tuple[tuple[str, Any], ...]
+) -> Iterator[tuple[SourceChannel, Any]]:
+    facts = (*((name, value) for name, value in struct.items() if np.size(value) == 1), *around)
+    rate_hz, trouble = told_rate_hz(facts)
     unit = struct.get("units", struct.get("unit", ""))
     for name, value in struct.items():
         match value:
             case dict():
-                yield from _numbers(value, f"{prefix}{name}.")
+                yield from _numbers(value, f"{prefix}{name}.", facts)
             case np.ndarray() if _holds_samples(value):
-                yield from _channels(f"{prefix}{name}", value, unit if isinstance(unit, str) else "")
+                for channel, row in _channels(
+                    f"{prefix}{name}", value, unit if isinstance(unit, str) else ""
+                ):
+                    yield replace(channel, sample_rate_hz=rate_hz, time_trouble=trouble), row
 
 
 def _holds_samples(values: np.ndarray[Any, Any]) -> bool:

@@ -1,9 +1,10 @@
 """What an import asks of a file, whoever wrote it: its channels, and their numbers in any stretch."""
 
+import re
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -14,10 +15,12 @@ from vibench.acquisition import shortened
 from ..errors import InvalidRequest, UnusableData
 from ..signals import Reals
 from ._csv import opened_csv
+from ._excerpt import BLOCK_SAMPLES
 from ._hdf5_source import opened_hdf5
 from ._mat import opened_mat
 from ._source_channel import SourceChannel
 from ._tdms_source import opened_tdms
+from ._time_axis import TimeAxis, time_axis, time_unit
 from ._uff import opened_uff
 from ._wav import opened_wav
 
@@ -36,6 +39,8 @@ class Source(Protocol):
 _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
     ".uff": opened_uff,
     ".unv": opened_uff,
+    ".ufb": opened_uff,
+    ".bunv": opened_uff,
     ".h5": opened_hdf5,
     ".hdf5": opened_hdf5,
     ".mat": opened_mat,
@@ -99,7 +104,38 @@ def opened_source(path: Path) -> Iterator[Source]:
                     f"{path.name} holds {len(source.channels)} rows or columns of numbers, and a measurement "
                     f"has at most {MOST_CHANNELS} channels; export fewer of them"
                 )
-        yield _CheckedSource(path, source)
+        plain = _CheckedSource(path, source, {each: each for each in source.channels})
+        yield replace(plain, found=dict(zip(_timed(plain), source.channels, strict=True)))
+
+
+def _timed(source: Source) -> Iterator[SourceChannel]:
+    """Yield the channels with the times that stand beside them in the file."""
+    axes: dict[SourceChannel, tuple[TimeAxis, str]] = {}
+    for each in source.channels:
+        unit = time_unit(each)
+        axis = None if unit is None else time_axis(channel_blocks(source, each))
+        if unit is not None and axis is not None:
+            axes[each] = axis, unit
+    for number, each in enumerate(source.channels):
+        above = [
+            time for time in axes if time.samples == each.samples and _group(each).startswith(_group(time))
+        ]
+        nearest = max((len(_group(time)) for time in above), default=0)
+        near = [time for time in above if len(_group(time)) == nearest]
+        before = [time for time in near if time in source.channels[: number + 1]]
+        chosen = (before[-1:] or near[:1] or [None])[0]
+        yield each if chosen is None else axes[chosen][0].of(each, axes[chosen][1])
+
+
+def _group(channel: SourceChannel) -> str:
+    """Return what comes before a channel's own name."""
+    return re.sub(r"[^/.]*$", "", channel.name)
+
+
+def channel_blocks(source: Source, channel: SourceChannel) -> Iterator[Reals]:
+    """Go through a channel of a file, a block at a time."""
+    for start in range(0, channel.samples, BLOCK_SAMPLES):
+        yield source.read(channel, start, min(start + BLOCK_SAMPLES, channel.samples))
 
 
 @dataclass(frozen=True)
@@ -108,15 +144,17 @@ class _CheckedSource:
 
     path: Path
     source: Source
+    found: Mapping[SourceChannel, SourceChannel]
+    """Channels as the reader knows them, by what else the file says of them."""
 
     @property
     def channels(self) -> tuple[SourceChannel, ...]:
-        return self.source.channels
+        return tuple(self.found)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
         # Converting a signalling NaN is no error: it is a lost sample like any other NaN.
         with _readable(self.path), np.errstate(invalid="ignore"):
-            values = self.source.read(channel, start, stop)
+            values = self.source.read(self.found[channel], start, stop)
         if values.shape != (stop - start,):
             raise UnusableData(
                 f"{self.path.name} gives {values.size} of the {stop - start} numbers of {channel.name} from "

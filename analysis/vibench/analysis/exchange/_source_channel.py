@@ -56,6 +56,15 @@ class SourceChannel:
     """Largest value the file can hold, where that is the converter's range."""
     rate_bounds_hz: tuple[float, float] | None = None
     """The same where the file does not say it exactly, but tells times in few digits."""
+    start_s: float | None = None
+    """When its first sample was taken, on the clock that all channels of the file share."""
+    start_error_s: float = 0.0
+    runs: tuple[tuple[int, int], ...] = ()
+    """First sample, and its place in sample intervals, of each stretch; empty where all are even."""
+    time_unit: str | None = None
+    """Unit of its times, empty where the file states none; None where it has no times."""
+    time_trouble: str = ""
+    """What the file says of its time that cannot be."""
 
     @property
     def rates_hz(self) -> tuple[float, float]:

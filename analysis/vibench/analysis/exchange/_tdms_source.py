@@ -12,11 +12,15 @@ import numpy as np
 from ..errors import InvalidRequest, UnusableData
 from ..signals import Reals
 from ._source_channel import SourceChannel
+from ._time_axis import told_rate_hz
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""
 INTERVAL, UNIT = "wf_increment", "unit_string"
-"""Properties that NI's software writes."""
+START, OFFSET = "wf_start_time", "wf_start_offset"
+"""Properties that NI's software writes; the offset is that of the first sample from the start time [s]."""
+START_ERROR_S = 1e-6
+"""Start times are kept in microseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,21 +60,37 @@ def opened_tdms(path: Path) -> Iterator[TdmsSource]:
         # It writes what it doubts to standard error, at any length; what matters, it raises.
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
-        yield TdmsSource(
-            {_channel(each): each for group in file.groups() for each in group.channels() if _is_real(each)}
-        )
+        found = [each for group in file.groups() for each in group.channels() if _is_real(each)]
+        starts = [np.datetime64(each.properties[START], "us") for each in found if START in each.properties]
+        origin = min(starts, default=np.datetime64(0, "us"))
+        yield TdmsSource({_channel(file, each, origin): each for each in found})
 
 
 def _is_real(channel: Any) -> bool:
     return len(channel) > 1 and channel.dtype.kind in "iuf"
 
 
-def _channel(channel: Any) -> SourceChannel:
-    interval_s = float(channel.properties.get(INTERVAL, 0.0))
+def _channel(file: Any, channel: Any, origin: np.datetime64) -> SourceChannel:
+    own = channel.properties
+    interval_s = float(own.get(INTERVAL, 0.0))
+    facts = [
+        ("dt", interval_s),
+        *own.items(),
+        *file[channel.group_name].properties.items(),
+        *file.properties.items(),
+    ]
+    rate_hz, trouble = told_rate_hz(facts)
+    is_placed = START in own or OFFSET in own
+    start = np.datetime64(own[START], "us") if START in own else origin
     return SourceChannel(
         name=f"{channel.group_name}/{channel.name}",
         samples=len(channel),
         label=channel.name,
-        sample_rate_hz=1 / interval_s if interval_s > 0 else None,
-        unit=str(channel.properties.get(UNIT, "")),
+        sample_rate_hz=rate_hz,
+        unit=str(own.get(UNIT, "")),
+        start_s=(start - origin) / np.timedelta64(1, "s") + float(own.get(OFFSET, 0.0))
+        if is_placed
+        else None,
+        start_error_s=START_ERROR_S if START in own else 0.0,
+        time_trouble=trouble,
     )

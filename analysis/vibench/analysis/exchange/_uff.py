@@ -18,6 +18,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
+from math import isfinite
 from pathlib import Path
 from typing import BinaryIO
 
@@ -29,7 +30,7 @@ from vibench.acquisition.recording import ChannelHeader, Origin
 from ..errors import UnusableData
 from ..signals import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
-from ._source_channel import SourceChannel, rate_bounds, text_of
+from ._source_channel import SECONDS, SourceChannel, rate_bounds, text_of
 
 DELIMITER = "    -1"
 TIME_RESPONSE = 1
@@ -257,6 +258,7 @@ def _skip_text(file: BinaryIO) -> None:
 def _channel(number: int, header: list[str]) -> SourceChannel:
     rates = [rate for line in header[:5] if (rate := exact_rate_hz(line)) is not None]
     label = header[0].strip()
+    start, second = _real(header[6][30:43]), SECONDS.get(header[7][46:66].strip().casefold())
     return SourceChannel(
         name=str(number),
         samples=int(header[6][10:20]),
@@ -265,16 +267,23 @@ def _channel(number: int, header: list[str]) -> SourceChannel:
         origin=next(filter(None, map(told_origin, header[:5])), None),
         unit=header[8][46:66].strip().removesuffix("NONE"),
         rate_bounds_hz=_rate_bounds(header),
+        start_s=start * second if start is not None and second is not None else None,
+        start_error_s=DIGITS * abs(start) * second if start is not None and second is not None else 0.0,
     )
 
 
 def _rate_bounds(header: list[str]) -> tuple[float, float] | None:
     """Take the increment of time for what its digits are worth; None where it is none, or in another unit."""
+    increment = _real(header[6][43:56])
+    return None if increment is None else rate_bounds(increment, DIGITS * increment, header[7][46:66].strip())
+
+
+def _real(text: str) -> float | None:
     try:
-        increment = float(header[6][43:56].upper().replace("D", "E"))
+        value = float(text.upper().replace("D", "E"))
     except ValueError:
         return None
-    return rate_bounds(increment, DIGITS * increment, header[7][46:66].strip())
+    return value if isfinite(value) else None
 
 
 def _text_numbers(path: Path, name: str, body: _Body) -> NDArray[np.float64]:

@@ -145,7 +145,7 @@ def _agree(lines_hz: Reals, hz: Reals) -> bool:
 def _multiples(lowest_hz: float, spacing: float) -> tuple[float, float]:
     """Return a first line and a spacing of six digits that divides it; 0 and 0 where none was found.
 
-    pyEMA and sdypy-EMA count the lines below the first by ``numpy.arange``, as here: a rounding error adds one.
+    pyEMA and sdypy-EMA count the lines below the first as here: a rounding error adds one.
     """
     for number in sorted(range(-_SPACINGS_TRIED, _SPACINGS_TRIED + 1), key=abs):
         step = _six_digits(spacing + number * _last_digit(spacing))

@@ -75,6 +75,7 @@ def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
         *_late(facts),
         *_ranges(facts),
         _rates(facts),
+        *_imported_time(facts),
         _calibrations(facts),
         _bench_check(facts),
     )
@@ -188,6 +189,12 @@ def _rates(facts: RecordingFacts) -> Check:
     same = abs(actual - wanted) <= _SAME_RATE * wanted
     text = f"{actual:.6g} samples/s" + ("" if same else f", where {wanted:.6g} were asked for")
     return Check("Sample rate", Verdict.PASSED if same else Verdict.NOTE, text)
+
+
+def _imported_time(facts: RecordingFacts) -> Iterator[Check]:
+    remarks = facts.bench.get("imported", {}).get("time", ())
+    if remarks:
+        yield Check("Time of the imported file", Verdict.NOTE, "; ".join(remarks))
 
 
 def _calibrations(facts: RecordingFacts) -> Check:
