@@ -7,8 +7,8 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025
 from vibench.sim.collision import collide, collision_tables, new_collision
-from vibench.sim.collision._tables import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING
 from vibench.sim.contact import begin_contact
+from vibench.sim.engine import DEPTHS, DURATION, HALF_FORCE, SOFTEST, SPACING
 from vibench.sim.scene._followed_run import FollowedRun, ObservedQuantities, Samples
 from vibench.sim.stepping import harmonic_tables, new_state
 

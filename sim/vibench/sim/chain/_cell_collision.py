@@ -6,8 +6,6 @@ Both are at hand for a cell, however long its chain.
 
 from ..collision import (
     FORCE,
-    POINTS,
-    TERMS,
     Collision,
     CollisionTables,
     deepest_of,
@@ -15,6 +13,7 @@ from ..collision import (
     find_collision,
 )
 from ..contact import ARGUMENT, DEEPEST, gap_of
+from ..engine import POINTS, TERMS
 from ..flight import P
 from ..kernels import Table, Vector, eight_of_sixteen, inlined, kernel_without_refcount, store
 from ._cell_contact import SUMMARY_ONLY, log_moment, motion_in_series

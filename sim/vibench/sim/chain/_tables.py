@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from ..collision import (
     LEAST_TOLERANCE,
-    TERMS,
     Collision,
     CollisionTables,
     collisions_in_a_course,
     new_collision,
 )
+from ..engine import TERMS
 from ..flight import SERIES_TERMS, P
 from ..kernels import Complex, Table, Vector
 from ..model import MOST_TERMS, Accuracy, Harmonic, Specimen

@@ -28,8 +28,6 @@ from ._observer import (
     observe_collision as observe_collision,
 )
 from ._tables import (
-    POINTS as POINTS,
-    TERMS as TERMS,
     CollisionTables as CollisionTables,
     collision_tables as collision_tables,
     collisions_in_a_course as collisions_in_a_course,

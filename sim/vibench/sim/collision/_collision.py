@@ -13,24 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..contact import ROOT_FLOOR, gap_of
-from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P
-from ..kernels import (
-    SimdVector,
-    Table,
-    Vector,
-    eight_of_eight,
-    eight_of_sixteen,
-    inlined,
-    root,
-    sixteen,
-    sixteen_of_sixteen,
-    store,
-    total,
-)
-from ..model import VX, VY, VZ, X, Y, Z
-from ..slots import RATE, ROOT, ROOT_SCALE, SIDE, Parameters
-from ._sums import at_heights, move_on, pushed
-from ._tables import (
+from ..engine import (
     BY_DAMPER,
     BY_JERK,
     BY_PRESS,
@@ -48,8 +31,25 @@ from ._tables import (
     SPACING,
     TERMS,
     TO_DURATION,
-    CollisionTables,
 )
+from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P
+from ..kernels import (
+    SimdVector,
+    Table,
+    Vector,
+    eight_of_eight,
+    eight_of_sixteen,
+    inlined,
+    root,
+    sixteen,
+    sixteen_of_sixteen,
+    store,
+    total,
+)
+from ..model import VX, VY, VZ, X, Y, Z
+from ..slots import RATE, ROOT, ROOT_SCALE, SIDE, Parameters
+from ._sums import at_heights, move_on, pushed
+from ._tables import CollisionTables
 
 LEAST_TOLERANCE = 1e-7
 """Stricter ones ask for more of the duration than sixteen points know."""

@@ -15,10 +15,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ..flight import P, linear_series
-from ..kernels import Table, Vector
-from ..model import Specimen, modal_form
-from ._tables import (
+from ..engine import (
     DEPTHS,
     DURATION,
     HALF_FORCE,
@@ -31,6 +28,9 @@ from ._tables import (
     TERMS,
     collision_shapes,
 )
+from ..flight import P, linear_series
+from ..kernels import Table, Vector
+from ..model import Specimen, modal_form
 
 MIDDLE = 1.47
 """Of a collision, in u."""

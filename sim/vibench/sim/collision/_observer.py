@@ -1,6 +1,7 @@
 """What is observed of a whole collision: its peaks and its lines. SI units."""
 
 from ..contact import hermite_peak
+from ..engine import POINTS, TERMS
 from ..flight import AT_X, COSINE, SINE, X_RATE
 from ..kernels import (
     SimdVector,
@@ -18,7 +19,7 @@ from ..kernels import (
 from ..slots import LINE_P_IM, LINE_P_RE, LINE_X_IM, LINE_X_RE, MODE, PEAK_P, PEAK_X, PEAKS_AND_LINES
 from ._collision import ACROSS, ACROSS_RATE, DEEPER_BY, DEPTHS, FORCE, UNIT, Collision
 from ._sums import at_heights, pushed
-from ._tables import POINTS, TERMS, CollisionTables, top_of
+from ._tables import CollisionTables, top_of
 
 FIRST_OF_FORCE = 2
 """A force reaches x by way of m2 and a damper: two integrals later."""

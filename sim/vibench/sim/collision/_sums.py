@@ -1,7 +1,8 @@
 """Sums over the points of a collision, and over the terms of what is slow beside it. SI units."""
 
+from ..engine import TERMS
 from ..kernels import SimdVector, Vector, eight, eight_of_eight, inlined, sixteen_of_sixteen, store
-from ._tables import TERMS, CollisionTables
+from ._tables import CollisionTables
 
 
 @inlined

@@ -1,43 +1,16 @@
-"""What is known of a Hertz collision before it happens. SI units.
+"""What is known of a Hertz collision before it happens: the shapes of `vibench.sim.engine`, and the specimen.
 
-With t = T (1 - cos phi) / 2, T the time that it lasts, depth and force are smooth in phi, square roots at
-both ends included: sixteen Gauss's points in phi hold a whole collision. Measured by the depth and the time
-of a collision of its speed all are alike but for how hard the other springs press; the shapes, and how they
-answer a change, stand in a row by that (collocation, as in `vibench.sim.power_law`, over one
-long step).
+SI units.
 """
 
-import math
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from ..engine import ABOUT_MIDDLE, HEIGHTS, POINTS, SHARES, TERMS, collision_shapes
 from ..flight import AT_X, WIDE, P, linear_series
 from ..kernels import Table, Vector, kernel_without_refcount
 from ..model import Hertz, Specimen
-
-POINTS = 16
-"""In phi. They find the duration to 1e-8, and the speed after to rounding."""
-TERMS = 8
-"""Of the series for all that is slow beside a collision."""
-SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
-"""Shapes stand at so many presses, from the first to the last. A press is the acceleration by all other
-springs, over speed^2 / depth."""
-SPACING = (HARDEST - SOFTEST) / (SHAPES - 1)
-QUADRATURE = 60
-NEWTON_STEPS = 60
-HALF_FORCE = 1.25
-"""k / m in units of the depth and the speed: m v^2 / 2 = 2 k d^(5/2) / 5."""
-TO_DURATION, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING = range(16, 23)
-"""Rows of a shape below those that answer the sixteen misfits of depth: that answers the last misfit, of the
-end; how the duration answers the misfits; depths at the points; and what they change by the press beside the
-shape's own, by its rate, and by what the force does through dampers and springs (two or three integrals)."""
-SHAPE_ROWS = 23
-DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY = range(4)
-"""Of the numbers beside a shape. The third: largest depth over that of the polynomial through the points,
-whose middle errs by 1e-5 where its end does by 1e-8. From the fourth on: what the duration changes by, as
-depths do."""
 
 
 class CollisionTables(NamedTuple):
@@ -70,25 +43,6 @@ class CollisionTables(NamedTuple):
     """Shape (k, m): what a depth at point k adds to the m-th Taylor term of all about the middle of phi."""
 
 
-PHI: Vector = 0.5 * math.pi * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
-HEIGHTS: Vector = 0.5 * (1.0 - np.cos(PHI))
-
-
-def _cardinal(at: Table) -> Table:
-    """Give the polynomials in phi that are 1 at one of the points and 0 at the others."""
-    others = ~np.eye(POINTS, dtype=np.bool_)
-    away = np.where(others, at[..., None, None] - PHI, 1.0)
-    apart = np.where(others, PHI[:, None] - PHI, 1.0)
-    return np.asarray(np.prod(away / apart, axis=-1))
-
-
-def _about_middle() -> Table:
-    """Give what depths at the points add to the Taylor terms of their polynomial about the middle of phi."""
-    cardinal = np.linalg.inv((PHI[:, None] - 0.5 * math.pi) ** np.arange(POINTS))
-    return np.ascontiguousarray(cardinal[:TERMS].T)
-
-
-ABOUT_MIDDLE: Table = _about_middle()
 NEWTON_TO_TOP = 4
 FARTHEST_TOP = 0.5
 """From the middle of phi: eight terms hold a depth there to 1e-7, and a tenth as far away to rounding."""
@@ -108,83 +62,6 @@ def top_of(terms: Vector) -> float:
     for term in range(TERMS - 1, -1, -1):
         value = value * at + terms[term]
     return value
-
-
-def _shares() -> Table:
-    """Integrals of (t_i - t)^m times the cardinal polynomials, shape (TERMS, POINTS, POINTS + 1)."""
-    places, weights = np.polynomial.legendre.leggauss(QUADRATURE)
-    ends = np.append(PHI, math.pi)
-    phi = 0.5 * (places + 1.0) * ends[:, None]
-    weights = 0.25 * weights * ends[:, None] * np.sin(phi)
-    left = 0.5 * (np.cos(phi) - np.cos(ends)[:, None])
-    powers = left ** np.arange(TERMS)[:, None, None]
-    return np.asarray(np.einsum("miq,iq,iqk->mki", powers, weights, _cardinal(phi), optimize=True))
-
-
-SHARES: Table = _shares()
-
-
-def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Table]:
-    """How far a collision of unit speed and depth is from its equations, and their derivative."""
-    times = np.append(HEIGHTS, 1.0)
-    root = np.sqrt(np.maximum(depths, 0.0))
-    pushed = HALF_FORCE * (depths * root) @ SHARES[1]
-    free = duration * times + 0.5 * press * (duration * times) ** 2
-    found = free - duration**2 * pushed - np.append(depths, 0.0)
-    slopes = np.zeros((POINTS + 1, POINTS + 1))
-    slopes[:, :POINTS] = -(duration**2) * 1.5 * HALF_FORCE * SHARES[1].T * root
-    slopes[:POINTS, :POINTS] -= np.eye(POINTS)
-    slopes[:, POINTS] = times + press * duration * times**2 - 2.0 * duration * pushed
-    return found, slopes
-
-
-@lru_cache(maxsize=1)
-def collision_shapes() -> tuple[Table, Table]:
-    """Solve the collisions of the row, each begun from the one before."""
-    shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
-    # Without a press: 2.943 long, and close to half a sine.
-    depths, duration = np.sin(math.pi * HEIGHTS), 2.943
-    for softer in np.linspace(0.0, SOFTEST, SHAPES):
-        depths, duration, _ = _solved(depths, duration, float(softer))
-    times = np.append(HEIGHTS, 1.0)
-    for place in range(SHAPES):
-        press = SOFTEST + SPACING * place
-        depths, duration, slopes = _solved(depths, duration, press)
-        answer = np.linalg.inv(slopes)
-        forces = HALF_FORCE * np.maximum(depths, 0.0) ** 1.5
-        changes = answer @ -np.transpose(
-            [
-                0.5 * (duration * times) ** 2,
-                (duration * times) ** 3,
-                duration**3 * forces @ SHARES[2],
-                duration**4 * forces @ SHARES[3],
-            ]
-        )
-        shapes[place, : POINTS + 1] = answer[:POINTS].T
-        shapes[place, DEPTHS], shapes[place, BY_PRESS:] = depths, changes[:POINTS].T
-        shapes[place, ONTO_DURATION] = answer[POINTS, :POINTS]
-        deeper = _deepest(press) / top_of(depths @ ABOUT_MIDDLE)
-        durations[place] = duration, answer[POINTS, POINTS], deeper, *changes[POINTS]
-    return shapes, durations
-
-
-def _deepest(press: float) -> float:
-    """Depth at which all energy is in the stop: d^(5/2) = 1 + 2 press d, in units of speed and depth."""
-    depth = 1.0
-    for _ in range(NEWTON_STEPS):
-        depth -= (depth**2.5 - 1.0 - 2.0 * press * depth) / (2.5 * depth**1.5 - 2.0 * press)
-    return depth
-
-
-def _solved(depths: Vector, duration: float, press: float) -> tuple[Vector, float, Table]:
-    """Newton's method to rounding."""
-    for _ in range(NEWTON_STEPS):
-        found, slopes = _misfits(depths, duration, press)
-        step = np.linalg.solve(slopes, found)
-        depths, duration = depths - step[:POINTS], duration - float(step[POINTS])
-        if float(np.abs(step).max()) < 1e-13:
-            break
-    return depths, duration, _misfits(depths, duration, press)[1]
 
 
 def collision_tables(

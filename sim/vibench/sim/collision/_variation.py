@@ -8,6 +8,7 @@ a collision that ends earlier or later by the change makes no difference of the 
 
 import numpy as np
 
+from ..engine import END_ONTO_DURATION, ONTO_DURATION, POINTS, TERMS, TO_DURATION
 from ..flight import P, read_change, write_change
 from ..kernels import (
     Table,
@@ -23,7 +24,7 @@ from ..kernels import (
 from ..slots import Parameters, keep_in_range
 from ._collision import DEPTHS, PLACE, SLOW_TERMS, UNIT, Collision
 from ._sums import at_heights, move_on
-from ._tables import END_ONTO_DURATION, ONTO_DURATION, POINTS, TERMS, TO_DURATION, CollisionTables
+from ._tables import CollisionTables
 
 SLOPES, BEFORE, AFTER, COURSE, MOMENTS, CHANGE, MISFIT, GAINS = range(8)
 """Rows of a memory. From the last on: what a change of p at one point adds to p at all of them."""

@@ -1,0 +1,145 @@
+// The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
+// calls, so that threads may share tables. What is given is checked, and refused with a code.
+#include "run.hpp"
+
+#if defined(_WIN32)
+#define VIBENCH_API extern "C" __declspec(dllexport)
+#else
+#define VIBENCH_API extern "C" __attribute__((visibility("default")))
+#endif
+
+using namespace vibench;
+
+namespace {
+
+constexpr double LATEST = 1e12;  // [s]
+
+bool is_positive(double x) { return x > 0.0 && is_finite(x); }
+bool is_not_negative(double x) { return x >= 0.0 && is_finite(x); }
+bool is_finite_phasor(const Phasor &x) { return is_finite(x.re) && is_finite(x.im); }
+
+bool is_usable(const LinearMotion &motion) {
+  if (motion.modes < 1 || motion.modes > MODES) return false;
+  for (int j = 0; j < int(motion.modes); j++) {
+    if (!is_finite_phasor(motion.rates[j])) return false;
+    for (int i = 0; i < 6; i++)
+      if (!is_finite_phasor(motion.shapes[j][i]) || !is_finite_phasor(motion.rows[j][i])) return false;
+  }
+  for (const Phasor &steady : motion.steady)
+    if (!is_finite_phasor(steady)) return false;
+  return true;
+}
+
+bool is_usable(const Specimen &s) {
+  const double positive[] = {s.m0, s.m1, s.m2, s.k0, s.k1, s.k2};
+  for (double number : positive)
+    if (!is_positive(number)) return false;
+  const double not_negative[] = {s.c0, s.c1, s.c2, s.linear_stiffness, s.contact_stiffness, s.loss};
+  for (double number : not_negative)
+    if (!is_not_negative(number)) return false;
+  if (!(s.lower_gap > 0.0 && s.upper_gap > 0.0) || s.law < 0 || s.law >= LAWS) return false;
+  if (s.law == HERTZ && !(s.contact_stiffness > 0.0)) return false;
+  if (s.law == YIELDING && !(s.contact_stiffness + s.linear_stiffness > 0.0)) return false;
+  return s.restitution >= 0.0 && s.restitution <= 1.0;
+}
+
+bool is_usable(const Scene &scene) {
+  const Specimen &s = scene.specimen;
+  if (!is_usable(s) || !is_usable(scene.flight) || !is_positive(scene.drive.frequency)) return false;
+  if (!is_finite_phasor(scene.drive.start) || !is_finite_phasor(scene.drive.force)) return false;
+  if (s.law == HERTZ && scene.collisions == nullptr) return false;
+  return (s.law != SPRINGS && s.law != RIGID) || is_usable(scene.held.motion);
+}
+
+bool is_usable(const Record &record) {
+  bool has_samples = record.sample_room == 0 || (record.samples != nullptr && is_positive(record.sample_rate));
+  bool has_times = record.impact_room == 0 || record.impact_times != nullptr;
+  return has_samples && has_times && record.samples_kept >= 0 && record.samples_kept <= record.sample_room &&
+         record.impacts >= 0 && record.impacts <= record.impact_room && record.steps_left >= 0 &&
+         record.steps_left <= MOST_STEPS && is_finite(record.start);
+}
+
+bool is_tolerance(double tolerance) { return tolerance > 0.0 && tolerance < 1.0; }
+
+Motion<double> motion_of(const State &state) {
+  Motion<double> motion;
+  __builtin_memcpy(motion.at, state.motion, sizeof motion.at);
+  motion.clock = {state.clock_high, state.clock_low, 0.0};
+  motion.contact = {state.root,       state.rate,       state.side, state.step,
+                    state.root_scale, state.rate_scale, state.pace};
+  return motion;
+}
+
+void keep(State &state, const Motion<double> &motion) {
+  __builtin_memcpy(state.motion, motion.at, sizeof motion.at);
+  state.clock_high = motion.clock.high, state.clock_low = motion.clock.low;
+  const Contact<double> &c = motion.contact;
+  state.root = c.w, state.rate = c.r, state.side = c.side, state.step = c.step;
+  state.root_scale = c.root_scale, state.rate_scale = c.rate_scale, state.pace = c.pace;
+}
+
+// Calls `act` with a run of the motion under the stops of the specimen.
+template <class T, class Act>
+Outcome with_stops(Motion<T> &motion, const Tables &t, double tolerance, Record &record, const Act &act) {
+  auto with = [&](const auto &stops) {
+    Run run(motion, t, stops, tolerance, record);
+    return act(run);
+  };
+  const Specimen &s = t.specimen;
+  switch (s.law) {
+    case NO_STOPS: return with(WithoutStops{});
+    case HERTZ: return with(HertzStops{{HertzForce{s.contact_stiffness}}});
+    case YIELDING: return with(YieldingStops<YieldingForce>{{s.linear_stiffness, s.contact_stiffness, s.loss}});
+    case SPRINGS: return with(SpringStops{});
+    case RIGID: return with(HardStops{});
+    default: return REFUSED;
+  }
+}
+
+}  // namespace
+
+// The text of all structures, in the order of `vibench_size_of`.
+VIBENCH_API const char *vibench_structure(int64_t index) {
+  constexpr const char *TEXTS[] = {Specimen_text, LinearMotion_text, HeldMotion_text, Drive_text, CollisionShapes_text,
+                                   Scene_text,    State_text,        Record_text};
+  return index >= 0 && index < 8 ? TEXTS[index] : nullptr;
+}
+VIBENCH_API int64_t vibench_size_of(int64_t index) {
+  constexpr int64_t SIZES[] = {sizeof(Specimen),        sizeof(LinearMotion), sizeof(HeldMotion), sizeof(Drive),
+                               sizeof(CollisionShapes), sizeof(Scene),        sizeof(State),      sizeof(Record)};
+  return index >= 0 && index < 8 ? SIZES[index] : 0;
+}
+VIBENCH_API int64_t vibench_size_of_tables() { return sizeof(Tables); }
+
+// Fills `tables`, of vibench_size_of_tables() bytes; the shapes of collisions must outlive them.
+VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
+  if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
+  fill_tables(*tables, *scene);
+  return REACHED_END;
+}
+
+// Decides whether the motion in `state` starts on a stop, and fills the rest of `state`.
+VIBENCH_API int64_t vibench_start(const Tables *tables, State *state, double tolerance) {
+  if (tables == nullptr || state == nullptr || !is_tolerance(tolerance)) return REFUSED;
+  Motion<double> motion = motion_of(*state);
+  Record record{};
+  Outcome outcome = with_stops(motion, *tables, tolerance, record, [](auto &run) {
+    run.place_on_its_side();
+    return REACHED_END;
+  });
+  keep(*state, motion);
+  return outcome;
+}
+
+// Advances `state` to the instant `until` [s], and fills `record`; an `Outcome`.
+VIBENCH_API int64_t vibench_run(const Tables *tables, State *state, double until, double tolerance, Record *record) {
+  if (tables == nullptr || state == nullptr || record == nullptr) return REFUSED;
+  if (!is_tolerance(tolerance) || !(magnitude(until) < LATEST) || !is_usable(*record)) return REFUSED;
+  if (!(magnitude(state->clock_high) < LATEST) || !is_finite(state->clock_low)) return REFUSED;
+  if (!(state->side == 0.0 || magnitude(state->side) == 1.0)) return REFUSED;
+  Motion<double> motion = motion_of(*state);
+  Outcome outcome =
+      with_stops(motion, *tables, tolerance, *record, [&](auto &run) { return run.advance(until); });
+  keep(*state, motion);
+  return outcome;
+}

@@ -1,0 +1,191 @@
+// A whole Hertz collision in one: depths at sixteen points and the duration, by Newton's method (decision 0008).
+// With time = duration (1 - cos phi) / 2 the depth is smooth in phi, square roots at both ends included, and sixteen
+// Gauss points hold it. Measured by their own depth and time collisions differ only by how hard the other springs
+// press; shapes, and how they answer a misfit, are tabulated by that press and then corrected.
+#pragma once
+#include "flight.hpp"
+
+namespace vibench {
+
+enum { POINTS = 16, SLOW_TERMS = 6, MOST_SHAPE_CORRECTIONS = 8 };
+// Rows of `CollisionShapes::shapes` below the sixteen that answer the misfits of depth.
+enum ShapeRow { TO_DURATION = POINTS, ONTO_DURATION, DEPTHS, BY_PRESS, BY_JERK, BY_DAMPER, BY_SPRING };
+enum DurationColumn { DURATION, END_ONTO_DURATION, DEEPER, LASTS_BY };
+constexpr double SOFTEST = -0.3, HARDEST = 0.5, SPACING = (HARDEST - SOFTEST) / 40;  // presses of the shapes
+constexpr double LONGEST = 3.5;         // duration of the collision pressed hardest, over its depth and speed
+constexpr double LONGEST_COLLISION = 0.4;  // fastest rate times duration: what the series bears [rad]
+constexpr double HALF_FORCE = 1.25;     // k / m in units of depth and speed: m v^2 / 2 = 2 k d^(5/2) / 5
+constexpr double LEAST_TOLERANCE = 1e-7;  // stricter ones ask for more of the duration than sixteen points know
+constexpr double CLOSE = 0.1;           // corrections end when depths change by this part of the tolerance
+constexpr double LAG = 3e-6;  // what slow springs make of the force is found anew while depths change by more
+
+// Seen from its own side: whatever the stop, p is positive.
+template <class T> struct Collision {
+  Wide<T, POINTS> depths;  // over `unit`
+  Wide<T, POINTS> force;   // at the points [N]
+  Wide<T, WIDE> motion;    // when it begins
+  Wide<T, WIDE> after;     // when it ends
+  Wide<T, TERMS> course;   // Taylor terms of p without force, in fastest * t
+  Wide<T, TERMS> moments;  // integrals of the force up to the end
+  T duration;              // [s]
+  double unit;             // depth of a collision of this speed with nothing else acting [m]
+  double pace;             // unit over speed [s]
+  int press;               // row of the tables
+};
+
+template <class T> INLINE Wide<T, POINTS> constants(const double (&of)[POINTS]) {
+  Wide<T, POINTS> row{};
+  if constexpr (is_dual<T>) row.value = Vector<POINTS>::load(of);
+  else row = Vector<POINTS>::load(of);
+  return row;
+}
+
+// Terms 1 and up of a Taylor series, at the times `turns` of the points.
+template <class T>
+INLINE Wide<T, POINTS> series_at_points(const Wide<T, TERMS> &terms, const Wide<T, POINTS> &turns) {
+  Wide<T, POINTS> sum = at(terms, TERMS - 1) * turns;
+  for (int m = TERMS - 2; m > 0; m--) sum = (sum + at(terms, m)) * turns;
+  return sum;
+}
+
+// What the force at the points does to a number of the motion there, by some terms of the series.
+template <class T>
+INLINE Wide<T, POINTS> pushed(const Wide<T, POINTS> &force, int first, int last, int number, const T &duration,
+                              const CollisionTables &t) {
+  T turn = t.fastest * duration, factor = duration;
+  for (int m = 0; m < first; m++) factor = factor * turn;
+  Wide<T, POINTS> sum = (factor * t.struck[first][number]) * times(t.shapes->shares[first], force);
+  for (int m = first + 1; m < last; m++) {
+    factor = factor * turn;
+    sum = sum + (factor * t.struck[m][number]) * times(t.shapes->shares[m], force);
+  }
+  return sum;
+}
+
+// Whether a correction was the last: by the value's change; for derivatives by theirs.
+INLINE bool is_settled(const Vector<POINTS> &change, const Vector<POINTS> &, double close) {
+  return total(change * change) <= close * close;
+}
+template <int M>
+INLINE bool is_settled(const Dual<Vector<POINTS>, M> &change, const Dual<Vector<POINTS>, M> &depths, double) {
+  for (int i = 0; i < M; i++)
+    if (!(total(change.slope[i] * change.slope[i]) <= 1e-20 * total(depths.slope[i] * depths.slope[i]))) return false;
+  return true;
+}
+
+// Corrects depths and duration until the equations of the collision hold; `begun` is p - gap at the start [m].
+// With derivatives the values have been found already, and stay: both kinds of motion are the same to the last bit.
+template <class T> inline bool correct(Collision<T> &c, const T &begun, double close, const Tables &tables) {
+  const CollisionTables &t = tables.collision;
+  const auto &shape = t.shapes->shapes[c.press];
+  double end_onto_duration = t.shapes->durations[c.press][END_ONTO_DURATION];
+  double stiff = tables.specimen.contact_stiffness * c.unit * square_root(c.unit), over = 1.0 / c.unit;
+  Wide<T, POINTS> slow{};
+  bool is_slow_known = false;
+  for (int n = 0; n < MOST_SHAPE_CORRECTIONS * (is_dual<T> ? 2 : 1); n++) {
+    c.force = stiff * (c.depths * square_root(c.depths));
+    c.moments = times(t.shapes->ends, c.force);
+    if (!is_slow_known) slow = pushed<T>(c.force, 2, SLOW_TERMS, P, c.duration, t);
+    T turn = t.fastest * c.duration, end = constant<T>(0.0);
+    for (int m = TERMS - 1; m > 0; m--)
+      end = turn * (end + at(c.course, m) + c.duration * t.struck[m][P] * at(c.moments, m));
+    end = over * (begun + end);
+    Wide<T, POINTS> free = series_at_points<T>(c.course, turn * Vector<POINTS>::load(t.shapes->heights));
+    Wide<T, POINTS> there = begun + free + slow + pushed<T>(c.force, 1, 2, P, c.duration, t);
+    Wide<T, POINTS> misfit = over * there - c.depths;
+    Wide<T, POINTS> change = end * Vector<POINTS>::load(shape[TO_DURATION]);
+    for (int k = 0; k < POINTS; k++) change = change + at(misfit, k) * Vector<POINTS>::load(shape[k]);
+    T later = end_onto_duration * end + total(Vector<POINTS>::load(shape[ONTO_DURATION]) * misfit);
+    if constexpr (is_dual<T>) change.value = Vector<POINTS>(0.0), later.value = 0.0;
+    c.depths = c.depths - change;
+    c.duration = c.duration - c.pace * later;
+    if (is_settled(change, c.depths, close)) {
+      c.force = stiff * (c.depths * square_root(c.depths));
+      c.moments = times(t.shapes->ends, c.force);
+      return true;
+    }
+    if constexpr (!is_dual<T>) is_slow_known = total(change * change) <= LAG * LAG;
+  }
+  return false;
+}
+
+// Depths and duration as far as they are known beforehand, to the first order.
+inline void foresee(Collision<double> &c, double press, const Tables &tables) {
+  const CollisionTables &t = tables.collision;
+  c.press = int((press - SOFTEST) / SPACING + 0.5);
+  const auto &shape = t.shapes->shapes[c.press];
+  const auto &known = t.shapes->durations[c.press];
+  // Each number of the specimen in units of the collision.
+  double turn = t.fastest * c.pace, stiff = tables.specimen.contact_stiffness * c.unit * square_root(c.unit);
+  double kick = turn * stiff * c.pace / (c.unit * HALF_FORCE);
+  double by[4] = {press - (SOFTEST + SPACING * c.press), c.course[3] * turn * turn * turn / c.unit,
+                  t.struck[2][P] * turn * kick, t.struck[3][P] * turn * turn * kick};
+  c.depths = Vector<POINTS>::load(shape[DEPTHS]);
+  c.duration = known[DURATION];
+  for (int k = 0; k < 4; k++) {
+    c.depths = c.depths + by[k] * Vector<POINTS>::load(shape[BY_PRESS + k]);
+    c.duration += by[k] * known[LASTS_BY + k];
+  }
+  c.duration *= c.pace;
+}
+
+// The motion at the end of the collision.
+template <class T> inline void move_on(Collision<T> &c, const CollisionTables &t) {
+  T turn = t.fastest * c.duration, factor = constant<T>(1.0);
+  c.after = c.motion + (c.duration * at(c.moments, 0)) * Vector<WIDE>::load(t.struck[0]);
+  for (int m = 1; m < TERMS; m++) {
+    factor = factor * turn;
+    Wide<T, WIDE> moved = times(t.powers[m], c.motion);
+    c.after = c.after + factor * (moved + (c.duration * at(c.moments, m)) * Vector<WIDE>::load(t.struck[m]));
+  }
+}
+
+template <class T> INLINE void drop_slopes(Collision<double> &values, const Collision<T> &c) {
+  if constexpr (is_dual<T>) values.motion = c.motion.value, values.course = c.course.value;
+  else values.motion = c.motion, values.course = c.course;
+}
+
+// Carries a motion that has just touched the stop on `side` to the end of its collision. Returns false, with
+// nothing changed, where a few corrections do not suffice: next to no speed, springs as fast as the collision, an
+// instant to stop at in the midst of it, the reference level. Then the steps of contact.hpp resolve it.
+template <class T>
+inline bool collide(Collision<T> &c, T *motion, double side, const Complex<T> &drive, double longest,
+                    double tolerance, const Tables &tables) {
+  const CollisionTables &t = tables.collision;
+  double gap = gap_at(tables.specimen, side), speed = side * value_of(motion[VY] - motion[VZ]);
+  if (tolerance < LEAST_TOLERANCE || !(speed > 0.0)) return false;
+  double w = fifth_root(speed * speed / (0.8 * tables.specimen.contact_stiffness / tables.pair));
+  double most = smaller(longest, LONGEST_COLLISION / t.fastest);
+  if (!(LONGEST * w * w < speed * most)) return false;
+  const T begins[WIDE] = {side * (motion[Y] - motion[Z]),   side * motion[X],  side * motion[Z],
+                          side * (motion[VY] - motion[VZ]), side * motion[VX], side * motion[VZ],
+                          side * drive.re,                  side * drive.im};
+  c.motion = gathered(begins);
+  c.course = times(t.onto_p, c.motion);
+  Collision<double> values;
+  drop_slopes(values, c);
+  values.unit = w * w;
+  values.pace = values.unit / speed;
+  double press = 2.0 * values.course[2] * t.fastest * t.fastest * values.pace / speed;
+  if (!(SOFTEST <= press && press <= HARDEST)) return false;
+  foresee(values, press, tables);
+  if (!correct<double>(values, values.motion[P] - gap, CLOSE * tolerance, tables)) return false;
+  if (!(0.0 < values.duration && values.duration < most)) return false;
+  if constexpr (is_dual<T>) {
+    c.unit = values.unit, c.pace = values.pace, c.press = values.press;
+    c.depths = {}, c.depths.value = values.depths;
+    c.duration = constant<T>(values.duration);
+    if (!correct<T>(c, begins[P] - gap, 0.0, tables)) return false;
+  } else {
+    c = values;
+  }
+  move_on(c, t);
+  if (!(value_of(at(c.after, P_RATE)) < 0.0)) return false;
+  motion[X] = side * at(c.after, AT_X), motion[Z] = side * at(c.after, AT_Z);
+  motion[VX] = side * at(c.after, X_RATE), motion[VZ] = side * at(c.after, Z_RATE);
+  motion[Y] = motion[Z] + side * gap;
+  motion[VY] = motion[VZ] + side * at(c.after, P_RATE);
+  return true;
+}
+
+}  // namespace vibench

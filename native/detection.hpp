@@ -1,0 +1,118 @@
+// Whether, and when, a flight touches a stop: proved by a bound on the acceleration of p, never sampled (0004).
+// Over a stretch p is a Taylor polynomial (exact to rounding) and |d2p/dt2| <= bound. Two rules follow: the stretch
+// is clear if both end gaps exceed bound h^2 / 8; and from the gap g with approach speed v no stop can be reached
+// sooner than 2 g / (v + sqrt(v^2 + 2 bound g)).
+#pragma once
+#include "tables.hpp"
+
+namespace vibench {
+
+constexpr double NEVER = -1.0;
+constexpr double TOUCH = 1e-12;              // a gap below this part of the stop's distance counts as closed
+constexpr double ROUNDING = 8.0 * EPSILON;   // and one below this part of the largest term of p
+constexpr double JUST_SHORT = 0.999;         // part of the earliest possible return after leaving a stop
+constexpr double SHORTEST_ADVANCE = 1e-15;   // [s], so that a search always ends
+constexpr int TIGHTER_AFTER = 4;             // advances after which a tighter bound is worth its cost
+constexpr int PATIENCE = 400;                // a tangency followed for longer has no crossing ...
+constexpr double IMPATIENT = 1e-4;           // ... and is crossed in steps of this part of the stretch
+constexpr int NEWTON_STEPS = 6;              // corrections to a touch; two are the rule
+
+struct ValueAndRate {
+  double value, rate;
+};
+
+// A polynomial of AHEAD terms. Even and odd powers are summed apart: two short chains take half the time of one.
+INLINE ValueAndRate polynomial_at(const double *series, double tau) {
+  double square = tau * tau, even = 0.0, odd = 0.0, even_slope = 0.0, odd_slope = 0.0;
+  for (int k = AHEAD - 2; k >= 0; k -= 2) {
+    even_slope = even_slope * square + even;
+    odd_slope = odd_slope * square + odd;
+    even = even * square + series[k];
+    odd = odd * square + series[k + 1];
+  }
+  return {even + tau * odd, odd + 2.0 * tau * (even_slope + tau * odd_slope)};
+}
+
+// Bound of a derivative of the polynomial on [0, length].
+inline double derivative_bound(const double *series, double length, int derivative) {
+  double bound = 0.0, power = 1.0;
+  for (int k = derivative; k < AHEAD; k++) {
+    double factor = 1.0;
+    for (int i = 0; i < derivative; i++) factor *= k - i;
+    bound += factor * magnitude(series[k]) * power;
+    power *= length;
+  }
+  return bound;
+}
+
+// Earliest time [s] at which a gap [m] can close that closes now at `approach` [m/s].
+INLINE double earliest_closing(double gap, double approach, double bound) {
+  if (gap == INFINITE) return INFINITE;
+  double root = square_root(approach * approach + 2.0 * bound * gap);
+  return approach > 0.0 ? 2.0 * gap / (approach + root) : JUST_SHORT * (root - approach) / bound;
+}
+
+// Where p may go on one stretch.
+struct Room {
+  double lower, upper;  // distances of the stops [m]; infinite for none
+  double bound;         // of |d2p/dt2| [m/s^2]
+  double reach;         // size of the terms that p is summed from [m]: its rounding decides what is a touch
+
+  INLINE double nearer() const { return smaller(lower, upper); }
+  INLINE double closed() const { return TOUCH * nearer() + ROUNDING * reach; }
+};
+
+// The first touch on [0, length], or NEVER. A stop that is being left at the start is no touch.
+inline double first_contact(const double *series, double length, const Room &room) {
+  if (room.nearer() == INFINITE) return NEVER;
+  double closed = room.closed(), shortest = smaller(SHORTEST_ADVANCE, IMPATIENT * length);
+  double bound = room.bound + 1e-300, tau = 0.0;
+  for (int advances = 1; tau < length; advances++) {
+    auto [p, rate] = polynomial_at(series, tau);
+    double above = room.upper - p, below = room.lower + p;
+    if ((above <= closed && rate > 0.0) || (below <= closed && rate < 0.0)) return tau;
+    double advance = smaller(earliest_closing(larger(above, 0.0), rate, bound),
+                             earliest_closing(larger(below, 0.0), -rate, bound));
+    tau += larger(advance, shortest);
+    // What bounds the terms of p knows nothing of how they cancel; the polynomial does.
+    if (advances == TIGHTER_AFTER) bound = smaller(bound, derivative_bound(series, length, 2) + 1e-300);
+    if (advances == PATIENCE) shortest = IMPATIENT * length;
+  }
+  return NEVER;
+}
+
+// The same on a stretch of at most LONGEST_TURN. Where p surely does not turn, only the stop ahead can be touched,
+// and only once, so that Newton's method may be trusted.
+inline double first_touch(const double *series, double length, const Room &room) {
+  double change = room.bound * LONGEST_TURN;  // d2p/dt2 changes by no more in this time
+  double side = series[1] > 0.0 ? 1.0 : -1.0;
+  double speed = side * series[1], bend = 2.0 * side * series[2], stop = side > 0.0 ? room.upper : room.lower;
+  if (!(smaller(speed, speed + bend * length) > change * length)) return first_contact(series, length, room);
+  double closed = room.closed(), gap = stop - side * series[0];
+  if (gap <= closed) return 0.0;
+  if (gap > length * (speed + 0.5 * length * (larger(bend, 0.0) + change))) return NEVER;
+  double tau = 2.0 * gap / (speed + square_root(larger(speed * speed + 2.0 * bend * gap, 0.0)));
+  for (int n = 0; n < NEWTON_STEPS; n++) {
+    tau = smaller(tau, length);
+    auto [p, rate] = polynomial_at(series, tau);
+    gap = stop - side * p;
+    if (tau == length && gap > closed) return NEVER;
+    double step = gap / (side * rate);
+    tau += step;
+    // What this correction leaves of the gap is at most half of bound step^2.
+    if (room.bound * step * step <= closed) return smaller(tau, length);
+  }
+  return first_contact(series, length, room);
+}
+
+// Side of the stop that is touched: the nearer one, not the one moved towards, for at a grazing touch the sign of
+// the speed is rounding. Where there is no room between the stops p is rounding in its turn, and the speed decides.
+INLINE double touched_side(double p, double rate, const Specimen &specimen) {
+  if (specimen.upper_gap == INFINITE) return -1.0;
+  if (specimen.lower_gap == INFINITE) return 1.0;
+  double above = specimen.upper_gap - p, below = specimen.lower_gap + p;
+  if (magnitude(above - below) <= 0.5 * (specimen.upper_gap + specimen.lower_gap)) return with_sign_of(1.0, rate);
+  return above < below ? 1.0 : -1.0;
+}
+
+}  // namespace vibench

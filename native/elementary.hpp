@@ -1,0 +1,69 @@
+// exp, sine and cosine, from additions and multiplications in a fixed order: the same digits on every processor.
+// Cody and Waite, Software Manual for the Elementary Functions (1980): x is reduced by a constant in two or three
+// parts, of which the first have so few digits that their products are exact. Errors are below 1.5 units in the
+// last place (native/test_engine.cpp compares with libm).
+#pragma once
+#include "numbers.hpp"
+
+namespace vibench {
+
+inline double exponential(double x) {
+  if (!(x > -708.0)) return x != x ? x : 0.0;
+  if (x > 709.0) return INFINITE;
+  constexpr double LOG2_HIGH = 6.93147180369123816490e-01, LOG2_LOW = 1.90821492927058770002e-10;
+  double twos = nearest(x * 1.44269504088896338700);
+  double r = (x - twos * LOG2_HIGH) - twos * LOG2_LOW;  // |r| < 0.35
+  double sum = 1.0 / 6227020800.0;                      // 1 / 13!, where the series is exact to rounding
+  constexpr double INVERSE_FACTORIALS[] = {1.0 / 479001600, 1.0 / 39916800, 1.0 / 3628800, 1.0 / 362880,
+                                           1.0 / 40320,     1.0 / 5040,     1.0 / 720,     1.0 / 120,
+                                           1.0 / 24,        1.0 / 6,        0.5};
+  for (double term : INVERSE_FACTORIALS) sum = sum * r + term;
+  sum = (sum * r + 1.0) * r;  // exp(r) - 1, whose rounding is small beside 1
+  double power = __builtin_bit_cast(double, (int64_t(twos) + 1023) << 52);
+  return (1.0 + sum) * power;
+}
+
+struct CosineSine {
+  double cosine, sine;
+};
+
+// On |x| <= pi / 4. Coefficients of Sun's fdlibm, whose errors are below 2^-58.
+INLINE CosineSine cosine_sine_near_zero(double x, double tail) {
+  double z = x * x;
+  double s = -1.66666666666666324348e-01 +
+             z * (8.33333333332248946124e-03 +
+                  z * (-1.98412698298579493134e-04 +
+                       z * (2.75573137070700676789e-06 +
+                            z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10))));
+  double c = z * (4.16666666666666019037e-02 +
+                  z * (-1.38888888888741095749e-03 +
+                       z * (2.48015872894767294178e-05 +
+                            z * (-2.75573143513906633035e-07 +
+                                 z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11)))));
+  double half = 0.5 * z, near = 1.0 - half;
+  double cosine = near + (((1.0 - near) - half) + (z * c - x * tail));
+  double sine = x + (tail * (1.0 - half) + x * z * s);
+  return {cosine, sine};
+}
+
+// Of any angle [rad]. Beyond 10^6 rad the product with the first part rounds, as the angle itself has.
+inline CosineSine cosine_sine(double angle) {
+  constexpr double PI_2_HIGH = 1.57079632673412561417e+00;  // 33 bits
+  constexpr double PI_2_MIDDLE = 6.07710050630396597660e-11;  // the next 33
+  constexpr double PI_2_LOW = 2.02226624879595063154e-21;
+  if (!is_finite(angle)) return {angle - angle, angle - angle};
+  double quarters = nearest(angle * (2.0 / PI));
+  double first = angle - quarters * PI_2_HIGH, second = quarters * PI_2_MIDDLE;
+  double x = first - second;
+  double tail = ((first - x) - second) - quarters * PI_2_LOW;
+  double reduced = x + tail;
+  CosineSine of = cosine_sine_near_zero(reduced, (x - reduced) + tail);
+  switch (int64_t(magnitude(quarters) < 9e15 ? quarters : 0.0) & 3) {
+    case 0: return of;
+    case 1: return {-of.sine, of.cosine};
+    case 2: return {-of.cosine, -of.sine};
+    default: return {of.sine, -of.cosine};
+  }
+}
+
+}  // namespace vibench

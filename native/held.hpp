@@ -1,0 +1,131 @@
+// m1 on a stop that holds it, or that is a spring: a linear motion, exact until the stop would have to pull; impact
+// on a rigid stop; lift-off. A rigid stop makes two bodies of three, a spring a stiffer specimen about another place
+// of rest. The stop lets go where the acceleration that presses m1 on it, or the indentation, falls to zero: found
+// like a touch, by the same proof, with it in the gap's place.
+#pragma once
+#include "flight.hpp"
+
+namespace vibench {
+
+constexpr double RESOLVED = 4.0;       // hops lower than this many closed gaps cannot be told from rest
+constexpr double LARGEST_PART = 1e-3;  // and of the room between the stops the closed gap may be this part
+constexpr double SHORTEST_PART = 1e-3;  // a departure takes at least this part of a grid step: so little that m1
+                                        // gets no farther than rounding into the stop, so much that a run goes on
+constexpr double NEARLY = 0.99;         // part of the least time to the other stop: the rest is rounding
+
+// How far from a stop m1 counts as touching it [m]; `reach` is the size of the terms that p is summed from.
+INLINE double closed_gap(double reach, const Specimen &s) {
+  return TOUCH * smaller(s.lower_gap, s.upper_gap) + ROUNDING * reach;
+}
+INLINE double closed_gap(const Phasor *phasors, const Tables &t) {
+  double reach = 0.0;
+  for (int j = 0; j <= t.flight.modes; j++) reach += magnitude(phasors[j] * t.flight.path[j]);
+  return closed_gap(reach, t.specimen);
+}
+// Whether m1 between its stops can be told from m1 on one of them: not where p is rounding.
+INLINE bool is_resolved(double closed, const Specimen &s) {
+  return closed < LARGEST_PART * (s.lower_gap + s.upper_gap);
+}
+
+// Acceleration with which m1 is pressed on the stop at its side, d2|p|/dt2 if the stop were not [m/s^2].
+template <class T> INLINE T press_on(double side, const T *motion, const Tables &t) {
+  const Specimen &s = t.specimen;
+  T pull = s.k2 * (motion[Z] - motion[X]) + s.c2 * (motion[VZ] - motion[VX]);
+  T inner = s.k1 * gap_at(s, side) + s.c1 * (side * (motion[VY] - motion[VZ]));
+  return side * pull / s.m2 - inner / t.pair;
+}
+
+// Puts m1 exactly on a stop, with `rate` = d|p|/dt [m/s]; the pair keeps its centre and its momentum.
+template <class T> inline void place_on_stop(T *motion, double side, const T &rate, const Tables &t) {
+  double gap = side * gap_at(t.specimen, side), share = t.pair / t.specimen.m2;
+  T before = motion[Y] - motion[Z], relative = motion[VY] - motion[VZ];
+  motion[Z] = motion[Z] - share * (gap - before);
+  motion[VZ] = motion[VZ] - share * (side * rate - relative);
+  motion[Y] = motion[Z] + gap;
+  motion[VY] = motion[VZ] + side * rate;
+}
+
+// Whether m1, which stands on a stop or leaves it, stays: the impacts still to come are too small to follow. Pressed
+// with the acceleration a, m1 hops, each hop `restitution` times as long as the one before: chatter, an infinity of
+// impacts in the time 2 v / (a (1 - restitution)). Left out are hops that cannot be told from rest, and those whose
+// speeds add up to less than the tolerance times the speed of a fall through the gap.
+template <class T>
+inline bool hold_if_pressed(T *motion, double side, double closed, double tolerance, const Tables &t) {
+  double rate = value_of(motion[VY] - motion[VZ]), press = value_of(press_on(side, motion, t));
+  double part = tolerance * (1.0 - t.specimen.restitution);
+  double too_low = RESOLVED * closed + part * part * gap_at(t.specimen, side);
+  if (!(press >= 0.0 && rate * rate <= 2.0 * press * too_low)) return false;
+  place_on_stop(motion, side, constant<T>(0.0), t);
+  return true;
+}
+
+// Strikes a rigid stop: places stay, and the speed of approach becomes `restitution` times itself (Newton). Returns
+// whether m1 stays on it. The touch was found a hair before the gap had closed; the speed is what it will be when it
+// has, so that a million impacts do not lose a million hairs.
+template <class T> inline bool rebound(T *motion, double side, double closed, double tolerance, const Tables &t) {
+  T approach = side * (motion[VY] - motion[VZ]);
+  double hair = gap_at(t.specimen, side) - side * value_of(motion[Y] - motion[Z]);
+  T square = approach * approach + 2.0 * hair * press_on(side, motion, t);
+  T speed = value_of(square) > 0.0 ? square_root(square) : constant<T>(0.0);
+  place_on_stop(motion, side, -t.specimen.restitution * speed, t);
+  return hold_if_pressed(motion, side, closed, tolerance, t);
+}
+
+// How long m1 stays on a stop: until it lets go (TOUCHES, at the place of a touch in a flight), or `longest` [s].
+// `level` is what the stop pushes at rest.
+inline Flight hold(double side, double level, const Phasor *phasors, const Clock<double> &clock, double longest,
+                   const Tables &tables) {
+  const LinearTables &t = tables.held;
+  double elapsed = 0.0, h = t.grid;
+  Phasor now[PHASORS];
+  while (elapsed < longest) {
+    propagate(now, phasors, elapsed, drive_phasor(clock, elapsed, tables), t);
+    PhasorSum<PHASORS> pull(now, tables.pulls, t);
+    for (Phasor &term : pull.terms) term = -side * term;
+    Room room{INFINITE, 0.0, pull.bound, level + pull.reach};
+    if (!(pull.bound < LARGEST_BOUND)) return {FlightEnd::LOST, elapsed};
+    int steps = whole_steps(longest - elapsed, h, RUN_OF_STEPS);
+    double high = -level - pull.bound * h * h / 8.0;
+    if (steps > 0 && pull.now() < high) {
+      int made = pull.march(steps, -INFINITE, high);
+      elapsed += made * h;
+      if (made == steps) continue;
+    }
+    double length = smaller(h, longest - elapsed), series[AHEAD];
+    pull.rows(t.series).store(series);
+    series[0] += level;
+    double free = first_contact(series, length, room);
+    if (free != NEVER) return {FlightEnd::TOUCHES, elapsed + free};
+    elapsed = length < h ? longest : elapsed + length;
+  }
+  return {FlightEnd::CLEAR, longest};
+}
+
+// How long a flight that starts on a rigid stop surely leaves it [s]; 0 where it does not start on one. A search
+// there cannot tell leaving from touching: the gap grows from nothing, and its first digits are rounding. But it
+// surely grows while d2|p|/dt2 <= a + j t + b t^2 / 2 <= 0, a and j the first derivatives there and b a bound of the
+// fourth derivative of p; and as long as m1 cannot have crossed to the other stop.
+inline double time_to_lift_off(const double *series, double length, double closed, const Specimen &s) {
+  double side = s.upper_gap - series[0] <= closed ? 1.0 : s.lower_gap + series[0] <= closed ? -1.0 : 0.0;
+  double rate = side * series[1], bend = side * 2.0 * series[2], jerk = side * 6.0 * series[3];
+  double low = RESOLVED * closed, size = magnitude(rate);
+  // A speed that cannot carry m1 out of what counts as closed, against the bend or against the jerk alone, is none.
+  bool by_bend = rate * rate <= 2.0 * magnitude(bend) * low;
+  bool by_jerk = 8.0 * size * size * size <= 9.0 * magnitude(jerk) * low * low;
+  if (side == 0.0 || !(by_bend || by_jerk)) return 0.0;
+  // Still pressed on the stop, and by more than rounding: so far would it go before it turns.
+  if (bend > 0.0 && !(jerk < 0.0 && 2.0 * bend * bend * bend <= 3.0 * closed * jerk * jerk)) return 0.0;
+  double bound = derivative_bound(series, length, 4), under_root = jerk * jerk - 2.0 * bend * bound;
+  double sure = under_root > 0.0 ? 0.5 * (square_root(under_root) - jerk) / larger(bound, 1e-300) : 0.0;
+  double fastest = derivative_bound(series, length, 2);
+  double across = NEARLY * square_root(2.0 * (s.lower_gap + s.upper_gap) / larger(fastest, 1e-300));
+  return smaller(smaller(length, across), larger(sure, SHORTEST_PART * length));
+}
+
+inline double lift_off(const Phasor *phasors, double closed, const Tables &t) {
+  double series[AHEAD];
+  PhasorSum<PHASORS>(phasors, t.flight.path, t.flight).rows(t.flight.series).store(series);
+  return time_to_lift_off(series, t.flight.grid, closed, t.specimen);
+}
+
+}  // namespace vibench

@@ -1,0 +1,262 @@
+// A run: flight, contact, flight, ... up to an instant. One source for a motion and for its derivatives.
+#pragma once
+#include "collision.hpp"
+#include "contact.hpp"
+#include "held.hpp"
+
+namespace vibench {
+
+// ---- Stops: how m1 meets them is chosen by type.
+
+struct WithoutStops {};
+// Stops that push with a force while m1 presses them in; a Hertz collision is first tried as a whole.
+template <class Force> struct YieldingStops {
+  Force force;
+  static constexpr bool whole_collisions = false;
+};
+struct HertzStops : YieldingStops<HertzForce> {
+  static constexpr bool whole_collisions = true;
+};
+struct SpringStops {};  // exact, with modes of their own
+struct HardStops {};    // Newton's restitution, and sticking
+
+template <class T> struct Motion {
+  T at[6];  // x, y, z, vx, vy, vz [m, m/s]
+  Clock<T> clock;
+  Contact<T> contact;
+};
+
+constexpr int64_t MOST_STEPS = 2000000000;  // of flight in a run
+constexpr int64_t RESOLVED_STEP = 50;       // steps of flight that a contact counts as: it takes as long
+
+// Grid steps that a flight counts as; all of them where its length or its grid is no number.
+INLINE int64_t steps_of(double length, double grid) {
+  double steps = length / grid;
+  return steps >= 0.0 && steps < double(MOST_STEPS) ? 1 + int64_t(steps) : MOST_STEPS;
+}
+
+template <class T, class Stops> class Run {
+ public:
+  Run(Motion<T> &motion, const Tables &tables, const Stops &stops, double tolerance, Record &record)
+      : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record) {}
+
+  // Advances the motion to the instant `until` [s]. Samples on the way change nothing of it.
+  Outcome advance(double until) {
+    for (;;) {
+      T longest = time_until(m.clock, until);
+      if (!(value_of(longest) > 0.0)) return REACHED_END;
+      if (!is_finite(value_of(m.at[X] + m.at[Y] + m.at[Z]))) return NOT_FINITE;
+      if (record.steps_left <= 0) return TOO_LONG;
+      Outcome outcome = m.contact.side == 0.0 ? fly_on(until, longest) : stay(until, longest);
+      if (outcome != REACHED_END) return outcome;
+    }
+  }
+
+  // Decides from the displacements whether a motion that is given starts on a stop.
+  void place_on_its_side() {
+    const Specimen &s = t.specimen;
+    double p = value_of(m.at[Y] - m.at[Z]), side = with_sign_of(1.0, p), gap = gap_at(s, side);
+    m.contact = {};
+    if constexpr (is_same<Stops, HardStops>) {
+      double reach = magnitude(value_of(m.at[X])) + magnitude(value_of(m.at[Y])) + magnitude(value_of(m.at[Z]));
+      double closed = closed_gap(reach, s);
+      if (!(gap - side * p <= closed)) return;
+      T rate = side * (m.at[VY] - m.at[VZ]);
+      place_on_stop(m.at, side, rate, t);
+      if (hold_if_pressed(m.at, side, closed, tolerance, t)) m.contact.side = side;
+    } else if constexpr (!is_same<Stops, WithoutStops>) {
+      if (p > s.upper_gap || p < -s.lower_gap) begin_contact(m.contact, m.at, side, tolerance, t);
+    }
+  }
+
+ private:
+  Motion<T> &m;
+  const Tables &t;
+  const Stops &stops;
+  double tolerance;
+  Record &record;
+  Complex<T> drive;             // the drive's phasor now, where it is known
+  bool is_drive_known = false;
+
+  template <class A, class B> static constexpr bool is_same = __is_same(A, B);
+
+  void pass(const T &time) {
+    vibench::advance(m.clock, time);
+    is_drive_known = false;
+  }
+  void arrive(double until) {
+    m.clock = {until, 0.0, constant<T>(0.0)};
+    is_drive_known = false;
+  }
+  Complex<T> drive_now() const { return is_drive_known ? drive : drive_phasor(m.clock, constant<T>(0.0), t); }
+  Clock<double> clock_value() const { return {m.clock.high, m.clock.low, 0.0}; }
+  static constexpr bool is_sampled = !is_dual<T>;
+
+  // ---- Flight
+
+  Flight next_flight(const Phasor *phasors, double longest) const {
+    if constexpr (is_same<Stops, HardStops>) {
+      double closed = closed_gap(phasors, t);
+      if (!is_resolved(closed, t.specimen)) return {FlightEnd::LOST, 0.0};
+      if (double leaves = lift_off(phasors, closed, t); leaves > 0.0)
+        return {FlightEnd::CLEAR, smaller(leaves, longest)};
+    }
+    return fly(phasors, clock_value(), longest, t);
+  }
+
+  Outcome fly_on(double until, const T &longest) {
+    Complex<T> phasors[PHASORS], landed[PHASORS];
+    Phasor values[PHASORS];
+    start_flight(phasors, m.at, drive_now(), t.flight);
+    copy_values(values, phasors, t.flight);
+    Flight flight = next_flight(values, smaller(value_of(longest), double(record.steps_left) * t.flight.grid));
+    if (flight.ends == FlightEnd::LOST) return NOT_FINITE;
+    bool is_whole = flight.ends == FlightEnd::CLEAR && flight.length >= value_of(longest);
+    T length = is_whole ? longest : constant<T>(flight.length);
+    land(landed, phasors, length);
+    if constexpr (is_dual<T>)
+      if (flight.ends == FlightEnd::TOUCHES) {
+        length = length + later_touch();
+        land(landed, phasors, length);
+      }
+    if constexpr (is_sampled) keep_samples(flight.length, [&](double later, double *sample) {
+      Phasor there[PHASORS];
+      propagate(there, phasors, later, drive_phasor(m.clock, later, t), t.flight);
+      place(sample, there, t.flight);
+    });
+    record.steps_left -= steps_of(flight.length, t.flight.grid);
+    if (is_whole) {
+      arrive(until);
+      return REACHED_END;
+    }
+    pass(length);
+    drive = landed[t.flight.modes];
+    is_drive_known = true;
+    return flight.ends == FlightEnd::TOUCHES ? touch(landed) : REACHED_END;
+  }
+
+  void land(Complex<T> *landed, const Complex<T> *phasors, const T &length) {
+    propagate(landed, phasors, length, drive_phasor(m.clock, length, t), t.flight);
+    place(m.at, landed, t.flight);
+  }
+
+  // By how much a changed motion touches later: all corrections where the motion switches (saltation, Mueller 1995)
+  // follow from this by the rules of derivatives. At a grazing touch no derivative exists; its rate is floored.
+  T later_touch() const {
+    T p = m.at[Y] - m.at[Z];
+    double rate = value_of(m.at[VY] - m.at[VZ]);
+    return slopes_only(-p) / with_sign_of(larger(magnitude(rate), SLOWEST_TOUCH), rate);
+  }
+
+  Outcome touch(const Complex<T> *landed) {
+    if (record.impacts == record.impact_room) return TOO_MANY_IMPACTS;
+    record.impact_times[record.impacts++] = m.clock.high;
+    double p = value_of(m.at[Y] - m.at[Z]), rate = value_of(m.at[VY] - m.at[VZ]);
+    double side = touched_side(p, rate, t.specimen);
+    if constexpr (is_same<Stops, HardStops>) {
+      Phasor values[PHASORS];
+      copy_values(values, landed, t.flight);
+      m.contact.side = rebound(m.at, side, closed_gap(values, t), tolerance, t) ? side : 0.0;
+    } else {
+      // The touch was found a hair before or after the gap closed: w begins at zero.
+      begin_contact(m.contact, m.at, side, tolerance, t);
+      m.contact.w = constant<T>(0.0);
+    }
+    return REACHED_END;
+  }
+
+  // ---- On a stop
+
+  Outcome stay(double until, const T &longest) {
+    if constexpr (is_same<Stops, SpringStops> || is_same<Stops, HardStops>) return stay_held(until, longest);
+    else if constexpr (is_same<Stops, WithoutStops>) return NOT_FINITE;  // there is no stop to be on
+    else return stay_pressed(until, longest);
+  }
+
+  Outcome stay_held(double until, const T &longest) {
+    double side = m.contact.side, gap = gap_at(t.specimen, side), rests = side * t.rests * gap;
+    Complex<T> phasors[PHASORS], landed[PHASORS];
+    Phasor values[PHASORS];
+    m.at[Y] = m.at[Y] - rests;
+    start_flight(phasors, m.at, drive_now(), t.held);
+    copy_values(values, phasors, t.held);
+    double most = smaller(value_of(longest), double(record.steps_left) * t.held.grid);
+    Flight held = hold(side, t.let_go * gap, values, clock_value(), most, t);
+    if (held.ends == FlightEnd::LOST) return NOT_FINITE;
+    bool is_whole = held.ends == FlightEnd::CLEAR && held.length >= value_of(longest);
+    T length = is_whole ? longest : constant<T>(held.length);
+    propagate(landed, phasors, length, drive_phasor(m.clock, length, t), t.held);
+    place(m.at, landed, t.held);
+    m.at[Y] = m.at[Y] + rests;
+    if (held.ends == FlightEnd::TOUCHES) m.at[Y] = slopes_only(m.at[Y]) + (value_of(m.at[Z]) + side * gap);
+    if constexpr (is_sampled) keep_samples(held.length, [&](double later, double *sample) {
+      Phasor there[PHASORS];
+      propagate(there, phasors, later, drive_phasor(m.clock, later, t), t.held);
+      place(sample, there, t.held);
+      sample[Y] += rests;
+    });
+    record.steps_left -= steps_of(held.length, t.held.grid);
+    if (held.ends == FlightEnd::TOUCHES) m.contact.side = 0.0;
+    if (is_whole) arrive(until);
+    else pass(length);
+    return REACHED_END;
+  }
+
+  Outcome stay_pressed(double until, const T &longest) {
+    record.steps_left -= RESOLVED_STEP;
+    Motion<T> before = m;
+    if constexpr (Stops::whole_collisions)
+      if (value_of(m.contact.w) == 0.0) {
+        Collision<T> collision;
+        if (collide(collision, m.at, m.contact.side, drive_now(), value_of(longest), tolerance, t)) {
+          m.contact.side = 0.0;
+          double length = value_of(collision.duration);
+          if constexpr (is_sampled) sample_contact(before, length, BaseForce(clock_value(), 0.5 * length, t));
+          pass(collision.duration);
+          return REACHED_END;
+        }
+      }
+    BaseForce base(clock_value(), smaller(0.5 * value_of(longest), 0.5 * STRETCH_TURN / t.omega), t);
+    bool is_last = value_of(longest) <= 2.0 * base.middle;
+    // Instants of the clock depend on nothing; the start of this stretch does.
+    T begin = m.clock.slip, tau = begin;
+    T limit = constant<T>(is_last ? value_of(longest) : 2.0 * base.middle);
+    switch (advance_contact(m.contact, m.at, tau, limit, base, stops.force, tolerance, t, [](auto &&...) {})) {
+      case ContactEnd::LOST: return NOT_FINITE;
+      case ContactEnd::STALLED: return STALLED;
+      case ContactEnd::HELD:
+        if constexpr (is_sampled) sample_contact(before, value_of(tau), base);
+        if (is_last) arrive(until);
+        else pass(tau - begin);
+        return REACHED_END;
+      case ContactEnd::LEFT: break;
+    }
+    if constexpr (is_sampled) sample_contact(before, value_of(tau), base);
+    pass(tau - begin);
+    return REACHED_END;
+  }
+
+  // ---- Samples
+
+  // Keeps the samples that fall into the next `length` seconds: `place_sample(later, sample)` writes one.
+  template <class PlaceSample> void keep_samples(double length, const PlaceSample &place_sample) {
+    while (record.samples_kept < record.sample_room) {
+      double later = time_until(clock_value(), record.start + double(record.samples_kept) / record.sample_rate);
+      if (later > length) return;
+      place_sample(later, record.samples + 6 * record.samples_kept);
+      record.samples_kept++;
+    }
+  }
+
+  // Samples of a contact come from a second run from where it began, which lands on each of them.
+  void sample_contact(Motion<T> &shadow, double length, const BaseForce &base) {
+    double reached = 0.0;
+    keep_samples(length, [&](double later, double *sample) {
+      if (shadow.contact.side != 0.0 && later > reached)
+        advance_contact(shadow.contact, shadow.at, reached, later, base, stops.force, tolerance, t, [](auto &&...) {});
+      __builtin_memcpy(sample, shadow.at, sizeof shadow.at);
+    });
+  }
+};
+
+}  // namespace vibench

@@ -1,0 +1,204 @@
+// What a motion may be made of: `double`, or `Dual<double, M>`, a number with M of its derivatives. One source then
+// gives the motion and its tangent: exponents, Floquet multipliers and Newton's matrices need no code of their own.
+// `Wide<T, N>` holds N numbers of T so that both kinds fill the processor's registers. `Complex<T>` is a phasor.
+#pragma once
+#include "elementary.hpp"
+#include "vector.hpp"
+
+namespace vibench {
+
+// A value and its derivatives in M directions.
+template <class R, int M> struct Dual {
+  R value;
+  R slope[M];
+};
+
+template <class> struct DualTrait {
+  static constexpr bool is_dual = false;
+};
+template <class R, int M> struct DualTrait<Dual<R, M>> {
+  static constexpr bool is_dual = true;
+};
+template <class T> constexpr bool is_dual = DualTrait<T>::is_dual;
+template <class T>
+concept Plain = !is_dual<T>;
+
+template <class A, class B, int M> INLINE auto operator+(const Dual<A, M> &x, const Dual<B, M> &y) {
+  Dual<decltype(x.value + y.value), M> sum;
+  sum.value = x.value + y.value;
+  for (int i = 0; i < M; i++) sum.slope[i] = x.slope[i] + y.slope[i];
+  return sum;
+}
+template <class A, class B, int M> INLINE auto operator-(const Dual<A, M> &x, const Dual<B, M> &y) {
+  Dual<decltype(x.value - y.value), M> difference;
+  difference.value = x.value - y.value;
+  for (int i = 0; i < M; i++) difference.slope[i] = x.slope[i] - y.slope[i];
+  return difference;
+}
+template <class A, class B, int M> INLINE auto operator*(const Dual<A, M> &x, const Dual<B, M> &y) {
+  Dual<decltype(x.value * y.value), M> product;
+  product.value = x.value * y.value;
+  for (int i = 0; i < M; i++) product.slope[i] = x.value * y.slope[i] + x.slope[i] * y.value;
+  return product;
+}
+template <int M> INLINE Dual<double, M> operator/(const Dual<double, M> &x, const Dual<double, M> &y) {
+  Dual<double, M> ratio;
+  ratio.value = x.value / y.value;
+  for (int i = 0; i < M; i++) ratio.slope[i] = (x.slope[i] - ratio.value * y.slope[i]) / y.value;
+  return ratio;
+}
+template <class A, Plain B, int M> INLINE auto operator+(const Dual<A, M> &x, const B &y) {
+  Dual<decltype(x.value + y), M> sum;
+  sum.value = x.value + y;
+  for (int i = 0; i < M; i++) sum.slope[i] = x.slope[i];
+  return sum;
+}
+template <class A, Plain B, int M> INLINE auto operator+(const B &y, const Dual<A, M> &x) { return x + y; }
+template <class A, Plain B, int M> INLINE auto operator-(const Dual<A, M> &x, const B &y) {
+  Dual<decltype(x.value - y), M> difference;
+  difference.value = x.value - y;
+  for (int i = 0; i < M; i++) difference.slope[i] = x.slope[i];
+  return difference;
+}
+template <class A, Plain B, int M> INLINE auto operator-(const B &y, const Dual<A, M> &x) {
+  Dual<decltype(y - x.value), M> difference;
+  difference.value = y - x.value;
+  for (int i = 0; i < M; i++) difference.slope[i] = -x.slope[i];
+  return difference;
+}
+template <class A, Plain B, int M> INLINE auto operator*(const Dual<A, M> &x, const B &y) {
+  Dual<decltype(x.value * y), M> product;
+  product.value = x.value * y;
+  for (int i = 0; i < M; i++) product.slope[i] = x.slope[i] * y;
+  return product;
+}
+template <class A, Plain B, int M> INLINE auto operator*(const B &y, const Dual<A, M> &x) { return x * y; }
+template <int M> INLINE Dual<double, M> operator/(const Dual<double, M> &x, double y) {
+  Dual<double, M> ratio;
+  ratio.value = x.value / y;
+  for (int i = 0; i < M; i++) ratio.slope[i] = x.slope[i] / y;
+  return ratio;
+}
+template <class A, int M> INLINE Dual<A, M> operator-(const Dual<A, M> &x) { return 0.0 - x; }
+
+template <int N, int M> INLINE Dual<Vector<N>, M> square_root(const Dual<Vector<N>, M> &x) {
+  Dual<Vector<N>, M> root;
+  root.value = square_root(x.value);
+  Vector<N> rate = Vector<N>(0.5 / root.value.lanes);
+  for (int i = 0; i < M; i++) root.slope[i] = x.slope[i] * rate;
+  return root;
+}
+template <int M> INLINE Dual<double, M> square_root(const Dual<double, M> &x) {
+  Dual<double, M> root;
+  root.value = square_root(x.value);
+  for (int i = 0; i < M; i++) root.slope[i] = x.slope[i] * (0.5 / root.value);
+  return root;
+}
+
+// The value alone: all that decides (a touch, a step, the end of an iteration) is decided by it.
+INLINE double value_of(double x) { return x; }
+template <int M> INLINE double value_of(const Dual<double, M> &x) { return x.value; }
+
+// A number that depends on nothing.
+template <class T> INLINE T constant(double value) {
+  T number{};
+  if constexpr (is_dual<T>) number.value = value;
+  else number = value;
+  return number;
+}
+
+// The derivatives without the value, of which nothing is left for a plain number.
+template <class T> INLINE T slopes_only(T x) {
+  if constexpr (is_dual<T>) x.value = 0.0;
+  else x = 0.0;
+  return x;
+}
+
+// ---- N numbers side by side
+
+template <class T, int N> struct WideTrait;
+template <int N> struct WideTrait<double, N> {
+  using type = Vector<N>;
+};
+template <int N, int M> struct WideTrait<Dual<double, M>, N> {
+  using type = Dual<Vector<N>, M>;
+};
+template <class T, int N> using Wide = typename WideTrait<T, N>::type;
+
+template <int N, int M> INLINE Dual<double, M> total(const Dual<Vector<N>, M> &x) {
+  Dual<double, M> sum;
+  sum.value = total(x.value);
+  for (int i = 0; i < M; i++) sum.slope[i] = total(x.slope[i]);
+  return sum;
+}
+template <int N> INLINE double at(const Vector<N> &x, int lane) { return x[lane]; }
+template <int N, int M> INLINE Dual<double, M> at(const Dual<Vector<N>, M> &x, int lane) {
+  Dual<double, M> one;
+  one.value = x.value[lane];
+  for (int i = 0; i < M; i++) one.slope[i] = x.slope[i][lane];
+  return one;
+}
+template <int N> INLINE Vector<N> gathered(const double (&from)[N]) { return Vector<N>::load(from); }
+template <int M, int N> INLINE Dual<Vector<N>, M> gathered(const Dual<double, M> (&from)[N]) {
+  Dual<Vector<N>, M> all;
+  for (int k = 0; k < N; k++) {
+    all.value.set(k, from[k].value);
+    for (int i = 0; i < M; i++) all.slope[i].set(k, from[k].slope[i]);
+  }
+  return all;
+}
+
+// Sum over k of x_k table[k]: a matrix of K rows of N numbers, from the left.
+template <int N, int K> INLINE Vector<N> times(const double (&table)[K][N], const Vector<K> &x) {
+  Vector<N> sum = x[0] * Vector<N>::load(table[0]);
+  for (int k = 1; k < K; k++) sum = sum + x[k] * Vector<N>::load(table[k]);
+  return sum;
+}
+template <int N, int K, int M>
+INLINE Dual<Vector<N>, M> times(const double (&table)[K][N], const Dual<Vector<K>, M> &x) {
+  Dual<Vector<N>, M> sum;
+  sum.value = times(table, x.value);
+  for (int i = 0; i < M; i++) sum.slope[i] = times(table, x.slope[i]);
+  return sum;
+}
+
+// ---- Phasors
+
+template <class T> struct Complex {
+  T re, im;
+};
+using Phasor = Complex<double>;
+
+template <class A, class B> INLINE auto operator*(const Complex<A> &x, const Complex<B> &y) {
+  auto re = x.re * y.re - x.im * y.im;
+  return Complex<decltype(re)>{re, x.re * y.im + x.im * y.re};
+}
+template <class A> INLINE Complex<A> operator*(double x, const Complex<A> &y) { return {x * y.re, x * y.im}; }
+template <class A> INLINE Complex<A> operator+(const Complex<A> &x, const Complex<A> &y) {
+  return {x.re + y.re, x.im + y.im};
+}
+template <class A> INLINE Complex<A> operator-(const Complex<A> &x, const Complex<A> &y) {
+  return {x.re - y.re, x.im - y.im};
+}
+template <class A> INLINE Complex<A> conjugate(const Complex<A> &x) { return {x.re, -x.im}; }
+INLINE double magnitude(const Phasor &x) { return square_root(x.re * x.re + x.im * x.im); }
+// Re(x y): what the phasor y does to a motion of unit shape x.
+template <class A> INLINE A real_of_product(const Complex<A> &x, const Phasor &y) { return x.re * y.re - x.im * y.im; }
+
+// exp(i angle), and exp(rate time); slopes by the chain rule.
+INLINE Phasor turned_by(double angle) {
+  auto [cosine, sine] = cosine_sine(angle);
+  return {cosine, sine};
+}
+INLINE Phasor grown(const Phasor &rate, double time) {
+  return exponential(rate.re * time) * turned_by(rate.im * time);
+}
+template <int M> INLINE Complex<Dual<double, M>> grown(const Phasor &rate, const Dual<double, M> &time) {
+  Phasor now = grown(rate, time.value), change = now * rate;
+  Complex<Dual<double, M>> all;
+  all.re.value = now.re, all.im.value = now.im;
+  for (int i = 0; i < M; i++) all.re.slope[i] = change.re * time.slope[i], all.im.slope[i] = change.im * time.slope[i];
+  return all;
+}
+
+}  // namespace vibench

@@ -1,0 +1,119 @@
+// What crosses the C interface, declared once: STRUCTURE declares it for C++ and keeps the same text, from which
+// `vibench.sim.engine` builds its side. Allowed are double, int64_t, Phasor, structures above, arrays, and pointers.
+#pragma once
+#include "scalar.hpp"
+
+#define STRUCTURE(Name, ...)          \
+  struct Name {                       \
+    __VA_ARGS__                       \
+  };                                  \
+  inline constexpr char Name##_text[] = #Name " { " #__VA_ARGS__ " }";
+
+namespace vibench {
+
+// Places of a motion: absolute displacements [m] and velocities [m/s] of m0, m1, m2.
+enum { X, Y, Z, VX, VY, VZ };
+
+// How m1 meets its stops; `Specimen::law`.
+enum Law : int64_t {
+  NO_STOPS,
+  HERTZ,     // eq. 2, no loss
+  YIELDING,  // (linear_stiffness d + contact_stiffness d^(3/2)) (1 + loss dd/dt) at the penetration d
+  SPRINGS,   // linear_stiffness d alone: exact, with modes of its own
+  RIGID,
+  LAWS,
+};
+
+// How a run ended: the numbers of `vibench.sim.model.Outcome`; below zero what was given is refused.
+enum Outcome : int64_t {
+  REFUSED = -1,
+  REACHED_END,
+  TOO_MANY_IMPACTS,
+  NOT_FINITE,
+  STALLED,
+  TOO_LONG,
+};
+
+// Gong et al. 2025, eqs. 1 and 2: masses, springs, dampers, clearances, and the stops' numbers.
+STRUCTURE(Specimen,
+  double m0, m1, m2;           // [kg]
+  double k0, k1, k2;           // [N/m]
+  double c0, c1, c2;           // [N s/m]
+  double lower_gap;            // clearance at negative p [m]; infinite for no stop there
+  double upper_gap;            // clearance at positive p [m]
+  int64_t law;                 // one of `Law`
+  double linear_stiffness;     // of stops that are springs [N/m]
+  double contact_stiffness;    // k_contact of eq. 2 [N/m^1.5]
+  double loss;                 // of Hunt and Crossley [s/m]
+  double restitution;          // of rigid stops, 0 to 1
+)
+
+// A linear motion, solved: s(t) = Re sum_j a_j shapes_j exp(rates_j t), with a_j = rows_j . s(0). One of each
+// conjugate pair and every real rate counts as a mode. `steady` is the motion under the drive, per unit phasor.
+STRUCTURE(LinearMotion,
+  int64_t modes;               // 2 to 6
+  Phasor rates[6];             // [1/s]
+  Phasor shapes[6][6];
+  Phasor rows[6][6];
+  Phasor steady[6];
+)
+
+// m1 on a stop that holds it, or that is a spring: a linear motion about another place of rest.
+STRUCTURE(HeldMotion,
+  LinearMotion motion;
+  Phasor pulls[7];             // what unit phasors, the drive's last, add to what the stop must pull for m1 to stay
+  double let_go;               // what the stop pushes at rest, over the gap, in the same measure
+  double rests;                // the constant part of |p|, over the gap
+)
+
+// U(t) = A0 sin(2 pi f t + phase): the drive's phasor is exp(i (2 pi f t + phase)).
+STRUCTURE(Drive,
+  double frequency;            // [Hz]
+  Phasor start;                // the phasor at time zero
+  Phasor force;                // k0 U + c0 dU/dt = Re(force phasor) [N]
+)
+
+// Hertz collisions solved beforehand (decision 0008), the same for every specimen: `vibench.sim.engine` makes them.
+STRUCTURE(CollisionShapes,
+  double shares[8][16][16];    // [m][k][i]: integral up to point i of (t_i - t)^m of what is 1 at point k alone
+  double ends[16][8];          // [k][m]: the same up to the end
+  double weights[16];          // of the points in an integral over the duration
+  double heights[16];          // times of the points, over the duration
+  double about_middle[16][8];  // what a depth at a point adds to the Taylor terms about the middle
+  double shapes[41][23][16];   // by press; rows as `ShapeRow` names them
+  double durations[41][7];     // by press; columns as `DurationColumn` names them
+)
+
+STRUCTURE(Scene,
+  Specimen specimen;
+  Drive drive;
+  LinearMotion flight;
+  HeldMotion held;             // no modes where the law does not hold m1
+  const CollisionShapes *collisions;
+)
+
+// Where a motion is. Valid in flight and in contact; the last seven serve a contact.
+STRUCTURE(State,
+  double motion[6];            // x, y, z, vx, vy, vz [m, m/s]
+  double clock_high, clock_low;  // time is their exact sum [s]
+  double side;                 // +1 or -1 while m1 is on the stop at positive or negative p; 0 in flight
+  double root;                 // w: the square root of the penetration [m^0.5]
+  double rate;                 // r = d|p|/dt [m/s]
+  double step;                 // the next step, in s with dt = w ds [s/m^0.5]
+  double root_scale;           // how large w will become [m^0.5]
+  double rate_scale;           // how large r will become [m/s]
+  double pace;                 // w over r, as large as they will become [s/m^0.5]
+)
+
+// What a run fills on its way. None of it changes a step.
+STRUCTURE(Record,
+  double start;                // time of sample 0 [s]
+  double sample_rate;          // [Hz]
+  double *samples;             // [sample_room][6]
+  int64_t sample_room, samples_kept;
+  double *impact_times;        // [impact_room]; a run ends when it is full
+  int64_t impact_room, impacts;
+  int64_t steps_left;          // that a run may still make
+)
+
+}  // namespace vibench

@@ -1,0 +1,124 @@
+// Tests of the engine as a C++ program, which the sanitizers of g++ can watch:
+//
+//     g++ -std=c++20 -O1 -g -fsanitize=address,undefined native/test_engine.cpp -o test_engine && ./test_engine FILE ...
+//
+// Each file holds the bytes of a Scene and of its CollisionShapes; tests/sim/engine/test_native_program.py makes them.
+#include "api.cpp"
+
+#include <cmath>
+#include <cstdio>
+#include <vector>
+
+namespace {
+
+int failures = 0;
+
+void expect(bool holds, const char *what, double found) {
+  if (holds) return;
+  std::printf("FAILED: %s (%.3g)\n", what, found);
+  failures++;
+}
+
+// Uniform in [low, high): a linear congruential generator, the same everywhere.
+double draw(double low, double high) {
+  static uint64_t state = 1;
+  state = state * 6364136223846793005u + 1442695040888963407u;
+  return low + (high - low) * double(state >> 11) * 0x1p-53;
+}
+
+double units_in_last_place(double found, double exact) {
+  return std::fabs(found - exact) / (std::nextafter(std::fabs(exact), INFINITY) - std::fabs(exact));
+}
+
+void test_elementary_functions_are_those_of_libm() {
+  double worst_exp = 0, worst_turn = 0, worst_root = 0;
+  for (int n = 0; n < 200000; n++) {
+    double x = draw(-700, 700);
+    worst_exp = std::fmax(worst_exp, units_in_last_place(exponential(x), std::exp(x)));
+    double angle = n % 2 ? draw(-1e5, 1e5) : draw(-7, 13);
+    auto [cosine, sine] = cosine_sine(angle);
+    worst_turn = std::fmax(worst_turn, units_in_last_place(cosine, std::cos(angle)));
+    worst_turn = std::fmax(worst_turn, units_in_last_place(sine, std::sin(angle)));
+    double y = std::exp(x), root = fifth_root(y);
+    worst_root = std::fmax(worst_root, std::fabs(root * root * root * root * root / y - 1));
+  }
+  expect(worst_exp <= 1.5, "exp is right to 1.5 units in the last place", worst_exp);
+  expect(worst_turn <= 1.5, "sine and cosine are right to 1.5 units in the last place", worst_turn);
+  expect(worst_root <= 3e-15, "the fifth root is right to rounding", worst_root);
+  expect(exponential(0) == 1 && exponential(-INFINITY) == 0, "exp at its ends", 0);
+  expect(exponential(INFINITY) == INFINITY && std::isnan(exponential(NAN)), "exp of what is no number", 0);
+  expect(std::isnan(cosine_sine(NAN).cosine) && std::isnan(cosine_sine(INFINITY).sine), "no angle has no cosine", 0);
+  expect(fifth_root(0) == 0 && fifth_root(INFINITY) == INFINITY, "the fifth root at its ends", 0);
+  expect(std::fabs(fifth_root(4e-320) / std::pow(4e-320, 0.2) - 1) < 1e-3, "the fifth root of a subnormal", 0);
+}
+
+void test_products_keep_what_they_round_off() {
+  for (int n = 0; n < 1000; n++) {
+    double a = draw(1, 1000), b = draw(0, 1e6), product = a * b;
+    expect(product_error(a, b, product) == std::fma(a, b, -product), "product_error is exact", a);
+  }
+}
+
+Motion<double> at_rest() { return {}; }
+
+template <class T> Outcome run_to(Motion<T> &motion, const Tables &tables, double until, double tolerance) {
+  std::vector<double> times(100000);
+  Record record{};
+  record.impact_times = times.data(), record.impact_room = int64_t(times.size()), record.steps_left = MOST_STEPS;
+  return with_stops(motion, tables, tolerance, record, [&](auto &run) {
+    run.place_on_its_side();
+    return run.advance(until);
+  });
+}
+
+// The derivatives of the flow, from duals, against central differences of two runs beside it.
+void test_duals_are_derivatives(const Tables &tables, double until, double tolerance) {
+  const double scale[6] = {1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1};
+  constexpr double STEP = 1e-6;
+  Motion<double> plain = at_rest();
+  run_to(plain, tables, until, tolerance);
+  for (int k = 0; k < 6; k++) {
+    Motion<Dual<double, 1>> motion{};
+    motion.at[k].slope[0] = scale[k];
+    expect(run_to(motion, tables, until, tolerance) == REACHED_END, "a run of duals reaches its end", k);
+    for (int i = 0; i < 6; i++)
+      expect(plain.at[i] == motion.at[i].value, "duals move as plain numbers do", plain.at[i] - motion.at[i].value);
+    Motion<double> ahead = at_rest(), behind = at_rest();
+    ahead.at[k] = STEP * scale[k], behind.at[k] = -STEP * scale[k];
+    run_to(ahead, tables, until, 1e-10);
+    run_to(behind, tables, until, 1e-10);
+    double size = 0, worst = 0;
+    for (int i = 0; i < 6; i++) {
+      double exact = (ahead.at[i] - behind.at[i]) / (2 * STEP) / scale[i];
+      size = std::fmax(size, std::fabs(exact));
+      worst = std::fmax(worst, std::fabs(motion.at[i].slope[0] / scale[i] - exact));
+    }
+    expect(worst <= 1e-4 * size, "slopes are derivatives of the flow", worst / size);
+  }
+}
+
+}  // namespace
+
+int main(int count, char **names) {
+  test_elementary_functions_are_those_of_libm();
+  test_products_keep_what_they_round_off();
+  for (int n = 1; n < count; n++) {
+    Scene scene;
+    CollisionShapes shapes;
+    std::FILE *file = std::fopen(names[n], "rb");
+    bool is_read = file != nullptr && std::fread(&scene, sizeof scene, 1, file) == 1 &&
+                   std::fread(&shapes, sizeof shapes, 1, file) == 1;
+    if (file != nullptr) std::fclose(file);
+    expect(is_read, "a scene can be read", n);
+    if (!is_read) continue;
+    scene.collisions = &shapes;
+    Tables tables;
+    expect(vibench_prepare(&scene, &tables) == REACHED_END, "a scene is accepted", n);
+    int before = failures;
+    test_duals_are_derivatives(tables, 0.03, 3e-7);
+    test_duals_are_derivatives(tables, 0.03, 1e-10);
+    if (failures > before) std::printf("in %s\n", names[n]);
+  }
+  std::printf(failures > 0 ? "%d checks failed\n" : "all checks passed\n", failures);
+  return failures > 0;
+}

@@ -1,0 +1,76 @@
+// N doubles side by side, which the compiler keeps in as many registers as the processor needs. Every operation is
+// IEEE's, uncontracted and in a fixed order, so that results do not depend on the width of the registers.
+#pragma once
+#include "numbers.hpp"
+
+namespace vibench {
+
+// Spelled out for each N: g++ ignores the attribute where the size depends on a template's argument.
+template <int N> struct LanesTrait;
+template <> struct LanesTrait<8> {
+  typedef double Lanes __attribute__((vector_size(64)));
+};
+template <> struct LanesTrait<16> {
+  typedef double Lanes __attribute__((vector_size(128)));
+};
+
+template <int N> struct Vector {
+  using Lanes = typename LanesTrait<N>::Lanes;
+  Lanes lanes;
+
+  Vector() = default;
+  INLINE Vector(double everywhere) : lanes(everywhere - Lanes{}) {}
+  INLINE explicit Vector(Lanes of) : lanes(of) {}
+  static INLINE Vector load(const double *from) {
+    Vector loaded;
+    __builtin_memcpy(&loaded.lanes, from, sizeof loaded.lanes);
+    return loaded;
+  }
+  INLINE void store(double *to) const { __builtin_memcpy(to, &lanes, sizeof lanes); }
+  INLINE double operator[](int lane) const { return lanes[lane]; }
+  INLINE void set(int lane, double value) { lanes[lane] = value; }
+
+  friend INLINE Vector operator+(Vector a, Vector b) { return Vector(a.lanes + b.lanes); }
+  friend INLINE Vector operator-(Vector a, Vector b) { return Vector(a.lanes - b.lanes); }
+  friend INLINE Vector operator*(Vector a, Vector b) { return Vector(a.lanes * b.lanes); }
+  friend INLINE Vector operator-(Vector a) { return Vector(-a.lanes); }
+};
+
+template <int N> INLINE Vector<N> square_root(Vector<N> x) {
+#if defined(__clang__)
+  return Vector<N>(__builtin_elementwise_sqrt(x.lanes));
+#else
+  for (int i = 0; i < N; i++) x.lanes[i] = square_root(x.lanes[i]);
+  return x;
+#endif
+}
+
+// Sum of all lanes, in halves of halves.
+template <int N> INLINE double total(Vector<N> x) {
+  double of[N];
+  x.store(of);
+  for (int half = N / 2; half > 0; half /= 2)
+    for (int i = 0; i < half; i++) of[i] += of[i + half];
+  return of[0];
+}
+
+template <int N> INLINE double largest(Vector<N> x) {
+  double best = x[0];
+  for (int i = 1; i < N; i++) best = larger(best, x[i]);
+  return best;
+}
+
+// Number of lanes, from the first on, that lie between low and high.
+INLINE int leading_between(Vector<16> x, double low, double high) {
+  auto inside = (x.lanes > Vector<16>(low).lanes) & (x.lanes < Vector<16>(high).lanes);
+#if defined(__clang__)
+  typedef bool Flags __attribute__((ext_vector_type(16)));
+  unsigned flags = __builtin_bit_cast(uint16_t, __builtin_convertvector(inside, Flags));
+#else
+  unsigned flags = 0;
+  for (int i = 0; i < 16; i++) flags |= unsigned(inside[i] & 1) << i;
+#endif
+  return __builtin_ctz(~flags);
+}
+
+}  // namespace vibench

@@ -1,0 +1,45 @@
+from ._collision_shapes import (
+    ABOUT_MIDDLE as ABOUT_MIDDLE,
+    BY_DAMPER as BY_DAMPER,
+    BY_JERK as BY_JERK,
+    BY_PRESS as BY_PRESS,
+    BY_SPRING as BY_SPRING,
+    DEEPER as DEEPER,
+    DEPTHS as DEPTHS,
+    DURATION as DURATION,
+    END_ONTO_DURATION as END_ONTO_DURATION,
+    HALF_FORCE as HALF_FORCE,
+    HARDEST as HARDEST,
+    HEIGHTS as HEIGHTS,
+    LASTS_BY as LASTS_BY,
+    ONTO_DURATION as ONTO_DURATION,
+    POINTS as POINTS,
+    SHARES as SHARES,
+    SOFTEST as SOFTEST,
+    SPACING as SPACING,
+    TERMS as TERMS,
+    TO_DURATION as TO_DURATION,
+    collision_shapes as collision_shapes,
+)
+from ._library import (
+    FOLDER as FOLDER,
+    Engine as Engine,
+    EngineError as EngineError,
+    library_path as library_path,
+)
+from ._processor import (
+    usable_families as usable_families,
+)
+from ._run import (
+    NativeRun as NativeRun,
+    check_known_answer as check_known_answer,
+    native_engine as native_engine,
+)
+from ._scene import (
+    scene_of as scene_of,
+    shapes_for as shapes_for,
+)
+from ._structures import (
+    Structure as Structure,
+    parse_structures as parse_structures,
+)

@@ -1,0 +1,137 @@
+"""A library of the native engine: found, loaded, and called by `ctypes`, which releases Python's lock."""
+
+import ctypes
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._processor import usable_families
+from ._structures import Structure, StructureType, parse_structures
+
+FOLDER = Path(__file__).parent / "libraries"
+"""Where the build puts libraries: ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
+CHECKOUT = Path(__file__).resolve().parents[4]
+BUILD = CHECKOUT / "native" / "build.py"
+"""Builds them; there in a checkout, not in an installed wheel."""
+REBUILD = "python native/build.py"
+Tables = NDArray[np.float64]
+"""What a run of one scene needs ready, as the engine lays it out."""
+_Pointer = ctypes.c_void_p
+
+
+class EngineError(RuntimeError):
+    """The native engine cannot be used here; the text says what to do."""
+
+
+class Engine:
+    """A library of the native engine, loaded."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._library = ctypes.CDLL(str(path))
+        self._declare("vibench_structure", ctypes.c_char_p, ctypes.c_int64)
+        self._declare("vibench_size_of", ctypes.c_int64, ctypes.c_int64)
+        self._declare("vibench_size_of_tables", ctypes.c_int64)
+        self._declare("vibench_prepare", ctypes.c_int64, _Pointer, _Pointer)
+        self._declare("vibench_start", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double)
+        self._declare(
+            "vibench_run", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double, ctypes.c_double, _Pointer
+        )
+        self._types = self._read_structures()
+
+    def _declare(self, name: str, result: type, *arguments: type) -> None:
+        function = getattr(self._library, name)
+        function.restype, function.argtypes = result, arguments
+
+    def _read_structures(self) -> dict[str, StructureType]:
+        texts: list[str] = []
+        while (text := self._library.vibench_structure(len(texts))) is not None:
+            texts.append(text.decode())
+        types = parse_structures(texts)
+        for index, (name, of) in enumerate(types.items()):
+            size = self._library.vibench_size_of(index)
+            if size != of.itemsize:
+                msg = (
+                    f"{self.path} has {size} bytes for a {name}, Python {of.itemsize}: rebuild it, {REBUILD}."
+                )
+                raise EngineError(msg)
+        return types
+
+    @property
+    def family(self) -> str:
+        """Family of processors that the library was compiled for."""
+        return self.path.name.split("-")[1]
+
+    def new(self, name: str) -> Structure:
+        """Make a structure of the interface, all zero; ``name`` as in native/structures.hpp."""
+        return np.zeros((), self._types[name])
+
+    def prepare(self, scene: Structure) -> Tables:
+        """Make the tables of a scene; its shapes of collisions must outlive them.
+
+        Raises ValueError when the engine refuses a number of the scene.
+        """
+        tables = np.zeros(int(self._library.vibench_size_of_tables()) // 8, np.float64)
+        if self._library.vibench_prepare(scene.ctypes.data, tables.ctypes.data) != 0:
+            msg = "This scene is not allowed: numbers must be finite, masses and springs positive."
+            raise ValueError(msg)
+        return tables
+
+    def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
+        """Decide whether the motion of ``state`` starts on a stop; returns 0, or -1 when refused."""
+        return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
+
+    def run(
+        self, tables: Tables, state: Structure, until_s: float, tolerance: float, record: Structure
+    ) -> int:
+        """Advance ``state`` and fill ``record``; returns the number of an `Outcome`, or -1 when refused."""
+        return int(
+            self._library.vibench_run(
+                tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data
+            )
+        )
+
+
+def library_path() -> Path:
+    """Find the library of the fastest family that runs here; in a checkout, build it where it is missing.
+
+    Raises EngineError when there is none, or when it was built from other sources and cannot be rebuilt.
+    """
+    families = usable_families()
+    current = sources_digest()
+    found = _newest_of(families, current)
+    if found is None and current is not None and importlib.util.find_spec("ziglang") is not None:
+        command = [sys.executable, str(BUILD), *families[:1]]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - a script of this checkout
+        found = _newest_of(families, current)
+    if found is not None:
+        return found
+    if current is None:
+        msg = f"{FOLDER} holds no native engine for {families or 'this processor'}: install vibench again."
+    else:
+        msg = f"The native engine is older than its sources: run pip install ziglang && {REBUILD}."
+    raise EngineError(msg)
+
+
+def sources_digest() -> str | None:
+    """Return the digest of the native sources; None where there are none, as in an installed wheel."""
+    if not BUILD.is_file():
+        return None
+    spec = importlib.util.spec_from_file_location("vibench_native_build", BUILD)
+    assert spec is not None
+    assert spec.loader is not None
+    build = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(build)
+    return str(build.sources_digest())
+
+
+def _newest_of(families: tuple[str, ...], digest: str | None) -> Path | None:
+    for family in families:
+        found = sorted(FOLDER.glob(f"engine-{family}-{digest or '*'}.*"))
+        if found:
+            return found[0]
+    return None

@@ -1,0 +1,150 @@
+"""A specimen and a harmonic drive as the native engine takes them: the modal forms are Python's part."""
+
+import cmath
+import math
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import (
+    PULL,
+    RATE,
+    ROW,
+    SHAPE,
+    Harmonic,
+    Hertz,
+    LinearGap,
+    NoContact,
+    PowerLaw,
+    RigidStops,
+    Specimen,
+    Y,
+    Z,
+    bound_motion,
+    harmonic_motion,
+    modal_form,
+)
+from ._collision_shapes import (
+    ABOUT_MIDDLE,
+    HEIGHTS,
+    POINTS,
+    SHARES,
+    collision_shapes,
+)
+from ._library import Engine
+from ._structures import Structure
+
+NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID = range(5)
+"""`Law` in native/structures.hpp."""
+Phasors = NDArray[np.complex128]
+
+
+def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic, shapes: Structure | None) -> Structure:
+    """Fill a `Scene` of native/structures.hpp; ``shapes`` from `shapes_for`.
+
+    Raises ValueError when two modes coincide, or the law acts at every p.
+    """
+    scene = engine.new("Scene")
+    omega = 2.0 * math.pi * drive.frequency_hz
+    _fill_specimen(scene["specimen"], specimen)
+    _, force = harmonic_motion(specimen, omega, drive.amplitude_m)
+    scene["drive"]["frequency"] = drive.frequency_hz
+    scene["drive"]["start"] = cmath.exp(1j * drive.phase_rad)
+    scene["drive"]["force"] = force
+    _fill_free(scene["flight"], specimen, omega, drive.amplitude_m)
+    match specimen.contact:
+        case RigidStops():
+            _fill_rigid(scene["held"], specimen, omega, drive.amplitude_m)
+        case LinearGap(stiffness=stop):
+            _fill_springs(scene, specimen, stop, omega, drive.amplitude_m)
+    if shapes is not None:
+        scene["collisions"] = shapes.ctypes.data
+    return scene
+
+
+def shapes_for(engine: Engine, specimen: Specimen) -> Structure | None:
+    """Return the solved collisions that runs of a specimen need; None for laws other than Hertz's."""
+    return _collision_structure(engine) if isinstance(specimen.contact, Hertz) else None
+
+
+@lru_cache(maxsize=4)
+def _collision_structure(engine: Engine) -> Structure:
+    solved = engine.new("CollisionShapes")
+    solved["shares"] = SHARES[:, :, :POINTS]
+    solved["ends"] = SHARES[:, :, POINTS].T
+    solved["weights"] = SHARES[0, :, POINTS]
+    solved["heights"] = HEIGHTS
+    solved["about_middle"] = ABOUT_MIDDLE
+    solved["shapes"], solved["durations"] = collision_shapes()
+    return solved
+
+
+def _fill_specimen(target: Structure, specimen: Specimen) -> None:
+    for name, values in (("m", specimen.masses), ("k", specimen.stiffnesses), ("c", specimen.dampings)):
+        for index, value in enumerate(values):
+            target[f"{name}{index}"] = value
+    target["lower_gap"], target["upper_gap"] = specimen.gaps_m
+    stops = specimen.contact.stops
+    target["linear_stiffness"] = stops.linear_stiffness
+    target["contact_stiffness"] = stops.contact_stiffness
+    target["loss"] = stops.loss
+    match specimen.contact:
+        case NoContact():
+            target["law"] = NO_STOPS
+            target["lower_gap"] = target["upper_gap"] = math.inf
+        case Hertz():
+            target["law"] = HERTZ
+        case LinearGap():
+            target["law"] = SPRINGS
+        case RigidStops(restitution=restitution):
+            target["law"], target["restitution"] = RIGID, restitution
+        case PowerLaw():
+            msg = "The native engine does not know power laws yet: use the compiled kernels."
+            raise ValueError(msg)
+        case _:
+            target["law"] = YIELDING
+
+
+def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
+    modes = modal_form(specimen)
+    steady, _ = harmonic_motion(specimen, omega, amplitude_m)
+    _fill_motion(target, modes.rates, modes.shapes, modes.rows, steady)
+
+
+def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
+    """m1 on a stop that holds it: two bodies, and one condition, that the stop can only push."""
+    bound = bound_motion(specimen, omega, amplitude_m)
+    _fill_motion(target["motion"], bound[:-1, RATE], bound[:-1, SHAPE], bound[:-1, ROW], bound[-1, SHAPE])
+    m1, m2 = specimen.masses[1:]
+    target["pulls"][: len(bound)] = bound[:, PULL] / m2
+    target["let_go"], target["rests"] = specimen.stiffnesses[1] * (1.0 / m1 + 1.0 / m2), 1.0
+
+
+def _fill_springs(
+    scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
+) -> None:
+    """m1 on a stop that is a spring: the specimen with that spring beside k1, about another place of rest."""
+    k0, k1, k2 = specimen.stiffnesses
+    pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
+    held = scene["held"]
+    try:
+        _fill_free(held["motion"], pressed, omega, amplitude_m)
+    except ValueError:
+        # Two of its modes coincide: contacts are resolved in steps.
+        scene["specimen"]["law"] = YIELDING
+        return
+    steady = held["motion"]["steady"]
+    count = int(held["motion"]["modes"])
+    held["pulls"][:count] = (held["motion"]["shapes"][:, Y] - held["motion"]["shapes"][:, Z])[:count]
+    held["pulls"][count] = steady[Y] - steady[Z]
+    held["let_go"], held["rests"] = k1 / (k1 + stop), stop / (k1 + stop)
+
+
+def _fill_motion(target: Structure, rates: Phasors, shapes: Phasors, rows: Phasors, steady: Phasors) -> None:
+    target["modes"] = len(rates)
+    target["rates"][: len(rates)] = rates
+    target["shapes"][: len(rates)] = shapes
+    target["rows"][: len(rates)] = rows
+    target["steady"] = steady

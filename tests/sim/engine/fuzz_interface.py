@@ -1,0 +1,81 @@
+"""Call the C interface with broken structures; it must answer with a code, and never crash.
+
+python tests/sim/engine/fuzz_interface.py LIBRARY [--count N] [--seed N]
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from vibench.sim import Harmonic, gong2025
+from vibench.sim.engine import Engine, EngineError, scene_of, shapes_for
+
+STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
+STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
+POINTERS = {"collisions", "samples", "impact_times"}
+LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear")
+CODES = {-1, 0, 1, 2, 3, 4}
+
+
+def spoil(structure, draws):
+    """Overwrite one number of a structure, or of one inside it."""
+    name = draws.choice([name for name in structure.dtype.names if name not in POINTERS])
+    kind = structure.dtype[name]
+    if kind.names:
+        spoil(structure[name], draws)
+    elif kind.base == np.int64:
+        structure[name] = draws.choice(STRANGE_COUNTS)
+    elif kind.shape:
+        structure[name][tuple(draws.integers(size) for size in kind.shape)] = draws.choice(STRANGE)
+    else:
+        structure[name] = draws.choice(STRANGE)
+
+
+def call(engine, draws):
+    """Run one scene of which something may be broken; returns its code."""
+    specimen = gong2025(contact=str(draws.choice(LAWS)))
+    shapes = shapes_for(engine, gong2025())
+    scene = scene_of(engine, specimen, Harmonic(draws.uniform(50.0, 500.0), 2e-5), shapes)
+    state, record = engine.new("State"), engine.new("Record")
+    samples, times = np.zeros((50, 6)), np.zeros(40)
+    record["sample_rate"], record["samples"] = 1e4, samples.ctypes.data
+    record["sample_room"], record["impact_times"] = len(samples), times.ctypes.data
+    record["impact_room"], record["steps_left"] = len(times), 100_000
+    until, tolerance = 0.02, 3e-7
+    # Rooms say how long the arrays are: only they must be true.
+    rooms = int(record["sample_room"]), int(record["impact_room"])
+    for part in draws.choice(["scene", "state", "record", "until", "tolerance"], draws.integers(1, 4)):
+        if part == "until":
+            until = float(draws.choice(STRANGE))
+        elif part == "tolerance":
+            tolerance = float(draws.choice(STRANGE))
+        else:
+            spoil({"scene": scene, "state": state, "record": record}[part], draws)
+    record["sample_room"] = min(int(record["sample_room"]), rooms[0])
+    record["impact_room"] = min(int(record["impact_room"]), rooms[1])
+    record["steps_left"] = min(int(record["steps_left"]), 100_000) if record["steps_left"] <= 2e9 else -1
+    try:
+        tables = engine.prepare(scene)
+    except ValueError:
+        return -1
+    if draws.random() < 0.5:
+        engine.start(tables, state, tolerance)
+    return engine.run(tables, state, until, tolerance, record)
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("library", type=Path)
+    options.add_argument("--count", type=int, default=2000)
+    options.add_argument("--seed", type=int, default=45)
+    given = options.parse_args()
+    engine, draws = Engine(given.library), np.random.default_rng(given.seed)
+    codes = [call(engine, draws) for _ in range(given.count)]
+    if not set(codes) <= CODES:
+        raise EngineError(f"Codes that no outcome has: {set(codes) - CODES}")
+    print({code: codes.count(code) for code in sorted(set(codes))})  # noqa: T201 - what its caller reads
+
+
+if __name__ == "__main__":
+    main()

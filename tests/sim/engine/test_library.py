@@ -1,0 +1,103 @@
+"""The library of the native engine: found, checked, rebuilt, and the same on every family of processors."""
+
+import importlib.util
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vibench.sim import Harmonic, gong2025
+from vibench.sim.engine import (
+    Engine,
+    EngineError,
+    NativeRun,
+    check_known_answer,
+    native_engine,
+    parse_structures,
+    scene_of,
+    shapes_for,
+    usable_families,
+)
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture(scope="module")
+def build():
+    spec = importlib.util.spec_from_file_location("native_build", ROOT / "native" / "build.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def final_motions(engine):
+    for law in ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8"):
+        for drive in (Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6)):
+            run = NativeRun(
+                gong2025(contact=law), drive, np.zeros(6), 3e-7, most_impacts=10_000, engine=engine
+            )
+            run.advance(0.3)
+            yield run.motion
+
+
+def test_every_family_that_runs_here_gives_the_same_digits(build):
+    engines = [Engine(build.compile_engine(family)) for family in usable_families()]
+    for engine in engines:
+        check_known_answer(engine)
+    answers = [np.array(list(final_motions(engine))) for engine in engines]
+    for answer in answers[1:]:
+        assert np.array_equal(answer, answers[0])
+
+
+def test_the_loaded_engine_is_built_from_the_sources_of_this_checkout(build):
+    engine = native_engine()
+    assert engine.path == build.compile_engine(engine.family)
+    assert engine.path.stat().st_size < 3_000_000
+
+
+def test_an_engine_that_answers_wrongly_is_refused(monkeypatch):
+    monkeypatch.setattr("vibench.sim.engine._run.KNOWN_DURATION_S", 0.0301)
+    with pytest.raises(EngineError, match="answers a known scene wrongly"):
+        check_known_answer(native_engine())
+
+
+def test_structures_are_read_from_what_the_compiler_read():
+    types = parse_structures(
+        ["Inner { double a, b; Phasor c[2]; }", "Outer { int64_t n; Inner d[3]; const Inner *e; }"]
+    )
+    assert types["Outer"].itemsize == 8 + 3 * (2 * 8 + 2 * 16) + 8
+    assert types["Outer"]["d"].shape == (3,)
+    with pytest.raises(ValueError, match="is not a structure of the native engine"):
+        parse_structures(["double a;"])
+    with pytest.raises(ValueError, match="is not a field"):
+        parse_structures(["Inner { double a-b; }"])
+
+
+def test_threads_share_tables_and_give_the_same_motion():
+    engine, specimen, drive = native_engine(), gong2025(), Harmonic(130.0, 20e-6)
+
+    def motion(_):
+        run = NativeRun(specimen, drive, np.zeros(6), 3e-7, most_impacts=1000, engine=engine)
+        run.advance(0.2)
+        return run.motion
+
+    with ThreadPoolExecutor(4) as pool:
+        motions = list(pool.map(motion, range(8)))
+    assert all(np.array_equal(each, motions[0]) for each in motions)
+
+
+def test_a_scene_with_numbers_that_no_specimen_has_is_refused():
+    engine, specimen = native_engine(), gong2025()
+    scene = scene_of(engine, specimen, Harmonic(130.0, 20e-6), shapes_for(engine, specimen))
+    scene["specimen"]["m0"] = np.nan
+    with pytest.raises(ValueError, match="scene is not allowed"):
+        engine.prepare(scene)
+
+
+def test_an_instant_that_is_no_number_is_refused():
+    run = NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 3e-7)
+    with pytest.raises(ValueError, match="instant must be finite"):
+        run.advance(np.nan)
+    with pytest.raises(ValueError, match="tolerance"):
+        NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 0.0)

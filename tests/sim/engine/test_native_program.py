@@ -1,0 +1,56 @@
+"""The engine under the sanitizers of g++, and its C interface with broken structures."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from vibench.sim import Harmonic, gong2025
+from vibench.sim.engine import native_engine, scene_of, shapes_for
+
+ROOT = Path(__file__).resolve().parents[3]
+FUZZ = Path(__file__).parent / "fuzz_interface.py"
+SANITIZED = (
+    *("g++", "-std=c++20", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-Wno-psabi", "-ffp-contract=off"),
+    *("-fsanitize=address,undefined", "-fno-sanitize-recover=undefined"),
+)
+LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "rigid:0.3", "linear")
+needs_gcc = pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++ here for its sanitizers")
+
+
+def output_of(*command, **environment):
+    words = [str(word) for word in command]
+    result = subprocess.run(words, env=os.environ | environment, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, f"{words}\n{result.stdout[-3000:]}{result.stderr[-3000:]}"
+    return result.stdout
+
+
+@needs_gcc
+@pytest.mark.thorough
+@pytest.mark.timeout(600)  # g++ takes 20 s of a core to compile with sanitizers
+def test_the_program_of_tests_passes_under_the_sanitizers(tmp_path):
+    engine, shapes = native_engine(), shapes_for(native_engine(), gong2025())
+    for law in LAWS:
+        scene = scene_of(engine, gong2025(contact=law), Harmonic(130.0, 20e-6), shapes)
+        (tmp_path / law.replace(":", "_")).write_bytes(scene.tobytes() + shapes.tobytes())
+    files = sorted(tmp_path.iterdir())
+    output_of(*SANITIZED, ROOT / "native" / "test_engine.cpp", "-o", tmp_path / "program")
+    assert "all checks passed" in output_of(tmp_path / "program", *files)
+
+
+def test_a_broken_structure_is_answered_by_a_code():
+    assert "-1:" in output_of(sys.executable, FUZZ, native_engine().path, "--count", 3000)
+
+
+@needs_gcc
+@pytest.mark.thorough
+@pytest.mark.timeout(600)
+def test_broken_structures_do_nothing_undefined(tmp_path):
+    library = tmp_path / "engine-sanitized.so"
+    output_of(*SANITIZED, "-shared", "-fPIC", ROOT / "native" / "api.cpp", "-o", library)
+    runtime = output_of("g++", "-print-file-name=libasan.so").strip()
+    environment = {"LD_PRELOAD": runtime, "ASAN_OPTIONS": "detect_leaks=0"}
+    output_of(sys.executable, FUZZ, library, "--count", 1000, **environment)
