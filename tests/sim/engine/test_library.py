@@ -13,6 +13,7 @@ from vibench.sim.engine import (
     EngineError,
     NativeRun,
     check_known_answer,
+    library_path,
     native_engine,
     parse_structures,
     scene_of,
@@ -101,3 +102,26 @@ def test_an_instant_that_is_no_number_is_refused():
         run.advance(np.nan)
     with pytest.raises(ValueError, match="tolerance"):
         NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 0.0)
+
+
+def test_an_engine_older_than_its_sources_is_rebuilt_or_refused_with_the_command(tmp_path, monkeypatch):
+    older = tmp_path / "engine-x86_64-000000000000.so"
+    older.touch()
+    monkeypatch.setattr("vibench.sim.engine._library.FOLDER", tmp_path)
+    monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
+    with pytest.raises(
+        EngineError, match=r"older than its sources: run pip install ziglang && python native/build\.py"
+    ):
+        library_path()
+
+
+def test_without_its_sources_an_installed_engine_is_taken_as_it_is(tmp_path, monkeypatch):
+    family = usable_families()[-1]
+    installed = tmp_path / f"engine-{family}-000000000000.so"
+    installed.touch()
+    monkeypatch.setattr("vibench.sim.engine._library.FOLDER", tmp_path)
+    monkeypatch.setattr("vibench.sim.engine._library.BUILD", tmp_path / "absent.py")
+    assert library_path() == installed
+    installed.unlink()
+    with pytest.raises(EngineError, match="install vibench again"):
+        library_path()
