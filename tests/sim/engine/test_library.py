@@ -117,8 +117,10 @@ def test_an_engine_older_than_its_sources_is_rebuilt_or_refused_with_the_command
 
 def test_without_its_sources_an_installed_engine_is_taken_as_it_is(tmp_path, monkeypatch):
     family = usable_families()[-1]
-    installed = tmp_path / f"engine-{family}-000000000000.so"
+    ending = native_engine().path.suffix
+    installed = tmp_path / f"engine-{family}-000000000000{ending}"
     installed.touch()
+    (tmp_path / f"engine-{family}-000000000000.another_system").touch()
     monkeypatch.setattr("vibench.sim.engine._library.FOLDER", tmp_path)
     monkeypatch.setattr("vibench.sim.engine._library.BUILD", tmp_path / "absent.py")
     assert library_path() == installed

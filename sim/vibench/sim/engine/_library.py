@@ -17,6 +17,8 @@ FOLDER = Path(__file__).parent / "libraries"
 CHECKOUT = Path(__file__).resolve().parents[4]
 BUILD = CHECKOUT / "native" / "build.py"
 """Builds them; there in a checkout, not in an installed wheel."""
+_ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
+"""Of libraries of this system; wheels of others may have been built in the same checkout."""
 REBUILD = "python native/build.py"
 Tables = NDArray[np.float64]
 """What a run of one scene needs ready, as the engine lays it out."""
@@ -131,7 +133,7 @@ def sources_digest() -> str | None:
 
 def _newest_of(families: tuple[str, ...], digest: str | None) -> Path | None:
     for family in families:
-        found = sorted(FOLDER.glob(f"engine-{family}-{digest or '*'}.*"))
+        found = sorted(FOLDER.glob(f"engine-{family}-{digest or '*'}.{_ENDING}"))
         if found:
             return found[0]
     return None
