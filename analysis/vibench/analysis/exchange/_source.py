@@ -123,8 +123,8 @@ def _timed(source: Source) -> Iterator[SourceChannel]:
         nearest = max((len(_group(time)) for time in above), default=0)
         near = [time for time in above if len(_group(time)) == nearest]
         before = [time for time in near if time in source.channels[: number + 1]]
-        chosen = (before[-1:] or near[:1] or [None])[0]
-        yield each if chosen is None else axes[chosen][0].of(each, axes[chosen][1])
+        chosen = before[-1:] or near[:1]
+        yield axes[chosen[0]][0].of(each, axes[chosen[0]][1]) if chosen else each
 
 
 def _group(channel: SourceChannel) -> str:

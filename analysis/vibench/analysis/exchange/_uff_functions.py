@@ -120,15 +120,15 @@ def _spaced(function: UniversalFunction) -> tuple[UniversalFunction, float, floa
     hz = function.frequency_hz
     if hz.size < 2:
         return function, 0.0, 0.0
-    index = np.arange(hz.size)
+    index = np.arange(hz.size, dtype=np.float64)
     spacing = float(hz[-1] - hz[0]) / (hz.size - 1)
-    multiples = (round(float(hz[0]) / spacing) + index) * spacing
+    multiples: Reals = (round(float(hz[0]) / spacing) + index) * spacing
     if function.kind is not FunctionType.DENSITY and _agree(multiples, hz):
         first, step = _multiples(float(hz[0]), spacing)
     else:
         first, step = _six_digits(hz[0]), _six_digits(hz[1] - hz[0])
         return (function, first, step) if _agree(first + step * index, hz) else (function, 0.0, 0.0)
-    even_hz = first + step * np.arange(round((hz[-1] - first) / step) + 1 if step else 0)
+    even_hz: Reals = first + step * np.arange(round((hz[-1] - first) / step) + 1 if step else 0)
     if not step or (even_hz.size == hz.size and _agree(even_hz, hz)):
         return function, first, step
     if np.iscomplexobj(function.values):

@@ -31,6 +31,7 @@ class ChannelLevel:
         "rms": "{0.header.unit}",
         "peak": "{0.header.unit}",
         "full_scale": "{0.header.unit}",
+        "flat_tops": "{0.header.unit}",
     }
 
     header: ChannelHeader
@@ -43,6 +44,8 @@ class ChannelLevel:
     """Of the converter's input [unit of the channel]."""
     share_at_full_scale: float
     """Share of the samples within a thousandth of the full scale, or beyond."""
+    flat_tops: tuple[float, ...] = ()
+    """Values at which its peaks are cut, above, below or on both sides [unit of the channel]."""
 
     @property
     def share_of_range(self) -> float:
@@ -72,9 +75,13 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
     offset = np.array([[each.physical_offset] for each in recording.channels])
     full_scale = np.array([[abs(each.physical_per_volt) * each.range_v] for each in recording.channels])
     parts, cut = [], np.zeros(len(recording.channels), dtype=np.int64)
+    counts = np.zeros((len(recording.channels), _COUNTED), dtype=np.int64)
     for each in recording.blocks(recording.roles, block):
         parts.append(_extremes(each.values, length))
         cut += _cut_off(each.values, offset, _AT_FULL_SCALE * full_scale)
+        for row, shares in enumerate((each.values - offset) / full_scale):
+            bins = np.rint((np.clip(shares[np.isfinite(shares)], -1, 1) + 1) / 2 * (_COUNTED - 1))
+            counts[row] += np.bincount(bins.astype(np.int64), minlength=_COUNTED)
         on_read(each.first_sample + each.values.shape[1], recording.samples)
     lower, upper, power = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
     if np.isnan(lower).all():
@@ -89,9 +96,56 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
             peak=float(np.nanmax(np.maximum(np.abs(lower[row]), np.abs(upper[row])))),
             full_scale=float(full_scale[row, 0]),
             share_at_full_scale=int(cut[row]) / recording.samples,
+            flat_tops=tuple(
+                float(offset[row, 0] + side * (2 * top / (_COUNTED - 1) - 1) * full_scale[row, 0])
+                for side in (1, -1)
+                if (top := _flat_top(counts[row, ::side], header, full_scale[row, 0])) is not None
+            ),
         )
         for row, header in enumerate(recording.channels)
     )
+
+
+_COUNTED = 2**16 + 1
+"""Values, evenly over the range, whose samples are counted to find flat tops."""
+_TOPS = (0.1, 0.03, 0.01)
+"""Heights of a top that are looked at, over that of the peak."""
+_FLAT = 0.88
+"""Share of a top's samples in its upper half: 0.71 of a smooth peak, 0.84 without curvature, 1 if cut."""
+_FLAT_VALUE = 0.4
+"""Share of the upper half of a peak's samples at one value that no smooth peak has."""
+_FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
+
+
+def _flat_top(counts: Integers, header: ChannelHeader, full_scale: float) -> int | None:
+    """Return the counted value at which the upper peaks are cut; None where they are not."""
+    filled = np.flatnonzero(counts)
+    if filled.size < 2:
+        return None
+    total = np.cumsum(counts)
+    top, middle = int(filled[-1]), int(np.searchsorted(total, total[-1] / 2))
+    height = top - middle
+
+    def above(value: float) -> int:
+        return int(total[-1] - total[max(0, int(value))])
+
+    if height < _LEAST_HEIGHT * (top - filled[0]) or counts[top - 1 :].sum() == total[-1]:
+        return None
+    if counts[top - 1 :].sum() >= max(_FEWEST_AT_TOP, _FLAT_VALUE * above(top - height / 2)):
+        return top
+    step = 0.0 if header.volts_per_count is None else header.volts_per_count * abs(header.physical_per_volt)
+    for share in _TOPS:
+        whole = above(top - share * height)
+        values = int(np.count_nonzero(counts[int(top - share * height) :]))
+        is_resolved = share * height > _FEWEST_VALUES * max(1.0, step / full_scale * _COUNTED / 2)
+        is_counted = whole >= _FEWEST_AT_TOP and values >= _FEWEST_VALUES
+        if is_resolved and is_counted and above(top - share * height / 2) > _FLAT * whole:
+            return top
+    return None
+
+
+_LEAST_HEIGHT = 0.1
+"""Of a peak above the median, over the whole span: less is a channel that rests at its lowest value."""
 
 
 def _cut_off(values: Reals, offset: Reals, limit: Reals) -> Integers:

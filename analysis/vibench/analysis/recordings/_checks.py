@@ -109,10 +109,25 @@ def _stretches(facts: RecordingFacts) -> Check:
 
 
 def _overloads(facts: RecordingFacts) -> Check:
+    flat = [
+        f"{each.header.role} at {' and '.join(f'{value:.4g}' for value in each.flat_tops)} {each.header.unit}"
+        for each in facts.channels
+        if each.flat_tops and not (facts.dropouts and each.header.role == RESPONSE)
+    ]
+    if flat:
+        text = f"flat tops: {', '.join(flat)}; peaks are cut, so Responses I and II are wrong; measure again"
+        return Check("Overloads", Verdict.WARNING, text)
     if not facts.overload_s:
+        imported = facts.bench.get("imported", {})
+        mapped = imported.get("mapping", {}).get("channels", ())
+        both = zip(mapped, imported.get("channels", ()), strict=False)
+        unknown = [one["role"] for one, other in both if not (one["full_scale"] or other["full_scale"])]
+        if unknown:
+            text = f"the full scale of {', '.join(unknown)} is not known; no flat tops were found"
+            return Check("Overloads", Verdict.NOTE, text)
         return Check("Overloads", Verdict.PASSED, "no input came near its full scale")
     parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
-    what = "peaks may be cut, so Response I is a lower bound"
+    what = "peaks may be cut, so Response I is a lower bound and Response II may be wrong"
     if facts.dropouts and RESPONSE in facts.overload_s:
         what = (
             "the vibrometer lost its light for longer than is bridged, or peaks were cut: look at the "

@@ -1,0 +1,214 @@
+"""Times in imported files: every generated file is aligned, counted as lost, or refused."""
+
+import h5py
+import numpy as np
+import pytest
+from scipy.io import savemat, wavfile
+
+from vibench.acquisition import open_recording, validated
+from vibench.analysis import InvalidRequest, analyse
+from vibench.analysis.exchange import ImportMapping, import_recording
+from vibench.analysis.recordings import Verdict
+
+nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
+pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")
+RATE_HZ = 5120.0
+SAMPLES = 12_000
+FAULTS = ("sound", "late", "gap", "drop", "repeat", "swap", "restart", "drift", "rate")
+SAYS_TIMES = ("csv", "csv units row", "csv ms", "csv tab", "csv comma", "mat", "h5")
+SAYS_STARTS = ("tdms", "uff a", "uff b")
+
+
+def motion(times):
+    """A signal that tells when a sample was taken."""
+    return np.sin(2 * np.pi * 20.0 * times) + 0.3 * np.sin(2 * np.pi * 137.0 * times)
+
+
+def faulty_times(fault, rng):
+    """Times of the rows of a file with one fault."""
+    times = np.arange(SAMPLES) / RATE_HZ
+    at, count = int(rng.integers(500, SAMPLES - 500)), int(rng.integers(2, 60))
+    match fault:
+        case "late":
+            return times + round(rng.uniform(2, 50)) / RATE_HZ
+        case "gap":
+            return np.delete(times, slice(at, at + count))
+        case "drop":
+            return np.delete(times, rng.integers(1, SAMPLES - 1, 20))
+        case "repeat":
+            return np.insert(times, at, times[at])
+        case "swap":
+            times[[at, at + 1]] = times[[at + 1, at]]
+            return times
+        case "restart":
+            return np.concatenate((times[:at], times[: SAMPLES - at]))
+        case "drift":
+            return times * (1 + 2e-3 * times / times[-1])
+    return times
+
+
+def write(kind, folder, fault, rng):
+    """Write two channels; the second has the fault where a format keeps times of its own for each."""
+    times = faulty_times(fault, rng)
+    values = np.stack((motion(times), 2 * motion(times)))
+    path = folder / f"a.{kind.split()[0]}"
+    match kind.split():
+        case ["csv", *dialect]:
+            heading, scale, between, point = {
+                (): ("time [s],a,b", 1, ",", "."),
+                ("units", "row"): ("Time;a;b\ns;V;m/s", 1, ";", ","),
+                ("ms",): ("Time,a,b", 1e3, ",", "."),
+                ("tab",): ("t (s)\ta\tb\t", 1, "\t", "."),
+                ("comma",): ("Zeit [s] a b", 1, " ", ","),
+            }[tuple(dialect)]
+            rows = (between.join(f"{x:.9g}" for x in row) for row in np.stack((times * scale, *values)).T)
+            end = between if dialect == ["tab"] else ""
+            text = "".join(f"{row}{end}\n" for row in rows)
+            path.write_text(f"{heading}\n{text if point == '.' else text.replace('.', ',')}")
+        case ["mat"]:
+            savemat(path, {"run": {"t": times, "a": values[0], "b": values[1]}})
+        case ["h5"]:
+            with h5py.File(path, "w") as file:
+                file["run/time"], file["run/a"], file["run/b"] = (times, *values)
+        case ["tdms"]:
+            start = np.datetime64("2026-03-01T12:00:00", "us")
+            with nptdms.TdmsWriter(path) as writer:
+                for name, row, offset_s in (
+                    ("a", motion(np.arange(SAMPLES) / RATE_HZ), 0.0),
+                    ("b", values[1], times[0]),
+                ):
+                    about = {"wf_increment": 1 / RATE_HZ, "wf_start_time": start, "wf_start_offset": offset_s}
+                    writer.write_segment([nptdms.ChannelObject("g", name, row, about)])
+        case ["uff", form]:
+            file = pyuff.UFF(str(path))
+            for name, row, first_s in (
+                ("a", motion(np.arange(SAMPLES) / RATE_HZ), 0.0),
+                ("b", values[1], times[0]),
+            ):
+                x = first_s + np.arange(row.size) / RATE_HZ
+                about = {
+                    "func_type": 1,
+                    "rsp_node": 1,
+                    "rsp_dir": 3,
+                    "ref_node": 0,
+                    "ref_dir": 0,
+                    "ord_data_type": 4,
+                    "ordinate_spec_data_type": 11,
+                    "orddenom_spec_data_type": 0,
+                }
+                axis = {"abscissa_spacing": 1, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s"}
+                binary = int(form == "b")
+                file.write_sets(
+                    [pyuff.prepare_58(binary=binary, data=row, x=x, id1=name, **about, **axis)], "add"
+                )
+        case ["wav"]:
+            wavfile.write(path, int(RATE_HZ), values.T.astype(np.float32))
+    return path
+
+
+def mapped(kind, rate_hz):
+    names = {"csv": ("a", "b"), "mat": ("run.a", "run.b"), "h5": ("/run/a", "/run/b"), "wav": ("1", "2")}
+    first, second = names.get(kind.split()[0], ("a", "b"))
+    plan = {"kind": "dwell", "amplitude_vpp": 1.0, "frequency_hz": 20, "settle_s": 0, "duration_s": 2}
+    content = {
+        "started_utc": "2026-03-01T12:00:00Z",
+        "sample_rate_hz": rate_hz,
+        "measurement": {"name": "m", "excitation": plan},
+        "channels": [{"source": first, "role": "drive_voltage"}, {"source": second, "role": "m0_velocity"}],
+    }
+    return validated(content, ImportMapping, "test")
+
+
+def allowed(kind, fault):
+    """What may become of a file."""
+    if fault == "rate":
+        return "refused"
+    if kind in SAYS_TIMES:
+        return {"restart": "refused", "drift": "refused", "sound": "whole", "late": "whole"}.get(
+            fault, "lost"
+        )
+    return "lost" if fault == "late" and kind in SAYS_STARTS else "whole"
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # pyuff leaves a file open
+@pytest.mark.parametrize("kind", [*SAYS_TIMES, *SAYS_STARTS, "wav"])
+@pytest.mark.parametrize("seed", [43])
+def test_what_a_file_says_of_time_reaches_the_recording(tmp_path, kind, seed):
+    rng = np.random.default_rng(seed)
+    faults = (
+        FAULTS
+        if kind in SAYS_TIMES
+        else ("sound", "late", "rate")
+        if kind in SAYS_STARTS
+        else ("sound", "rate")
+    )
+    for number, fault in enumerate(faults):
+        folder = tmp_path / f"{number}"
+        folder.mkdir()
+        path = write(kind, folder, fault, rng)
+        wanted = allowed(kind, fault)
+        meaning = mapped(kind, RATE_HZ * 1.05 if fault == "rate" else RATE_HZ)
+        if wanted == "refused":
+            with pytest.raises(InvalidRequest):
+                import_recording(path, meaning, folder / "made.h5")
+            continue
+        with open_recording(import_recording(path, meaning, folder / "made.h5")) as recording:
+            drive, response = (recording.read(role) for role in recording.roles)
+            lost = int(np.isnan(response).sum())
+        assert (lost > 0) == (wanted == "lost"), (kind, fault, lost)
+        np.testing.assert_allclose(response, 2 * drive, atol=2e-5, equal_nan=True)
+        if kind in SAYS_TIMES and fault == "late":
+            continue  # a shared axis begins with its first sample
+        # A place is a moment of an even axis.
+        expected = motion(np.arange(drive.size) / RATE_HZ)
+        np.testing.assert_allclose(drive, np.where(np.isnan(drive), np.nan, expected), atol=2e-5)
+
+
+def test_a_mapping_overrides_the_times_of_a_file_and_says_so(tmp_path):
+    path = write("csv", tmp_path, "drift", np.random.default_rng(0))
+    content = {**mapped("csv", RATE_HZ).model_dump(), "time": "even"}
+    with open_recording(
+        import_recording(path, validated(content, ImportMapping, "t"), tmp_path / "a.h5")
+    ) as made:
+        (remark,) = made.bench["imported"]["time"]
+    assert remark.startswith("the mapping's 5120 samples/s replace what the file says")
+
+
+def dwell_at(file, volts, base, velocity, rate_hz=5120.0, more=""):
+    """Write and map a dwell at 260 Hz."""
+    times = np.arange(volts.size) / rate_hz
+    np.savetxt(
+        file, np.stack((times, volts, base, velocity)).T, "%.9g", ",", header="time [s],u,a,v", comments=""
+    )
+    roles = {"u": "drive_voltage", "a": "base_acceleration", "v": "m0_velocity"}
+    plan = {"kind": "dwell", "amplitude_vpp": 2.0, "frequency_hz": 260, "settle_s": 1, "duration_s": 3}
+    content = {
+        "started_utc": "2026-03-01T12:00:00Z",
+        "measurement": {"name": "m", "excitation": plan},
+        "channels": [{"source": key, "role": role} for key, role in roles.items()],
+    }
+    if more:
+        content["channels"][2]["full_scale"] = float(more)
+    return validated(content, ImportMapping, "test")
+
+
+@pytest.mark.parametrize("full_scale", ["", "10"])
+@pytest.mark.parametrize(
+    ("low", "high", "noise"), [(-0.8, 0.8, 0.0), (-9, 0.8, 0.0), (-0.8, 0.8, 1e-3), (-9, 9, 0.0)]
+)
+def test_flat_tops_and_an_unknown_full_scale_are_reported(tmp_path, full_scale, low, high, noise):
+    rng = np.random.default_rng(1)
+    phase = 2 * np.pi * 260.0 * np.arange(22_000) / 5120.0
+    volts, base = np.cos(phase), 3.0 * np.cos(phase + 0.4) + 1e-4 * rng.standard_normal(phase.size)
+    velocity = np.clip(np.cos(phase + 1.0), low, high) + (noise + 1e-5) * rng.standard_normal(phase.size)
+    meaning = dwell_at(tmp_path / "a.csv", volts, base, velocity, more=full_scale)
+    with open_recording(import_recording(tmp_path / "a.csv", meaning, tmp_path / "a.h5")) as recording:
+        (check,) = (each for each in analyse(recording).checks if each.what == "Overloads")
+    if high < 1:
+        assert check.verdict is Verdict.WARNING
+        assert "flat tops: m0_velocity at 0.8" in check.text
+        assert "Responses I and II are wrong" in check.text
+        assert (" and -0.8" in check.text) == (low > -1)
+    else:
+        assert check.verdict is Verdict.NOTE
+        assert ("m0_velocity is not known" in check.text) == (not full_scale)
