@@ -96,8 +96,7 @@ def found_dropouts(velocity: Samples, sample_rate_hz: float) -> tuple[Dropout, .
         for each in [] if together else _apart(edges, flank):
             together += explained(each)
         found += together
-    joined = _joined(found, flank)
-    return joined if len(joined) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
+    return _joined(found, flank) if len(found) <= _MOST_PER_S * velocity.size / sample_rate_hz else ()
 
 
 def _joined(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
