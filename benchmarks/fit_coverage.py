@@ -29,7 +29,7 @@ from scipy.stats import ncx2
 from twin_agreement import random_rig as random_bench
 
 from vibench.acquisition import open_bench, rig as hardware, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise
+from vibench.acquisition.plan import Dwell, Measurement, WhiteNoise
 from vibench.analysis import (
     Estimator,
     FrequencyResponse,
@@ -284,9 +284,7 @@ CASES: dict[str, tuple[Wrong, Assumption | None]] = {
 }
 
 
-def recorded(
-    true: hardware.Rig, described: hardware.Rig, plans: list[Dwell | MultisineNoise]
-) -> UpdatedSpecimen:
+def recorded(true: hardware.Rig, described: hardware.Rig, plans: list[Dwell | WhiteNoise]) -> UpdatedSpecimen:
     """Measure a virtual rig that its configuration describes as another, and fit the specimen."""
     with TemporaryDirectory() as folder:
         paths = [Path(folder) / f"{number}.h5" for number in range(len(plans))]
@@ -297,9 +295,9 @@ def recorded(
         return update_model(analyse_files(paths, "wrong", Simulation.LEFT_OUT))
 
 
-def weak_noise(rng: np.random.Generator) -> MultisineNoise:
+def weak_noise(rng: np.random.Generator) -> WhiteNoise:
     """Draw noise in which nothing collides."""
-    return MultisineNoise(
+    return WhiteNoise(
         amplitude_vpp=float(10 ** rng.uniform(-2.0, -1.4)),
         band_start_hz=50,
         band_stop_hz=600,

@@ -28,7 +28,7 @@ from twin_agreement import random_rig
 
 import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.acquisition import LimitExceeded, open_bench, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
 from vibench.acquisition.rig import Rig, specimen_of
 from vibench.analysis import AnalysisError, Simulation, analyse_files, budgets_of
 from vibench.analysis.frequency_response import scatters_beyond_noise
@@ -65,13 +65,13 @@ class Held:
 
 def drawn(
     rng: np.random.Generator, kind: str, *, is_weak: bool
-) -> MultisineNoise | Dwell | SineSweep | SteppedSine:
+) -> WhiteNoise | Dwell | SineSweep | SteppedSine:
     """Draw a short plan of a kind."""
     level_vpp = WEAK_VPP if is_weak else float(10 ** rng.uniform(-1, 0.9))
     at_hz = float(np.round(rng.uniform(90, 480), 1))
     match kind:
         case "noise":
-            return MultisineNoise(
+            return WhiteNoise(
                 amplitude_vpp=level_vpp, band_start_hz=50, band_stop_hz=600, repetition_hz=2,
                 realisations=int(rng.integers(2, 7)), periods=2, settle_s=1.5,
             )  # fmt: skip
@@ -128,7 +128,7 @@ def true_values(rig: Rig, plan: object) -> dict[str, float]:
         played_hz = plan.frequency_hz * (1 + 1e-6 * rig.virtual.generator_clock_ppm)
         ratio = float(np.abs(base_transmissibility(specimen, [played_hz])[0, 0]))
         return {"Response I": ratio, "Response II": ratio}
-    if not isinstance(plan, MultisineNoise):
+    if not isinstance(plan, WhiteNoise):
         return {}
     found = {}
     for number, (natural_hz, ratio) in enumerate(zip(*modes(specimen), strict=True), start=1):

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import binom, chisquare
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise
+from vibench.acquisition.plan import Dwell, Measurement, WhiteNoise
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
 from vibench.analysis.results import overlay
@@ -46,7 +46,7 @@ class Compared:
     draws: int
 
 
-def compared(rig: Rig, excitation: Dwell | MultisineNoise, scene: str) -> Iterator[Compared]:
+def compared(rig: Rig, excitation: Dwell | WhiteNoise, scene: str) -> Iterator[Compared]:
     """Measure, simulate and compare."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "measured.h5"
@@ -110,7 +110,7 @@ def random_scenes(count: int, seed: int) -> Iterator[Compared]:
         level_vpp = float(10 ** rng.uniform(-0.7, 0.9))
         frequency_hz = float(np.round(rng.uniform(90, 480), 1))
         dwell = Dwell(amplitude_vpp=level_vpp, frequency_hz=frequency_hz, settle_s=1.5, duration_s=4.0)
-        noise = MultisineNoise(
+        noise = WhiteNoise(
             amplitude_vpp=level_vpp,
             band_start_hz=50,
             band_stop_hz=600,

@@ -24,7 +24,7 @@ class Announced:
 
     def name(self) -> str:
         """Return what it was started for, and its number."""
-        import json  # noqa: PLC0415 - after the stop was put down
+        import json
 
         try:
             with open(self.path, encoding="utf-8") as file:  # noqa: PTH123 - pathlib takes 8 ms to load
@@ -41,7 +41,7 @@ def main() -> None:
         code = None if asked is None else stopped(*asked)
         if code is not None:
             sys.exit(code)
-    from vibench.cli import main as run_command  # noqa: PLC0415 - the libraries that a stop must not wait for
+    from vibench.cli import main as run_command
 
     run_command()
 
@@ -125,7 +125,7 @@ def _start_of(pid: str) -> str:
 
 def _is_locked(path: str) -> bool:
     """Whether the program that announced itself there lives: it holds a lock."""
-    import fcntl  # noqa: PLC0415 - Linux
+    import fcntl
 
     try:
         with open(path, "rb+") as file:  # noqa: PTH123

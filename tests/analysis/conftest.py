@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.plan import Dwell, MultisineNoise, SineSweep, SteppedSine, StreamedNoise
+from vibench.acquisition.plan import Dwell, SineSweep, SteppedSine, StreamedNoise, WhiteNoise
 
 
 def _load(name):
@@ -104,7 +104,7 @@ def noise_file(noise_motion, tmp_path_factory):
     """Write noise, whole or not, in a folder of its own."""
 
     def write(**how):
-        plan = MultisineNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
+        plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=3.0, **NOISE)
         folder = tmp_path_factory.mktemp("noise")
         return synthetic.write_recording(folder, plan, *noise_motion, **{"name": "noise", **how})
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.plan import MultisineNoise
+from vibench.acquisition.plan import WhiteNoise
 from vibench.sim import base_transmissibility, gong2025, load_specimen
 
 PLACE = Path(__file__).parents[1] / "analysis" / "synthetic_recordings.py"
@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
         synthetic.Part("realisation", 3.0 * number + 2.0, 3.0 * number + 2.5, {"realisation": number})
         for number in range(2)
     ]
-    plan = MultisineNoise(amplitude_vpp=0.05, realisations=2, settle_s=2.0, **NOISE)
+    plan = WhiteNoise(amplitude_vpp=0.05, realisations=2, settle_s=2.0, **NOISE)
     noisy = velocity + 2e-7 * rng.standard_normal(velocity.size)
     synthetic.write_recording(place, plan, base, noisy, parts, name="noise")
     return place

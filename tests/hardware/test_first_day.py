@@ -16,7 +16,7 @@ import pytest
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.bench import Verdict
 from vibench.acquisition.check import check_bench
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.rig import KnobSheet, load_rig
 from vibench.analysis import analyse
 
@@ -105,7 +105,7 @@ def test_a_sweep_keeps_to_its_plan(bench, tmp_path):
 
 
 def test_noise_is_recorded_whole(bench, tmp_path):
-    excitation = MultisineNoise(
+    excitation = WhiteNoise(
         amplitude_vpp=level(bench), band_start_hz=50, band_stop_hz=600, repetition_hz=2, periods=4,
         realisations=2, settle_s=1.0,
     )  # fmt: skip

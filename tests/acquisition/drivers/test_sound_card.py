@@ -10,7 +10,7 @@ from vibench.acquisition.bench import Verdict
 from vibench.acquisition.check import bench_report
 from vibench.acquisition.drivers._sound_card import _Card
 from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, StreamedNoise
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, StreamedNoise, WhiteNoise
 from vibench.acquisition.rig import CalibrationRule, OutputConfig, confirm_simulated
 from vibench.analysis import analyse
 from vibench.virtual_rig.world import World
@@ -137,7 +137,7 @@ def test_what_it_plays_is_recorded_without_a_gap_and_analysed(opened, tmp_path, 
 def test_noise_that_needs_a_generator_is_refused_before_anything_plays(opened, tmp_path):
     plan = Measurement(
         name="card",
-        excitation=MultisineNoise(amplitude_vpp=0.5, band_start_hz=40, band_stop_hz=400),
+        excitation=WhiteNoise(amplitude_vpp=0.5, band_start_hz=40, band_stop_hz=400),
         ramp_s=0.5,
     )
     with pytest.raises(LimitExceeded, match="range of the no function generator"):

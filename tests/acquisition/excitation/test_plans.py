@@ -11,15 +11,15 @@ from vibench.acquisition.plan import (
     Direction,
     Dwell,
     Excitation,
-    MultisineNoise,
     OddMultisine,
     SineSweep,
     SteppedSine,
     StreamedNoise,
+    WhiteNoise,
 )
 
 PLANS = [
-    MultisineNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, realisations=3),
+    WhiteNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, realisations=3),
     OddMultisine(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, realisations=3),
     SineSweep(amplitude_vpp=1.5, start_hz=150, stop_hz=350, duration_s=4, settle_s=0.5),
     SineSweep(amplitude_vpp=1.5, start_hz=350, stop_hz=150, duration_s=4, spacing=Spacing.LOGARITHMIC),
@@ -99,12 +99,12 @@ def test_an_unknown_kind_lists_the_known_ones():
     ("kind", "fields", "sentence"),
     [
         (
-            MultisineNoise,
+            WhiteNoise,
             {"band_start_hz": 800, "band_stop_hz": 20},
             "band_stop_hz = 20 is not above band_start_hz = 800; give the band from low to high",
         ),
         (
-            MultisineNoise,
+            WhiteNoise,
             {"band_start_hz": 10, "band_stop_hz": 1000, "repetition_hz": 0.25},
             (
                 "repetition_hz = 0.25 puts the first image of 1000 Hz at 1048 Hz, too near the band; "
@@ -112,7 +112,7 @@ def test_an_unknown_kind_lists_the_known_ones():
             ),
         ),
         (
-            MultisineNoise,
+            WhiteNoise,
             {"band_start_hz": 20.1, "band_stop_hz": 20.9, "repetition_hz": 1},
             "no harmonic of 1 Hz lies in the band up to 20.9 Hz; lower repetition_hz or widen the band",
         ),
@@ -146,7 +146,7 @@ def test_a_plan_that_cannot_be_played_says_what_can(kind, fields, sentence):
 
 
 def test_noise_excites_exactly_the_lines_of_its_band():
-    plan = MultisineNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=800, repetition_hz=0.5)
+    plan = WhiteNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=800, repetition_hz=0.5)
     # At a multiple of the playback rate a held waveform has its lines on the bins, images above half of it.
     shown = plan.preview(8192 * 0.5 * 4)
     strong = shown.frequency_hz[(shown.spectrum_v > 1e-9) & (shown.frequency_hz < 2048)]
@@ -154,9 +154,7 @@ def test_noise_excites_exactly_the_lines_of_its_band():
 
 
 def test_the_rms_at_one_volt_is_half_over_the_crest_factor():
-    shown = MultisineNoise(amplitude_vpp=1.0, band_start_hz=10, band_stop_hz=1000, realisations=1).preview(
-        16384
-    )
+    shown = WhiteNoise(amplitude_vpp=1.0, band_start_hz=10, band_stop_hz=1000, realisations=1).preview(16384)
     assert shown.rms_v == pytest.approx(0.5 / shown.crest_factor, rel=1e-3)
     assert 0.11 < shown.rms_v < 0.17
 

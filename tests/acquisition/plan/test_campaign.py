@@ -16,12 +16,12 @@ from vibench.acquisition.plan import (
     Dwell,
     InRunLimits,
     Measurement,
-    MultisineNoise,
     OddMultisine,
     OnOverload,
     SineSweep,
     SteppedSine,
     StreamedNoise,
+    WhiteNoise,
     require_within_limits,
 )
 from vibench.acquisition.rig import load_rig
@@ -62,7 +62,7 @@ EXCITATIONS = st.one_of(
     ),
     st.just(SteppedSine(amplitude_vpp=1, grid=FrequencyGrid(start_hz=1, stop_hz=9, step_hz=0.1))),
     st.just(OddMultisine(amplitude_vpp=1, band_start_hz=20, band_stop_hz=90)),
-    st.just(MultisineNoise(amplitude_vpp=0.05, band_start_hz=20, band_stop_hz=800)),
+    st.just(WhiteNoise(amplitude_vpp=0.05, band_start_hz=20, band_stop_hz=800)),
     st.just(SineSweep(amplitude_vpp=1.5, start_hz=350, stop_hz=150, duration_s=20)),
     st.just(StreamedNoise(amplitude_vpp=1.5, band_start_hz=20, band_stop_hz=800, duration_s=9)),
 )
@@ -186,7 +186,7 @@ class TestEstimates:
         assert campaign.size_bytes(1000.0, 2) == 3 * 12600 * 2 * 4
 
     def test_a_change_of_waveform_costs_a_ramp_down_and_up(self):
-        noise = MultisineNoise(
+        noise = WhiteNoise(
             amplitude_vpp=1, band_start_hz=20, band_stop_hz=90, realisations=4, periods=2, settle_s=1
         )
         campaign = Campaign(name="c", measurements=(Measurement(name="a", excitation=noise, ramp_s=0.5),))

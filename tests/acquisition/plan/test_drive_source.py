@@ -6,10 +6,10 @@ from vibench.acquisition.plan import (
     DriveSource,
     Dwell,
     Measurement,
-    MultisineNoise,
     SineSweep,
     SteppedSine,
     StreamedNoise,
+    WhiteNoise,
     drive_source_of,
 )
 from vibench.acquisition.plan._limits import limit_checks
@@ -21,7 +21,7 @@ TONES = [
     SineSweep(amplitude_vpp=1, start_hz=150, stop_hz=350, duration_s=1),
     SteppedSine(amplitude_vpp=1, frequencies_hz=(100, 200), record_s=1),
 ]
-WAVEFORM = MultisineNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1)
+WAVEFORM = WhiteNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1)
 
 
 def with_output(rig, plays):

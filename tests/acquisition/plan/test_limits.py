@@ -10,9 +10,9 @@ from vibench.acquisition.excitation import Waveform
 from vibench.acquisition.plan import (
     Dwell,
     Measurement,
-    MultisineNoise,
     SineSweep,
     StreamedNoise,
+    WhiteNoise,
     predicted_loads,
     require_within_limits,
     shortest_ramp_s,
@@ -60,9 +60,7 @@ def test_a_waveform_s_peaks_are_those_of_an_integration_in_time(rig):
     """The Fourier prediction against a step-by-step solution of the shaker's equations, nearly unladen."""
     light = {"masses_kg": tuple(1e-6 * each for each in rig.specimen.masses_kg), "contact": "linear"}
     rig = rig.model_copy(update={"specimen": rig.specimen.model_copy(update=light)})
-    noise = MultisineNoise(
-        amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=200, repetition_hz=2, realisations=1
-    )
+    noise = WhiteNoise(amplitude_vpp=2.0, band_start_hz=20, band_stop_hz=200, repetition_hz=2, realisations=1)
     loads = predicted_loads(noise, rig)
     (step,) = noise.steps()
     assert isinstance(step.play, Waveform)
@@ -155,7 +153,7 @@ def test_the_shortest_ramp_is_three_periods_of_the_loaded_suspension(rig):
         (Dwell(amplitude_vpp=0.0019, frequency_hz=160, duration_s=1), "smallest setting of the function"),
         (Dwell(amplitude_vpp=25, frequency_hz=160, duration_s=1), r"at most 20 Vpp \(range of the AFG1022"),
         (
-            MultisineNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=200, points=16384),
+            WhiteNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=200, points=16384),
             r"points of a period would be 1\.638e\+04 points, allowed is at most 8192 points",
         ),
     ],

@@ -8,9 +8,9 @@ from vibench.acquisition import LimitExceeded
 from vibench.acquisition.plan import (
     Dwell,
     Measurement,
-    MultisineNoise,
     SineSweep,
     StreamedNoise,
+    WhiteNoise,
     predicted_loads,
     require_within_limits,
 )
@@ -58,7 +58,7 @@ def test_no_level_on_the_way_moves_anything_more_than_was_foretold(rig, frequenc
         assert passed <= 1.05 * loads[quantity].peak, quantity
 
 
-@pytest.mark.parametrize("kind", [MultisineNoise, StreamedNoise])
+@pytest.mark.parametrize("kind", [WhiteNoise, StreamedNoise])
 def test_noise_is_foretold_by_its_lines_free_while_weak_and_stuck_when_strong(rig, kind):
     band = {"band_start_hz": 50.0, "band_stop_hz": 600.0}
     more = {"duration_s": 1.0} if kind is StreamedNoise else {"repetition_hz": 1.0, "realisations": 1}

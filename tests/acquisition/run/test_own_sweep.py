@@ -14,8 +14,8 @@ from vibench.acquisition.plan import (
     Campaign,
     Dwell,
     Measurement,
-    MultisineNoise,
     SineSweep,
+    WhiteNoise,
     require_within_limits,
 )
 from vibench.acquisition.rig import load_rig
@@ -106,9 +106,7 @@ def test_check_and_campaign_are_recorded_at_the_walls_pace_with_the_pause_of_a_l
     tmp_path, bench, swept_by
 ):
     excitations = {
-        "noise": MultisineNoise(
-            amplitude_vpp=0.2, band_start_hz=50, band_stop_hz=800, realisations=2, periods=3
-        ),
+        "noise": WhiteNoise(amplitude_vpp=0.2, band_start_hz=50, band_stop_hz=800, realisations=2, periods=3),
         "dwell": Dwell(amplitude_vpp=0.2, frequency_hz=260, settle_s=0.5, duration_s=2.0),
         "steps": SineSweep(
             amplitude_vpp=0.2, start_hz=150, stop_hz=310, duration_s=3.0, step_s=0.5, settle_s=0.5

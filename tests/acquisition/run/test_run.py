@@ -22,12 +22,12 @@ from vibench.acquisition.plan import (
     Dwell,
     InRunLimits,
     Measurement,
-    MultisineNoise,
     OnOverload,
     RunState,
     SineSweep,
     SteppedSine,
     StreamedNoise,
+    WhiteNoise,
     shortest_ramp_s,
 )
 from vibench.acquisition.recording import RecordingState
@@ -199,7 +199,7 @@ class TestSweepsAndSteps:
         assert bench.recorder.states().count("ramping_up") == 1
 
     def test_a_new_waveform_is_loaded_only_when_the_drive_is_quiet(self, bench, tmp_path):
-        noise = MultisineNoise(
+        noise = WhiteNoise(
             amplitude_vpp=2,
             band_start_hz=20,
             band_stop_hz=800,

@@ -20,9 +20,9 @@ from vibench.acquisition.campaign import PointOutcome
 from vibench.acquisition.plan import (
     Dwell,
     Measurement,
-    MultisineNoise,
     RunState,
     SineSweep,
+    WhiteNoise,
     predicted_loads,
 )
 from vibench.acquisition.recording import RecordingState
@@ -82,7 +82,7 @@ def test_the_ramps_rise_and_fall_on_a_half_cosine(virtual_bench, tmp_path):
 
 
 def test_noise_arrives_flat_and_whole_periods_hold_its_lines(virtual_bench, tmp_path):
-    noise = MultisineNoise(
+    noise = WhiteNoise(
         amplitude_vpp=1.0, band_start_hz=20, band_stop_hz=800, realisations=1, periods=1, settle_s=0.2
     )
     with measured(virtual_bench, tmp_path, noise) as recording:

@@ -11,11 +11,11 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.plan import (
     Dwell,
     Measurement,
-    MultisineNoise,
     SettledSine,
     SineSweep,
     SteppedSine,
     StreamedNoise,
+    WhiteNoise,
 )
 from vibench.analysis import Simulation
 from vibench.analysis.figures import (
@@ -181,7 +181,7 @@ def test_levels_of_all_channels_carry_their_units(dwell_file):
     [
         Dwell(amplitude_vpp=2, frequency_hz=260, duration_s=1),
         SineSweep(amplitude_vpp=2, start_hz=150, stop_hz=350, duration_s=2),
-        MultisineNoise(amplitude_vpp=2, band_start_hz=20, band_stop_hz=800),
+        WhiteNoise(amplitude_vpp=2, band_start_hz=20, band_stop_hz=800),
         StreamedNoise(amplitude_vpp=2, band_start_hz=50, band_stop_hz=600, duration_s=2),
         SteppedSine(amplitude_vpp=2, frequencies_hz=(200, 210), record_s=0.5, settle_s=0.1),
     ],

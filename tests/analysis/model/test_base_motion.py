@@ -5,7 +5,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep, SteppedSine
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.model._simulated_channels import (
     advanced,
@@ -49,7 +49,7 @@ def test_a_signal_is_advanced_by_a_fraction_of_a_sample():
     [
         (Dwell(amplitude_vpp=1, frequency_hz=260, duration_s=1), 260),
         (SineSweep(amplitude_vpp=1, start_hz=350, stop_hz=150, duration_s=1), 150),
-        (MultisineNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=800), 20),
+        (WhiteNoise(amplitude_vpp=1, band_start_hz=20, band_stop_hz=800), 20),
         (SteppedSine(amplitude_vpp=1, frequencies_hz=(90, 95)), 90),
         (SteppedSine(amplitude_vpp=1, grid=FrequencyGrid(start_hz=80, stop_hz=90, step_hz=5)), 80),
     ],

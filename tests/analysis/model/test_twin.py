@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise
+from vibench.acquisition.plan import Dwell, Measurement, WhiteNoise
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse, result_summary
 from vibench.analysis.figures import dwells_figure
@@ -18,7 +18,7 @@ from vibench.analysis.results import overlay
 from vibench.sim import gong2025
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-NOISE = MultisineNoise(
+NOISE = WhiteNoise(
     amplitude_vpp=0.05,
     band_start_hz=50,
     band_stop_hz=600,

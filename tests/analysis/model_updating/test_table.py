@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vibench.acquisition import open_bench, run_measurement
-from vibench.acquisition.plan import Measurement, MultisineNoise
+from vibench.acquisition.plan import Measurement, WhiteNoise
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse_files, update_model
 from vibench.analysis.model_updating import Assumption
@@ -18,7 +18,7 @@ TRUE_KG = RIG.shaker.moving_mass_kg + RIG.shaker.fixture_mass_kg
 @pytest.fixture(scope="module")
 def updated(tmp_path_factory):
     """Fit what the virtual rig, whose configuration is right, shows of weak noise."""
-    plan = MultisineNoise(
+    plan = WhiteNoise(
         amplitude_vpp=0.05,
         band_start_hz=50,
         band_stop_hz=600,

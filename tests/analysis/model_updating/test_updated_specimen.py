@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import synthetic_recordings as synthetic
 
-from vibench.acquisition.plan import MultisineNoise, SineSweep
+from vibench.acquisition.plan import SineSweep, WhiteNoise
 from vibench.analysis import CampaignResults, NotEnoughData, Simulation, analyse_files, update_model
 from vibench.analysis.model_updating import Parameter
 from vibench.analysis.model_updating._bracketed_gap import bracketed_gap, brackets
@@ -49,7 +49,7 @@ def noise_file(folder, rng):
         np.concatenate([each.displacement_m for each in motions]),
         np.concatenate([each.acceleration for each in motions]),
     )
-    plan = MultisineNoise(amplitude_vpp=0.05, realisations=REALISATIONS, settle_s=settle_s, **LINES)
+    plan = WhiteNoise(amplitude_vpp=0.05, realisations=REALISATIONS, settle_s=settle_s, **LINES)
     return synthetic.write_recording(folder, plan, base, np.concatenate(velocities), parts, name="noise")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.plan import Dwell, Measurement, MultisineNoise, SineSweep
+from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.recording import BridgedChannel, Dropout, bridged, found_dropouts
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files
@@ -153,7 +153,7 @@ def test_a_dwell_with_clustered_dropouts_says_what_it_says_without_or_nothing(
         Dwell(amplitude_vpp=1.5, frequency_hz=260, settle_s=1, duration_s=6),
         Dwell(amplitude_vpp=6.0, frequency_hz=397, settle_s=1, duration_s=6),
         SineSweep(amplitude_vpp=3.0, start_hz=220, stop_hz=300, duration_s=6, settle_s=1),
-        MultisineNoise(
+        WhiteNoise(
             amplitude_vpp=5.0, band_start_hz=50, band_stop_hz=600, repetition_hz=2, realisations=3, settle_s=1
         ),
     ],
@@ -198,7 +198,7 @@ def test_no_collision_of_a_shipped_specimen_is_a_dropout(rig, tmp_path, name):
     }
     document["shaker"]["limits"]["force_n"]["value"] = 1e3
     other = Rig.model_validate(document)
-    noise = MultisineNoise(
+    noise = WhiteNoise(
         amplitude_vpp=8.0, band_start_hz=50, band_stop_hz=600, repetition_hz=2, realisations=2, settle_s=1
     )
     dwells = (Dwell(amplitude_vpp=8.0, frequency_hz=each, settle_s=1, duration_s=3) for each in (140, 200))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, run_measurement
-from vibench.acquisition.plan import Dwell, HeldDwell, Measurement, MultisineNoise, SineSweep, base_motion
+from vibench.acquisition.plan import Dwell, HeldDwell, Measurement, SineSweep, WhiteNoise, base_motion
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files, budgets_of, expected_uncertainty
 from vibench.analysis.uncertainty import Cause
@@ -14,7 +14,7 @@ from vibench.sim import shipped_specimens
 from vibench.sim.shaker import LoadedShaker, MotionFailed
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
-NOISE = MultisineNoise(
+NOISE = WhiteNoise(
     amplitude_vpp=0.05,
     band_start_hz=50,
     band_stop_hz=600,

@@ -89,6 +89,5 @@ from ._streamed_noise import (
     StreamedNoise as StreamedNoise,
 )
 from ._white_noise import (
-    MultisineNoise as MultisineNoise,
     WhiteNoise as WhiteNoise,
 )

@@ -29,7 +29,3 @@ class WhiteNoise(PeriodicNoise):
     def lines(self) -> Lines:
         """All harmonics of ``repetition_hz`` in the band."""
         return self.candidates
-
-
-MultisineNoise = WhiteNoise
-"""Name of version 0.1, for scripts that use it."""
