@@ -4,6 +4,7 @@ After this, nothing but bytes at known places is written until the recording end
 closed the file, so that no crash can catch it between two steps.
 """
 
+import errno
 import shutil
 import uuid
 from collections.abc import Mapping
@@ -18,7 +19,7 @@ from vibench.sim.operating_system import sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout
-from ._attributes import write_attributes, write_text_dataset
+from ._attributes import read_text_dataset, write_attributes, write_text_dataset
 from ._disk import PositionedFile
 from ._disk_room import claim_room
 from ._header import RecordingHeader
@@ -90,9 +91,11 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
         with h5py.File(made, "w", libver=layout.LIBVER, locking=False) as file:
             places = _write_layout(file, header, capacity, reserved)
         _claim(made, places)
+        _require_whole(made, header)
         made.rename(part)
         sync_folder(part.parent)
-    except OSError as error:
+    # HDF5 reports a failing disk as one or the other.
+    except (OSError, RuntimeError) as error:
         for each in (made, part):
             with suppress(OSError):
                 each.unlink()
@@ -101,6 +104,18 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
             " Nothing was recorded; make room, or choose another folder or a shorter measurement."
         ) from error
     return places
+
+
+def _require_whole(made: Path, header: RecordingHeader) -> None:
+    """Read back what was written: h5py does not report a disk that fails while it closes an object.
+
+    Raises OSError where something is missing.
+    """
+    with h5py.File(made, "r", locking=False) as file:
+        texts = file[layout.CONFIGURATION]
+        for name, text in header.configuration().items():
+            if name not in texts or read_text_dataset(texts, name) != text:
+                raise OSError(errno.EIO, f"{name} could not be read back")
 
 
 def _lengths(header: RecordingHeader) -> tuple[int, int]:
