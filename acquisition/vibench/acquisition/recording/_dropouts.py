@@ -42,6 +42,8 @@ _OUTSTANDING = 8.0
 """Largest distance from the bridge, over what the bridge's fit leaves of the flanks."""
 _JUMP = 4.0
 """Change from sample to sample where light goes, over the fastest of the flanks."""
+_STEEP = 0.2
+"""The same change over the largest distance from the bridge: between clipped peaks a motion takes longer."""
 _MOST_PER_S = 400.0
 """What comes more often is made by the motion."""
 _ORDER = 48
@@ -197,8 +199,10 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
     shape = np.polynomial.legendre.legvander(at, 5)
     left = near - shape @ lstsq(shape[outside], near[outside])[0]
     rough = float(np.mean(left[outside] ** 2))
-    is_far = np.max(left[~outside] ** 2) > _OUTSTANDING**2 * rough
-    return rough if is_far else np.inf
+    distance = np.max(np.abs(left[~outside]))
+    is_far = distance**2 > _OUTSTANDING**2 * rough
+    is_steep = np.max(pace[before:-after]) > _STEEP * distance
+    return rough if is_far and is_steep else np.inf
 
 
 def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
