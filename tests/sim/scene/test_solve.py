@@ -159,6 +159,22 @@ def test_a_torus_is_told_from_chaos():
     assert found.scatter < 1e-3
 
 
+@pytest.mark.thorough
+def test_chaos_that_ends_in_a_torus_is_not_called_chaotic():
+    specimen = replace(gong2025(2.2e-5), lower_gap_m=38e-6, gap_m=52e-6)
+    found = solve_scene(
+        Scene(
+            specimen,
+            Harmonic(118.0, 12e-6),
+            observe=(Observable.RESPONSE, Observable.LYAPUNOV),
+            accuracy=Accuracy.REFERENCE,
+            duration=AutomaticDuration(window_s=5.0),
+        )
+    )
+    assert abs(found.lyapunov_per_s) < 3.0 * found.lyapunov_error_per_s
+    assert found.motion is MotionKind.QUASI_PERIODIC
+
+
 def test_an_undamped_motion_is_undecided_rather_than_guessed_at():
     specimen = gong2025(damping_time_s=0.0)
     drive = Harmonic(200.0, 1e-6)

@@ -93,6 +93,8 @@ def _followed_on(
     if states.repeats is not None:
         seen = _observe_period(run, states.repeats, path, pace)
         return replace(seen, grew=True, wandered_until_s=states.wandered_until_s)
+    # Chaos may have settled on a torus, which does not repeat either: only growth tells the two apart.
+    run.follow_tangent()
     begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
     last = [
         follow_strobed(
@@ -101,6 +103,10 @@ def _followed_on(
         for number in range(1, in_window + 1)
     ]
     window = window_of(begins, last)
+    kind = kind_of(None, growth_of(last), pace.fading_s)
+    if kind is not MotionKind.CHAOTIC:
+        seen = judged(run, window, (), pace, f"after {run.time_s:.3g} s it is {kind}")
+        return replace(seen, grew=True, wandered_until_s=last[0].start_s)
     seen = judged(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
     if run.outcome is not Outcome.REACHED_END:
         return seen
