@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 import typer
 
 from vibench.analysis import InvalidRequest
-from vibench.analysis.figures import ImageKind
+from vibench.analysis.report import ImageKind
 from vibench.sim.study import software
 
 from .exit_code import ExitCode

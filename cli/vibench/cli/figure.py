@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vibench.analysis import CampaignResults, InvalidRequest, analyse_files, recordings_in
-from vibench.analysis.figures import ImageKind
-from vibench.analysis.paper_figures import FigureOptions, FrequencyGrid
+from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind
 from vibench.sim import Accuracy
 
 from .analyse import complain_about

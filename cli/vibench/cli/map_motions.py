@@ -8,7 +8,7 @@ import typer
 from vibench.acquisition import load_toml, named
 from vibench.analysis import InvalidRequest, recorded_response
 from vibench.analysis.dynamics import map_caption, motion_words, read_diagram
-from vibench.analysis.figures import SHOWN, ImageKind
+from vibench.analysis.report import SHOWN, ImageKind
 from vibench.sim import Observable
 from vibench.sim.maps import (
     KickStability,

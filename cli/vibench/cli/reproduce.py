@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from vibench.analysis.figures import ImageKind
-from vibench.analysis.paper_figures import FigureOptions, FrequencyGrid
+from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind
 from vibench.analysis.reproduction import OPTIONS, Case, case_with
 from vibench.sim import Accuracy
 

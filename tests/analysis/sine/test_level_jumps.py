@@ -100,6 +100,7 @@ def test_a_response_that_stays_has_no_jump_and_none_is_seen_across_the_turning_p
         noise_error_i=np.zeros(steps),
         response_ii=np.array([1.0, 1.1, 1.2, 5.0, 5.1, 4.9]),
         sd_response_ii=np.zeros(steps),
+        slow_change=np.zeros(steps),
         phase_rad=np.zeros(steps),
         left_out=0,
     )

@@ -124,7 +124,19 @@ def out_of_reach() -> str:
 
 
 def require_ended(engine: Announcement) -> None:
-    """Raise EngineGone where an engine was killed: nobody has confirmed that its output is off."""
+    """Refuse to go on after an engine that was killed: nobody has confirmed that its output is off.
+
+    Parameters
+    ----------
+    engine
+        As it announced itself.
+
+    Raises
+    ------
+    EngineGone
+        When it was killed; the sentence says to switch the amplifier off.
+
+    """
     if engine.was_killed:
         raise EngineGone(f"The engine was killed. {SWITCH_OFF}")
 

@@ -82,7 +82,14 @@ _PRESENT_WORDS = {
 
 
 def present_word(word: str) -> str:
-    """Return the present name of a kind for a name in a file; an unknown name is returned unchanged."""
+    """Return the present name of a kind for a name in a file; an unknown name is returned unchanged.
+
+    Parameters
+    ----------
+    word
+        Name of a kind of excitation, of this version or of an earlier one.
+
+    """
     return _PRESENT_WORDS.get(word, word)
 
 

@@ -8,6 +8,12 @@ def printable(text: str) -> str:
 
     >>> print(printable("a\x1b[2J\nb"))
     a\x1b[2J\nb
+
+    Parameters
+    ----------
+    text
+        From a file, a folder or an instrument.
+
     """
     if text.isprintable():
         return text

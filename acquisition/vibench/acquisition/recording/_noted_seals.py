@@ -31,7 +31,14 @@ def noted_seals(path: Path) -> Mapping[str, str]:
 
 
 def opened(uri: str) -> sqlite3.Connection:
-    """Open a database as its address says; transactions are begun and ended by hand."""
+    """Open a database; its transactions are begun and ended by hand.
+
+    Parameters
+    ----------
+    uri
+        Address of the file with its mode, as SQLite spells it.
+
+    """
     connection = sqlite3.connect(uri, uri=True, isolation_level=None)
     connection.row_factory = sqlite3.Row
     return connection
@@ -39,7 +46,19 @@ def opened(uri: str) -> sqlite3.Connection:
 
 @contextmanager
 def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
-    """Let the file go when a new connection is of no use: Windows lets nobody move or delete an open one."""
+    """Close a new connection if its first use fails: Windows lets nobody move or delete an open file.
+
+    Parameters
+    ----------
+    connection
+        Just opened.
+
+    Raises
+    ------
+    sqlite3.Error
+        Whatever the first use raised, after closing.
+
+    """
     try:
         yield connection
     except BaseException:

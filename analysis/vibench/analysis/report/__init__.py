@@ -12,64 +12,6 @@ on speed and accuracy is docs/accuracy.md. Results are taken as they are: nothin
 'Options: c = 2e-05 s · k, gap 45 µm, standard'
 """
 
-from ..figures import (
-    SHOWN,
-    DrawnFigure,
-    ImageKind,
-    branches_figure,
-    chain_figure,
-    contact_forces_figure,
-    exponent_spectrum_figure,
-    map_figure,
-    tradeoff_figure,
-)
-from ..paper_figures import (
-    PAPER_FIGURES,
-    FigureOptions,
-    FrequencyGrid,
-    levels_figure,
-)
-from ._accuracy_document import (
-    accuracy_document,
-    worst_error,
-)
-from ._comparison_export import (
-    write_comparison,
-)
-from ._drawings import (
-    DRAWINGS,
-    Drawing,
-    findings,
-    recording_figures,
-    result_figures,
-)
-from ._report import (
-    check_warnings,
-    write_report,
-)
+import lazy_loader
 
-__all__ = [
-    "DRAWINGS",
-    "PAPER_FIGURES",
-    "SHOWN",
-    "Drawing",
-    "DrawnFigure",
-    "FigureOptions",
-    "FrequencyGrid",
-    "ImageKind",
-    "accuracy_document",
-    "branches_figure",
-    "chain_figure",
-    "check_warnings",
-    "contact_forces_figure",
-    "exponent_spectrum_figure",
-    "findings",
-    "levels_figure",
-    "map_figure",
-    "recording_figures",
-    "result_figures",
-    "tradeoff_figure",
-    "worst_error",
-    "write_comparison",
-    "write_report",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,35 @@
+from ._accuracy_document import (
+    accuracy_document as accuracy_document,
+    worst_error as worst_error,
+)
+from ._choices import (
+    SHOWN as SHOWN,
+    FigureOptions as FigureOptions,
+    FrequencyGrid as FrequencyGrid,
+    ImageKind as ImageKind,
+)
+from ._comparison_export import (
+    write_comparison as write_comparison,
+)
+from ._drawings import (
+    DRAWINGS as DRAWINGS,
+    Drawing as Drawing,
+    findings as findings,
+    recording_figures as recording_figures,
+    result_figures as result_figures,
+)
+from ._figures import (
+    PAPER_FIGURES as PAPER_FIGURES,
+    DrawnFigure as DrawnFigure,
+    branches_figure as branches_figure,
+    chain_figure as chain_figure,
+    contact_forces_figure as contact_forces_figure,
+    exponent_spectrum_figure as exponent_spectrum_figure,
+    levels_figure as levels_figure,
+    map_figure as map_figure,
+    tradeoff_figure as tradeoff_figure,
+)
+from ._report import (
+    check_warnings as check_warnings,
+    write_report as write_report,
+)
