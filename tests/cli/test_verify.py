@@ -1,6 +1,7 @@
 """`vibench verify`, and what other commands say of recordings that are damaged or made to harm."""
 
 import contextlib
+import hashlib
 import json
 import os
 import shutil
@@ -61,6 +62,8 @@ def point_outside(path):
         where = [(str(path.with_name("passwd")), 0, 2000)]
         made = file.create_dataset("m0_velocity", shape=(500,), dtype="<i4", external=where)
         made.attrs.update(kept)
+        # Whoever forges samples can forge their checksum, too.
+        made.attrs["sha256"] = np.bytes_(hashlib.sha256(SECRET[:2000]).hexdigest())
 
 
 def test_every_recording_of_a_folder_is_verified(vibench_here, folder):

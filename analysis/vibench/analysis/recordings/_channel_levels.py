@@ -115,6 +115,8 @@ _FLAT = 0.88
 _FLAT_VALUE = 0.4
 """Share of the upper half of a peak's samples at one value that no smooth peak has."""
 _FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
+_FEWEST_STEPS = 40
+"""Steps of the converter to a peak: a sine of 16 of them has 0.42 of its samples at two values."""
 
 
 def _flat_top(counts: Integers, header: ChannelHeader, full_scale: float) -> int | None:
@@ -131,13 +133,16 @@ def _flat_top(counts: Integers, header: ChannelHeader, full_scale: float) -> int
 
     if height < _LEAST_HEIGHT * (top - filled[0]) or counts[top - 1 :].sum() == total[-1]:
         return None
-    if counts[top - 1 :].sum() >= max(_FEWEST_AT_TOP, _FLAT_VALUE * above(top - height / 2)):
-        return top
     step = 0.0 if header.volts_per_count is None else header.volts_per_count * abs(header.physical_per_volt)
+    resolution = max(1.0, step / full_scale * _COUNTED / 2)
+    if height > _FEWEST_STEPS * resolution and counts[top - 1 :].sum() >= max(
+        _FEWEST_AT_TOP, _FLAT_VALUE * above(top - height / 2)
+    ):
+        return top
     for share in _TOPS:
         whole = above(top - share * height)
         values = int(np.count_nonzero(counts[int(top - share * height) :]))
-        is_resolved = share * height > _FEWEST_VALUES * max(1.0, step / full_scale * _COUNTED / 2)
+        is_resolved = share * height > _FEWEST_VALUES * resolution
         is_counted = whole >= _FEWEST_AT_TOP and values >= _FEWEST_VALUES
         if is_resolved and is_counted and above(top - share * height / 2) > _FLAT * whole:
             return top
