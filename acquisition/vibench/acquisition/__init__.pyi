@@ -31,7 +31,6 @@ from .errors import (
 from .host import (
     Beside as Beside,
     ChosenFrom as ChosenFrom,
-    FrozenModel as FrozenModel,
     all_shipped as all_shipped,
     built_site as built_site,
     documentation_page as documentation_page,

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from vibench.acquisition import FrozenModel
+from vibench.sim import FrozenModel
 
 from ..frequency_response import Estimator, FrequencyResponseRequest
 from ..model import Simulation

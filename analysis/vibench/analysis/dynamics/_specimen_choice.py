@@ -5,11 +5,12 @@ from typing import Annotated, Self
 
 from pydantic import PositiveFloat, model_validator
 
-from vibench.acquisition import ChosenFrom, FrozenModel
+from vibench.acquisition import ChosenFrom
 from vibench.sim import (
     CONTACT_LAWS,
     USUAL_SPECIMEN,
     DampingTime,
+    FrozenModel,
     Specimen,
     SpecimenTable,
     load_specimen,

@@ -5,10 +5,9 @@ from typing import Literal, Self
 
 from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
-from vibench.acquisition import FrozenModel
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import ROLE_PATTERN, Origin
-from vibench.sim import SpecimenTable
+from vibench.sim import FrozenModel, SpecimenTable
 
 from ..recordings import BASE, DRIVE, RESPONSE
 

@@ -16,9 +16,8 @@ from pathlib import Path
 import numpy as np
 from pydantic import ValidationError
 
-from vibench.acquisition import FrozenModel
 from vibench.acquisition.rig import Rig
-from vibench.sim import Specimen
+from vibench.sim import FrozenModel, Specimen
 from vibench.sim.operating_system import state_folder
 
 from ._parameters import Hidden

@@ -7,8 +7,8 @@ from pydantic import AfterValidator, Field
 from PySide6.QtGui import QFont
 from PySide6.QtWidgets import QApplication, QDialog, QDialogButtonBox, QVBoxLayout, QWidget
 
-from vibench.acquisition import FrozenModel
 from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S
+from vibench.sim import FrozenModel
 
 from ..forms import JudgedForm
 from ..page import AppContext, Remembered

@@ -14,7 +14,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from vibench.acquisition import FrozenModel, load_toml, named
+from vibench.acquisition import load_toml, named
+from vibench.sim import FrozenModel
 
 from ..world import World
 from ._faults import Heal, RigFaults, nothing_to_heal
