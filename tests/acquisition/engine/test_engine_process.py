@@ -454,5 +454,5 @@ class TestItsEnd:
         process = engine()
         running(process.client, shipped_rig, tmp_path)
         process._process.kill()
-        with pytest.raises(EngineGone, match="does not answer"):
+        with pytest.raises(EngineGone, match="switch the amplifier off"):
             until(process.client, lambda status: False)
