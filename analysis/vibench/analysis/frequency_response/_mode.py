@@ -5,6 +5,8 @@ from dataclasses import dataclass
 SMALLEST_RELATIVE_SD = 1e-6
 """Keeps the weights finite where a noise-free simulation states no spread at all."""
 LARGEST_DAMPING = 0.5
+RESOLVED_LINES = 4.0
+"""Noise bandwidths that a half-power bandwidth must hold to be resolved."""
 WELL_FITTED = 1.2
 """Reduced chi-square at which the background is good enough: a higher degree would only widen the spreads."""
 
@@ -23,10 +25,17 @@ class Resonance:
     peak_magnitude: float
     sd_peak_magnitude: float
     reduced_chi_square: float
-    """Misfit over what the stated spreads explain; the spreads above are widened when it is above 1."""
+    """Misfit about the mode over what the lines' scatter explains; spreads are widened when it is above 1."""
+    chi_square_limit: float
+    """What one right fit in a thousand exceeds."""
     lines_used: int
     is_resolved: bool
-    """Whether the lines are fine enough for this bandwidth; if not, damping is overestimated."""
+    """Whether the lines are fine enough for this bandwidth."""
+
+    @property
+    def is_explained(self) -> bool:
+        """Whether the fitted modes describe the lines about this one, within their scatter."""
+        return self.reduced_chi_square <= max(self.chi_square_limit, WELL_FITTED)
 
     @property
     def quality_factor(self) -> float:

@@ -1,6 +1,6 @@
 """Resonances of a transmission: frequency, damping and quality factor, with their uncertainties."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import scipy
 
 from ..errors import InvalidRequest
 from ..signals import Complexes, Reals, standard_uncertainty
-from ._joint_fit import jointly_fitted
+from ._modal_fit import Background, Lines, ModalFit, modal_fit
 from ._mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, WELL_FITTED, Resonance
 from ._results import FrequencyResponse
 
@@ -18,8 +18,14 @@ _LEAST_LINES = 8
 """Two pole and at most ten linear parameters need more reals than that: eight lines are sixteen."""
 _LEAST_RISE = 3.0
 """A peak stands above the valley beside it by at least so many standard deviations of the difference."""
-_RESOLVED_LINES = 4.0
-"""Noise bandwidths that a half-power bandwidth must hold, else the window smears the peak by over 2 %."""
+_MOST_MODES = 3
+"""Taken for one peak."""
+_APART = (0.5, 1.5)
+"""Of a half-width, at which poles side by side start."""
+_REACH_DAMPING = 4.0
+"""In its logarithm."""
+_USUAL_HZ = 300.0
+"""Scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
 """A peak too narrow for the lines is believed only where they are known to a tenth: else it is one of the
 ripples on top of a broad hill."""
@@ -53,14 +59,14 @@ def resonances(
             f"{band.frequency_hz.size} lines lie between {low_hz:g} and {high_hz:g} Hz; a fit needs at least "
             f"{_LEAST_LINES}"
         )
-    found = []
+    found: list[Resonance] = []
     if band.steady_relative_sd is not None:
         band = replace(band, relative_sd_magnitude=band.steady_relative_sd)
     for line, width in _significant_peaks(band):
-        fit = _refitted(band, _fitted(band, line, width))
-        if fit is not None and low_hz <= fit.frequency_hz <= high_hz:
-            found.append(fit)
-    return jointly_fitted(band, _distinct(found))
+        fit = _refitted(band, _fitted(band, line, width, 1))
+        if fit is not None:
+            found += [each for each in fit.resonances if low_hz <= each.frequency_hz <= high_hz]
+    return _jointly_fitted(band, _distinct(found))
 
 
 def scattered_resonances(
@@ -145,113 +151,124 @@ def _half_power_lines(size: Reals, line: int) -> int:
     return int(np.min(np.abs(below - line))) if below.size else size.size // 2
 
 
-def _fitted(band: FrequencyResponse, line: int, half_width: int) -> Resonance | None:
+def _fitted(band: FrequencyResponse, line: int, half_width: int, most: int) -> ModalFit | None:
+    """Fit the lines about a peak with one mode, or with as many as explain them, up to a number."""
     reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
-    part = slice(max(0, line - reach), line + reach + 1)
-    frequency_hz, value = band.frequency_hz[part], band.value[part]
-    spread = np.maximum(band.relative_sd_magnitude[part], SMALLEST_RELATIVE_SD) * np.abs(value)
-    usable = np.isfinite(spread) & np.isfinite(value) & (spread > 0)
-    if np.count_nonzero(usable) < _LEAST_LINES:
+    chosen = np.zeros(band.frequency_hz.size, dtype=np.bool_)
+    chosen[max(0, line - reach) : line + reach + 1] = True
+    lines = Lines(band, chosen)
+    if lines.value.size < _LEAST_LINES:
         return None
-    frequency_hz, value, spread = frequency_hz[usable], value[usable], spread[usable]
     centre_hz = float(band.frequency_hz[line])
-    data = (frequency_hz, value, spread, centre_hz)
-    found: Resonance | None = None
-    for degree in _BACKGROUND_DEGREES:
-        found = _fitted_on(band, data, half_width, degree) or found
-        if found is None or found.reduced_chi_square < WELL_FITTED:
-            break
-    return found
+    spacing_hz = float(np.median(np.diff(lines.frequency_hz)))
+    damping = float(np.clip(max(half_width, 0.5) * spacing_hz / centre_hz, 2e-6, 0.9 * LARGEST_DAMPING))
+    span = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / centre_hz
+    first: ModalFit | None = None
+    start = np.array([[np.log(centre_hz), np.log(damping)]])
+    for modes in range(1, most + 1):
+        for degree in _BACKGROUND_DEGREES if modes == 1 else _BACKGROUND_DEGREES[1:2]:
+            for split in _split(start, modes):
+                reaches = np.tile([span, _REACH_DAMPING], modes)
+                fit = modal_fit(band, lines, split, reaches, _powers(centre_hz, degree))
+                if fit is None or not all(_is_told(each, lines) for each in fit.resonances):
+                    continue
+                first = fit if modes == 1 else first
+                if fit.explains:
+                    return fit
+        if first is None or first.chi_square < WELL_FITTED:
+            return first
+        (one,) = first.resonances
+        start = np.log([[one.frequency_hz, one.damping_ratio]])
+    return first
 
 
-def _fitted_on(
-    band: FrequencyResponse, data: tuple[Reals, Complexes, Reals, float], half_width: int, degree: int
-) -> Resonance | None:
-    """Fit one mode on a background of one degree."""
-    frequency_hz, value, spread, centre_hz = data
-    spacing_hz = float(np.median(np.diff(frequency_hz)))
-    start = np.array([0.0, np.log(max(half_width, 0.5) * spacing_hz / centre_hz)])
-    span = (frequency_hz[-1] - frequency_hz[0]) / centre_hz
+def _powers(centre_hz: float, degree: int) -> Background:
+    """Powers of a background with complex factors."""
 
-    def misfit(pole: Reals) -> Reals:
-        natural_hz, damping = centre_hz * float(np.exp(pole[0])), float(np.exp(pole[1]))
-        basis = _basis(frequency_hz, natural_hz, damping, degree) / spread[:, None]
-        target = value / spread
-        coefficients = np.linalg.lstsq(basis, target, rcond=None)[0]
-        left = target - basis @ coefficients
-        return np.concatenate((left.real, left.imag))
+    def shapes(frequency_hz: Reals) -> Complexes:
+        off = frequency_hz / centre_hz - 1
+        return np.stack([factor * off**power for power in range(degree + 1) for factor in (1, 1j)], axis=1)
 
-    bounds = ([-span, np.log(1e-6)], [span, np.log(LARGEST_DAMPING)])
-    start = np.clip(start, np.asarray(bounds[0]) + 1e-9, np.asarray(bounds[1]) - 1e-9)
-    result = scipy.optimize.least_squares(
-        misfit, start, bounds=bounds, x_scale=[0.01, 1.0], xtol=1e-12, ftol=1e-12
-    )
-    jacobian = np.asarray(result.jac, dtype=np.float64)
-    return _resonance(band, result.x, jacobian, result.fun, data, degree)
+    return shapes
 
 
-def _refitted(band: FrequencyResponse, first: Resonance | None) -> Resonance | None:
+def _split(poles: Reals, modes: int) -> Iterator[Reals]:
+    """Start so many poles where one was: side by side, closer and farther, each narrower than it."""
+    ((log_frequency, log_damping),) = poles
+    if modes == 1:
+        yield poles.ravel()
+        return
+    sides = np.linspace(-1, 1, modes)
+    for apart in _APART:
+        off = apart * float(np.exp(log_damping)) * sides
+        yield np.stack((log_frequency + off, np.full(modes, log_damping - np.log(modes) / 2)), axis=1).ravel()
+
+
+def _is_told(found: Resonance, lines: Lines) -> bool:
+    """Say whether lines determine a mode: damping above zero, inside of them, and no ripple of noise."""
+    natural_hz, damping = found.frequency_hz, found.damping_ratio
+    first_hz, last_hz = lines.frequency_hz[[0, -1]]
+    if damping > 0.99 * LARGEST_DAMPING or not first_hz <= natural_hz <= last_hz:
+        return False
+    if found.sd_damping_ratio > _LARGEST_RELATIVE_SD_DAMPING * damping:
+        return False
+    return found.is_resolved or lines.relative_sd(natural_hz) <= _LARGEST_SD_UNRESOLVED
+
+
+def _refitted(band: FrequencyResponse, first: ModalFit | None) -> ModalFit | None:
     """Fit once more over the bandwidth found: the first width was read off single, noisy lines."""
     if first is None:
         return None
-    line = int(np.argmin(np.abs(band.frequency_hz - first.frequency_hz)))
+    (one,) = first.resonances
+    line = int(np.argmin(np.abs(band.frequency_hz - one.frequency_hz)))
     spacing_hz = float(np.median(np.diff(band.frequency_hz)))
-    return _fitted(band, line, round(0.5 * first.half_power_bandwidth_hz / spacing_hz)) or first
+    half_width = round(0.5 * one.half_power_bandwidth_hz / spacing_hz)
+    return _fitted(band, line, half_width, _MOST_MODES) or first
 
 
-def _basis(frequency_hz: Reals, natural_hz: float, damping: float, degree: int) -> Complexes:
-    """One mode and the powers of a background, each scaled to order one; shape (lines, degree + 2)."""
-    ratio = frequency_hz / natural_hz
-    mode = 2 * damping / (1 - ratio**2 + 2j * damping * ratio)
-    powers = [np.asarray((ratio - 1) ** power, dtype=np.complex128) for power in range(degree + 1)]
-    return np.stack((mode, *powers), axis=1)
+def _jointly_fitted(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
+    """Fit all modes of a band at once, from the single fits; those stand where the modes do not explain it.
+
+    H = sum of (a_k + i w b_k) / (w_k^2 - w^2 + 2 i zeta_k w_k w) + c0 + i w c1 + w^2 c2, all factors real:
+    exact for a linear specimen with any damping. Where these modes do not explain the band, the one about
+    which most is left is taken for two. With impacts nothing explains it, and nothing is gained.
+    """
+    if not found:
+        return ()
+    lines = Lines(band, band.is_significant)
+    start = np.log([[each.frequency_hz, each.damping_ratio] for each in found])
+    for _ in range(_MOST_MODES):
+        if 2 * lines.value.size < 2 * (4 * len(start) + 3):
+            break
+        fit = _best(band, lines, [start])
+        if fit is None:
+            break
+        if fit.explains:
+            return fit.resonances
+        poles = np.log([[each.frequency_hz, each.damping_ratio] for each in fit.resonances])
+        worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
+        rest = np.delete(poles, worst, axis=0)
+        pairs = [np.vstack((rest, two.reshape(2, 2))) for two in _split(poles[worst : worst + 1], 2)]
+        better = _best(band, lines, pairs)
+        if better is None or better.chi_square > fit.chi_square:
+            break
+        start = np.log([[each.frequency_hz, each.damping_ratio] for each in better.resonances])
+    return tuple(found)
 
 
-def _resonance(
-    band: FrequencyResponse,
-    pole: Reals,
-    jacobian: Reals,
-    left: Reals,
-    data: tuple[Reals, Complexes, Reals, float],
-    degree: int,
-) -> Resonance | None:
-    frequency_hz, value, spread, centre_hz = data
-    natural_hz, damping = centre_hz * float(np.exp(pole[0])), float(np.exp(pole[1]))
-    at_a_bound = damping > 0.99 * LARGEST_DAMPING or not frequency_hz[0] <= natural_hz <= frequency_hz[-1]
-    curvature = jacobian.T @ jacobian
-    if at_a_bound or np.linalg.cond(curvature) > 1e14:
-        return None
-    # Two reals of the pole, and two for every complex coefficient.
-    freedom = max(1, left.size - 2 - 2 * (degree + 2))
-    chi_square = float(left @ left) / freedom
-    covariance = np.linalg.inv(curvature) * max(1.0, chi_square)
-    sd_log_frequency, sd_log_damping = np.sqrt(np.diag(covariance))
-    if sd_log_damping > _LARGEST_RELATIVE_SD_DAMPING:
-        return None
-    basis = _basis(frequency_hz, natural_hz, damping, degree)
-    coefficients = np.linalg.lstsq(basis / spread[:, None], value / spread, rcond=None)[0]
-    fine_hz = np.linspace(frequency_hz[0], frequency_hz[-1], 2001)
-    curve = np.abs(_basis(fine_hz, natural_hz, damping, degree) @ coefficients)
-    top = int(np.argmax(curve))
-    # The peak's height follows the residue: it is known as well as the damping, and as the lines at it.
-    near = int(np.argmin(np.abs(frequency_hz - fine_hz[top])))
-    is_resolved = 2 * damping * natural_hz > _RESOLVED_LINES * band.resolution_hz
-    if not is_resolved and spread[near] > _LARGEST_SD_UNRESOLVED * np.abs(value[near]):
-        return None
-    lines_within = max(1.0, 2 * damping * natural_hz / float(np.median(np.diff(frequency_hz))))
-    sd_peak = spread[near] * np.sqrt(max(1.0, chi_square) / lines_within)
-    return Resonance(
-        frequency_hz=natural_hz,
-        sd_frequency_hz=float(natural_hz * sd_log_frequency),
-        damping_ratio=damping,
-        sd_damping_ratio=float(damping * sd_log_damping),
-        peak_frequency_hz=float(fine_hz[top]),
-        peak_magnitude=float(curve[top]),
-        sd_peak_magnitude=float(sd_peak),
-        reduced_chi_square=chi_square,
-        lines_used=frequency_hz.size,
-        is_resolved=is_resolved,
+def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> ModalFit | None:
+    """Fit all modes from each start; the best that determines every mode."""
+    fits = (
+        modal_fit(band, lines, np.ravel(each), np.tile([0.02, 1.0], len(each)), _outside) for each in starts
     )
+    told = [fit for fit in fits if fit is not None and all(_is_told(one, lines) for one in fit.resonances)]
+    return min(told, key=lambda fit: fit.chi_square, default=None)
+
+
+def _outside(frequency_hz: Reals) -> Complexes:
+    """Of modes outside of the band, and of what the channels' phases err: 1, i w and w^2."""
+    scaled = frequency_hz / _USUAL_HZ
+    return np.stack([np.ones_like(frequency_hz), 1j * scaled, scaled**2], axis=1)
 
 
 def _distinct(found: list[Resonance]) -> list[Resonance]:

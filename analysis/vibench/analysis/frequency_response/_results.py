@@ -78,6 +78,8 @@ class FrequencyResponse(Labelled):
     settings: FrequencyResponseSettings
     steady_relative_sd: Reals | None = None
     """As `relative_sd_magnitude`, steadied by neighbouring lines: weights of a fit. None: that is steady."""
+    drive_slope_per_hz: Complexes | None = None
+    """Relative slope of the density that lines average the transmission with; None where it is level."""
     reference_coherence: Reals | None = None
     """For the drive-referenced estimator: the lower of the reference's coherences with the two channels."""
 
@@ -146,6 +148,7 @@ class FrequencyResponse(Labelled):
                 f"no line lies between {low_hz:g} and {high_hz:g} Hz; the lines are at {span}"
             )
         steady, reference = self.steady_relative_sd, self.reference_coherence
+        slope = self.drive_slope_per_hz
         return replace(
             self,
             frequency_hz=self.frequency_hz[kept],
@@ -155,6 +158,7 @@ class FrequencyResponse(Labelled):
             sd_phase_rad=self.sd_phase_rad[kept],
             half_width=self.half_width[kept],
             steady_relative_sd=None if steady is None else steady[kept],
+            drive_slope_per_hz=None if slope is None else slope[kept],
             reference_coherence=None if reference is None else reference[kept],
         )
 

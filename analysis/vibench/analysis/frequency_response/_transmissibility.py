@@ -195,6 +195,7 @@ def frequency_response_of(
             coherence(s_rr, s_xx, products[_REFERENCE, _DRIVE]),
             coherence(s_rr, s_yy, products[_REFERENCE, _RESPONSE]),
         )
+    line_hz = settings.sample_rate_hz / averages.segment_samples
     bandwidth_lines = averages.segment_samples * averages.window_energy / averages.window_sum**2
     return FrequencyResponse(
         frequency_hz=averages.frequency_hz(settings.sample_rate_hz),
@@ -205,11 +206,12 @@ def frequency_response_of(
         sd_phase_rad=spread,
         half_width=student_half_width(spread, averages.n_eff, settings.confidence),
         coherence_significance=coherence_significance(averages.n_eff, settings.confidence),
-        resolution_hz=bandwidth_lines * settings.sample_rate_hz / averages.segment_samples,
+        resolution_hz=bandwidth_lines * line_hz,
         segments_used=averages.segments_used,
         segments_excluded=averages.segments_excluded,
         settings=settings,
         steady_relative_sd=steady_relative_sd(spread, value, power, 2 * (averages.n_eff - 1)),
+        drive_slope_per_hz=_slope(products, value, settings) / line_hz,
         reference_coherence=reference_coherence,
     )
 
@@ -219,3 +221,26 @@ def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexe
         return drive_referenced(products[_REFERENCE, _DRIVE], products[_REFERENCE, _RESPONSE])
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
     return least_squares(settings.estimator, s_xx, s_yy, products[_DRIVE, _RESPONSE], settings.noise_ratio)
+
+
+def _slope(products: Complexes, value: Complexes, settings: FrequencyResponseSettings) -> Complexes:
+    """Give the relative change from line to line of the density P that value = (H P) / P is averaged with.
+
+    It is that of the drive and of what the estimator takes as the instrument: the reference, x for h1, y for h2
+    and r x + H* y for hv with the noise ratio r. What it is held against is level: the reference, else x.
+    """
+    s_xx, s_yx = products[_DRIVE, _DRIVE], products[_RESPONSE, _DRIVE]
+    level = products[-1, -1].real if len(products) > _REFERENCE else s_xx.real
+    match settings.estimator:
+        case Estimator.DRIVE:
+            density = products[_REFERENCE, _DRIVE]
+        case Estimator.H1:
+            density = s_xx
+        case Estimator.H2:
+            density = s_yx
+        case Estimator.HV:
+            density = (settings.noise_ratio or 0.0) * s_xx + value * s_yx
+    with np.errstate(divide="ignore", invalid="ignore"):
+        relative = density / level
+        slope = np.gradient(relative) / relative
+    return np.asarray(np.where(np.abs(slope) < 1, slope, 0.0))

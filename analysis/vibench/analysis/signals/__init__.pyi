@@ -40,6 +40,7 @@ from ._quantity import (
 )
 from ._window import (
     Window as Window,
+    cosine_weights as cosine_weights,
     effective_averages as effective_averages,
     hop_samples as hop_samples,
     line_correlation as line_correlation,

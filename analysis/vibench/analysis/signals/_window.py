@@ -36,8 +36,13 @@ def taper(window: Window | str, samples: int) -> Reals:
     if samples == 1:
         return np.ones(1)
     turns = np.arange(samples) / samples
-    weights = enumerate(_COSINES[named_window(window)])
+    weights = enumerate(cosine_weights(window))
     return np.asarray(sum(w * np.cos(2 * np.pi * order * turns) for order, w in weights), dtype=np.float64)
+
+
+def cosine_weights(window: Window | str) -> tuple[float, ...]:
+    """Give the weights of 1, cos, cos of twice the angle, ... that a window is the sum of."""
+    return _COSINES[named_window(window)]
 
 
 def named_window(window: Window | str) -> Window:
