@@ -47,7 +47,9 @@ class Leakage:
         for order, falling, level in zip(*_autocorrelation(self.window), strict=True):
             once, twice = _exponentials(scaled + 2j * np.pi * order)
             integral += falling * twice + level * once
-        return np.asarray(self.segment_s * integral - slope_per_hz * 1j / (2 * np.pi) * (1 + scaled * integral))
+        return np.asarray(
+            self.segment_s * integral - slope_per_hz * 1j / (2 * np.pi) * (1 + scaled * integral)
+        )
 
     def covariance(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
         """Give the covariance of either part of the lines' errors, lower bands, shape (far lines, lines).
@@ -93,20 +95,22 @@ def leakage_of(found: FrequencyResponse) -> Leakage | None:
 def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[Reals, Reals]:
     """Sum what segments j hops apart share of errors k lines apart.
 
-    Sum over j of (1 - |j| / K) conj(c_j(k)) d_j(k), where c_j(k) transforms w(n) w(n + j D) and belongs to the
-    reference; d_j(k) is the same for noise, and that of w' for ringing.
+    Sum over j of (1 - |j| / K) conj(c_j(k)) d_j(k): c_j(k), of the reference, transforms w(n) w(n + j D);
+    d_j(k) is the same for noise, and that of w' for ringing.
     """
     values = taper(window, _PROXY_SAMPLES)
     weights = cosine_weights(window)
     turns = 2 * np.pi * np.arange(_PROXY_SAMPLES) / _PROXY_SAMPLES
-    slope = -sum(2 * np.pi * k * w * np.sin(k * turns) for k, w in enumerate(weights))
+    slope = np.zeros(_PROXY_SAMPLES)
+    for order, weight in enumerate(weights):
+        slope -= 2 * np.pi * order * weight * np.sin(order * turns)
     hop = hop_samples(_PROXY_SAMPLES, overlap)
     noise, ringing = np.zeros(_FAR_LINES), np.zeros(_FAR_LINES)
     for lag in range(0, min(_PROXY_SAMPLES, segments * hop), hop):
         share = (1 if lag == 0 else 2) * (1 - lag / hop / segments)
         here, there = slice(0, _PROXY_SAMPLES - lag), slice(lag, None)
         reference = np.fft.fft(values[here] * values[there], _PROXY_SAMPLES)[:_FAR_LINES]
-        rung = np.fft.fft((slope * np.ones_like(values))[here] * (slope * np.ones_like(values))[there], _PROXY_SAMPLES)[:_FAR_LINES]
+        rung = np.fft.fft(slope[here] * slope[there], _PROXY_SAMPLES)[:_FAR_LINES]
         noise += share * np.abs(reference) ** 2
         ringing += share * np.real(np.conj(reference) * rung)
     return noise / noise[0], ringing / noise[0]
@@ -126,7 +130,7 @@ def _autocorrelation(window: Window) -> tuple[Reals, Reals, Complexes]:
     np.fill_diagonal(apart, np.inf)
     level = weights * np.sum(weights / apart, axis=1) / (1j * np.pi)
     energy = float(weights @ weights)
-    return order, weights**2 / energy, level / energy
+    return np.asarray(order, dtype=np.float64), weights**2 / energy, np.asarray(level / energy)
 
 
 def _exponentials(exponent: Complexes) -> tuple[Complexes, Complexes]:

@@ -151,8 +151,12 @@ def modal_fit(
         return found, np.asarray(target - columns @ found)
 
     top = np.tile([np.inf, np.log(LARGEST_DAMPING)], start.size // 2)
+
+    def misfit(poles: Reals) -> Reals:
+        return factors(poles)[1]
+
     result = scipy.optimize.least_squares(
-        lambda poles: factors(poles)[1],
+        misfit,
         start,
         bounds=(start - reach, np.minimum(start + reach, np.maximum(top, start + 1e-6))),
         x_scale=reach / 20,
@@ -164,7 +168,7 @@ def modal_fit(
     found, left = factors(poles)
     # How the lines follow poles and factors together, and with what covariance.
     follows = np.hstack((_moved(lambda moved: basis(moved) @ found, poles), basis(poles)))
-    curvature = follows.T @ follows
+    curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
     freedom = left.size - follows.shape[1]
     if freedom < 1 or not result.success or np.linalg.cond(_scaled(curvature)) > _WORST_CONDITION:
         return None
@@ -179,14 +183,17 @@ def modal_fit(
         natural_hz, damping = np.exp(poles[2 * mode : 2 * mode + 2]).tolist()
         half_hz = damping * natural_hz
         away_hz = np.abs(lines.frequency_hz - natural_hz)
-        about = away_hz <= max(2 * half_hz, float(np.sort(away_hz)[min(_LEAST_LINES_ABOUT, away_hz.size) - 1]))
+        nearest_hz = float(np.sort(away_hz)[min(_LEAST_LINES_ABOUT, away_hz.size) - 1])
+        about = away_hz <= max(2 * half_hz, nearest_hz)
         share = freedom / left.size
         beside = 2 * float(np.count_nonzero(about)) * share
         nearby = float(np.sum(squares[about])) / beside
         widened = max(1.0, chi_square, nearby)
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
-        fine_hz = np.clip(np.linspace(natural_hz - 2 * half_hz, natural_hz + 2 * half_hz, _FINE_POINTS), *ends_hz)
+        fine_hz = np.clip(
+            np.linspace(natural_hz - 2 * half_hz, natural_hz + 2 * half_hz, _FINE_POINTS), *ends_hz
+        )
         height = np.abs(curve(fine_hz, poles) @ found)
         top_hz = fine_hz[[int(np.argmax(height))]]
         value = curve(top_hz, poles) @ found
