@@ -227,7 +227,8 @@ def _slope(products: Complexes, value: Complexes, settings: FrequencyResponseSet
     """Give the relative change from line to line of the density P that value = (H P) / P is averaged with.
 
     It is that of the drive and of the estimator's instrument: the reference, x for h1, y for h2, and for hv
-    r x + H* y with the noise ratio r. The density it is compared with is taken as level: the reference, else x.
+    r x + H* y with the noise ratio r.
+    It is compared with the reference, else with x, which are taken as level.
     """
     s_xx, s_yx = products[_DRIVE, _DRIVE], products[_RESPONSE, _DRIVE]
     level = products[-1, -1].real if len(products) > _REFERENCE else s_xx.real
