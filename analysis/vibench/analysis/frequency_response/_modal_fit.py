@@ -21,6 +21,8 @@ _MOST_STEPS = 40
 _STEADY_AVERAGES = 49.0
 """Averages that scatter steadied by neighbouring lines is worth."""
 _LEAST_LINES_ABOUT = 8
+_EDGE = 1e-3
+"""Of its reach within which a fit ends at a bound: it has found no minimum."""
 
 
 class Lines:
@@ -152,25 +154,29 @@ def modal_fit(
 
     top = np.tile([np.inf, np.log(LARGEST_DAMPING)], start.size // 2)
 
+    low, high = start - reach, np.minimum(start + reach, np.maximum(top, start + 1e-6))
+
     def misfit(poles: Reals) -> Reals:
         return factors(poles)[1]
 
     result = scipy.optimize.least_squares(
         misfit,
         start,
-        bounds=(start - reach, np.minimum(start + reach, np.maximum(top, start + 1e-6))),
+        bounds=(low, high),
         x_scale=reach / 20,
         xtol=1e-9,
         ftol=1e-9,
         max_nfev=_MOST_STEPS,
     )
     poles = np.asarray(result.x, dtype=np.float64)
+    if not result.success or np.any(np.minimum(poles - low, high - poles) < _EDGE * reach):
+        return None
     found, left = factors(poles)
     # How the lines follow poles and factors together, and with what covariance.
     follows = np.hstack((_moved(lambda moved: basis(moved) @ found, poles), basis(poles)))
     curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
     freedom = left.size - follows.shape[1]
-    if freedom < 1 or not result.success or np.linalg.cond(_scaled(curvature)) > _WORST_CONDITION:
+    if freedom < 1 or np.linalg.cond(_scaled(curvature)) > _WORST_CONDITION:
         return None
     squares = lines.squares(left)
     chi_square = float(np.sum(squares)) / freedom

@@ -27,8 +27,8 @@ _REACH_DAMPING = 4.0
 _USUAL_HZ = 300.0
 """Scales the background."""
 _LARGEST_SD_UNRESOLVED = 0.1
-"""A peak too narrow for the lines is believed only where they are known to a tenth: else it is one of the
-ripples on top of a broad hill."""
+"""Believe a peak too narrow for the lines only where its line or its damping is known to a tenth: else it
+is a ripple on top of a broad hill."""
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
 _LARGEST_RELATIVE_SD_DAMPING = 0.5
@@ -212,7 +212,8 @@ def _is_told(found: Resonance, lines: Lines) -> bool:
         return False
     if found.sd_damping_ratio > _LARGEST_RELATIVE_SD_DAMPING * damping:
         return False
-    return found.is_resolved or lines.relative_sd(natural_hz) <= _LARGEST_SD_UNRESOLVED
+    known = min(lines.relative_sd(natural_hz), found.sd_damping_ratio / damping)
+    return found.is_resolved or known <= _LARGEST_SD_UNRESOLVED
 
 
 def _refitted(band: FrequencyResponse, first: ModalFit | None) -> ModalFit | None:
@@ -272,9 +273,9 @@ def _outside(frequency_hz: Reals) -> Complexes:
 
 
 def _distinct(found: list[Resonance]) -> list[Resonance]:
-    """Two ripples of one resonance give the same pole; keep the fit that knows it better."""
+    """Keep one fit of each pole: two ripples of one resonance give the same."""
     kept: list[Resonance] = []
-    for each in sorted(found, key=lambda one: one.sd_damping_ratio / one.damping_ratio):
+    for each in sorted(found, key=_doubt):
         half = 0.5 * each.half_power_bandwidth_hz
         if all(
             abs(each.frequency_hz - other.frequency_hz) > max(half, 0.5 * other.half_power_bandwidth_hz)
@@ -282,3 +283,8 @@ def _distinct(found: list[Resonance]) -> list[Resonance]:
         ):
             kept.append(each)
     return sorted(kept, key=lambda one: one.frequency_hz)
+
+
+def _doubt(found: Resonance) -> tuple[bool, float]:
+    """Rank fits that explain their lines first, and these by the relative uncertainty of their damping."""
+    return not found.is_explained, found.sd_damping_ratio / found.damping_ratio
