@@ -65,7 +65,8 @@ class Leakage:
         steps_hz = np.gradient(line / self.segment_s)
         ringing = np.gradient(value) / steps_hz * np.sqrt(self.ringing[0])
         most = np.sqrt(1 - _LEAST_NOISE) * spread
-        ringing *= np.minimum(1.0, most / np.maximum(np.abs(ringing), np.finfo(float).tiny))
+        size = np.abs(ringing)
+        ringing *= np.divide(most, size, out=np.ones_like(size), where=size > most)
         noise = np.sqrt(spread**2 - np.abs(ringing) ** 2)
         bands = np.zeros((_FAR_LINES, line.size), dtype=np.complex128)
         for off in range(min(_FAR_LINES, line.size)):

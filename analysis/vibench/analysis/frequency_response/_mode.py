@@ -38,6 +38,16 @@ class Resonance:
         return self.reduced_chi_square <= max(self.chi_square_limit, WELL_FITTED)
 
     @property
+    def remark(self) -> str:
+        """Sentence about a fit that does not describe its lines; empty where it does."""
+        if self.is_explained:
+            return ""
+        return (
+            f"one mode does not describe the lines about {self.frequency_hz:.5g} Hz (reduced chi² = "
+            f"{self.reduced_chi_square:.3g}, at most {max(self.chi_square_limit, WELL_FITTED):.3g} by chance)"
+        )
+
+    @property
     def quality_factor(self) -> float:
         """1 / (2 damping ratio)."""
         return 0.5 / self.damping_ratio

@@ -31,7 +31,7 @@ _LARGEST_SD_UNRESOLVED = 0.1
 is a ripple on top of a broad hill."""
 _BACKGROUND_DEGREES = (1, 2, 3)
 """Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
-_LARGEST_RELATIVE_SD_DAMPING = 0.5
+_LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
 """Past it the damping is not significantly above zero: a ripple of noisy lines, and no resonance."""
 
 

@@ -1,6 +1,6 @@
 """Noise: the transmission from base to m0, its resonances, and what JSON says of them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -21,7 +21,7 @@ from ..frequency_response import (
     streamed_response,
 )
 from ..model import Draw, NoiseOverlay, SimulatedChannels, noise_overlay, noise_quantities
-from ..recordings import Channels, RecordingFacts, measurement_checks
+from ..recordings import Channels, Check, RecordingFacts, Verdict, measurement_checks
 from ..tables import named
 from ..uncertainty import noise_budgets
 from ._analysis_kind import AnalysisKind, Json
@@ -85,8 +85,16 @@ def _resonance(found: Resonance) -> Json:
     return {
         **named(found, "frequency_hz", "sd_frequency_hz", "damping_ratio", "sd_damping_ratio"),
         **named(found, "peak_frequency_hz", "peak_magnitude", "sd_peak_magnitude"),
+        **named(found, "reduced_chi_square", "chi_square_limit", "remark"),
         "is_resolved": bool(found.is_resolved),
     }
+
+
+def _unexplained(found: Sequence[Resonance]) -> Iterator[Check]:
+    """Warn of resonances whose fit does not describe the lines."""
+    remarks = [each.remark for each in found if each.remark]
+    if remarks:
+        yield Check("Resonances", Verdict.WARNING, "; ".join(remarks))
 
 
 def _simulated(laid: NoiseOverlay) -> Json:
@@ -100,7 +108,8 @@ def _noise(
         facts: RecordingFacts, channels: Channels, plan: Noise, request: FrequencyResponseRequest
     ) -> NoiseAnalysis:
         response = estimate(channels, plan, request)
-        return NoiseAnalysis(facts, measurement_checks(facts), plan, response, request)
+        checks = (*measurement_checks(facts), *_unexplained(response.resonances))
+        return NoiseAnalysis(facts, checks, plan, response, request)
 
     def draw(analysis: NoiseAnalysis, channels: SimulatedChannels) -> Draw[NoiseResponse]:
         response = again(analysis)(channels, analysis.excitation, analysis.request)

@@ -26,7 +26,8 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
             f"{result.laid.difference.median_abs_db:.2g} dB away (median) and strikes "
             f"{result.laid.run.impact_rate_hz:.0f} times per second{agreement_text(result.laid)}"
         )
-    yield " ".join([f"{text}.", *feedback_sentences(result.analysis.facts.feedback)])
+    remarks = "".join(f"; {each.remark}" for each in result.analysis.response.resonances if each.remark)
+    yield " ".join([f"{text}{remarks}.", *feedback_sentences(result.analysis.facts.feedback)])
 
 
 def sweep_findings(result: SweepResult) -> Iterator[str]:

@@ -1,0 +1,131 @@
+"""How often bounds of the resonances of streamed noise hold, on signals whose truth is a closed form.
+
+    python benchmarks/resonance_coverage.py --count 20 --seed 1
+    python benchmarks/resonance_coverage.py --count 20 --seed 1 --shard 1/10 --save part1.json
+
+Each scene is one mode with a damping ratio, a window and sensor noise, or two modes close to each other.
+A row gives how many of its modes were found, and in how many k = 2 holds frequency, damping and peak. A
+mode that is reported, explained and more than five standard deviations off is counted as wrong.
+"""
+
+import argparse
+import json
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
+from vibench.analysis.frequency_response import resonances, transmissibility
+
+RATE_HZ = 1024.0
+SECONDS = 60.0
+SEGMENT_SAMPLES = 4096
+WINDOWS = {"hann": 0.5, "blackmanharris": 0.75, "flattop": 0.75, "boxcar": 0.0}
+"""With the overlap of their segments."""
+DAMPINGS = (0.0005, 0.0015, 0.005, 0.015, 0.05)
+APART = (1.0, 2.0)
+"""Distance of two close modes, in half-power bandwidths."""
+NOISES = (0.001, 0.05)
+"""Of the response's sensor, relative to the response."""
+BAND_HZ = (80.0, 400.0)
+WRONG = 5.0
+
+Mode = tuple[float, float, float]
+"""Natural frequency [Hz], damping ratio and static share."""
+
+
+def transmission(frequency_hz: np.ndarray, modes: list[Mode]) -> np.ndarray:
+    """Give 1 + sum of share / (1 - r^2 + 2 i zeta r)."""
+    value = np.ones(frequency_hz.size, dtype=complex)
+    for natural_hz, damping, share in modes:
+        ratio = frequency_hz / natural_hz
+        value += share / (1 - ratio**2 + 2j * damping * ratio)
+    return value
+
+
+def peak(modes: list[Mode], natural_hz: float, damping: float) -> float:
+    """Give the largest magnitude about a mode."""
+    fine_hz = natural_hz * (1 + np.linspace(-2 * damping, 2 * damping, 20001))
+    return float(np.abs(transmission(fine_hz, modes)).max())
+
+
+def scenes() -> Iterator[tuple[str, str, float, list[Mode]]]:
+    """Name, window, noise and modes of every scene."""
+    for window, damping, noise in product(WINDOWS, DAMPINGS, NOISES):
+        yield f"{window:15} {damping:7.2%} noise {noise:g}", window, noise, [(200.0, damping, 1.0)]
+    for window, apart in product(WINDOWS, APART):
+        second_hz = 200.0 * (1 + 2 * 0.01 * apart)
+        modes = [(200.0, 0.01, 1.0), (second_hz, 0.01, 1.0)]
+        yield f"{window:15}   1.00% two, {apart:g} bandwidths", window, 0.01, modes
+
+
+def scores(window: str, noise: float, modes: list[Mode], rng: np.random.Generator) -> dict:
+    """Measure once: errors over standard deviations of each mode that was found."""
+    samples = int(SECONDS * RATE_HZ)
+    drive = rng.standard_normal(samples)
+    spectrum = np.fft.rfft(drive)
+    response = np.fft.irfft(spectrum * transmission(np.fft.rfftfreq(samples, 1 / RATE_HZ), modes), samples)
+    response += noise * np.std(response) * rng.standard_normal(samples)
+    lines = transmissibility(
+        drive,
+        response,
+        RATE_HZ,
+        segment_samples=SEGMENT_SAMPLES,
+        window=window,
+        overlap=WINDOWS[window],
+        estimator="drive",
+        reference=drive,
+    )
+    errors, wrong = [], 0
+    for each in resonances(lines, low_hz=BAND_HZ[0], high_hz=BAND_HZ[1]):
+        natural_hz, damping, _ = min(modes, key=lambda mode: abs(mode[0] - each.frequency_hz))
+        error = [
+            (each.frequency_hz - natural_hz) / each.sd_frequency_hz,
+            (each.damping_ratio - damping) / each.sd_damping_ratio,
+            (each.peak_magnitude - peak(modes, natural_hz, damping)) / each.sd_peak_magnitude,
+        ]
+        errors.append(error)
+        wrong += each.is_explained and max(map(abs, error[:2])) > WRONG
+    return {"modes": len(modes), "errors": errors, "wrong": int(wrong)}
+
+
+def main() -> None:
+    """Run the scenes of a shard and print a row for each."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--count", type=int, default=20, help="measurements of each scene")
+    parser.add_argument("--scenes", default="", help="only scenes whose names hold this text")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--shard", default="1/1", help="which part of the measurements: 3/10 is the third of ten"
+    )
+    parser.add_argument(
+        "--save", type=Path, metavar="FILE.json", help="keep every error; resumed where it exists"
+    )
+    args = parser.parse_args()
+    part, parts = map(int, args.shard.split("/"))
+    kept = json.loads(args.save.read_text()) if args.save and args.save.exists() else {}
+    for number, (name, window, noise, modes) in enumerate(scenes()):
+        if args.scenes not in name:
+            continue
+        row = kept.setdefault(name, {})
+        for draw in range(part - 1, args.count, parts):
+            if str(draw) not in row:
+                rng = np.random.default_rng((args.seed, number, draw))
+                row[str(draw)] = scores(window, noise, modes, rng)
+        if args.save:
+            args.save.write_text(json.dumps(kept))
+        errors = np.array([error for one in row.values() for error in one["errors"]]).reshape(-1, 3)
+        held = [f"{np.mean(np.abs(column) < 2):5.0%}" for column in errors.T] if errors.size else []
+        bias = np.round(errors.mean(axis=0), 1).tolist() if errors.size else []
+        total = sum(one["modes"] for one in row.values())
+        wrong = sum(one["wrong"] for one in row.values())
+        print(
+            f"{name:42} found {len(errors):3}/{total:3} wrong {wrong:2}  held {' '.join(held)}  mean {bias}",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
