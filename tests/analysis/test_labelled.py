@@ -163,7 +163,8 @@ def wholes():
 
 
 _PURE = """
-averages block_points blocks cells chi_square_limit coherence coherence_significance collides confidence covariance
+averages block_points blocks cells chi_square_limit coherence coherence_significance collides confidence
+covariance
 damping_ratio damping_ratios differs dimension dimension_high dimension_low distortion distortion_share
 down draws dropouts edge_samples ends error_estimate events exponent first first_sample half_width holdable
 impact_cell impacts index innovation_level is_colliding is_unexplained is_significant is_similar is_stable

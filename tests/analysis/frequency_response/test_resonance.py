@@ -127,6 +127,54 @@ def test_a_resonance_is_found_in_noise_records_and_its_resolution_is_judged():
     assert smeared.damping_ratio > found.damping_ratio
 
 
+def _streamed(rng, modes, noise, window="hann", seconds=60):
+    """Lines of streamed noise through modes (natural frequency, damping ratio), 0.25 Hz apart."""
+    rate, samples = 1024.0, int(1024 * seconds)
+    drive = rng.standard_normal(samples)
+    frequency_hz = np.fft.rfftfreq(samples, 1 / rate)
+    through = 1 + sum(single(frequency_hz, *mode) for mode in modes)
+    response = np.fft.irfft(np.fft.rfft(drive) * through, samples)
+    response += noise * np.std(response) * rng.standard_normal(samples)
+    settings = {"segment_samples": 4096, "window": window, "estimator": "drive", "reference": drive}
+    return transmissibility(drive, response, rate, **settings)
+
+
+def _z(found, natural_hz, damping):
+    return (
+        (found.frequency_hz - natural_hz) / found.sd_frequency_hz,
+        (found.damping_ratio - damping) / found.sd_damping_ratio,
+    )
+
+
+def test_a_mode_narrower_than_a_line_is_not_reported_wider():
+    modes = [(95.0, 0.0012), (266.0, 0.0033)]
+    errors = []
+    for seed in range(3):
+        found = resonances(_streamed(np.random.default_rng(seed), modes, 0.05), low_hz=50, high_hz=400)
+        errors += [_z(each, *modes[0]) for each in found if each.frequency_hz < 200]
+    assert errors
+    assert np.max(np.abs(errors)) < 3.5
+
+
+@pytest.mark.parametrize("window", ["hann", "blackmanharris", "flattop"])
+def test_bounds_of_streamed_noise_hold_under_every_window(window):
+    errors = []
+    for seed in range(4):
+        lines = _streamed(np.random.default_rng(seed), [(200.0, 0.005)], 0.02, window)
+        (found,) = resonances(lines, low_hz=150, high_hz=250)
+        errors.append(_z(found, 200.0, 0.005))
+    assert np.max(np.abs(errors)) < 3.5
+
+
+def test_two_close_modes_are_two_or_remarked():
+    modes = [(200.0, 0.01), (202.0, 0.01)]
+    found = resonances(_streamed(np.random.default_rng(5), modes, 0.01), low_hz=150, high_hz=250)
+    assert found
+    for each in found:
+        nearest = min(np.max(np.abs(_z(each, *mode))) for mode in modes)
+        assert nearest < 3.5 or "does not describe" in each.remark
+
+
 def test_noise_has_no_resonance():
     x, y = np.random.default_rng(3).standard_normal((2, 100_000))
     assert resonances(transmissibility(x, y, 5120.0, segment_samples=2048), low_hz=50, high_hz=2000) == ()

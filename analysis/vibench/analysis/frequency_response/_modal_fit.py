@@ -53,6 +53,12 @@ class Lines:
             bands = self._leakage.covariance(number, self.value, self._spread)
             self._root = np.asarray(scipy.linalg.cholesky_banded(bands, lower=True))
 
+    @property
+    def narrowest_hz(self) -> float:
+        """Half-power bandwidth [Hz] below which a boxcar tells no damping: its leakage is not local."""
+        leakage = self._leakage
+        return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
+
     def independent(self, columns: Complexes) -> Reals:
         """Turn complex values of the lines into real ones of variance one, shape (2 lines, ...)."""
         if self._root is None:

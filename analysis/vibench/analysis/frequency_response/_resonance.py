@@ -212,6 +212,8 @@ def _is_told(found: Resonance, lines: Lines) -> bool:
         return False
     if found.sd_damping_ratio > _LARGEST_RELATIVE_SD_DAMPING * damping:
         return False
+    if found.half_power_bandwidth_hz < lines.narrowest_hz:
+        return False
     known = min(lines.relative_sd(natural_hz), found.sd_damping_ratio / damping)
     return found.is_resolved or known <= _LARGEST_SD_UNRESOLVED
 
