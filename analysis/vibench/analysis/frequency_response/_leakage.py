@@ -51,32 +51,33 @@ class Leakage:
             self.segment_s * integral - slope_per_hz * 1j / (2 * np.pi) * (1 + scaled * integral)
         )
 
-    def covariance(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Give the covariance of either part of the lines' errors, lower bands, shape (far lines, lines).
+    def rung(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
+        """Give the standard deviation of either part of a line's error from cut-off ringing, along dH/df.
 
         Parameters
         ----------
         line
             Numbers of the lines, rising.
         value, spread
-            Of the transmission there, and the standard deviation of either part of it.
+            Of the transmission there, and the standard deviation of either part of it, which bounds the result.
 
         """
-        steps_hz = np.gradient(line / self.segment_s)
-        ringing = np.gradient(value) / steps_hz * np.sqrt(self.ringing[0])
-        most = np.sqrt(1 - _LEAST_NOISE) * spread
-        size = np.abs(ringing)
-        ringing *= np.divide(most, size, out=np.ones_like(size), where=size > most)
-        noise = np.sqrt(spread**2 - np.abs(ringing) ** 2)
+        ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
+        most, size = np.sqrt(1 - _LEAST_NOISE) * spread, np.abs(ringing)
+        return np.asarray(ringing * np.divide(most, size, out=np.ones_like(size), where=size > most))
+
+    def covariance(self, line: Integers, rung: Complexes, spread: Reals) -> Complexes:
+        """Give the covariance of either part of the lines' errors, lower bands, shape (far lines, lines)."""
+        noise = np.sqrt(spread**2 - np.abs(rung) ** 2)
+        alike = self.ringing / (self.ringing[0] or 1.0)
         bands = np.zeros((_FAR_LINES, line.size), dtype=np.complex128)
         for off in range(min(_FAR_LINES, line.size)):
             here, there = slice(0, line.size - off), slice(off, None)
             apart = line[there] - line[here]
             near = apart < _FAR_LINES
             apart = np.where(near, apart, 0)
-            common = self.noise[apart] * noise[here] * noise[there]
-            rung = self.ringing[apart] / self.ringing[0] if self.ringing[0] > 0 else 0.0
-            bands[off, here] = near * (common + rung * ringing[there] * np.conj(ringing[here]))
+            noisy = self.noise[apart] * noise[here] * noise[there]
+            bands[off, here] = near * (noisy + alike[apart] * rung[there] * np.conj(rung[here]))
         return bands
 
 

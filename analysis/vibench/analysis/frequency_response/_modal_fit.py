@@ -48,9 +48,13 @@ class Lines:
         # Scatter of few averages is steadied, elsewhere it is each line's own.
         self._averages = band.n_eff if band.steady_relative_sd is None else max(band.n_eff, _STEADY_AVERAGES)
         self._root: Complexes | None = None
+        self.ringing_share = np.zeros(self.value.size)
+        """Of the variance of each line's error, what cut-off ringing makes; all of it with a boxcar."""
         if self._leakage is not None and self.value.size:
             number = np.rint(self.frequency_hz * self._leakage.segment_s).astype(np.int64)
-            bands = self._leakage.covariance(number, self.value, self._spread)
+            rung = self._leakage.rung(number, self.value, self._spread)
+            bands = self._leakage.covariance(number, rung, self._spread)
+            self.ringing_share += 1.0 if self.narrowest_hz else np.abs(rung / self._spread) ** 2
             self._root = np.asarray(scipy.linalg.cholesky_banded(bands, lower=True))
 
     @property
@@ -117,8 +121,6 @@ class ModalFit:
     chi_square: float
     """Per degree of freedom, of all lines."""
     freedom: int
-    squares: Reals
-    """Chi square of each line, 2 degrees of freedom where the fit is right."""
 
     @property
     def explains(self) -> bool:
@@ -200,7 +202,9 @@ def modal_fit(
         share = freedom / left.size
         beside = 2 * float(np.count_nonzero(about)) * share
         nearby = float(np.sum(squares[about])) / beside
-        widened = max(1.0, chi_square, nearby)
+        # Ringing is the drive's own: its errors correlate with the conjugates of others too, by so much that
+        # the variance of a fitted number is up to twice what covariances of the lines give.
+        widened = max(1.0, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
         fine_hz = np.clip(
@@ -225,7 +229,7 @@ def modal_fit(
             is_resolved=2 * half_hz > RESOLVED_LINES * band.resolution_hz,
         )
 
-    return ModalFit(tuple(resonance(mode) for mode in range(poles.size // 2)), chi_square, freedom, squares)
+    return ModalFit(tuple(resonance(mode) for mode in range(poles.size // 2)), chi_square, freedom)
 
 
 def _scaled(curvature: Reals) -> Reals:
