@@ -59,7 +59,7 @@ class Leakage:
         line
             Numbers of the lines, rising.
         value, spread
-            Of the transmission there, and the standard deviation of either part of it, which bounds the result.
+            Of the transmission there; the standard deviation of either part of it bounds the result.
 
         """
         ringing = np.gradient(value) / np.gradient(line / self.segment_s) * np.sqrt(self.ringing[0])
