@@ -43,9 +43,11 @@ class Leakage:
         g [1/Hz] adds g i / (2 pi) (-1 - z I).
         """
         scaled = (pole - 2j * np.pi * frequency_hz) * self.segment_s
+        # Lines are whole turns apart in a segment, and so are the orders of a window.
+        rest = complex(np.expm1(pole * self.segment_s))
         integral = np.zeros_like(scaled)
         for order, falling, level in zip(*_autocorrelation(self.window), strict=True):
-            once, twice = _exponentials(scaled + 2j * np.pi * order)
+            once, twice = _exponentials(scaled + 2j * np.pi * order, rest)
             integral += falling * twice + level * once
         return np.asarray(
             self.segment_s * integral - slope_per_hz * 1j / (2 * np.pi) * (1 + scaled * integral)
@@ -135,11 +137,11 @@ def _autocorrelation(window: Window) -> tuple[Reals, Reals, Complexes]:
     return np.asarray(order, dtype=np.float64), weights**2 / energy, np.asarray(level / energy)
 
 
-def _exponentials(exponent: Complexes) -> tuple[Complexes, Complexes]:
-    """Integrate exp(q t) and (1 - t) exp(q t) over 0 to 1."""
+def _exponentials(exponent: Complexes, rest: complex) -> tuple[Complexes, Complexes]:
+    """Integrate exp(q t) and (1 - t) exp(q t) over 0 to 1, from q and `rest` = exp(q) - 1."""
     near = np.abs(exponent) < _NEAR
     q = np.where(near, 1.0, exponent)
-    once, small = np.expm1(q) / q, np.where(near, exponent, 0.0)
+    once, small = rest / q, np.where(near, exponent, 0.0)
     first = 1 + small / 2 * (1 + small / 3 * (1 + small / 4 * (1 + small / 5)))
     second = 0.5 * (1 + small / 3 * (1 + small / 4 * (1 + small / 5 * (1 + small / 6))))
     return np.where(near, first, once), np.where(near, second, (once - 1) / q)

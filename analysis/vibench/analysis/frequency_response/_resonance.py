@@ -130,8 +130,11 @@ def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
     lines, about = scipy.signal.find_peaks(size, prominence=0.0)
     result = []
     for line, rise in zip(lines, about["prominences"], strict=True):
-        if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line]:
-            result.append((int(line), _half_power_lines(size, int(line))))
+        width = _half_power_lines(size, int(line))
+        # Peaks as wide as the band are fitted with the same lines: one of them does.
+        is_wide = 2 * width >= size.size - 1 and line != np.argmax(size)
+        if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line] and not is_wide:
+            result.append((int(line), width))
     return result
 
 
