@@ -9,7 +9,7 @@ import scipy
 from ..errors import InvalidRequest
 from ..signals import Complexes, Reals, standard_uncertainty
 from ._modal_fit import Background, Lines, ModalFit, modal_fit
-from ._mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, WELL_FITTED, Resonance
+from ._mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, Resonance
 from ._results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
@@ -59,13 +59,12 @@ def resonances(
             f"{band.frequency_hz.size} lines lie between {low_hz:g} and {high_hz:g} Hz; a fit needs at least "
             f"{_LEAST_LINES}"
         )
-    found: list[Resonance] = []
+    found: list[tuple[Resonance, ...]] = []
     if band.steady_relative_sd is not None:
         band = replace(band, relative_sd_magnitude=band.steady_relative_sd)
     for line, width in _significant_peaks(band):
-        fit = _refitted(band, _fitted(band, line, width, 1))
-        if fit is not None:
-            found += [each for each in fit.resonances if low_hz <= each.frequency_hz <= high_hz]
+        together = _refitted(band, width, _fitted(band, line, width, 1))
+        found.append(tuple(each for each in together if low_hz <= each.frequency_hz <= high_hz))
     return _jointly_fitted(band, _distinct(found))
 
 
@@ -154,34 +153,32 @@ def _half_power_lines(size: Reals, line: int) -> int:
     return int(np.min(np.abs(below - line))) if below.size else size.size // 2
 
 
-def _fitted(band: FrequencyResponse, line: int, half_width: int, most: int) -> ModalFit | None:
+def _fitted(band: FrequencyResponse, line: int, half_width: int, most: int) -> tuple[Resonance, ...]:
     """Fit the lines about a peak with one mode, or with as many as explain them, up to a number."""
     reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
     chosen = np.zeros(band.frequency_hz.size, dtype=np.bool_)
     chosen[max(0, line - reach) : line + reach + 1] = True
     lines = Lines(band, chosen)
     if lines.value.size < _LEAST_LINES:
-        return None
+        return ()
     centre_hz = float(band.frequency_hz[line])
     spacing_hz = float(np.median(np.diff(lines.frequency_hz)))
     damping = float(np.clip(max(half_width, 0.5) * spacing_hz / centre_hz, 2e-6, 0.9 * LARGEST_DAMPING))
     span = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / centre_hz
-    first: ModalFit | None = None
+    first: tuple[Resonance, ...] = ()
     start = np.array([[np.log(centre_hz), np.log(damping)]])
     for modes in range(1, most + 1):
         for degree in _BACKGROUND_DEGREES if modes == 1 else _BACKGROUND_DEGREES[1:2]:
             for split in _split(start, modes):
                 reaches = np.tile([span, _REACH_DAMPING], modes)
                 fit = modal_fit(band, lines, split, reaches, _powers(centre_hz, degree))
-                if fit is None or not all(_is_told(each, lines) for each in fit.resonances):
-                    continue
-                first = fit if modes == 1 else first
-                if fit.explains:
-                    return fit
-        if first is None or first.chi_square < WELL_FITTED:
-            return first
-        (one,) = first.resonances
-        start = np.log([[one.frequency_hz, one.damping_ratio]])
+                told = () if fit is None else _told(fit, lines)
+                if fit is not None and told and fit.explains:
+                    return told
+                first = told if modes == 1 and told else first
+        if not first:
+            return ()
+        start = _poles(first)
     return first
 
 
@@ -221,15 +218,20 @@ def _is_told(found: Resonance, lines: Lines) -> bool:
     return found.is_resolved or known <= _LARGEST_SD_UNRESOLVED
 
 
-def _refitted(band: FrequencyResponse, first: ModalFit | None) -> ModalFit | None:
-    """Fit once more over the bandwidth found: the first width was read off single, noisy lines."""
-    if first is None:
-        return None
-    (one,) = first.resonances
+def _refitted(
+    band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...]
+) -> tuple[Resonance, ...]:
+    """Fit once more over the bandwidth found: the first width was read off single, noisy lines.
+
+    What one mode does not describe is fitted over all its lines: a background follows fewer.
+    """
+    if not first:
+        return ()
+    (one,) = first
     line = int(np.argmin(np.abs(band.frequency_hz - one.frequency_hz)))
     spacing_hz = float(np.median(np.diff(band.frequency_hz)))
-    half_width = round(0.5 * one.half_power_bandwidth_hz / spacing_hz)
-    return _fitted(band, line, half_width, _MOST_MODES) or first
+    found = round(0.5 * one.half_power_bandwidth_hz / spacing_hz)
+    return _fitted(band, line, found if one.is_explained else max(found, half_width), _MOST_MODES) or first
 
 
 def _jointly_fitted(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
@@ -242,33 +244,41 @@ def _jointly_fitted(band: FrequencyResponse, found: list[Resonance]) -> tuple[Re
     if not found:
         return ()
     lines = Lines(band, band.is_significant)
-    start = np.log([[each.frequency_hz, each.damping_ratio] for each in found])
+    starts = [_poles(found)]
+    last = np.inf
     for _ in range(_MOST_MODES):
-        if 2 * lines.value.size < 2 * (4 * len(start) + 3):
+        if 2 * lines.value.size < 2 * (4 * len(starts[0]) + 3):
             break
-        fit = _best(band, lines, [start])
-        if fit is None:
+        fit = _best(band, lines, starts)
+        if fit is None or fit.chi_square > last:
             break
-        if fit.explains:
-            return fit.resonances
-        poles = np.log([[each.frequency_hz, each.damping_ratio] for each in fit.resonances])
+        told = _told(fit, lines)
+        if fit.explains and told:
+            return told
+        last, poles = fit.chi_square, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
         rest = np.delete(poles, worst, axis=0)
-        pairs = [np.vstack((rest, two.reshape(2, 2))) for two in _split(poles[worst : worst + 1], 2)]
-        better = _best(band, lines, pairs)
-        if better is None or better.chi_square > fit.chi_square:
-            break
-        start = np.log([[each.frequency_hz, each.damping_ratio] for each in better.resonances])
+        starts = [np.vstack((rest, two.reshape(2, 2))) for two in _split(poles[worst : worst + 1], 2)]
     return tuple(found)
 
 
 def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> ModalFit | None:
-    """Fit all modes from each start; the best that determines every mode."""
+    """Fit all modes from each start; the best of these."""
     fits = (
         modal_fit(band, lines, np.ravel(each), np.tile([0.02, 1.0], len(each)), _outside) for each in starts
     )
-    told = [fit for fit in fits if fit is not None and all(_is_told(one, lines) for one in fit.resonances)]
-    return min(told, key=lambda fit: fit.chi_square, default=None)
+    return min((fit for fit in fits if fit is not None), key=lambda fit: fit.chi_square, default=None)
+
+
+def _told(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
+    """Give the modes of a fit that its lines determine, in the order of frequency."""
+    told = (each for each in fit.resonances if _is_told(each, lines))
+    return tuple(sorted(told, key=lambda one: one.frequency_hz))
+
+
+def _poles(found: Sequence[Resonance]) -> Reals:
+    """Logarithms of natural frequency and damping ratio, shape (modes, 2)."""
+    return np.log([[each.frequency_hz, each.damping_ratio] for each in found])
 
 
 def _outside(frequency_hz: Reals) -> Complexes:
@@ -277,16 +287,18 @@ def _outside(frequency_hz: Reals) -> Complexes:
     return np.stack([np.ones_like(frequency_hz), 1j * scaled, scaled**2], axis=1)
 
 
-def _distinct(found: list[Resonance]) -> list[Resonance]:
+def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
     """Keep one fit of each pole: two ripples of one resonance give the same."""
     kept: list[Resonance] = []
-    for each in sorted(found, key=_doubt):
-        half = 0.5 * each.half_power_bandwidth_hz
-        if all(
-            abs(each.frequency_hz - other.frequency_hz) > max(half, 0.5 * other.half_power_bandwidth_hz)
-            for other in kept
-        ):
-            kept.append(each)
+    for together in sorted(filter(None, found), key=lambda fit: min(map(_doubt, fit))):
+        known = tuple(kept)
+        for each in together:
+            half = 0.5 * each.half_power_bandwidth_hz
+            if all(
+                abs(each.frequency_hz - other.frequency_hz) > max(half, 0.5 * other.half_power_bandwidth_hz)
+                for other in known
+            ):
+                kept.append(each)
     return sorted(kept, key=lambda one: one.frequency_hz)
 
 
