@@ -32,9 +32,18 @@ def synthetic():
 
 @pytest.fixture(scope="module")
 def analysed(synthetic, tmp_path_factory):
-    """Analyse a mass that moves twice as far as its base, plus a distortion of its velocity."""
+    """Analyse a mass that moves twice as far as its base, plus a distortion of its velocity.
 
-    def played(distorted, realisations=REALISATIONS, drive_noise_m=0.0):
+    `through` gives another transmission, `base_gain` the base sensor's gain; both may differ by realisation.
+    """
+
+    def played(
+        distorted,
+        realisations=REALISATIONS,
+        drive_noise_m=0.0,
+        through=lambda hz, number: np.full(hz.size, 2.0),
+        base_gain=lambda number: 1.0,
+    ):
         plan = OddMultisine(
             amplitude_vpp=0.2,
             band_start_hz=60.0,
@@ -51,9 +60,12 @@ def analysed(synthetic, tmp_path_factory):
         motions, velocities, parts = [], [], []
         for number in range(realisations):
             angles = np.outer(omega, time_s) + rng.uniform(0, 2 * np.pi, (omega.size, 1))
-            velocity = 2e-6 * omega @ np.cos(angles)
+            ratio = through(omega / (2 * np.pi), number)
+            velocity = 1e-6 * omega * np.abs(ratio) @ np.cos(angles + np.angle(ratio)[:, None])
             velocity += distorted(velocity / 0.01) * 0.01 + NOISE_M_PER_S * rng.standard_normal(time_s.size)
-            motions.append((1e-6 * np.sin(angles).sum(axis=0), -1e-6 * omega**2 @ np.sin(angles)))
+            motions.append(
+                (1e-6 * np.sin(angles).sum(axis=0), -1e-6 * base_gain(number) * omega**2 @ np.sin(angles))
+            )
             velocities.append(velocity)
             start_s = number * time_s.size / synthetic.RATE + SETTLE_S
             parts.append(synthetic.Part("realisation", start_s, start_s + played_s, {"realisation": number}))
@@ -94,6 +106,33 @@ def test_without_distortion_only_noise_is_left_and_it_is_the_noise_that_was_put_
     assert found.detection_noise_m_per_s == pytest.approx(expected, rel=0.1)
     assert found.odd_m_per_s < expected > found.even_m_per_s
     assert found.distortion_share < 2 * found.noise_share
+
+
+def _mode(natural_hz, hz):
+    ratio = hz / natural_hz
+    return 2 + 1 / (1 - ratio**2 + 2j * 0.08 * ratio)
+
+
+@pytest.mark.parametrize(
+    ("drifting", "named"),
+    [
+        ({"through": lambda hz, number: np.full(hz.size, 2 + 0.004 * number)}, "gain"),
+        ({"base_gain": lambda number: 1 - 0.003 * number}, "gain"),
+        ({"through": lambda hz, number: _mode(200 * (1 + 0.002 * number), hz)}, "frequencies"),
+    ],
+)
+def test_what_drifts_from_realisation_to_realisation_is_not_called_distortion(analysed, drifting, named):
+    analysis = analysed(np.zeros_like, **drifting)
+    found = distortion(analysis.response.periodic)
+    assert found.distortion_share < 3 * found.noise_share
+    (remark,) = [each.text for each in analysis.checks if each.what == "Drift"]
+    assert named in remark
+    assert "drift" in distortion_caption(analysis.response.periodic)
+
+
+@pytest.mark.parametrize("distorted", [np.zeros_like, lambda v: 0.02 * v**3, lambda v: 0.05 * v**2])
+def test_no_drift_is_reported_where_none_is(analysed, distorted):
+    assert "Drift" not in [each.what for each in analysed(distorted).checks]
 
 
 def test_the_figure_holds_the_lines_and_its_caption_the_levels(analysed):

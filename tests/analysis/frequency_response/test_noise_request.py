@@ -51,6 +51,30 @@ def test_a_noisy_vibrometer_biases_h2_and_not_the_estimate_referenced_to_the_dri
     assert np.median(referenced.frequency_response.magnitude[band]) == pytest.approx(2, abs=0.005)
 
 
+@pytest.mark.parametrize("noisy", ["base", "m0"])
+@pytest.mark.parametrize(
+    ("estimator", "biased_by"), [(Estimator.H1, "base"), (Estimator.H2, "m0"), (Estimator.HV, "both")]
+)
+def test_an_estimator_that_noise_biases_is_remarked(
+    streamed_noise, tmp_path, synthetic_module, estimator, biased_by, noisy
+):
+    plan, base, velocity, parts = streamed_noise
+    rng = np.random.default_rng(4)
+    if noisy == "base":
+        extra = 0.3 * np.std(base.acceleration) * rng.standard_normal(velocity.size)
+        base = synthetic_module.Motion(base.displacement_m, base.acceleration + extra)
+    else:
+        velocity = velocity + 0.3 * np.std(velocity) * rng.standard_normal(velocity.size)
+    path = synthetic_module.write_recording(tmp_path, plan, base, velocity, parts)
+    # The ratio tells of noise on the other channel.
+    ratio = {"noise_ratio": 1e6 if noisy == "base" else 0.0} if estimator is Estimator.HV else {}
+    with open_recording(path) as recording:
+        checks = analyse(recording, FrequencyResponseRequest(estimator=estimator, **ratio)).checks
+    remarks = [each.text for each in checks if each.what == "Estimator"]
+    assert bool(remarks) == (biased_by in (noisy, "both"))
+    assert all(estimator.value in each and "drive" in each for each in remarks)
+
+
 @pytest.mark.parametrize("window", list(Window))
 def test_the_resolution_asked_for_is_the_noise_bandwidth_of_a_line(streamed_file, window):
     found = response(streamed_file(), resolution_hz=3.0, window=window).frequency_response

@@ -136,6 +136,8 @@ def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
         said.append("; one realisation cannot show distortion.")
     else:
         said.append(f", distortion {_percent(found.distortion_share)}.")
+    if periodic.drift is not None:
+        said.append(f" The {periodic.drift.text}; this is not distortion.")
     return "".join(said) + _quiet_text(found)
 
 

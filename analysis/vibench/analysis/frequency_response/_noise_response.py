@@ -31,6 +31,10 @@ _BLOCK = 1 << 19
 _LEVEL_SEGMENT_S = 1.0
 DEFAULT_REQUEST = FrequencyResponseRequest()
 _LEAST_PERIODS = 2
+_SURELY = 3.0
+"""Standard deviations of a mean difference between estimators that is bias."""
+_ALIKE_LINES = 4
+"""Neighbouring lines under a window that are worth one, and a median for a mean."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ class NoiseResponse(Labelled):
     h2: FrequencyResponse
     resonances: tuple[Resonance, ...]
     base_level: NoiseDriveLevel
+    bias: str
+    """Sentence on an estimator that noise biases; empty where it does not."""
     periodic: PeriodicFrequencyResponse | None
     """Where the scatter comes from; None for noise that does not repeat."""
     used_s: float
@@ -133,6 +139,7 @@ def repeated_response(
         h2=by(Estimator.H2),
         resonances=found,
         base_level=noise_drive_level(level.density(), low_hz=noise.band_start_hz, high_hz=noise.band_stop_hz),
+        bias=_bias(chosen, by(Estimator.DRIVE), found),
         periodic=periodic,
         used_s=used / rate,
         left_out=len(stretches) - taken,
@@ -243,17 +250,51 @@ def streamed_response(
         return as_displacements(inside).without_gain(channels.response_gain(inside.frequency_hz))
 
     chosen = by(request.estimator)
+    found = _resonances(chosen)
     return NoiseResponse(
         frequency_response=chosen,
         h1=by(Estimator.H1),
         h2=by(Estimator.H2),
-        resonances=_resonances(chosen),
+        resonances=found,
         base_level=noise_drive_level(level.density(), low_hz=band[0], high_hz=band[1]),
+        bias=_bias(chosen, by(Estimator.DRIVE), found),
         periodic=None,
         used_s=stretch.samples / rate,
         left_out=chosen.segments_excluded,
         lost_samples=bad.lost,
         overloaded_samples=bad.overloaded,
+    )
+
+
+def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Sequence[Resonance]) -> str:
+    """Compare an estimate with the one referenced to the drive, which noise of the channels does not bias.
+
+    Over the band and about each resonance, the mean of their relative difference is bias where it exceeds
+    three of its standard deviations and half of a line's.
+    """
+    name = chosen.settings.estimator
+    if name is Estimator.DRIVE:
+        return ""
+    sd = np.fmax(chosen.relative_sd_magnitude, referenced.relative_sd_magnitude)
+    off = np.log(chosen.magnitude / referenced.magnitude)
+    known = np.isfinite(off) & np.isfinite(sd) & referenced.is_significant
+    away_hz = [(each, np.abs(chosen.frequency_hz - each.frequency_hz)) for each in found]
+    groups = {"over the band (median)": known}
+    groups |= {
+        f"about {each.frequency_hz:.4g} Hz": known
+        & (away < max(each.half_power_bandwidth_hz, chosen.resolution_hz))
+        for each, away in away_hz
+    }
+    said = []
+    for where, lines in groups.items():
+        typical = float(np.median(sd[lines])) if lines.any() else np.inf
+        mean = float(np.median(off[lines])) if lines.any() else 0.0
+        if abs(mean) > typical * max(0.5, _SURELY / np.sqrt(np.count_nonzero(lines) / _ALIKE_LINES)):
+            said.append(f"{100 * abs(np.expm1(mean)):.2g} % {'above' if mean > 0 else 'below'} {where}")
+    if not said:
+        return ""
+    return (
+        f"noise biases {name}: it lies {', '.join(said)} of the estimate referenced to the drive; use drive"
     )
 
 

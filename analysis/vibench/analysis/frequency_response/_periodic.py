@@ -23,6 +23,11 @@ from ._repetition import Repetition, driven_lines, measured_repetition, period_s
 from ._results import Estimator, FrequencyResponse, FrequencyResponseSettings
 from ._steady import steady_relative_sd
 
+_OVER_CHANCE = 8.0
+"""Times the scatter that lines share by chance that they share by a drift."""
+_MOST = 0.5
+"""Part of the scatter beyond noise that a drift explains at least."""
+
 
 class Scatter(StrEnum):
     """What the bounds of a periodic transmission were measured from."""
@@ -31,6 +36,25 @@ class Scatter(StrEnum):
     """The full uncertainty: noise and nonlinear distortion."""
     PERIODS = "periods"
     """One realisation only: noise alone; a nonlinear specimen may lie outside the bounds."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """What all lines of a realisation share, and what differs among realisations: no distortion does that."""
+
+    OWN_UNITS: ClassVar = {"gain_share": "1", "frequency_share": "1"}
+
+    gain_share: float
+    """Relative standard deviation among realisations of a factor of all lines."""
+    frequency_share: float
+    """That of a factor of all frequencies."""
+
+    @property
+    def text(self) -> str:
+        """What drifted, in words."""
+        drifts = (("gain of the channels", self.gain_share), ("specimen's frequencies", self.frequency_share))
+        shares = " and ".join(f"the {what} by {100 * share:.2g} %" for what, share in drifts if share)
+        return f"realisations differ by a drift of {shares}"
 
 
 @dataclass(frozen=True)
@@ -46,14 +70,20 @@ class BestLinearApproximation:
     noise_variance: Reals
     """Complex variance of one realisation's estimate that noise explains."""
     distortion_variance: Reals | None
-    """What realisations scatter beyond the noise; None for a single one."""
+    """What realisations scatter beyond the noise and their drift; None for a single one."""
+    drift: "Drift | None"
     scatter: Scatter
     averages: int
     """Independent values the scatter was measured from: realisations, or periods of the only one."""
 
 
 def best_linear_approximation(
-    drive: Complexes, base: Complexes, response: Complexes, covariance: Complexes, periods: int
+    drive: Complexes,
+    base: Complexes,
+    response: Complexes,
+    covariance: Complexes,
+    periods: int,
+    frequency_hz: Reals,
 ) -> BestLinearApproximation:
     """Form response over base, referenced to the drive, and split its scatter.
 
@@ -68,6 +98,8 @@ def best_linear_approximation(
         Of these averages of (X, Y) between periods, averaged over realisations, shape (2, 2, lines).
     periods
         Periods per realisation.
+    frequency_hz
+        Of the lines.
 
     """
     count = len(drive)
@@ -91,12 +123,16 @@ def best_linear_approximation(
             steady_relative_sd=steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (periods - 1)),
             noise_variance=noise_variance,
             distortion_variance=None,
+            drift=None,
             scatter=Scatter.PERIODS,
             averages=periods,
         )
     residual = response - value * base
     variance = to_one * np.sum(np.abs(residual) ** 2, axis=0) / (count - 1)
     relative_sd = np.sqrt(variance / count / 2) / np.abs(value)
+    steady_sd = steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (count - 1))
+    drift, left = _without_drift(residual / (value * base), value, frequency_hz, noise_variance, steady_sd)
+    varied = to_one * np.sum(np.abs(left * value * base) ** 2, axis=0) / (count - 1)
     return BestLinearApproximation(
         value=value,
         coherence=coherence(
@@ -105,12 +141,52 @@ def best_linear_approximation(
             np.sum(np.conj(base) * response, axis=0),
         ),
         relative_sd=relative_sd,
-        steady_relative_sd=steady_relative_sd(relative_sd, value, 1 / to_one, 2 * (count - 1)),
+        steady_relative_sd=steady_sd,
         noise_variance=noise_variance,
-        distortion_variance=np.maximum(variance - noise_variance, 0.0),
+        distortion_variance=np.maximum(varied - noise_variance, 0.0),
+        drift=drift,
         scatter=Scatter.REALISATIONS,
         averages=count,
     )
+
+
+def _without_drift(
+    off: Complexes, value: Complexes, frequency_hz: Reals, noise_variance: Reals, sd: Reals
+) -> tuple[Drift | None, Complexes]:
+    """Find a drift of gain and of frequencies; give what it leaves.
+
+    Distortion of random phases is independent from line to line, so it has hardly a part in common. A drift
+    is one that explains most of the scatter beyond noise, and far more than chance does.
+
+    Parameters
+    ----------
+    off
+        Relative deviations of the realisations, shape (realisations, lines).
+    value, frequency_hz, noise_variance, sd
+        Transmission, frequencies, complex variance by noise, and relative standard deviation of the mean.
+
+    """
+    count, lines = off.shape
+    stretch = frequency_hz * np.gradient(value, frequency_hz) / value if lines > 1 else np.zeros_like(value)
+    known = np.isfinite(off).all(axis=0) & np.isfinite(stretch) & np.isfinite(sd) & (sd > 0)
+    weight = 1 / sd[known, None]
+    shapes = weight * np.stack((np.ones_like(stretch), stretch), axis=1)[known]
+    target = weight * off[:, known].T
+    by_noise = (noise_variance / np.abs(value) ** 2)[known, None]
+    excess = float(np.sum(np.abs(target) ** 2) - (count - 1) * np.sum(weight**2 * by_noise))
+    left, shares = target, [0.0, 0.0]
+    for used in range(1, shapes.shape[1] + 1):
+        factors = np.linalg.lstsq(shapes[:, :used], target, rcond=None)[0]
+        rest = target - shapes[:, :used] @ factors
+        before, after = (float(np.sum(np.abs(each) ** 2)) for each in (left, rest))
+        if before - after > max(_OVER_CHANCE * before / lines, _MOST * excess):
+            left = rest
+            shares[:used] = np.sqrt(np.sum(np.abs(factors) ** 2, axis=1) / (count - 1)).tolist()
+    if not any(shares):
+        return None, off
+    off = off.copy()
+    off[:, known] = (left / weight).T
+    return Drift(*shares), off
 
 
 @dataclass(frozen=True)
@@ -143,7 +219,8 @@ class PeriodicFrequencyResponse(Labelled):
     noise_variance: Reals
     """Complex variance of one realisation's estimate that noise explains [(unit of the value)^2]."""
     distortion_variance: Reals | None
-    """What realisations scatter beyond it; None when there was one realisation only."""
+    """What realisations scatter beyond it and their drift; None when there was one realisation only."""
+    drift: Drift | None
     scatter: Scatter
     realisations: int
     repetitions: tuple[Repetition, ...]
@@ -280,7 +357,12 @@ class PeriodicSums:
         driven = driven_lines(drive) if orders is None else _lines_of(orders, frequency_hz)
         periods = self._realisations[0].repetition.periods
         estimate = best_linear_approximation(
-            drive[:, driven], base[:, driven], response[:, driven], covariance[:, :, driven], periods
+            drive[:, driven],
+            base[:, driven],
+            response[:, driven],
+            covariance[:, :, driven],
+            periods,
+            frequency_hz[driven],
         )
         return PeriodicFrequencyResponse(
             frequency_response=self._frequency_response(frequency_hz[driven], estimate, period).without_delay(
@@ -288,6 +370,7 @@ class PeriodicSums:
             ),
             noise_variance=estimate.noise_variance,
             distortion_variance=estimate.distortion_variance,
+            drift=estimate.drift,
             scatter=estimate.scatter,
             realisations=len(self._realisations),
             repetitions=tuple(one.repetition for one in self._realisations),

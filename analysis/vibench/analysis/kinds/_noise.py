@@ -1,6 +1,6 @@
 """Noise: the transmission from base to m0, its resonances, and what JSON says of them."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -75,6 +75,8 @@ def _distortion(periodic: PeriodicFrequencyResponse) -> Json:
         "realisations": periodic.realisations,
         "median_not_repeating_over_magnitude": found.noise_share,
         "median_distortion_over_magnitude": found.distortion_share,
+        "gain_drift": periodic.drift and periodic.drift.gain_share,
+        "frequency_drift": periodic.drift and periodic.drift.frequency_share,
         "odd_detection_lines_m_per_s": found.odd_m_per_s,
         "even_detection_lines_m_per_s": found.even_m_per_s,
         "noise_on_detection_lines_m_per_s": found.detection_noise_m_per_s,
@@ -90,11 +92,16 @@ def _resonance(found: Resonance) -> Json:
     }
 
 
-def _unexplained(found: Sequence[Resonance]) -> Iterator[Check]:
-    """Warn of resonances whose fit does not describe the lines."""
-    remarks = [each.remark for each in found if each.remark]
-    if remarks:
-        yield Check("Resonances", Verdict.WARNING, "; ".join(remarks))
+def _warnings(found: NoiseResponse) -> Iterator[Check]:
+    """Warn of resonances that the fit does not describe, of a biased estimator and of drift."""
+    drift = found.periodic and found.periodic.drift
+    for what, remarks in (
+        ("Resonances", [each.remark for each in found.resonances]),
+        ("Estimator", [found.bias]),
+        ("Drift", [drift.text] if drift else []),
+    ):
+        if any(remarks):
+            yield Check(what, Verdict.WARNING, "; ".join(filter(None, remarks)))
 
 
 def _simulated(laid: NoiseOverlay) -> Json:
@@ -108,7 +115,7 @@ def _noise(
         facts: RecordingFacts, channels: Channels, plan: Noise, request: FrequencyResponseRequest
     ) -> NoiseAnalysis:
         response = estimate(channels, plan, request)
-        checks = (*measurement_checks(facts), *_unexplained(response.resonances))
+        checks = (*measurement_checks(facts), *_warnings(response))
         return NoiseAnalysis(facts, checks, plan, response, request)
 
     def draw(analysis: NoiseAnalysis, channels: SimulatedChannels) -> Draw[NoiseResponse]:

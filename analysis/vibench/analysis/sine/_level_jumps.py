@@ -8,6 +8,9 @@ from ._stepped_response import SteppedResponse
 JUMP_FACTOR = 2.0
 """Response II that changes by more than this between two levels has jumped: a linear one does not change."""
 
+_UNSTEADY = 0.05
+"""Relative uncertainty of Response II above which a step may hold two motions; NaN is above it too."""
+
 
 @dataclass(frozen=True)
 class LevelJump:
@@ -25,14 +28,25 @@ class LevelJump:
 
 
 def level_jumps(response: SteppedResponse, factor: float = JUMP_FACTOR) -> tuple[LevelJump, ...]:
-    """Find the jumps of a stepped level, in the order of time; none is looked for across a turning point."""
-    steps = zip(
-        response.direction,
-        response.amplitude_vpp.tolist(),
-        response.drive_amplitude_m.tolist(),
-        response.response_ii.tolist(),
-        strict=True,
+    """Find the jumps of a stepped level, in the order of time; none is looked for across a turning point.
+
+    A step during which the motion jumped shows a mean of both: the jump is that from the step before it to
+    the one after it.
+    """
+    steps = list(
+        zip(
+            response.direction,
+            response.amplitude_vpp.tolist(),
+            response.drive_amplitude_m.tolist(),
+            response.response_ii.tolist(),
+            strict=True,
+        )
     )
+    steady = response.sd_response_ii < _UNSTEADY * response.response_ii
+    for place in range(len(steps) - 2, 0, -1):
+        (way, *_, before), (_, *_, now), (other, *_, after) = steps[place - 1 : place + 2]
+        if not steady[place] and way == other and min(before, after) < now < max(before, after):
+            del steps[place]
     found = []
     for (way, before_vpp, before_m, before), (other, after_vpp, after_m, after) in pairwise(steps):
         if way == other and before > 0 and not 1 / factor <= after / before <= factor:
