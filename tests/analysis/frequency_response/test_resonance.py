@@ -1,5 +1,6 @@
 """Resonances: exact on exact curves, as scattered as stated on noisy ones, silent where there is none."""
 
+import dataclasses
 from dataclasses import replace
 
 import numpy as np
@@ -128,11 +129,11 @@ def test_a_resonance_is_found_in_noise_records_and_its_resolution_is_judged():
 
 
 def _streamed(rng, modes, noise, window="hann", seconds=60):
-    """Lines of streamed noise through modes (natural frequency, damping ratio), 0.25 Hz apart."""
+    """Lines of streamed noise through modes (natural frequency, damping ratio, share), 0.25 Hz apart."""
     rate, samples = 1024.0, int(1024 * seconds)
     drive = rng.standard_normal(samples)
     frequency_hz = np.fft.rfftfreq(samples, 1 / rate)
-    through = 1 + sum(single(frequency_hz, *mode) for mode in modes)
+    through = 1 + sum(np.prod(mode[2:]) * single(frequency_hz, *mode[:2]) for mode in modes)
     response = np.fft.irfft(np.fft.rfft(drive) * through, samples)
     response += noise * np.std(response) * rng.standard_normal(samples)
     settings = {"segment_samples": 4096, "window": window, "estimator": "drive", "reference": drive}
@@ -166,13 +167,23 @@ def test_bounds_of_streamed_noise_hold_under_every_window(window):
     assert np.max(np.abs(errors)) < 3.5
 
 
-def test_two_close_modes_are_two_or_remarked():
-    modes = [(200.0, 0.01), (202.0, 0.01)]
-    found = resonances(_streamed(np.random.default_rng(5), modes, 0.01), low_hz=150, high_hz=250)
-    assert found
+@pytest.mark.parametrize("apart_hz", [2.0, 4.0])
+@pytest.mark.parametrize("shares", [(1.0, 1.0), (1.0, 0.4), (1.0, -0.7), (1.0, 0.6, 1.0)])
+def test_close_modes_are_not_one(apart_hz, shares):
+    modes = [(200 + apart_hz * place, 0.01, share) for place, share in enumerate(shares)]
+    found = resonances(_streamed(np.random.default_rng(16), modes, 0.01), low_hz=150, high_hz=250)
+    assert len(found) > 1
     for each in found:
-        nearest = min(np.max(np.abs(_z(each, *mode))) for mode in modes)
-        assert nearest < 3.5 or "does not describe" in each.remark
+        assert min(np.max(np.abs(_z(each, *mode[:2]))) for mode in modes) < 3.5
+
+
+def test_a_fit_that_does_not_describe_the_lines_gives_its_chi_square():
+    lines = _streamed(np.random.default_rng(5), [(200.0, 0.01)], 0.01)
+    # A seventh of the magnitude on alternate pairs of lines: no sum of three modes does that.
+    pairs = 1 + 0.15 * (-1.0) ** (np.arange(lines.value.size) // 2)
+    (each,) = resonances(dataclasses.replace(lines, value=lines.value * pairs), low_hz=190, high_hz=210)
+    assert each.reduced_chi_square > 10 * each.chi_square_limit
+    assert f"reduced chi² = {each.reduced_chi_square:.3g}" in each.remark
 
 
 def test_noise_has_no_resonance():

@@ -269,33 +269,26 @@ def streamed_response(
 def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Sequence[Resonance]) -> str:
     """Compare an estimate with the one referenced to the drive, which noise of the channels does not bias.
 
-    Over the band and about each resonance, the mean of their relative difference is bias where it exceeds
-    three of its standard deviations and half of a line's.
+    Over the band and about each resonance, their median difference is bias where it exceeds three of its
+    standard deviations and half of a line's.
     """
-    name = chosen.settings.estimator
-    if name is Estimator.DRIVE:
-        return ""
     sd = np.fmax(chosen.relative_sd_magnitude, referenced.relative_sd_magnitude)
-    off = np.log(chosen.magnitude / referenced.magnitude)
-    known = np.isfinite(off) & np.isfinite(sd) & referenced.is_significant
-    away_hz = [(each, np.abs(chosen.frequency_hz - each.frequency_hz)) for each in found]
-    groups = {"over the band (median)": known}
-    groups |= {
-        f"about {each.frequency_hz:.4g} Hz": known
-        & (away < max(each.half_power_bandwidth_hz, chosen.resolution_hz))
-        for each, away in away_hz
-    }
+    known = np.isfinite(sd) & (chosen.magnitude > 0) & (referenced.magnitude > 0) & referenced.is_significant
+    stretches = [("over the band", np.inf, 0.0)]
+    stretches += [
+        (f"about {each.frequency_hz:.4g} Hz", each.half_power_bandwidth_hz, each.frequency_hz)
+        for each in found
+    ]
     said = []
-    for where, lines in groups.items():
-        typical = float(np.median(sd[lines])) if lines.any() else np.inf
-        mean = float(np.median(off[lines])) if lines.any() else 0.0
-        if abs(mean) > typical * max(0.5, _SURELY / np.sqrt(np.count_nonzero(lines) / _ALIKE_LINES)):
-            said.append(f"{100 * abs(np.expm1(mean)):.2g} % {'above' if mean > 0 else 'below'} {where}")
-    if not said:
-        return ""
-    return (
-        f"noise biases {name}: it lies {', '.join(said)} of the estimate referenced to the drive; use drive"
-    )
+    for where, width_hz, middle_hz in stretches:
+        lines = known & (np.abs(chosen.frequency_hz - middle_hz) <= width_hz)
+        worth = np.count_nonzero(lines) / _ALIKE_LINES
+        if worth >= 1:
+            off = float(np.median(chosen.magnitude[lines] / referenced.magnitude[lines])) - 1
+            if abs(off) > np.median(sd[lines]) * max(0.5, _SURELY / np.sqrt(worth)):
+                said.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} it {where}")
+    name = chosen.settings.estimator
+    return f"noise biases {name}; use drive: {name} lies {' and '.join(said)}" if said else ""
 
 
 def as_displacements(frequency_response: FrequencyResponse) -> FrequencyResponse:

@@ -180,7 +180,7 @@ def _without_drift(
         rest = target - shapes[:, :used] @ factors
         before, after = (float(np.sum(np.abs(each) ** 2)) for each in (left, rest))
         if before - after > max(_OVER_CHANCE * before / lines, _MOST * excess):
-            left = rest
+            left, excess = rest, excess - (before - after)
             shares[:used] = np.sqrt(np.sum(np.abs(factors) ** 2, axis=1) / (count - 1)).tolist()
     if not any(shares):
         return None, off
