@@ -38,6 +38,8 @@ WRONG = 5.0
 
 Mode = tuple[float, float, float]
 """Natural frequency [Hz], damping ratio and static share."""
+Scene = tuple[str, float, float, list[Mode]]
+"""Window, noise, segment [s] and modes."""
 
 
 def transmission(frequency_hz: np.ndarray, modes: list[Mode]) -> np.ndarray:
@@ -65,15 +67,16 @@ def paper_modes(damping_time_s: float) -> list[Mode]:
     return [(float(hz), float(damping), float(share)) for hz, damping, share in modes]
 
 
-def scenes() -> Iterator[tuple[str, str, float, float, list[Mode]]]:
-    """Name, window, noise, segment [s] and modes of every scene."""
+def scenes() -> Iterator[tuple[str, Scene]]:
+    """Name every scene."""
     for window, damping, noise in product(WINDOWS, DAMPINGS, NOISES):
-        yield f"{window:15} {damping:7.2%} noise {noise:g}", window, noise, 4.0, [(200.0, damping, 1.0)]
+        yield f"{window:15} {damping:7.2%} noise {noise:g}", (window, noise, 4.0, [(200.0, damping, 1.0)])
     for window, apart_hz, shares in product(WINDOWS, CLOSE_HZ, SHARES):
         modes = [(200.0 + apart_hz * place, 0.01, share) for place, share in enumerate(shares)]
-        yield f"{window:15} close {apart_hz:g} Hz {shares}", window, 0.01, 2.0, modes
+        yield f"{window:15} close {apart_hz:g} Hz {shares}", (window, 0.01, 2.0, modes)
     for window, damping_s, noise in product(WINDOWS, DAMPING_TIMES_S, NOISES):
-        yield f"{window:15} paper {damping_s:g} s noise {noise:g}", window, noise, 1.0, paper_modes(damping_s)
+        modes = paper_modes(damping_s)
+        yield f"{window:15} paper {damping_s:g} s noise {noise:g}", (window, noise, 1.0, modes)
 
 
 def scores(window: str, noise: float, segment_s: float, modes: list[Mode], rng: np.random.Generator) -> dict:
@@ -121,7 +124,7 @@ def main() -> None:
     args = parser.parse_args()
     part, parts = map(int, args.shard.split("/"))
     kept = json.loads(args.save.read_text()) if args.save and args.save.exists() else {}
-    for number, (name, *scene) in enumerate(scenes()):
+    for number, (name, scene) in enumerate(scenes()):
         if args.scenes not in name:
             continue
         row = kept.setdefault(name, {})
