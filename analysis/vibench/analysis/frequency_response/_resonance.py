@@ -9,7 +9,7 @@ import scipy
 from ..errors import InvalidRequest
 from ..signals import Complexes, Reals, standard_uncertainty
 from ._modal_fit import Background, Lines, ModalFit, modal_fit
-from ._mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, WELL_FITTED, Resonance
+from ._mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, Resonance
 from ._results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
@@ -256,7 +256,7 @@ def _jointly_fitted(band: FrequencyResponse, found: list[Resonance]) -> tuple[Re
             break
         told = _told(fit, lines)
         best = told if fit.explains and told else best
-        if best is told and max(each.reduced_chi_square for each in fit.resonances) < WELL_FITTED:
+        if best is told and max(each.reduced_chi_square for each in told) <= fit.chi_square:
             break
         last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
         worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
