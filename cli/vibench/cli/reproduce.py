@@ -1,7 +1,6 @@
 """`vibench reproduce`: every claim of the paper that can be measured, with a verdict."""
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +8,7 @@ import typer
 from rich.table import Table
 
 from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind
-from vibench.analysis.reproduction import OPTIONS, Case, case_with
+from vibench.analysis.reproduction import OPTIONS, case_with
 from vibench.sim import Accuracy
 
 from .output import bold, console, leave_output_to_json, print_json, print_table
@@ -17,7 +16,7 @@ from .paths import AsJson, room_for_folder, room_for_page
 from .study import KeptStudies, Workers
 
 if TYPE_CHECKING:
-    from vibench.analysis.reproduction import Evidence, Picture, Reproduction
+    from vibench.analysis.reproduction import Reproduction
 
 PAGE = "reproduction.md"
 _FORMS = ", ".join(f"{name}={option.example} ({option.about})" for name, option in OPTIONS.items())
@@ -47,7 +46,17 @@ def reproduce(
     as_json: AsJson = False,
 ) -> None:
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
-    from vibench.analysis.reproduction import SECTIONS, Evidence, reproduction, reproduction_document
+    from vibench.analysis.report import levels_figure, write_page
+    from vibench.analysis.reproduction import (
+        SECTIONS,
+        Evidence,
+        Picture,
+        damping_score_figure,
+        levels_asked,
+        reproduction,
+        reproduction_document,
+        reproduction_page,
+    )
 
     if as_json:
         leave_output_to_json()
@@ -60,25 +69,21 @@ def reproduce(
     evidence = Evidence(studies)
     found = reproduction(SECTIONS, evidence, case, lambda step: console.print(f"measuring {step}"))
     page.parent.mkdir(parents=True, exist_ok=True)
-    pictures = tuple(_pictures(found, evidence, case, page))
+    score = damping_score_figure(found.scores)
+    levels = levels_figure(case.options, evidence.study(levels_asked(case)))
+    pictures = []
+    for drawn in (score, levels):
+        image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
+        pictures.append(Picture(drawn.title, Path(os.path.relpath(image, page.parent)).as_posix()))
     page.write_text(reproduction_document(found, pictures), encoding="utf-8")
+    report = write_page(reproduction_page(found, levels, score), out / "report.html")
     _tell(found)
     console.print("The page:", bold(page.resolve()))
+    console.print("The report:", bold(report.resolve()))
     if as_json:
         judged = [{"claim": each.claim.says, "verdict": each.verdict.value} for each in found.judgements]
-        print_json({"page": str(page), "claims": judged})
+        print_json({"page": str(page), "report": str(report), "claims": judged})
     studies.complain()
-
-
-def _pictures(found: "Reproduction", evidence: "Evidence", case: Case, page: Path) -> "Iterator[Picture]":
-    """Draw what the page shows into a folder beside it."""
-    from vibench.analysis.report import levels_figure
-    from vibench.analysis.reproduction import Picture, damping_score_figure, levels_asked
-
-    curves = evidence.study(levels_asked(case))
-    for drawn in (damping_score_figure(found.scores), levels_figure(case.options, curves)):
-        image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
-        yield Picture(drawn.title, Path(os.path.relpath(image, page.parent)).as_posix())
 
 
 def _tell(found: "Reproduction") -> None:
@@ -88,5 +93,5 @@ def _tell(found: "Reproduction") -> None:
     rows.add_column("claim")
     rows.add_column("verdict")
     for each in found.judgements:
-        rows.add_row(each.claim.says, verdict_text(each).strip("*"))
+        rows.add_row(each.claim.says, verdict_text(each))
     print_table(rows)

@@ -1,14 +1,15 @@
 """A report is one file that needs nothing else, says what the results say, and hides no failure."""
 
 import json
-import re
 import shutil
-from html.parser import HTMLParser
+from dataclasses import replace
 
 import pytest
 
+from tests.reading_reports import Page
 from vibench.acquisition.recording import RecordingState
 from vibench.analysis import (
+    CampaignResults,
     NotEnoughData,
     Simulation,
     analyse_files,
@@ -17,40 +18,16 @@ from vibench.analysis import (
     recordings_in,
     result_summary,
 )
-from vibench.analysis.report import write_report
+from vibench.analysis.kinds import Result
+from vibench.analysis.recordings import Check, Verdict
+from vibench.analysis.report import recording_figures, result_figures, write_report
+from vibench.analysis.report._page import LONGEST_CAPTION
+from vibench.analysis.report._report import CHANGE_A_CONCLUSION
 from vibench.analysis.tables import plus_minus
 
-VOID = {"meta", "img", "br", "link", "hr"}
 RATE = 6400.0
 
 pytestmark = pytest.mark.thorough
-
-
-class Page(HTMLParser):
-    """Collects what a page refers to, and whether its elements are closed in order."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.sources, self.links, self.texts = [], [], [], []
-        self.feed(text)
-        self.close()
-
-    def handle_starttag(self, tag, attributes):
-        found = dict(attributes)
-        self.sources += [found[key] for key in ("src", "data", "poster") if key in found]
-        self.links += [found["href"]] if "href" in found else []
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.texts.append(data)
-
-    @property
-    def text(self):
-        return re.sub(r"\s+", " ", "".join(self.texts))
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +60,7 @@ def test_a_report_holds_the_results_numbers(page, campaign):
         assert plus_minus(found.frequency_hz, 2 * found.sd_frequency_hz) in page.text
     middle = campaign.noise[0].analysis.response.resonances[0].frequency_hz
     assert f"resonances at {middle:.1f}" in page.text
+    assert f"{middle:.1f}" in page.findings
     region = campaign.sweeps[0].analysis.collisions.regions[0]
     assert f"{region.start.frequency_hz:.1f} ({region.start.lower_hz:.1f} to" in page.text
     for dwell in campaign.dwells:
@@ -90,6 +68,70 @@ def test_a_report_holds_the_results_numbers(page, campaign):
             assert budget.text.strip("()").split(")")[0] in page.text
     assert "not stated" in page.text
     assert "Uncertainty, and what it is made of" in page.text
+
+
+def test_the_first_screen_is_findings_figure_and_table_and_cards_follow(page, campaign):
+    order = ["findings", "figure-1", "cards", "card-1", "figure-2", "further", "details"]
+    assert [each for each in page.ids if each in order] == order
+    assert page.headings == ["recording", "result", "agreement", "what to look at"]
+    names = [each.analysis.facts.name for each in campaign.in_order]
+    rows = page.visible.split("what to look at")[1].split("One by one")[0]
+    places = [rows.index(f" {name} ") for name in (*names, "stopped.h5")]
+    assert places == sorted(places)
+    assert 10 < len(page.findings.split()) <= 120
+
+
+def test_a_report_is_short_with_all_folds_closed_and_its_captions_have_three_lines(page):
+    assert len(page.visible.split()) <= 2000
+    assert page.captions
+    assert max(map(len, page.captions)) <= len("Figure 99. . ") + LONGEST_CAPTION
+
+
+def test_folds_hold_the_statistics_checks_and_settings(page, campaign):
+    facts = (
+        "Uncertainty, and what it is made of", "Resonances of the transmission", "Checks", "How it ended",
+        "draws", "impacts per second", "rank", "largest |z|", "independent averages", "Estimator",
+        "coherence",
+        "Where the masses collide in a sweep", "Dwells: responses over the last seconds", "noise bias of I",
+        "Dwells: lines and terminal bands", "Channels", "sensitivity", "Versions that made the recordings",
+        "half cosine", "samples/s", "crest factor", "of its range", "Phase portraits", "Orders of a sweep",
+    )  # fmt: skip
+    assert [each for each in facts if each not in page.text] == []
+    assert [each for each in ("rank", "|z|", "crest factor", "noise bias") if each in page.visible] == []
+    for each in campaign.results:
+        for budget in budgets_of(each):
+            assert budget.quantity in page.text
+        for check in each.analysis.checks:
+            assert check.text.split("\n")[0] in page.text
+
+
+def test_every_figure_has_one_legend_without_repeated_entries(campaign):
+    drawn = [
+        *result_figures(campaign),
+        *(figure for each in campaign.results for figure in recording_figures(each)),
+    ]
+    for each in drawn:
+        legends = [
+            *each.figure.legends,
+            *(axes.get_legend() for axes in each.figure.axes if axes.get_legend()),
+        ]
+        entries = [text.get_text() for legend in legends for text in legend.get_texts()]
+        assert len(legends) <= 1, each.name
+        assert len(entries) == len(set(entries)), each.name
+
+
+def test_a_warning_that_changes_a_conclusion_is_at_the_top_and_any_other_at_its_recording(
+    dwell_file, tmp_path
+):
+    analysis = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT).results[0].analysis
+    assert {each.what for each in analysis.checks} >= CHANGE_A_CONCLUSION - {"Drop-outs"}
+    for what, is_first in (("Overloads", True), ("Calibration", False)):
+        checks = (Check(what, Verdict.WARNING, "look at it"),)
+        results = CampaignResults("one", (Result(replace(analysis, checks=checks), None),), ())
+        page = Page(write_report(results, tmp_path / "one.html").read_text(encoding="utf-8"))
+        assert ("To know before reading on" in page.visible) is is_first
+        assert f"{what}: look at it" in page.visible
+        assert f"Figure 1; not simulated; {what.lower()}" in page.visible
 
 
 def test_a_report_says_how_it_was_measured_and_that_it_was_simulated(page):
@@ -101,7 +143,8 @@ def test_a_report_says_how_it_was_measured_and_that_it_was_simulated(page):
 def test_a_recording_without_a_result_is_named_first_and_stops_no_other(page, campaign):
     assert [each.name for each in campaign.failures] == ["stopped.h5"]
     assert len(campaign.results) == 4
-    assert page.text.index("cable out") < page.text.index("Resonances of the transmission")
+    assert page.visible.index("cable out") < page.visible.index("One recording of five gave no result.")
+    assert page.visible.count("cannot tell") >= 1
 
 
 def test_text_from_a_plan_is_shown_as_text(page):
@@ -117,7 +160,7 @@ def test_one_recording_makes_a_report_of_its_own(dwell_file, tmp_path):
     results = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT)
     path = write_report(results, tmp_path / "one.html")
     page = Page(path.read_text(encoding="utf-8"))
-    assert "Report of 1 recording," in page.text
+    assert "Report of 1 recording. These recordings" in page.text
     assert "simulation takes the damping" not in page.text
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.analysis.report import FigureOptions
+from vibench.analysis.report import FigureOptions, ReportTable
 from vibench.analysis.reproduction import (
     AS_CHOSEN,
     SECTIONS,
@@ -19,7 +19,6 @@ from vibench.analysis.reproduction._case import SCORED_S, damping
 from vibench.analysis.reproduction._catalogue import CLAIMS
 from vibench.analysis.reproduction._claim import Claim, Verdict, at_least, judged
 from vibench.analysis.reproduction._document import HEAD, wanted_text
-from vibench.analysis.reproduction._page_tables import PageTable
 from vibench.analysis.reproduction._score import DampingScore
 
 PAGE = Path(__file__).parents[3] / "docs" / "reproduction.md"
@@ -52,7 +51,7 @@ def found():
             DampingScore(2e-5, ("first",), ("second", "third"), -1.5, 120.0),
             DampingScore(3e-5, ("first", "second"), ("third",), -2.5, 90.0),
         ),
-        tables=(PageTable("Regions", "Frequencies.", ("A0", "colliding"), (("1 µm", "nowhere"),)),),
+        tables=(ReportTable("Regions", ("A0", "colliding"), (("1 µm", "nowhere"),), "Frequencies."),),
         options="Defaults: these.",
         made_with="Computed by nobody.",
     )

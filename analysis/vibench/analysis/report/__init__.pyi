@@ -29,6 +29,14 @@ from ._figures import (
     map_figure as map_figure,
     tradeoff_figure as tradeoff_figure,
 )
+from ._page import (
+    Agreement as Agreement,
+    Card as Card,
+    Fold as Fold,
+    Page as Page,
+    ReportTable as ReportTable,
+    write_page as write_page,
+)
 from ._report import (
     check_warnings as check_warnings,
     write_report as write_report,

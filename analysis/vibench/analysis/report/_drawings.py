@@ -1,9 +1,11 @@
-"""What a report shows of each kind of excitation: figures, sentences and tables; one row a kind."""
+"""What a report shows of each kind of excitation: figures, sentences, numbers and tables; one row a kind."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Generic, TypeVar
+
+import numpy as np
 
 from vibench.acquisition.plan import Family, rows_by_kind
 
@@ -30,8 +32,9 @@ from ..figures import (
 from ..kinds import AnyResult, DwellResult, NoiseResult, Result, SteppedSineResult, SweepResult
 from ..model import AbstractOverlay
 from ..recordings import AbstractAnalysis
-from ..results import CampaignResults
+from ..results import CampaignResults, budgets_of
 from ..sine import tracked_resonances
+from ..tables import plus_minus
 from ._findings import (
     branch_findings,
     dwell_findings,
@@ -41,14 +44,8 @@ from ._findings import (
     sweep_findings,
     tracked_findings,
 )
-from ._result_tables import (
-    ReportTable,
-    collision_table,
-    dwell_table,
-    line_table,
-    resonance_table,
-    uncertainty_table,
-)
+from ._page import ReportTable
+from ._result_tables import collision_table, dwell_table, edge_text, line_table, resonance_table
 
 A = TypeVar("A", bound=AbstractAnalysis[Any, Any])
 L = TypeVar("L", bound=AbstractOverlay[Any])
@@ -56,54 +53,62 @@ L = TypeVar("L", bound=AbstractOverlay[Any])
 
 @dataclass(frozen=True)
 class Drawing(Generic[A, L]):
-    """How results of one kind are shown; those that follow each other and share a row, together."""
+    """How results of one kind are shown, each on its card and several together."""
 
-    figures: Callable[[Sequence[Result[A, L]]], Iterator[DrawnFigure]]
+    figures: Callable[[Result[A, L]], Iterator[DrawnFigure]]
+    """The first shows the result; the others unfold."""
     findings: Callable[[Result[A, L]], Iterator[str]]
+    """The first sentence is the result, the others are its statistics."""
+    numbers: Callable[[Result[A, L]], Iterator[tuple[str, str]]]
+    """What a reader takes away, each with its bounds, the most important first."""
     tables: tuple[Callable[[Sequence[Result[A, L]]], ReportTable], ...] = ()
+    together: Callable[[Sequence[Result[A, L]]], Iterator[DrawnFigure]] = lambda _: iter(())
 
 
-def _noise_figures(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
-    """Draw all levels in one, then each with its distortion."""
+def _noise_figures(noise: NoiseResult) -> Iterator[DrawnFigure]:
+    yield transmission_figure(noise.analysis, noise.laid)
+    if noise.analysis.response.periodic is not None:
+        yield distortion_figure(noise.analysis, noise.analysis.response.periodic)
+
+
+def _noise_levels(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
     if len(noise) > 1:
         yield transmission_levels_figure([each.analysis for each in noise])
-    for each in noise:
-        yield transmission_figure(each.analysis, each.laid)
-        if each.analysis.response.periodic is not None:
-            yield distortion_figure(each.analysis, each.analysis.response.periodic)
 
 
-def _sweep_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
-    """Draw each sweep, then those that went there and back over each other."""
-    for sweep in sweeps:
-        yield sweep_figure(sweep.analysis, sweep.laid)
-        yield sweep_orders_figure(sweep.analysis)
-    for up, down in _there_and_back(sweeps):
-        yield hysteresis_figure(up.analysis, down.analysis)
+def _sweep_figures(sweep: SweepResult) -> Iterator[DrawnFigure]:
+    yield sweep_figure(sweep.analysis, sweep.laid)
+    yield sweep_orders_figure(sweep.analysis)
 
 
 def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
+    yield dwells_figure([(each.analysis, each.laid) for each in dwells])
+    yield portraits_figure([each.analysis for each in dwells])
+
+
+def _dwell_levels(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
     """Draw the dwells at one frequency together."""
     for _, group in groupby(dwells, key=lambda each: each.analysis.excitation.frequency_hz):
         same = tuple(group)
-        yield dwells_figure([(each.analysis, each.laid) for each in same])
-        yield portraits_figure([each.analysis for each in same])
+        if len(same) > 1:
+            yield from _dwell_figures(same)
 
 
-def _stepped_figures(
-    look: SteppedLook[Any],
-) -> Callable[[Sequence[SteppedSineResult]], Iterator[DrawnFigure]]:
-    """Draw a figure of each over what was stepped."""
-    return lambda stepped: (stepped_sine_figure(each.analysis, each.laid, look) for each in stepped)
+def _stepped_figures(look: SteppedLook[Any]) -> Callable[[SteppedSineResult], Iterator[DrawnFigure]]:
+    return lambda stepped: iter((stepped_sine_figure(stepped.analysis, stepped.laid, look),))
 
 
-def _tracked_figures(tracked: Sequence[SteppedSineResult]) -> Iterator[DrawnFigure]:
-    """Draw each resonance over level, where one was found."""
-    for each in tracked:
-        if tracked_resonances(each.analysis.facts.feedback):
-            yield backbone_figure(each.analysis, each.laid)
-        else:
-            yield stepped_sine_figure(each.analysis, each.laid, TRACKED_RESONANCE)
+def _tracked_figures(tracked: SteppedSineResult) -> Iterator[DrawnFigure]:
+    """Draw the resonance over level, where one was found."""
+    if tracked_resonances(tracked.analysis.facts.feedback):
+        yield backbone_figure(tracked.analysis, tracked.laid)
+    else:
+        yield stepped_sine_figure(tracked.analysis, tracked.laid, TRACKED_RESONANCE)
+
+
+def _hysteresis_figures(sweeps: Sequence[SweepResult]) -> Iterator[DrawnFigure]:
+    for up, down in _there_and_back(sweeps):
+        yield hysteresis_figure(up.analysis, down.analysis)
 
 
 def _there_and_back(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult, SweepResult]]:
@@ -119,40 +124,79 @@ def _there_and_back(sweeps: Sequence[SweepResult]) -> Iterator[tuple[SweepResult
                 break
 
 
+def _budgeted(result: AnyResult) -> Iterator[tuple[str, str]]:
+    return ((each.quantity, each.text) for each in budgets_of(result))
+
+
+def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
+    """Give the frequencies of the resonances, the level of the base, and the rest of the budgets."""
+    budgets = budgets_of(noise)
+    yield from ((each.quantity, each.text) for each in budgets if each.unit == "Hz")
+    level = noise.analysis.response.base_level
+    bounds = plus_minus(level.rms_acceleration, 2 * level.relative_sd * level.rms_acceleration)
+    yield "base acceleration, rms", f"{bounds} m/s²"
+    yield from ((each.quantity, each.text) for each in budgets if each.unit != "Hz")
+
+
+def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
+    """Give where collisions begin, and the budgets."""
+    for region in sweep.analysis.collisions.regions[:1]:
+        yield "collisions begin at", edge_text(region.start, "start of sweep" if region.reaches_start else "")
+    amplitude, *largest = _budgeted(sweep)
+    yield from (*largest, amplitude)
+
+
+def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
+    """Give the first resonance tracked, if any, the budgets, and the level of the base."""
+    for each in tracked_resonances(stepped.analysis.facts.feedback)[:1]:
+        yield "phase resonance", f"{plus_minus(each.frequency_hz, 2 * each.u_frequency_hz)} Hz"
+    yield from _budgeted(stepped)
+    found = stepped.analysis.response
+    if found.response_ii.size:
+        top = int(np.argmax(found.response_ii))
+        amplitude = plus_minus(1e6 * found.drive_amplitude_m[top], 2e6 * found.sd_drive_amplitude_m[top])
+        yield f"base amplitude A0, at {found.frequency_hz[top]:.4g} Hz", f"{amplitude} µm"
+
+
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
-        Family.NOISE: Drawing(_noise_figures, noise_findings, (resonance_table,)),
-        Family.SWEEP: Drawing(_sweep_figures, sweep_findings, (collision_table,)),
-        Family.DWELL: Drawing(_dwell_figures, dwell_findings, (dwell_table, line_table)),
-        Family.STEPPED: Drawing(_stepped_figures(STEPPED_FREQUENCIES), stepped_findings),
+        Family.NOISE: Drawing(
+            _noise_figures, noise_findings, _noise_numbers, (resonance_table,), _noise_levels
+        ),
+        Family.SWEEP: Drawing(
+            _sweep_figures, sweep_findings, _sweep_numbers, (collision_table,), _hysteresis_figures
+        ),
+        Family.DWELL: Drawing(
+            lambda dwell: _dwell_figures((dwell,)),
+            dwell_findings,
+            _budgeted,
+            (dwell_table, line_table),
+            _dwell_levels,
+        ),
+        Family.STEPPED: Drawing(_stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers),
     },
     {
-        "stepped_level": Drawing(_stepped_figures(STEPPED_LEVELS), level_findings),
-        "resonance_tracking": Drawing(_tracked_figures, tracked_findings),
+        "stepped_level": Drawing(_stepped_figures(STEPPED_LEVELS), level_findings, _stepped_numbers),
+        "resonance_tracking": Drawing(_tracked_figures, tracked_findings, _stepped_numbers),
         "branch_continuation": Drawing(
-            lambda branches: (held_branch_figure(each.analysis) for each in branches), branch_findings
+            lambda branch: iter((held_branch_figure(branch.analysis),)), branch_findings, _stepped_numbers
         ),
     },
 )
 """By the word in a plan."""
 
 
-def _groups(results: CampaignResults) -> Iterator[tuple[Drawing[Any, Any], tuple[AnyResult, ...]]]:
+def figures_together(results: CampaignResults) -> Iterator[DrawnFigure]:
+    """Draw what several recordings of one kind show together."""
     for drawing, group in groupby(results.in_order, key=lambda each: DRAWINGS[each.kind]):
-        yield drawing, tuple(group)
+        yield from drawing.together(tuple(group))
 
 
 def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
     """Draw what was found: transmissions, sweeps, dwells, stepped sines."""
-    for drawing, group in _groups(results):
-        yield from drawing.figures(group)
-
-
-def result_tables(results: CampaignResults) -> tuple[ReportTable, ...]:
-    """Build every table for which there are results."""
-    found = tuple(build(group) for drawing, group in _groups(results) for build in drawing.tables)
-    budgets = uncertainty_table(results.in_order)
-    return (*found, budgets) if budgets.rows else found
+    yield from figures_together(results)
+    for each in results.in_order:
+        yield from DRAWINGS[each.kind].figures(each)
 
 
 def findings(results: CampaignResults) -> Iterator[str]:

@@ -1,7 +1,4 @@
-"""The report in short: one sentence for each thing that was found, with its numbers.
-
-What a report cannot say: stated in it, so that nobody reads more out of it than is there.
-"""
+"""What was found in each recording, the result first and then its statistics, and the limits of a report."""
 
 from collections.abc import Iterator
 
@@ -19,37 +16,38 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
     """Say where the resonances are, and how far the simulation lies from the transmission."""
     peaks = ", ".join(f"{each.frequency_hz:.1f}" for each in result.analysis.response.resonances)
     where = f"resonances at {peaks} Hz" if peaks else "no resonance above its uncertainty"
-    text = f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}"
+    yield f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}."
+    yield from feedback_sentences(result.analysis.facts.feedback)
     if result.laid is not None:
-        text += (
-            f"; the simulation under the {result.laid.run.driven.value} lies "
+        yield (
+            f"The simulation under the {result.laid.run.driven.value} lies "
             f"{result.laid.difference.median_abs_db:.2g} dB away (median) and strikes "
-            f"{result.laid.run.impact_rate_hz:.0f} times per second{agreement_text(result.laid)}"
+            f"{result.laid.run.impact_rate_hz:.0f} times per second{agreement_text(result.laid)}."
         )
-    remarks = "".join(f"; {each.remark}" for each in result.analysis.response.resonances if each.remark)
-    yield " ".join([f"{text}{remarks}.", *feedback_sentences(result.analysis.facts.feedback)])
+    remarks = [each.remark for each in result.analysis.response.resonances if each.remark]
+    if remarks:
+        yield f"Remarks: {'; '.join(remarks)}."
 
 
 def sweep_findings(result: SweepResult) -> Iterator[str]:
     """Say where the masses collide, measured and simulated."""
     plan = result.analysis.excitation
-    text = (
+    yield (
         f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz: "
-        f"{regions_text(result.analysis.collisions)}"
+        f"{regions_text(result.analysis.collisions)}."
     )
     if result.laid is not None:
-        text += f"; simulated: {regions_text(result.laid.collisions)}{agreement_text(result.laid)}"
-    yield f"{text}."
+        yield f"Simulated: {regions_text(result.laid.collisions)}{agreement_text(result.laid)}."
 
 
 def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
     """Say how far Response II went in steps of frequency, and what feedback found."""
     found, plan = result.analysis.response.response_ii, result.analysis.excitation
-    text = (
+    yield (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp: Response II "
         f"up to {found.max():.3g} in {found.size} steps."
     )
-    yield " ".join([text, *feedback_sentences(result.analysis.facts.feedback)])
+    yield from feedback_sentences(result.analysis.facts.feedback)
 
 
 def level_findings(result: SteppedSineResult) -> Iterator[str]:
@@ -78,21 +76,21 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
     )
     if verdict.kind is MotionKind.UNDECIDED:
         text += f" ({verdict.why})"
-    if result.laid is not None:
-        if result.laid.run.driven.by_voltage:
-            text += agreement_text(result.laid)
-        else:
-            simulated = result.laid.response
-            text += f"; simulated {simulated.response_i:.3g} and {simulated.response_ii:.3g}"
     yield f"{text}."
+    if result.laid is not None:
+        simulated = result.laid.response
+        told = agreement_text(result.laid).removeprefix("; ")
+        yield f"Simulated: {told or f'{simulated.response_i:.3g} and {simulated.response_ii:.3g}'}."
 
 
 def limits(results: CampaignResults) -> Iterator[str]:
     """Give the sentences that apply to these results."""
     if any(each.is_simulated for each in results.facts):
         yield (
-            "The instruments were simulated, with the same model that is laid over the measurement: "
-            "agreement shows that the whole chain from generator to figure is right, not that the model is."
+            "The instruments were simulated: the samples are what the simulated generator's output does to "
+            "the simulated amplifier, shaker, specimen, vibrometer and converter. The same model is laid "
+            "over the measurement: agreement shows that the whole chain from generator to figure is right, "
+            "not that the model is."
         )
     laid = [each.laid.run for each in results.results if each.laid is not None]
     if laid:

@@ -5,15 +5,14 @@ from datetime import datetime, timedelta
 from typing import Any
 
 from ..recordings import Check, RecordingFacts
+from ._page import ReportTable
 
-Rows = tuple[tuple[str, str], ...]
 
-
-def measured_rows(facts: RecordingFacts) -> Rows:
+def measured_table(facts: RecordingFacts) -> ReportTable:
     """Say what was played, when, and how it ended."""
     plan = facts.measurement
     reason = f": {facts.reason}" if facts.reason else ""
-    return (
+    rows = (
         ("excitation", excitation_text(plan.excitation.model_dump(mode="json"))),
         ("ramps", f"{plan.ramp_s:g} s, half cosine"),
         ("started", f"{facts.started_utc} UTC"),
@@ -22,6 +21,7 @@ def measured_rows(facts: RecordingFacts) -> Rows:
         ("file", f"{facts.path.name}, id {facts.recording_id}"),
         *((("notes", plan.notes),) if plan.notes else ()),
     )
+    return ReportTable("Recording", (), rows)
 
 
 def excitation_text(plan: Mapping[str, Any]) -> str:
@@ -32,7 +32,7 @@ def excitation_text(plan: Mapping[str, Any]) -> str:
     return f"{str(plan['kind']).replace('_', ' ')}: {', '.join(rest)}"
 
 
-def bench_rows(facts: RecordingFacts) -> Rows:
+def bench_table(facts: RecordingFacts) -> ReportTable:
     """Say which bench it was, who answered, and what was confirmed by hand."""
     rows = [("bench", str(facts.bench.get("name", "not named")))]
     rows += [
@@ -58,7 +58,7 @@ def bench_rows(facts: RecordingFacts) -> Rows:
     rows.append(("bench check", bench_check_text(facts)))
     rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} asked for"
     rows.append(("sample rate", rate))
-    return tuple(rows)
+    return ReportTable("Bench", (), tuple(rows))
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
@@ -90,22 +90,12 @@ def _value(value: Any) -> str:
             return str(value)
 
 
-CHANNEL_HEADINGS = (
-    "channel",
-    "input",
-    "sensor",
-    "serial",
-    "sensitivity",
-    "range",
-    "coupling",
-    "calibrated",
-    "delay",
-)
+_HEADINGS = "channel, input, sensor, serial, sensitivity, range, coupling, calibrated, delay"
 
 
-def channel_rows(facts: RecordingFacts) -> tuple[tuple[str, ...], ...]:
+def channel_table(facts: RecordingFacts) -> ReportTable:
     """Say how every channel was set and calibrated."""
-    return tuple(
+    rows = tuple(
         (
             each.header.role.replace("_", " "),
             each.header.physical_channel,
@@ -121,20 +111,23 @@ def channel_rows(facts: RecordingFacts) -> tuple[tuple[str, ...], ...]:
         )
         for each in facts.channels
     )
+    return ReportTable("Channels", tuple(_HEADINGS.split(", ")), rows)
 
 
-def version_rows(facts: RecordingFacts) -> Rows:
+def version_table(facts: RecordingFacts) -> ReportTable:
     """Say which programs made the recording."""
     provenance = facts.provenance
     packages = ", ".join(f"{name} {which}" for name, which in dict(provenance.get("packages", {})).items())
-    return (
+    rows = (
         ("packages", packages),
         ("commit", str(provenance.get("commit") or "not from a checkout")),
         ("python", str(provenance.get("python", ""))),
         ("platform", str(provenance.get("platform", ""))),
     )
+    return ReportTable("Versions that made the recordings", (), rows)
 
 
-def check_rows(checks: tuple[Check, ...]) -> tuple[tuple[str, str, str], ...]:
+def check_table(checks: tuple[Check, ...]) -> ReportTable:
     """Verdict, what, and text of each check."""
-    return tuple((each.verdict.value, each.what, each.text) for each in checks)
+    rows = tuple((each.verdict.value, each.what, each.text) for each in checks)
+    return ReportTable("Checks", (), rows)

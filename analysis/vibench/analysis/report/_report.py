@@ -1,72 +1,29 @@
-"""Writing the report of a campaign, or of one recording, as one self-contained HTML file."""
+"""The report of a campaign, or of one recording, as one self-contained HTML file."""
 
-import base64
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib.metadata import version
+from itertools import islice
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from vibench.acquisition import printable
-from vibench.acquisition.plan import excitation_text
 from vibench.sim.maps import MapResults
 
 from ..dynamics import BranchDiagram
 from ..errors import NotEnoughData
-from ..figures import DrawnFigure, hidden_impacts_figure, hidden_motion_figure
+from ..figures import hidden_impacts_figure, hidden_motion_figure
 from ..hidden_motion import HiddenMotion
 from ..kinds import AnyResult
 from ..recordings import Verdict
-from ..results import AnalysisFailure, CampaignResults
-from ._drawings import findings, recording_figures, result_figures, result_tables
+from ..results import AnalysisFailure, CampaignResults, FailedStep
+from ._drawings import DRAWINGS, figures_together, recording_figures
 from ._findings import limits
 from ._laid_branches import laid_branches, laid_maps
-from ._recording_section import (
-    CHANNEL_HEADINGS,
-    Rows,
-    bench_rows,
-    channel_rows,
-    check_rows,
-    measured_rows,
-    version_rows,
-)
-from ._result_tables import ReportTable
+from ._page import Agreement, Card, Fold, Page, ReportTable, write_page
+from ._recording_section import bench_table, channel_table, check_table, measured_table, version_table
+from ._result_tables import uncertainty_table
+from ._summary import summary
 
-_LARGEST_SVG_BYTES = 300_000
-"""Above this a PNG is smaller and quicker to show, and as legible."""
-
-
-@dataclass(frozen=True)
-class EmbeddedFigure:
-    """A figure as the page holds it."""
-
-    number: int
-    title: str
-    caption: str
-    source: str
-    """A ``data:`` address with the whole image in it."""
-
-
-@dataclass(frozen=True)
-class RecordingSection:
-    """What the page says of one recording."""
-
-    name: str
-    measured: Rows
-    checks: tuple[tuple[str, str, str], ...]
-    figures: tuple[EmbeddedFigure, ...]
-
-
-@dataclass(frozen=True)
-class BenchSection:
-    """A bench, and the recordings that were made with it."""
-
-    recordings: str
-    rows: Rows
-    channels: tuple[tuple[str, ...], ...]
-    versions: Rows
+CHANGE_A_CONCLUSION = frozenset({"How it ended", "Seal", "Overloads", "Drop-outs", "Drive level"})
+"""Checks whose warnings say that a result is wrong or not the planned one; those of others qualify it."""
+_MOST_NUMBERS = 3
 
 
 def write_report(
@@ -90,7 +47,7 @@ def write_report(
     diagrams
         Branches that are laid over the stepped sines and sweeps.
     hidden
-        Hidden motions; each stands with the recording whose name it has.
+        Hidden motions of these recordings.
     maps
         Maps on which the levels of stepped sines and sweeps are laid.
 
@@ -102,104 +59,108 @@ def write_report(
     """
     if not results.results and not results.failures:
         raise NotEnoughData(f"{results.name!r} has no recordings, so there is nothing to report")
-    numbers = iter(range(1, 1000))
-    found = [_embedded(next(numbers), each, figures_folder) for each in result_figures(results)]
-    found += [_embedded(next(numbers), each, figures_folder) for each in laid_branches(results, diagrams)]
-    found += [_embedded(next(numbers), each, figures_folder) for each in laid_maps(results, maps)]
-    motions = {each.name: each for each in hidden}
-    sections = [_section(each, motions, numbers, figures_folder) for each in results.results]
-    page = _environment().get_template("report.html.j2")
-    text = page.render(
-        name=results.name,
-        is_simulated=any(each.is_simulated for each in results.facts),
-        is_real=any(not each.is_simulated for each in results.facts),
-        written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        version=version("vibench"),
-        overview=_overview(results),
-        warnings=tuple(_warnings(results)),
-        figures=found,
-        tables=result_tables(results),
-        sections=sections,
-        benches=_benches(results),
-        channel_headings=CHANNEL_HEADINGS,
-        findings=tuple(findings(results)),
+    failed = {each.name.removesuffix(".part").removesuffix(".h5"): each for each in results.failures}
+    cards = [_card(each, failed) for each in results.in_order]
+    together = [*figures_together(results), *laid_branches(results, diagrams), *laid_maps(results, maps)]
+    together += [draw(each) for each in hidden for draw in (hidden_motion_figure, hidden_impacts_figure)]
+    first = together.pop(0) if len(cards) > 1 and together else next((each.figure for each in cards), None)
+    page = Page(
+        title=results.name,
+        about=_about(results),
+        warnings=(
+            *(f"{each.name}: no {each.what}: {each.sentence}" for each in results.failures),
+            *check_warnings(results, CHANGE_A_CONCLUSION),
+        ),
+        findings=summary(results, [each.agreement for each in cards]),
+        figure=first,
+        noun="recording",
+        cards=(
+            *cards,
+            *(
+                Card(each.name, f"No result: {each.sentence}", Agreement.OPEN, "")
+                for each in results.failures
+                if each.what is FailedStep.ANALYSIS
+            ),
+        ),
+        further=Fold("Recordings together, and the model", results.model_said, figures=tuple(together)),
+        folds=tuple(_benches(results)),
         limits=tuple(limits(results)),
-        failures=results.failures,
     )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-    return path
+    return write_page(page, path, figures_folder)
 
 
-def _shown(content: object) -> object:
-    """Write control characters of names and texts as escapes; Markup is of the template itself."""
-    return printable(content) if type(content) is str else content
+def _about(results: CampaignResults) -> str:
+    count = len(results.facts)
+    origins = {each.is_simulated for each in results.facts}
+    which = "Some of these recordings" if len(origins) > 1 else "These recordings"
+    where = f" {which} come from {'simulated instruments' if True in origins else 'a real bench'}."
+    return f"Report of {count} recording{'' if count == 1 else 's'}.{where if origins else ''}"
 
 
-def _environment() -> Environment:
-    return Environment(
-        loader=PackageLoader("vibench.analysis.report", "."),
-        autoescape=True,
-        finalize=_shown,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-
-
-def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> EmbeddedFigure:
-    if folder is not None:
-        drawn.save(folder)
-    svg = drawn.svg
-    kind, content = ("svg+xml", svg) if len(svg) <= _LARGEST_SVG_BYTES else ("png", drawn.png)
-    source = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
-    return EmbeddedFigure(number, drawn.title, drawn.caption, source)
-
-
-def _section(
-    result: AnyResult, motions: Mapping[str, HiddenMotion], numbers: Iterator[int], folder: Path | None
-) -> RecordingSection:
-    facts = result.analysis.facts
-    drawn = list(recording_figures(result))
-    if facts.name in motions:
-        drawn += [draw(motions[facts.name]) for draw in (hidden_motion_figure, hidden_impacts_figure)]
-    return RecordingSection(
+def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
+    facts, drawing = result.analysis.facts, DRAWINGS[result.kind]
+    said, *statistics = drawing.findings(result)
+    figure, *more = drawing.figures(result)
+    agreement, look_at = agreement_of(result, failed.get(facts.name))
+    warned = [each for each in result.analysis.checks if each.verdict is Verdict.WARNING]
+    tables = [build((result,)) for build in drawing.tables]
+    looks = [each for each in (look_at, ", ".join(each.what.lower() for each in warned)) if each]
+    return Card(
         name=facts.name,
-        measured=measured_rows(facts),
-        checks=check_rows(result.analysis.checks),
-        figures=tuple(_embedded(next(numbers), each, folder) for each in drawn),
+        result=said,
+        agreement=agreement,
+        look_at="; ".join(looks),
+        numbers=tuple(islice(drawing.numbers(result), _MOST_NUMBERS)),
+        warnings=tuple(f"{each.what}: {each.text}" for each in warned),
+        figure=figure,
+        folds=(
+            Fold(
+                "Statistics and uncertainty",
+                tuple(statistics),
+                (*tables, uncertainty_table((result,))),
+                tuple(more),
+            ),
+            Fold(
+                "Checks, settings and levels",
+                tables=(check_table(result.analysis.checks), measured_table(facts)),
+                figures=recording_figures(result),
+            ),
+        ),
     )
 
 
-def _overview(results: CampaignResults) -> ReportTable:
-    rows = tuple(
-        (
-            facts.name,
-            excitation_text(facts.measurement.excitation),
-            facts.started_utc[:19].replace("T", " "),
-            f"{facts.duration_s:.1f} s",
-            facts.state.value,
-            "simulated instruments" if facts.is_simulated else "real bench",
-        )
-        for facts in results.facts
-    )
-    headings = ("recording", "excitation", "started (UTC)", "length", "ended", "origin")
-    return ReportTable("Recordings", headings, rows, "")
+def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Agreement, str]:
+    """Say whether the measurement could be one of the simulated draws, and if not yes, why.
+
+    Parameters
+    ----------
+    failure
+        Why there is no simulation, where one was tried.
+
+    """
+    laid = result.laid
+    if laid is None:
+        return Agreement.OPEN, "not simulated" if failure is None else failure.sentence
+    if not laid.run.driven.by_voltage:
+        return Agreement.OPEN, f"simulated under the recorded base, once{laid.run.why and ': '}{laid.run.why}"
+    outside = [each.name for each in laid.ensemble if each.compared and not each.agrees]
+    if outside:
+        return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}"
+    rest = [each.name for each in laid.ensemble if not each.compared]
+    if len(rest) == len(laid.ensemble):
+        return Agreement.OPEN, "too few simulated draws of the measured kind of motion"
+    return Agreement.YES, f"not compared: {', '.join(rest)}" if rest else ""
 
 
-def _warnings(results: CampaignResults) -> Iterator[str]:
-    for failure in results.failures:
-        yield _sentence(failure)
-    yield from check_warnings(results)
-
-
-def check_warnings(results: CampaignResults) -> Iterator[str]:
+def check_warnings(results: CampaignResults, checks: frozenset[str] | None = None) -> Iterator[str]:
     """Say what to look at before a result is trusted.
 
     Parameters
     ----------
     results
         As `vibench.analysis.analyse_files` gives them.
+    checks
+        Names of the checks whose warnings are wanted; by default all.
 
     Returns
     -------
@@ -208,21 +169,15 @@ def check_warnings(results: CampaignResults) -> Iterator[str]:
     """
     for result in results.results:
         for check in result.analysis.checks:
-            if check.verdict is Verdict.WARNING:
+            if check.verdict is Verdict.WARNING and (checks is None or check.what in checks):
                 yield f"{result.analysis.facts.name}: {check.what.lower()}: {check.text}"
 
 
-def _sentence(failure: AnalysisFailure) -> str:
-    return f"{failure.name}: no {failure.what}: {failure.sentence}"
-
-
-def _benches(results: CampaignResults) -> tuple[BenchSection, ...]:
+def _benches(results: CampaignResults) -> Iterator[Fold]:
     """Group recordings that say the same of their bench, so that it is said once."""
-    groups: dict[tuple[object, ...], list[str]] = {}
+    groups: dict[tuple[ReportTable, ...], list[str]] = {}
     for facts in results.facts:
-        said = (bench_rows(facts), channel_rows(facts), version_rows(facts))
+        said = (bench_table(facts), channel_table(facts), version_table(facts))
         groups.setdefault(said, []).append(facts.name)
-    return tuple(
-        BenchSection(", ".join(names), *said)  # type: ignore[arg-type]
-        for said, names in groups.items()
-    )
+    for tables, names in groups.items():
+        yield Fold("Bench, settings and versions", (f"Recordings: {', '.join(names)}",), tables)

@@ -1,7 +1,6 @@
 """The tables of a report: resonances, collisions, dwells and the lines of their spectra."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from ..results import budgets_of
 from ..sine import Edge
 from ..tables import plus_minus
 from ..uncertainty import COVERAGE, Budget, Cause
+from ._page import ReportTable
 
 _NEAR = 0.08
 """Two resonances are set beside each other when they lie within 8 %: the modes lie at least 9 % apart."""
@@ -28,16 +28,6 @@ _SMALLEST_BIAS = 1e-3
 """Below this a bias says only that noise plays no part."""
 _PAPER_COLLISION = "about 240 to 290 Hz"
 """Gong et al. 2025, section 5: the grey area of the sweep."""
-
-
-@dataclass(frozen=True)
-class ReportTable:
-    """Text in rows and columns, with a sentence under it."""
-
-    title: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    note: str
 
 
 def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
@@ -96,7 +86,7 @@ def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
     if not found:
         yield level, "none above its uncertainty", *([ABSENT] * 5)
     for each in found:
-        beside = _nearest_resonance(each.frequency_hz, simulated)
+        beside = nearest_resonance(each.frequency_hz, simulated)
         yield (
             level,
             plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz),
@@ -108,7 +98,8 @@ def _resonance_rows(result: NoiseResult) -> Iterator[tuple[str, ...]]:
         )
 
 
-def _nearest_resonance(frequency_hz: float, among: Sequence[Resonance]) -> Resonance | None:
+def nearest_resonance(frequency_hz: float, among: Sequence[Resonance]) -> Resonance | None:
+    """Return the nearest of some resonances, where it may be the same mode; else None."""
     near = [each for each in among if abs(each.frequency_hz - frequency_hz) < _NEAR * frequency_hz]
     return min(near, key=lambda each: abs(each.frequency_hz - frequency_hz), default=None)
 
@@ -145,14 +136,15 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
         for regions in (measured, simulated):
             if number < len(regions):
                 region = regions[number]
-                cells.append(_edge(region.start, "start of sweep" if region.reaches_start else ""))
+                cells.append(edge_text(region.start, "start of sweep" if region.reaches_start else ""))
                 cells.append("end of sweep" if region.reaches_stop else _last(region.stop))
             else:
                 cells += [ABSENT, ABSENT]
         yield (*cells, _PAPER_COLLISION)
 
 
-def _edge(edge: Edge, instead: str) -> str:
+def edge_text(edge: Edge, instead: str) -> str:
+    """Return an edge with its bounds, or what is said in its place."""
     return instead or f"{edge.frequency_hz:.1f} ({edge.lower_hz:.1f} to {edge.upper_hz:.1f}) Hz"
 
 

@@ -14,6 +14,7 @@ from ._document import (
     Picture as Picture,
     Reproduction as Reproduction,
     reproduction_document as reproduction_document,
+    reproduction_page as reproduction_page,
     verdict_text as verdict_text,
 )
 from ._evidence import (

@@ -1,18 +1,31 @@
-"""The page on what of the paper holds, as Markdown, made from judgements."""
+"""The page on what of the paper holds, as Markdown and as a report, made from judgements."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from vibench.sim import wilson_share
 
+from ..figures import DrawnFigure
+from ..report import Agreement, Card, Fold, Page, ReportTable
 from ._claim import Claim, Expectation, Finding, Judgement, Verdict
-from ._page_tables import PageTable, score_table
+from ._page_tables import score_table
 from ._score import DampingScore
 
-HEAD = "| claim | where | measured | wanted | verdict |"
+_HEADINGS = ("claim", "where", "measured", "wanted", "verdict")
+HEAD = f"| {' | '.join(_HEADINGS)} |"
 _RULE = "|---|---|---|---|---|"
 _PIPE = "&#124;"
 """A bar inside of a cell."""
+_METHOD = (
+    "Every claim of Gong et al. (2025) that has a number or a direction, measured on our simulation of",
+    "their specimen, with what we want to see and the verdict. Chaotic motion is a draw: another run of",
+    "it differs by some per cent, and the bounds are wide enough for that. Where it is chance which",
+    "motion chaos ends in, or when, a claim is measured from several starts, a millionth of the gap",
+    "apart, and the spread of each number stands behind it. The paper gives hardly any",
+    "tolerances: the bounds are ours, and some were settled after a first look at the numbers. Where a",
+    "claim does not hold, options are tried one by one, in the order listed, until one upholds it.",
+    "The experiment of Figs. 12 to 14 is repeated on the virtual rig by `vibench demo`.",
+)
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 
@@ -23,7 +36,7 @@ class Reproduction:
     sections: Mapping[str, tuple[Judgement, ...]]
     """By heading, in order."""
     scores: tuple[DampingScore, ...]
-    tables: tuple[PageTable, ...]
+    tables: tuple[ReportTable, ...]
     """After the claims."""
     options: str
     """The defaults, as a sentence."""
@@ -38,6 +51,16 @@ class Reproduction:
     def count(self, verdict: Verdict) -> int:
         """How many claims have this verdict."""
         return sum(each.verdict is verdict for each in self.judgements)
+
+    @property
+    def sentence(self) -> str:
+        """The counts in words."""
+        return (
+            f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults,\n"
+            f"{self.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts,\n"
+            f"{self.count(Verdict.HOLDS_UNDER)} under another named option,\n"
+            f"{self.count(Verdict.FAILS)} under none that was tried."
+        )
 
 
 @dataclass(frozen=True)
@@ -74,22 +97,12 @@ def _summary(found: Reproduction) -> Iterator[str]:
         "# What of the paper holds",
         "",
         f"Made by `{COMMAND}`; not edited by hand.",
-        "Every claim of Gong et al. (2025) that has a number or a direction, measured on our simulation of",
-        "their specimen, with what we want to see and the verdict. Chaotic motion is a draw: another run of",
-        "it differs by some per cent, and the bounds are wide enough for that. Where it is chance which",
-        "motion chaos ends in, or when, a claim is measured from several starts, a millionth of the gap",
-        "apart, and the spread of each number stands behind it. The paper gives hardly any",
-        "tolerances: the bounds are ours, and some were settled after a first look at the numbers. Where a",
-        "claim does not hold, options are tried one by one, in the order listed, until one upholds it.",
-        "The experiment of Figs. 12 to 14 is repeated on the virtual rig by `vibench demo`.",
+        *_METHOD,
         "",
         found.options,
         found.made_with,
         "",
-        f"Of {len(found.judgements)} claims {found.count(Verdict.HOLDS)} hold under the defaults,",
-        f"{found.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts,",
-        f"{found.count(Verdict.HOLDS_UNDER)} under another named option,",
-        f"{found.count(Verdict.FAILS)} under none that was tried.",
+        found.sentence,
     )
     apart = [each for each in found.judgements if each.verdict is not Verdict.HOLDS]
     if apart:
@@ -122,24 +135,32 @@ def _except(judgement: Judgement) -> str:
     )
 
 
-def _table(table: PageTable) -> Iterator[str]:
-    yield from ("", f"## {table.title}", "", table.text, "")
-    yield f"| {' | '.join(table.headings)} |"
+def _table(table: ReportTable) -> Iterator[str]:
+    yield from ("", f"## {table.title}", "", table.note, "")
+    yield _line(table.headings)
     yield f"|{'---|' * len(table.headings)}"
-    for row in table.rows:
-        yield f"| {' | '.join(row)} |"
+    yield from map(_line, table.rows)
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(each.replace('|', _PIPE) for each in cells)} |"
 
 
 def _row(judgement: Judgement) -> str:
+    key, *cells, verdict = _cells(judgement)
+    bold = verdict.replace(Verdict.FAILS, f"**{Verdict.FAILS}**", 1)
+    return _line((f"**{judgement.claim.key}**{key.removeprefix(judgement.claim.key)}", *cells, bold))
+
+
+def _cells(judgement: Judgement) -> tuple[str, ...]:
     claim = judgement.claim
-    cells = (
-        f"**{claim.key}**: {claim.says}",
+    return (
+        f"{claim.key}: {claim.says}",
         claim.place,
         _values(claim, judgement.findings[0]),
         wanted_text(claim),
         verdict_text(judgement),
     )
-    return f"| {' | '.join(each.replace('|', _PIPE) for each in cells)} |"
 
 
 def verdict_text(judgement: Judgement) -> str:
@@ -155,7 +176,7 @@ def verdict_text(judgement: Judgement) -> str:
         return f"holds under {under.case.name}"
     if judgement.verdict is Verdict.HOLDS:
         return judgement.verdict.value
-    return f"**{judgement.verdict.value}**{_except(judgement)}"
+    return f"{judgement.verdict.value}{_except(judgement)}"
 
 
 def _values(claim: Claim, finding: Finding) -> str:
@@ -181,11 +202,72 @@ def _differing(judgements: Sequence[Judgement]) -> Iterator[str]:
     for each in judgements:
         if len(each.findings) > 1:
             yield from ("", f"Tried for **{each.claim.key}**:", "")
-            for finding in each.findings:
-                yield f"- {finding.case.name}: {_values(each.claim, finding)} ({_mark(finding)})"
+            yield from (f"- {tried}" for tried in _tried(each))
+
+
+def _tried(judgement: Judgement) -> Iterator[str]:
+    for finding in judgement.findings:
+        yield f"{finding.case.name}: {_values(judgement.claim, finding)} ({_mark(finding)})"
 
 
 def _mark(finding: Finding) -> str:
     if finding.is_met_in_part:
         return f"holds for {finding.met} of {len(finding.draws)} starts"
     return "holds" if finding.is_met else "does not hold"
+
+
+def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigure) -> Page:
+    """Show the judgements as the report of recordings does: one card for each section of claims.
+
+    Parameters
+    ----------
+    levels
+        Responses at every drive level, the first figure.
+    score
+        How many claims hold at each damping.
+
+    """
+    failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
+    missing = f" Those that do not hold: {', '.join(failed)}." if failed else ""
+    return Page(
+        title="What of the paper holds",
+        about="Claims of Gong et al. (2025), measured on our simulation of their specimen.",
+        warnings=(),
+        findings=found.sentence + missing,
+        figure=levels,
+        noun="claims on",
+        cards=tuple(_card(heading, judgements) for heading, judgements in found.sections.items()),
+        further=Fold("Score by damping", figures=(score,)),
+        folds=(Fold("All scores and settings", tables=(score_table(found.scores), *found.tables)),),
+        limits=(" ".join(_METHOD), found.options, found.made_with),
+    )
+
+
+def _card(heading: str, judgements: Sequence[Judgement]) -> Card:
+    verdicts = [each.verdict for each in judgements]
+    apart = [each for each in judgements if each.verdict is not Verdict.HOLDS]
+    rows = tuple(_cells(each) for each in judgements)
+    tried = tuple(
+        (each.claim.key, text) for each in judgements if len(each.findings) > 1 for text in _tried(each)
+    )
+    how = tuple((each.claim.key, each.claim.measured_by) for each in judgements)
+    return Card(
+        name=heading,
+        result=f"{verdicts.count(Verdict.HOLDS)} of {len(verdicts)} claims hold under the defaults.",
+        agreement=Agreement.NO if Verdict.FAILS in verdicts else Agreement.OPEN if apart else Agreement.YES,
+        look_at=", ".join(each.claim.key for each in apart),
+        numbers=tuple(
+            (f"claims: {each.value}", str(verdicts.count(each))) for each in Verdict if each in verdicts
+        ),
+        folds=(
+            Fold(
+                "Claims, what was tried and how it was measured",
+                tuple(f"{each.claim.key}: {each.claim.says} {_difference(each)}" for each in apart),
+                (
+                    ReportTable("Claims", _HEADINGS, rows),
+                    ReportTable("Tried", ("claim", "option: result"), tried),
+                    ReportTable("How each was measured", ("claim", "measured by"), how),
+                ),
+            ),
+        ),
+    )

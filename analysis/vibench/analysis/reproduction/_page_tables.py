@@ -1,13 +1,13 @@
 """Tables of the page beside the claims: colliding regions, similarity rates, and the score by damping."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from vibench.sim import gong2025
 
 from ..paper_figures import AMPLITUDES_M
+from ..report import ReportTable
 from ..signals import Flags, Reals
 from ._case import Case
 from ._evidence import PIECE_WISE, Evidence, level
@@ -18,17 +18,7 @@ SI_READING_S = 0.01
 """c_i = 0.01 k_i, as the paper prints it, in SI units."""
 
 
-@dataclass(frozen=True)
-class PageTable:
-    """A table with its heading and what it says."""
-
-    title: str
-    text: str
-    headings: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
-def regions_table(evidence: Evidence, case: Case) -> PageTable:
+def regions_table(evidence: Evidence, case: Case) -> ReportTable:
     """Where m1 and m2 collide, at each amplitude."""
     rows = []
     for amplitude_m in AMPLITUDES_M:
@@ -41,12 +31,12 @@ def regions_table(evidence: Evidence, case: Case) -> PageTable:
                 f"{np.mean(curve.collides):.0%}",
             )
         )
-    return PageTable(
+    return ReportTable(
         "Where collisions begin and end",
-        f"Frequencies, on a grid of {case.options.grid.step_hz:g} Hz, at which m1 and m2 collided within "
-        "the last 5 s of 30 s from rest. The paper's text gives no numbers for the shaded regions of Fig. 3.",
         ("A0", "colliding [Hz]", "of the grid"),
         tuple(rows),
+        f"Frequencies, on a grid of {case.options.grid.step_hz:g} Hz, at which m1 and m2 collided within "
+        "the last 5 s of 30 s from rest. The paper's text gives no numbers for the shaded regions of Fig. 3.",
     )
 
 
@@ -62,7 +52,7 @@ def _span(low_hz: float, high_hz: float) -> str:
     return f"{low_hz:g}" if low_hz == high_hz else f"{low_hz:g}–{high_hz:g}"
 
 
-def rates_table(evidence: Evidence, case: Case) -> PageTable:
+def rates_table(evidence: Evidence, case: Case) -> ReportTable:
     """Give the similarity rate of every continuous model at every amplitude."""
     rows = tuple(
         (
@@ -73,25 +63,22 @@ def rates_table(evidence: Evidence, case: Case) -> PageTable:
     )
     options = case.options
     named = [f"{title}, {1e6 * each:g} µm" for title in ("I", "II") for each in AMPLITUDES_M]
-    return PageTable(
+    return ReportTable(
         "Similarity rates",
-        f"Eqs. 6 and 7 with log10 of the response [{options.logarithm_of.value}], a difference of at most "
-        f"{options.threshold:.0%}, up to {options.similarity_highest_hz:g} Hz.",
         ("n", *named),
         rows,
+        f"Eqs. 6 and 7 with log10 of the response [{options.logarithm_of.value}], a difference of at most "
+        f"{options.threshold:.0%}, up to {options.similarity_highest_hz:g} Hz.",
     )
 
 
-def score_table(scores: Sequence[DampingScore]) -> PageTable:
+def score_table(scores: Sequence[DampingScore]) -> ReportTable:
     """Give the score by damping."""
     ratios = gong2025(SI_READING_S).damping_ratios
     most = max(len(each.held) for each in scores)
     best = ", ".join(f"{each.damping_time_s:.3g} s" for each in scores if len(each.held) == most)
-    return PageTable(
+    return ReportTable(
         "Score by damping",
-        f"The paper's c = 0.01 k, read in SI units, would make the damping ratios {_listed(ratios)}; "
-        "above 1 a mode does not oscillate. Read in mm, g and ms it is 1e-05 s. Of the claims that are "
-        f"measured at every damping, most hold at {best}.",
         ("c / k", "hold", "largest exponent at 1 µm [1/s]", "at 5 µm [1/s]", "do not hold"),
         tuple(
             (
@@ -103,6 +90,9 @@ def score_table(scores: Sequence[DampingScore]) -> PageTable:
             )
             for each in scores
         ),
+        f"The paper's c = 0.01 k, read in SI units, would make the damping ratios {_listed(ratios)}; "
+        "above 1 a mode does not oscillate. Read in mm, g and ms it is 1e-05 s. Of the claims that are "
+        f"measured at every damping, most hold at {best}.",
     )
 
 

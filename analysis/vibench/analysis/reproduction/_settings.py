@@ -15,10 +15,10 @@ from vibench.sim.accuracy_benchmark import (
 )
 
 from ..paper_figures import drive_at
+from ..report import ReportTable
 from ._case import ALIKE, BY_ODE45, CLOSEST, SCORED_S, Alternative, Case, damping, together
 from ._claim import Claim, found
 from ._evidence import MODERATE_M, Evidence, level, specimen_under
-from ._page_tables import PageTable
 
 SETTINGS: tuple[Alternative, ...] = (
     damping(1e-5),
@@ -40,7 +40,7 @@ _PHASES = 50
 """Of a step in which a contact begins."""
 
 
-def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -> PageTable:
+def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -> ReportTable:
     """Say which claims hold under which setting: those that do not hold under all, from rest."""
     settings = [case, *(each.of(case) for each in SETTINGS), CLOSEST.of(case)]
     rows = []
@@ -51,12 +51,12 @@ def claims_by_setting(claims: Sequence[Claim], evidence: Evidence, case: Case) -
     columns = list(zip(*rows, strict=True))[1:]
     totals = (f"{each.count(_HOLDS)} of {len(rows) - each.count(_NOT_ASKED)}" for each in columns)
     kept = tuple(row for row in rows if _FAILS in row)
-    return PageTable(
+    return ReportTable(
         "Claims by setting",
-        "From rest alone. Claims that hold under every setting are left out, but counted in the first row. "
-        "An empty cell was not computed: claims on continuous models take too long.",
         ("claim", *(each.name for each in settings)),
         (("hold", *totals), *kept),
+        "From rest alone. Claims that hold under every setting are left out, but counted in the first row. "
+        "An empty cell was not computed: claims on continuous models take too long.",
     )
 
 
@@ -64,7 +64,7 @@ def _verdict(claim: Claim, evidence: Evidence, case: Case) -> str:
     return _HOLDS if found(replace(claim, draws=1), evidence, case).is_met else _FAILS
 
 
-def reach_table(case: Case) -> PageTable:
+def reach_table(case: Case) -> ReportTable:
     """Say when m1 first reaches its stops at 1 um, and between which frequencies it does at 5 um."""
     rows = []
     for setting in (*(damping(each) for each in SCORED_S), ALIKE):
@@ -75,20 +75,20 @@ def reach_table(case: Case) -> PageTable:
         ends = f"{over[0]:.1f} to {over[-1]:.1f}" if over.size else "nowhere"
         level_um = 1e6 * case.options.gap_m / p.max()
         rows.append((setting.name, f"{x.max():.3g}", f"{level_um:.3g}", ends))
-    return PageTable(
+    return ReportTable(
         "Where linear motion reaches the gap",
-        "Exact linear motion; up to there Responses I and II are the same.",
         (
             "damping",
-            "|x / U| at its peak near 95 Hz".replace("|", "&#124;"),
+            "|x / U| at its peak near 95 Hz",
             "A0 at which p reaches the gap there [µm]",
             "p reaches the gap at 5 µm between [Hz]",
         ),
         tuple(rows),
+        "Exact linear motion; up to there Responses I and II are the same.",
     )
 
 
-def exponents_table(evidence: Evidence, case: Case) -> PageTable:
+def exponents_table(evidence: Evidence, case: Case) -> ReportTable:
     """Say how chaotic the motion is at 5 um, around the first and around the second resonance."""
     settings = (damping(1e-5).of(case), case, ALIKE.of(case), BY_ODE45.of(case))
     curves = [level(evidence, each, MODERATE_M) for each in settings]
@@ -97,15 +97,15 @@ def exponents_table(evidence: Evidence, case: Case) -> PageTable:
         at = [np.flatnonzero(each.frequency_hz == frequency_hz) for each in curves]
         values = (each.exponent_per_s[place] for each, place in zip(curves, at, strict=True))
         rows.append((f"{frequency_hz:g}", *(f"{each[0]:.0f}" if each.size else "" for each in values)))
-    return PageTable(
+    return ReportTable(
         "Exponents at 5 µm around two resonances",
-        "Largest exponent [1/s]; another run of chaos differs by some per cent.",
         ("frequency [Hz]", *(each.name for each in settings)),
         tuple(rows),
+        "Largest exponent [1/s]; another run of chaos differs by some per cent.",
     )
 
 
-def methods_table(evidence: Evidence, case: Case) -> PageTable:
+def methods_table(evidence: Evidence, case: Case) -> ReportTable:
     """Compare textbook methods with the exact motion: energy of an impact, and exponent at 260 Hz."""
     options, drive = case.options, drive_at(SHOWN_HZ, MODERATE_M)
     specimen, settle_s = specimen_under(case), options.window_s
@@ -117,12 +117,12 @@ def methods_table(evidence: Evidence, case: Case) -> PageTable:
         found = textbook_exponent(specimen, drive, method, options.duration_s - settle_s, settle_s)
         rows.append((method.name, kept, f"{found:.0f}"))
     speeds = ", ".join(f"{each:g}" for each in SPEEDS)
-    return PageTable(
+    return ReportTable(
         "Methods of integration",
-        "Steps fall on a contact wherever they happen to. Energy is that of m1 and m2 in a free impact, over "
-        f"that before it, mean over when in a step it begins; exponents at {SHOWN_HZ:g} Hz, 5 µm, from rest.",
         ("method", f"energy kept at {speeds} m/s", "exponent [1/s]"),
         tuple(rows),
+        "Steps fall on a contact wherever they happen to. Energy is that of m1 and m2 in a free impact, over "
+        f"that before it, mean over when in a step it begins; exponents at {SHOWN_HZ:g} Hz, 5 µm, from rest.",
     )
 
 

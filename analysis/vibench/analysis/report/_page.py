@@ -1,0 +1,165 @@
+"""The page of every report: first screen, a card for each part, and what unfolds below them."""
+
+import base64
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from importlib.metadata import version
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from vibench.acquisition import printable
+
+from ..figures import DrawnFigure
+
+Rows = tuple[tuple[str, str], ...]
+LONGEST_CAPTION = 280
+"""Characters of title and caption together: three lines in the column of a figure."""
+MOST_OPEN_CARDS = 12
+"""With more of them each card is folded too, so that the page stays short."""
+_LARGEST_SVG_BYTES = 300_000
+"""Above this a PNG is smaller and quicker to show, and as legible."""
+_SENTENCE_ENDS = re.compile(r"(?<=\.)(?<!\bal\.)(?<!\bFig\.)\s+(?=[A-Z0-9])")
+
+
+class Agreement(StrEnum):
+    """Whether a simulation, or a claim, agrees with what was measured."""
+
+    YES = "yes"
+    NO = "no"
+    OPEN = "cannot tell"
+
+
+@dataclass(frozen=True)
+class ReportTable:
+    """Text in rows and columns, with a sentence under it."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Fold:
+    """What a reader unfolds: sentences, tables and figures below a heading."""
+
+    title: str
+    sentences: tuple[str, ...] = ()
+    tables: tuple[ReportTable, ...] = ()
+    figures: tuple[DrawnFigure, ...] = ()
+
+
+@dataclass(frozen=True)
+class Card:
+    """One recording, or one group of claims: its row in the first table and what is shown of it below."""
+
+    name: str
+    result: str
+    """A sentence."""
+    agreement: Agreement
+    look_at: str
+    """What to look at before the result is used."""
+    numbers: Rows = ()
+    """Up to three, each with its bounds."""
+    warnings: tuple[str, ...] = ()
+    figure: DrawnFigure | None = None
+    folds: tuple[Fold, ...] = ()
+
+
+@dataclass(frozen=True)
+class Page:
+    """Everything that a report shows, in the order of its fields."""
+
+    title: str
+    about: str
+    """What was reported, beside when and by which version."""
+    warnings: tuple[str, ...]
+    """Those that change a conclusion."""
+    findings: str
+    """At most 120 words."""
+    figure: DrawnFigure | None
+    noun: str
+    """What the rows of the first table are: recording, claims."""
+    cards: tuple[Card, ...]
+    further: Fold
+    """Shown, not folded: figures of several recordings, and sentences on the model."""
+    folds: tuple[Fold, ...]
+    limits: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EmbeddedFigure:
+    """A figure as the page holds it."""
+
+    number: int
+    title: str
+    caption: str
+    """At most three lines."""
+    rest: str
+    """The sentences of the caption that unfold."""
+    source: str
+    """A ``data:`` address with the whole image in it."""
+
+
+def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Path:
+    """Write one HTML file with all figures inside; an older file of that name is replaced.
+
+    Parameters
+    ----------
+    figures_folder
+        Where PNG, SVG and CSV of each figure are saved too; None saves none.
+
+    """
+    figures = list(dict.fromkeys(_figures(page)))
+    environment = Environment(
+        loader=PackageLoader("vibench.analysis.report", "."),
+        autoescape=True,
+        finalize=_shown,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    text = environment.get_template("report.html.j2").render(
+        page=page,
+        embedded={each: _embedded(number, each, figures_folder) for number, each in enumerate(figures, 1)},
+        is_long=len(page.cards) > MOST_OPEN_CARDS,
+        written=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        version=version("vibench"),
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def _figures(page: Page) -> Iterator[DrawnFigure]:
+    """Give every figure in the order of their numbers: shown ones first, then those in folds."""
+    yield from (each for each in (page.figure, *(card.figure for card in page.cards)) if each is not None)
+    yield from page.further.figures
+    for fold in (*(fold for card in page.cards for fold in card.folds), *page.folds):
+        yield from fold.figures
+
+
+def _shown(content: object) -> object:
+    """Write control characters of names and texts as escapes; Markup is of the template itself."""
+    return printable(content) if type(content) is str else content
+
+
+def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> EmbeddedFigure:
+    if folder is not None:
+        drawn.save(folder)
+    svg = drawn.svg
+    kind, content = ("svg+xml", svg) if len(svg) <= _LARGEST_SVG_BYTES else ("png", drawn.png)
+    source = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
+    return EmbeddedFigure(number, drawn.title, *divided_caption(drawn), source)
+
+
+def divided_caption(drawn: DrawnFigure) -> tuple[str, str]:
+    """Divide a caption into the first sentences that fill three lines, and the rest."""
+    sentences = _SENTENCE_ENDS.split(drawn.caption)
+    lengths = [len(drawn.title) + len(" ".join(sentences[:end])) for end in range(len(sentences) + 1)]
+    fitting = sum(each <= LONGEST_CAPTION for each in lengths) - 1
+    return " ".join(sentences[:fitting]), " ".join(sentences[fitting:])

@@ -1,0 +1,108 @@
+"""The findings of a report in plain words are right for every kind of result, and short."""
+
+from types import SimpleNamespace as Of
+
+import numpy as np
+import pytest
+
+from vibench.analysis.chaos import MotionKind
+from vibench.analysis.report import Agreement
+from vibench.analysis.report._summary import MOST_WORDS, summary
+from vibench.analysis.results import AnalysisFailure, FailedStep
+
+YES, NO, OPEN = Agreement
+
+
+def noise(vpp, *peaks_hz, band_hz=(50.0, 600.0), specimen="paper"):
+    response = Of(
+        resonances=tuple(Of(frequency_hz=each) for each in peaks_hz),
+        frequency_response=Of(frequency_hz=np.array(band_hz)),
+    )
+    facts = Of(bench={"specimen": specimen}, feedback=())
+    analysis = Of(excitation=Of(amplitude_vpp=vpp), response=response, facts=facts)
+    return Of(kind="white_noise", analysis=analysis, laid=None)
+
+
+def dwell(vpp, kind, frequency_hz=260.0, period=None):
+    verdict = Of(kind=kind, period=period, why="it is so")
+    facts = Of(bench={"specimen": "paper"}, feedback=())
+    excitation = Of(amplitude_vpp=vpp, frequency_hz=frequency_hz)
+    return Of(kind="dwell", analysis=Of(excitation=excitation, motion=Of(verdict=verdict), facts=facts))
+
+
+def campaign(noise=(), dwells=(), failures=()):
+    results = (*noise, *dwells)
+    return Of(noise=noise, dwells=dwells, in_order=results, results=results, failures=failures)
+
+
+def said(**parts):
+    return summary(campaign(**parts), ())
+
+
+def test_the_papers_campaign_is_told_in_three_findings():
+    results = campaign(
+        (noise(0.05, 94.61, 266.2, 499.6), noise(1.0, 201.0), noise(10.0, 199.1, 428.5)),
+        (dwell(0.05, MotionKind.PERIODIC), dwell(1.5, MotionKind.CHAOTIC), dwell(10.0, MotionKind.CHAOTIC)),
+    )
+    assert summary(results, [YES] * 6) == (
+        "At 0.05 Vpp there are three resonances, 94.6, 266.2 and 499.6 Hz. "
+        "At 10 Vpp they are gone and two others appear at 199.1 and 428.5 Hz. "
+        "At 260 Hz the motion is periodic at 0.05 Vpp and chaotic at 1.5 and 10 Vpp. "
+        "The simulation agrees with all six recordings."
+    )
+
+
+@pytest.mark.parametrize(
+    ("strong", "words"),
+    [
+        (noise(10.0, 94.5, 266.0), "At 10 Vpp, 94.5 and 266.0 Hz remain; 499.6 Hz is gone."),
+        (noise(10.0, 95.0, 266.0, 499.0), "At 10 Vpp, 95.0, 266.0 and 499.0 Hz remain."),
+        (noise(10.0), "At 10 Vpp no resonance stands above its uncertainty."),
+        (noise(10.0, 199.0), "At 10 Vpp they are gone and another appears at 199.0 Hz."),
+        (noise(10.0, 266.0, 428.0), "266.0 Hz remains; 94.6 and 499.6 Hz are gone; 428.0 Hz is new."),
+        (noise(10.0, 199.0, band_hz=(150.0, 300.0)), "At 10 Vpp there is one resonance, 199.0 Hz."),
+    ],
+)
+def test_what_becomes_of_the_resonances_is_told_as_it_was_measured(strong, words):
+    assert words in said(noise=(noise(0.05, 94.6, 266.2, 499.6), strong))
+
+
+@pytest.mark.parametrize(
+    "second", [noise(0.05, 201.0), noise(10.0, 201.0, specimen="another")], ids=["level", "specimen"]
+)
+def test_recordings_of_one_level_or_of_two_specimens_are_not_compared(second):
+    words = said(noise=(noise(0.05, 94.6, 266.2), second))
+    assert "gone" not in words
+    assert words.count("resonances at") == 2
+
+
+def test_undecided_motion_is_called_so_and_many_frequencies_are_counted():
+    assert said(dwells=(dwell(1.0, MotionKind.UNDECIDED),)) == "At 260 Hz the motion is undecided at 1 Vpp."
+    many = tuple(dwell(1.0, MotionKind.PERIODIC, 200.0 + each) for each in range(12))
+    assert said(dwells=many) == "Dwells by motion: 12 periodic."
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "words"),
+    [
+        ([YES], "The simulation agrees with the recording."),
+        ([YES, YES], "The simulation agrees with both recordings."),
+        ([OPEN, OPEN], "Whether a simulation agrees cannot be told."),
+        (
+            [YES, YES, NO, OPEN],
+            "the simulation agrees with two, disagrees with one and cannot be judged for one.",
+        ),
+        ([NO], "The simulation disagrees with the recording."),
+    ],
+)
+def test_agreement_is_stated_for_every_mix_of_verdicts(verdicts, words):
+    assert summary(campaign((noise(0.05, 94.6),)), verdicts).endswith(words)
+
+
+def test_a_recording_without_a_result_comes_first_and_many_findings_stay_short():
+    failed = AnalysisFailure("x.h5", FailedStep.ANALYSIS, "broken")
+    assert said(failures=(failed,)) == "One recording of one gave no result."
+    many = tuple(noise(0.05, 94.6, 266.2, 499.6) for _ in range(40))
+    words = summary(campaign(many, failures=(failed,)), [YES] * 40)
+    assert len(words.split()) <= MOST_WORDS
+    assert words.endswith("The table has the rest. The simulation agrees with all 40 recordings.")
