@@ -13,6 +13,7 @@ class Page(HTMLParser):
         super().__init__()
         self.open, self.sources, self.links, self.ids = [], [], [], []
         self.texts, self.seen, self.captions, self.headings, self.found = [], [], [], [], []
+        self.is_finding = False
         self.feed(text)
         self.close()
 
@@ -25,7 +26,7 @@ class Page(HTMLParser):
             self.open.append(tag)
         if tag == "figcaption":
             self.captions.append("")
-        self.is_finding = found.get("class") == "findings" or (self.is_finding if self.ids else False)
+        self.is_finding = found.get("class") == "findings"
 
     def handle_endtag(self, tag):
         assert self.open.pop() == tag

@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import welch
 from scipy.stats import norm
 
+from tests.reading_reports import Page
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import RecordingState, SegmentLabel
 from vibench.analysis import analyse
@@ -154,6 +155,28 @@ def test_dwells_grow_lines_towards_the_terminal_resonances_with_level(results):
         assert band["peak_hz"] == pytest.approx(hz, rel=0.04)
     upper_moderate, upper_strong = moderate[1]["peak_hz"], strong[1]["peak_hz"]
     assert abs(upper_strong - TERMINAL_HZ[1]) < abs(upper_moderate - TERMINAL_HZ[1])
+
+
+def test_the_first_screen_states_the_three_findings_of_the_paper(demo, results):
+    page = Page((demo / "report.html").read_text(encoding="utf-8"))
+    assert len(page.findings.split()) <= 120
+    assert len(page.visible.split()) <= 2000
+    linear, terminal = (
+        " and ".join(", ".join(f"{each:.1f}" for each in resonances_hz(results[name])).rsplit(", ", 1))
+        for name in ("noise_weak", "noise_strong")
+    )
+    assert f"At 0.05 Vpp there are three resonances, {linear} Hz." in page.findings
+    assert f"At 10 Vpp they are gone and two others appear at {terminal} Hz." in page.findings
+    assert results["dwell_moderate"]["measured"]["motion"]["kind"] == "chaotic"
+    assert "At 260 Hz the motion is periodic at 0.05 Vpp" in page.findings
+    assert " chaotic at 1.5 " in page.findings
+    compared = [
+        [each["agrees"] for each in found["simulated"]["ensemble"] if each["compared"]]
+        for found in results.values()
+    ]
+    agrees = sum(bool(each) and all(each) for each in compared)
+    words = {7: "agrees with all seven recordings", 6: "agrees with six"}
+    assert words[agrees] in page.findings
 
 
 def test_the_report_is_one_file_with_every_figure_inside(demo):

@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from vibench.acquisition.plan import Family, rows_by_kind
+from vibench.acquisition.plan import Family, excitation_text, rows_by_kind
 
 from ..figures import (
     STEPPED_FREQUENCIES,
@@ -215,6 +215,12 @@ def findings(results: CampaignResults) -> Iterator[str]:
     yield from results.model_said
     for each in results.in_order:
         yield from (f"{each.analysis.facts.name}: {said}" for said in DRAWINGS[each.kind].findings(each))
+
+
+def result_sentence(result: AnyResult) -> str:
+    """Return the first of the findings; what was played, where nothing was found."""
+    played = f"{excitation_text(result.analysis.excitation)}: no result."
+    return next(DRAWINGS[result.kind].findings(result), played)
 
 
 def recording_figures(result: AnyResult) -> tuple[DrawnFigure, ...]:

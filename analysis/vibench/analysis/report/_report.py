@@ -13,7 +13,7 @@ from ..hidden_motion import HiddenMotion
 from ..kinds import AnyResult
 from ..recordings import Verdict
 from ..results import AnalysisFailure, CampaignResults, FailedStep
-from ._drawings import DRAWINGS, figures_together, recording_figures
+from ._drawings import DRAWINGS, figures_together, recording_figures, result_sentence
 from ._findings import limits
 from ._laid_branches import laid_branches, laid_maps
 from ._page import Agreement, Card, Fold, Page, ReportTable, write_page
@@ -99,15 +99,13 @@ def _about(results: CampaignResults) -> str:
 
 def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
     facts, drawing = result.analysis.facts, DRAWINGS[result.kind]
-    said, *statistics = drawing.findings(result)
     figure, *more = drawing.figures(result)
     agreement, look_at = agreement_of(result, failed.get(facts.name))
     warned = [each for each in result.analysis.checks if each.verdict is Verdict.WARNING]
-    tables = [build((result,)) for build in drawing.tables]
     looks = [each for each in (look_at, ", ".join(each.what.lower() for each in warned)) if each]
     return Card(
         name=facts.name,
-        result=said,
+        result=result_sentence(result),
         agreement=agreement,
         look_at="; ".join(looks),
         numbers=tuple(islice(drawing.numbers(result), _MOST_NUMBERS)),
@@ -116,9 +114,8 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
         folds=(
             Fold(
                 "Statistics and uncertainty",
-                tuple(statistics),
-                (*tables, uncertainty_table((result,))),
-                tuple(more),
+                tables=(*(build((result,)) for build in drawing.tables), uncertainty_table((result,))),
+                figures=tuple(more),
             ),
             Fold(
                 "Checks, settings and levels",
@@ -146,10 +143,10 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
     outside = [each.name for each in laid.ensemble if each.compared and not each.agrees]
     if outside:
         return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}"
-    rest = [each.name for each in laid.ensemble if not each.compared]
-    if len(rest) == len(laid.ensemble):
+    compared, every = sum(each.compared > 0 for each in laid.ensemble), len(laid.ensemble)
+    if not compared:
         return Agreement.OPEN, "too few simulated draws of the measured kind of motion"
-    return Agreement.YES, f"not compared: {', '.join(rest)}" if rest else ""
+    return Agreement.YES, "" if compared == every else f"{compared} of {every} quantities were compared"
 
 
 def check_warnings(results: CampaignResults, checks: frozenset[str] | None = None) -> Iterator[str]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from ..figures import verdict_text
 from ..kinds import AnyResult, DwellResult, NoiseResult
 from ..results import CampaignResults, FailedStep
-from ._drawings import DRAWINGS
+from ._drawings import result_sentence
 from ._page import Agreement
 from ._result_tables import nearest_resonance
 
@@ -50,7 +50,7 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
         told = (*told, *dwells)
     for each in results.in_order:
         if each not in told:
-            yield next(DRAWINGS[each.kind].findings(each), "")
+            yield result_sentence(each)
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
