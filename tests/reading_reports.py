@@ -29,6 +29,8 @@ class Page(HTMLParser):
         self.is_finding = found.get("class") == "findings"
 
     def handle_endtag(self, tag):
+        if tag in {"td", "th", "dt", "dd", "li"}:
+            self.handle_data(" ")
         assert self.open.pop() == tag
         self.is_finding = False
 
@@ -40,7 +42,7 @@ class Page(HTMLParser):
             self.seen.append(data)
         if "figcaption" in self.open:
             self.captions[-1] += data
-        if "th" in self.open and self.is_seen:
+        if "th" in self.open and self.is_seen and data.strip():
             self.headings.append(data)
         if self.is_finding:
             self.found.append(data)

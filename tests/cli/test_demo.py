@@ -177,6 +177,9 @@ def test_the_first_screen_states_the_three_findings_of_the_paper(demo, results):
     agrees = sum(bool(each) and all(each) for each in compared)
     words = {7: "agrees with all seven recordings", 6: "agrees with six"}
     assert words[agrees] in page.findings
+    for statistic in ("rank ", "largest |z|", "draws from slightly different starts"):
+        assert statistic in page.text
+        assert statistic not in page.visible
 
 
 def test_the_report_is_one_file_with_every_figure_inside(demo):

@@ -219,8 +219,8 @@ def findings(results: CampaignResults) -> Iterator[str]:
 
 def result_sentence(result: AnyResult) -> str:
     """Return the first of the findings; what was played, where nothing was found."""
-    played = f"{excitation_text(result.analysis.excitation)}: no result."
-    return next(DRAWINGS[result.kind].findings(result), played)
+    said = next(DRAWINGS[result.kind].findings(result), "")
+    return said or f"{excitation_text(result.analysis.excitation)}: no result."
 
 
 def recording_figures(result: AnyResult) -> tuple[DrawnFigure, ...]:

@@ -92,17 +92,13 @@ class Page:
 
 
 @dataclass(frozen=True)
-class EmbeddedFigure:
-    """A figure as the page holds it."""
-
+class _Embedded:
     number: int
-    title: str
-    caption: str
-    """At most three lines."""
-    rest: str
-    """The sentences of the caption that unfold."""
     source: str
     """A ``data:`` address with the whole image in it."""
+    caption: str
+    rest: str
+    """The sentences of the caption that unfold."""
 
 
 def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Path:
@@ -148,13 +144,13 @@ def _shown(content: object) -> object:
     return printable(content) if type(content) is str else content
 
 
-def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> EmbeddedFigure:
+def _embedded(number: int, drawn: DrawnFigure, folder: Path | None) -> _Embedded:
     if folder is not None:
         drawn.save(folder)
     svg = drawn.svg
     kind, content = ("svg+xml", svg) if len(svg) <= _LARGEST_SVG_BYTES else ("png", drawn.png)
     source = f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
-    return EmbeddedFigure(number, drawn.title, *divided_caption(drawn), source)
+    return _Embedded(number, source, *divided_caption(drawn))
 
 
 def divided_caption(drawn: DrawnFigure) -> tuple[str, str]:

@@ -1,6 +1,5 @@
 """The findings of a campaign in plain words, for the first screen of its report."""
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from ..figures import verdict_text
@@ -16,14 +15,7 @@ _REST = "The table has the rest."
 
 
 def summary(results: CampaignResults, verdicts: Sequence[Agreement]) -> str:
-    """State what was found, and whether the simulation agrees, in at most 120 words.
-
-    Parameters
-    ----------
-    verdicts
-        Whether the simulation of each result agrees.
-
-    """
+    """State what was found, and whether the simulation agrees with each result, in at most 120 words."""
     last = _agreement(verdicts)
     kept: list[str] = []
     for each in _sentences(results):
@@ -39,18 +31,16 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
     if without:
         of_all = without + len(results.results)
         yield f"{_count(without, 'recording').capitalize()} of {_number(of_all)} gave no result."
-    noise, dwells = results.noise, results.dwells
-    if len({_level(each) for each in noise}) == len(noise) and _is_one_specimen(noise):
-        yield from _levels(noise)
-        told: tuple[AnyResult, ...] = noise
-    else:
-        told = ()
-    if dwells and _is_one_specimen(dwells):
-        yield from _motions(dwells)
-        told = (*told, *dwells)
-    for each in results.in_order:
-        if each not in told:
-            yield result_sentence(each)
+    alone = list(results.in_order)
+    if len({_level(each) for each in results.noise}) == len(results.noise) and _is_one_specimen(
+        results.noise
+    ):
+        yield from _levels(results.noise)
+        alone = [each for each in alone if each not in results.noise]
+    if _is_one_specimen(results.dwells):
+        yield from _motions(results.dwells)
+        alone = [each for each in alone if each not in results.dwells]
+    yield from map(result_sentence, alone)
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
@@ -93,16 +83,12 @@ def _resonances(result: NoiseResult) -> str:
 
 
 def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
-    """Say at which levels the motion is of which kind; of many frequencies, how often."""
+    """Say at which levels the motion is of which kind, frequency by frequency."""
     by_place: dict[float, dict[str, list[str]]] = {}
     for each in dwells:
         kinds = by_place.setdefault(each.analysis.excitation.frequency_hz, {})
         levels = kinds.setdefault(verdict_text(each.analysis.motion.verdict), [])
         levels.append(f"{each.analysis.excitation.amplitude_vpp:g}")
-    if len(by_place) > len(_NUMBERS) // 3:
-        counts = Counter(kind for kinds in by_place.values() for kind, some in kinds.items() for _ in some)
-        yield f"Dwells by motion: {', '.join(f'{number} {kind}' for kind, number in counts.items())}."
-        return
     for frequency_hz, kinds in by_place.items():
         said = [f"{kind} at {_joined(levels)} Vpp" for kind, levels in kinds.items()]
         yield f"At {frequency_hz:g} Hz the motion is {_joined(said)}."
@@ -140,8 +126,8 @@ def _band(result: NoiseResult) -> tuple[float, float]:
 
 
 def _is_one_specimen(results: Sequence[AnyResult]) -> bool:
-    described = [each.analysis.facts.bench.get("specimen") for each in results]
-    return all(each == described[0] for each in described)
+    first, *others = [each.analysis.facts.bench.get("specimen") for each in results] or [None]
+    return all(each == first for each in others)
 
 
 def _listed(values_hz: Sequence[float]) -> str:
