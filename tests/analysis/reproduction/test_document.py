@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from vibench.analysis.report import FigureOptions, ReportTable
+from tests.reading_reports import Page
+from vibench.analysis.report import FigureOptions, ReportTable, write_page
 from vibench.analysis.reproduction import (
     AS_CHOSEN,
     SECTIONS,
@@ -13,7 +14,9 @@ from vibench.analysis.reproduction import (
     Evidence,
     Picture,
     Reproduction,
+    damping_score_figure,
     reproduction_document,
+    reproduction_page,
 )
 from vibench.analysis.reproduction._case import SCORED_S, damping
 from vibench.analysis.reproduction._catalogue import CLAIMS
@@ -113,6 +116,22 @@ def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not
     assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second, third |" in page
     assert "| A0 | colliding |\n|---|---|\n| 1 µm | nowhere |" in page
     assert page.endswith("![A figure](images/it.png)\n")
+
+
+def test_the_report_begins_with_the_count_and_has_a_card_for_each_section(found, tmp_path):
+    score, levels = damping_score_figure(found.scores), damping_score_figure(found.scores)
+    path = write_page(reproduction_page(found, levels, score), tmp_path / "report.html")
+    page = Page(path.read_text(encoding="utf-8"))
+    assert page.headings == ["claims on", "result", "agreement", "what to look at"]
+    assert page.findings.startswith("Of 3 claims 1 hold under the defaults, 0 for a share of starts, 1 under")
+    assert page.findings.endswith("Those that do not hold: third.")
+    assert "Synthetic 1 of 3 claims hold under the defaults. no second, third" in page.visible
+    order = ["findings", "figure-1", "cards", "card-1", "further", "figure-2", "details"]
+    assert [each for each in page.ids if each in order] == order
+    for folded in ("third c = 3e-05 s · k: exponent: 60 1/s (does not hold)", "≥ 100 1/s", "Read off."):
+        assert folded in page.text
+    assert "exponent: 60 1/s" not in page.visible
+    assert len(page.visible.split()) <= 2000
 
 
 def test_every_claim_has_a_key_of_its_own():

@@ -56,9 +56,9 @@ class Reproduction:
     def sentence(self) -> str:
         """The counts in words."""
         return (
-            f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults,\n"
-            f"{self.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts,\n"
-            f"{self.count(Verdict.HOLDS_UNDER)} under another named option,\n"
+            f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults, "
+            f"{self.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts, "
+            f"{self.count(Verdict.HOLDS_UNDER)} under another named option, "
             f"{self.count(Verdict.FAILS)} under none that was tried."
         )
 
@@ -102,7 +102,7 @@ def _summary(found: Reproduction) -> Iterator[str]:
         found.options,
         found.made_with,
         "",
-        found.sentence,
+        found.sentence.replace(", ", ",\n"),
     )
     apart = [each for each in found.judgements if each.verdict is not Verdict.HOLDS]
     if apart:
