@@ -31,7 +31,7 @@ def test_every_card_has_a_row_and_many_cards_are_folded(number, tmp_path):
         f"card-{each}" for each in range(1, number + 1)
     ]
     shown = page.visible.split("One by one")[1].count("result")
-    assert shown == (0 if number > MOST_OPEN_CARDS else 20 * number)
+    assert shown == (0 if number > MOST_OPEN_CARDS else 100 * number)
 
 
 def test_text_from_files_is_shown_as_text_in_every_place(tmp_path):

@@ -162,7 +162,7 @@ def test_one_recording_makes_a_report_of_its_own(dwell_file, tmp_path):
     results = analyse_files([dwell_file("weak")], "one", Simulation.LEFT_OUT)
     path = write_report(results, tmp_path / "one.html")
     page = Page(path.read_text(encoding="utf-8"))
-    assert "Report of 1 recording. These recordings" in page.text
+    assert "Report of 1 recording. This recording comes from simulated instruments." in page.text
     assert "simulation takes the damping" not in page.text
 
 

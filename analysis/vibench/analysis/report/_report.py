@@ -90,10 +90,10 @@ def write_report(
 
 
 def _about(results: CampaignResults) -> str:
-    count = len(results.facts)
-    origins = {each.is_simulated for each in results.facts}
-    which = "Some of these recordings" if len(origins) > 1 else "These recordings"
-    where = f" {which} come from {'simulated instruments' if True in origins else 'a real bench'}."
+    count, origins = len(results.facts), {each.is_simulated for each in results.facts}
+    which = "Some of these recordings come" if len(origins) > 1 else "These recordings come"
+    said = "This recording comes" if count == 1 else which
+    where = f" {said} from {'simulated instruments' if True in origins else 'a real bench'}."
     return f"Report of {count} recording{'' if count == 1 else 's'}.{where if origins else ''}"
 
 
