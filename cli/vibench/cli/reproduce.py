@@ -50,7 +50,6 @@ def reproduce(
     from vibench.analysis.reproduction import (
         SECTIONS,
         Evidence,
-        Picture,
         damping_score_figure,
         levels_asked,
         reproduction,
@@ -74,7 +73,7 @@ def reproduce(
     pictures = []
     for drawn in (score, levels):
         image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
-        pictures.append(Picture(drawn.title, Path(os.path.relpath(image, page.parent)).as_posix()))
+        pictures.append((drawn.title, Path(os.path.relpath(image, page.parent)).as_posix()))
     page.write_text(reproduction_document(found, pictures), encoding="utf-8")
     report = write_page(reproduction_page(found, levels, score), out / "report.html")
     _tell(found)

@@ -12,7 +12,6 @@ from vibench.analysis.reproduction import (
     SECTIONS,
     Case,
     Evidence,
-    Picture,
     Reproduction,
     damping_score_figure,
     reproduction_document,
@@ -111,7 +110,7 @@ def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
 
 
 def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not(found):
-    page = reproduction_document(found, (Picture("A figure", "images/it.png"),))
+    page = reproduction_document(found, (("A figure", "images/it.png"),))
     assert "most hold at 3e-05 s." in page
     assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second, third |" in page
     assert "| A0 | colliding |\n|---|---|\n| 1 µm | nowhere |" in page

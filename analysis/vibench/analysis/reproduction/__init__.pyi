@@ -11,7 +11,6 @@ from ._damping_score import (
     damping_score_figure as damping_score_figure,
 )
 from ._document import (
-    Picture as Picture,
     Reproduction as Reproduction,
     reproduction_document as reproduction_document,
     reproduction_page as reproduction_page,

@@ -63,21 +63,12 @@ class Reproduction:
         )
 
 
-@dataclass(frozen=True)
-class Picture:
-    """A figure that the page shows."""
-
-    title: str
-    path: str
-    """Relative to the page."""
-
-
-def reproduction_document(found: Reproduction, pictures: Sequence[Picture] = ()) -> str:
-    """Write the page."""
+def reproduction_document(found: Reproduction, pictures: Sequence[tuple[str, str]] = ()) -> str:
+    """Write the page, with pictures by title and path relative to it."""
     return "\n".join(_lines(found, pictures)) + "\n"
 
 
-def _lines(found: Reproduction, pictures: Sequence[Picture]) -> Iterator[str]:
+def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator[str]:
     yield from _summary(found)
     for heading, judgements in found.sections.items():
         yield from ("", f"## {heading}", "", HEAD, _RULE)
@@ -88,8 +79,8 @@ def _lines(found: Reproduction, pictures: Sequence[Picture]) -> Iterator[str]:
         yield from (f"- **{each.claim.key}**: {each.claim.measured_by}" for each in judgements)
     for table in (score_table(found.scores), *found.tables):
         yield from _table(table)
-    for picture in pictures:
-        yield from ("", f"![{picture.title}]({picture.path})")
+    for title, path in pictures:
+        yield from ("", f"![{title}]({path})")
 
 
 def _summary(found: Reproduction) -> Iterator[str]:

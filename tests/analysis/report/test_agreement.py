@@ -1,0 +1,55 @@
+"""A row says yes, no or cannot tell, with the reason; a recording without a result has a row too."""
+
+from types import SimpleNamespace as Of
+
+import pytest
+
+from tests.reading_reports import Page
+from vibench.analysis import CampaignResults
+from vibench.analysis.report import Agreement, write_report
+from vibench.analysis.report._report import agreement_of
+from vibench.analysis.results import AnalysisFailure, FailedStep
+
+GOOD, BAD, OPEN = (
+    Of(name=name, compared=compared, agrees=agrees)
+    for name, compared, agrees in (("Response II", 9, True), ("Response I", 1, False), ("band", 0, True))
+)
+NOT_SIMULATED = AnalysisFailure("a.h5", FailedStep.SIMULATION, "it did not reach its end")
+
+
+def laid(*ensemble, by_voltage=True, why=""):
+    return Of(laid=Of(run=Of(driven=Of(by_voltage=by_voltage), why=why), ensemble=ensemble))
+
+
+@pytest.mark.parametrize(
+    ("result", "failure", "agreement", "reason"),
+    [
+        (laid(GOOD), None, Agreement.YES, ""),
+        (laid(GOOD, OPEN), None, Agreement.YES, "1 of 2 quantities were compared"),
+        (laid(GOOD, BAD, OPEN), None, Agreement.NO, "outside of the simulated draws: Response I"),
+        (laid(OPEN), None, Agreement.OPEN, "too few simulated draws of the measured kind of motion"),
+        (laid(), None, Agreement.OPEN, "too few simulated draws of the measured kind of motion"),
+        (laid(GOOD, by_voltage=False), None, Agreement.OPEN, "simulated under the recorded base, once"),
+        (
+            laid(by_voltage=False, why="no gain"),
+            None,
+            Agreement.OPEN,
+            "recorded base, once: no gain",
+        ),
+        (Of(laid=None), None, Agreement.OPEN, "not simulated"),
+        (Of(laid=None), NOT_SIMULATED, Agreement.OPEN, "it did not reach its end"),
+    ],
+)
+def test_agreement_is_what_was_compared(result, failure, agreement, reason):
+    found, said = agreement_of(result, failure)
+    assert found is agreement
+    assert said.endswith(reason)
+    assert bool(said) is bool(reason)
+
+
+def test_a_report_of_failures_alone_names_each_with_its_reason(tmp_path):
+    failed = tuple(AnalysisFailure(f"{each}.h5", FailedStep.ANALYSIS, f"{each} is cut") for each in "ab")
+    page = Page(write_report(CampaignResults("x", (), failed), tmp_path / "x.html").read_text("utf-8"))
+    assert page.findings == "Two recordings of two gave no result."
+    assert "a.h5 No result: a is cut cannot tell" in page.visible
+    assert "b.h5: no analysis: b is cut" in page.visible.split("Two recordings")[0]
