@@ -18,7 +18,7 @@ def noise(vpp, *peaks_hz, band_hz=(50.0, 600.0), specimen="paper"):
         resonances=tuple(Of(frequency_hz=each) for each in peaks_hz),
         frequency_response=Of(frequency_hz=np.array(band_hz)),
     )
-    facts = Of(bench={"specimen": specimen}, feedback=())
+    facts = Of(name=f"noise {vpp}", bench={"specimen": specimen}, feedback=())
     analysis = Of(excitation=Of(amplitude_vpp=vpp), response=response, facts=facts)
     return Of(kind="white_noise", analysis=analysis, laid=None)
 
@@ -59,6 +59,7 @@ def test_the_papers_campaign_is_told_in_three_findings():
         (noise(10.0, 95.0, 266.0, 499.0), "At 10 Vpp, 95.0, 266.0 and 499.0 Hz remain."),
         (noise(10.0), "At 10 Vpp no resonance stands above its uncertainty."),
         (noise(10.0, 199.0), "At 10 Vpp they are gone and another appears at 199.0 Hz."),
+        (noise(10.0, *range(110, 240, 10)), "At 10 Vpp they are gone and 13 others appear at 110.0, 120.0"),
         (noise(10.0, 266.0, 428.0), "266.0 Hz remains; 94.6 and 499.6 Hz are gone; 428.0 Hz is new."),
         (noise(10.0, 199.0, band_hz=(150.0, 300.0)), "At 10 Vpp there is one resonance, 199.0 Hz."),
     ],
@@ -73,7 +74,8 @@ def test_what_becomes_of_the_resonances_is_told_as_it_was_measured(strong, words
 def test_recordings_of_one_level_or_of_two_specimens_are_not_compared(second):
     words = said(noise=(noise(0.05, 94.6, 266.2), second))
     assert "gone" not in words
-    assert words.count("resonances at") == 2
+    assert words.count("noise 0.05: Noise at 0.05 Vpp: resonances at 94.6, 266.2 Hz.") == 1
+    assert words.count("Vpp: resonances at 201.0 Hz.") == 1
 
 
 def test_undecided_motion_is_called_so_and_many_frequencies_stay_short():

@@ -31,16 +31,16 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
     if without:
         of_all = without + len(results.results)
         yield f"{_count(without, 'recording').capitalize()} of {_number(of_all)} gave no result."
-    alone = list(results.in_order)
-    if len({_level(each) for each in results.noise}) == len(results.noise) and _is_one_specimen(
-        results.noise
-    ):
-        yield from _levels(results.noise)
-        alone = [each for each in alone if each not in results.noise]
-    if _is_one_specimen(results.dwells):
-        yield from _motions(results.dwells)
-        alone = [each for each in alone if each not in results.dwells]
-    yield from map(result_sentence, alone)
+    noise, dwells, alone = results.noise, results.dwells, results.in_order
+    if len({_level(each) for each in noise}) == len(noise) and _is_one_specimen(noise):
+        yield from _levels(noise)
+        alone = tuple(each for each in alone if each not in noise)
+    if _is_one_specimen(dwells):
+        yield from _motions(dwells)
+        alone = tuple(each for each in alone if each not in dwells)
+    for each in alone:
+        name = f"{each.analysis.facts.name}: " if len(alone) > 1 else ""
+        yield f"{name}{result_sentence(each)}"
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
@@ -59,7 +59,7 @@ def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
     new = [each.frequency_hz for each in after if nearest_resonance(each.frequency_hz, before) is None]
     kept = [each.frequency_hz for each in after if each.frequency_hz not in new]
     if len(gone) == len(before) > 1:
-        others = "another appears" if len(new) == 1 else f"{_NUMBERS[len(new)]} others appear"
+        others = "another appears" if len(new) == 1 else f"{_number(len(new))} others appear"
         yield f"At {_level(strong)} they are gone and {others} at {_listed(new)} Hz."
         return
     parts = [
