@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
@@ -30,6 +31,14 @@ class Shown:
     def is_true(self) -> bool:
         """Whether it belongs to what is asked for now, or does not look as if it did."""
         return self.inputs is None or self.inputs == self.wanted or not self.widget.isEnabled()
+
+
+@runtime_checkable
+class Themed(Protocol):
+    """A part of a page that draws with colours of the theme."""
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw in other colours."""
 
 
 class Page(QWidget):
@@ -70,6 +79,9 @@ class Page(QWidget):
 
     def retheme(self, theme: Theme) -> None:
         """Draw in other colours; widgets follow the palette by themselves, plots do not."""
+        for part in self.findChildren(QWidget):
+            if isinstance(part, Themed):
+                part.retheme(theme)
 
     def entered(self) -> None:
         """Come into sight."""

@@ -18,7 +18,7 @@ from vibench.analysis.dynamics import branch_curves
 
 from ...background import Job
 from ...page import AppContext, FileKind, Page, SideAndPicture
-from ...widgets import COMPARE, Notice, NoticeKind, Theme, column, filled, notice_of, push_button, row
+from ...widgets import COMPARE, Notice, NoticeKind, column, filled, notice_of, push_button, row
 from ._analysis_panel import AnalysisPanel
 from ._curve_list import CurveList, PairBox
 from ._curve_plots import CurvePlots
@@ -72,11 +72,6 @@ class ComparePage(Page):
     def left(self) -> None:
         """Keep how the page is divided."""
         self._parts.keep()
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plots.retheme(theme)
-        self.curves.retheme(theme)
 
     def add_recordings(self, paths: tuple[Path, ...]) -> None:
         """Analyse recordings, elsewhere, and lay their curves over those that are there."""

@@ -79,11 +79,6 @@ class CurvePlots(QWidget):
         self._marker_hz[number] = frequency_hz
         self._place_markers()
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.magnitudes.retheme(theme)
-        self.differences.retheme(theme)
-
     def _draw(self, curve: Curve, line_style: LineStyle) -> None:
         lone = curve.frequency_hz.size == 1
         if lone:

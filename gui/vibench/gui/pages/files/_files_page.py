@@ -29,7 +29,6 @@ from ...widgets import (
     NoticeKind,
     Scrolled,
     SentenceLabel,
-    Theme,
     column,
     filled,
     notice_of,
@@ -102,11 +101,6 @@ class FilesPage(Page):
     def left(self) -> None:
         """Keep how the page is divided."""
         self.context.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.pictures.retheme(theme)
-        self.table.recordings.retheme(theme)
 
     def list_folder(self) -> None:
         """Look at the files of the folder, elsewhere."""

@@ -82,10 +82,6 @@ class HiddenMotionView(QWidget):
         self._view_s = (low_s, high_s)
         self._ask()
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plot.retheme(theme)
-
     def showEvent(self, event: QShowEvent) -> None:
         """Work out what nobody wanted while it was out of sight."""
         super().showEvent(event)

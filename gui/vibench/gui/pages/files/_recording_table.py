@@ -245,6 +245,10 @@ class RecordingTable(QTableView):
             colour = self.palette().placeholderText().color()
             paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, colour)
 
+    def retheme(self, theme: Theme) -> None:
+        """Draw the pictures in other colours."""
+        self.recordings.retheme(theme)
+
     def search(self, text: str) -> None:
         """Show rows that hold a text anywhere."""
         self._sorted.setFilterFixedString(text)

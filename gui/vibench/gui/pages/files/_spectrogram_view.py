@@ -117,9 +117,7 @@ class SpectrogramView(QWidget):
         self._ask()
 
     def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        for plot in self._plots.values():
-            plot.retheme(theme)
+        """Write the scales in other colours."""
         for image in self._images.values():
             image.retheme(theme)
 
@@ -251,12 +249,6 @@ class Pictures(QTabWidget):
         self.hidden_motion.show_recording(None if overview is None else overview.recording)
         self.time_histories.show_recording(overview)
         self._show_view()
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.time_histories.retheme(theme)
-        self.spectrogram.retheme(theme)
-        self.hidden_motion.retheme(theme)
 
     def _show_view(self) -> None:
         for picture in (self.spectrogram, self.hidden_motion):

@@ -141,10 +141,8 @@ class RecordingTimeHistories(QWidget):
         self.markers_moved.emit()
 
     def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
+        """Make further plots in other colours."""
         self._theme = theme
-        for history in self._kept.values():
-            history.plot.retheme(theme)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         """Draw for the new width."""
@@ -175,7 +173,7 @@ class RecordingTimeHistories(QWidget):
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             up = PlotAxis("", plain_unit(channel.unit))
-            plot = Plot(f"{role_text(channel.role)} over time", TIME, up, self._theme)
+            plot = Plot(f"{role_text(channel.role)} over time", TIME, up, self._theme, self)
             plot.setMouseEnabled(x=True, y=False)
             plot.setFocusProxy(self)
             title = QLabel(role_text(channel.role), plot)

@@ -81,10 +81,6 @@ class MapPlot(QWidget):
         frequency_hz, amplitude_m = np.array(level.pairs).T
         self._levels[number].setData(frequency_hz, amplitude_m)
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plot.retheme(theme)
-
     def _click(self, event: MouseClickEvent) -> None:
         box = self.plot.getViewBox()
         if event.button() is not Qt.MouseButton.LeftButton or not box.sceneBoundingRect().contains(

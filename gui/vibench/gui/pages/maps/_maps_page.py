@@ -27,7 +27,6 @@ from ...widgets import (
     Notice,
     NoticeKind,
     SentenceLabel,
-    Theme,
     boxed,
     column,
     push_button,
@@ -105,11 +104,6 @@ class MapsPage(Page):
     def left(self) -> None:
         """Keep how the page is divided."""
         self._parts.keep()
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.map.retheme(theme)
-        self.motion.retheme(theme)
 
     def begin(self) -> None:
         """Compute what the form says."""

@@ -49,8 +49,3 @@ class MotionView(QWidget):
         for plot, curve, (across, up) in zip(self.plots, self.curves, data, strict=True):
             curve.setData(across, up)
             plot.show_everything()
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        for plot in self.plots:
-            plot.retheme(theme)

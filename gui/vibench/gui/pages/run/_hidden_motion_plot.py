@@ -73,10 +73,6 @@ class HiddenMotionPlot(QWidget):
         self.said.setText("The live twin is off.")
         self._end = (0, -1)
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plot.retheme(theme)
-
     def _draw_forecast(self, twin: TwinStatus) -> None:
         """Draw it in pieces, each as faint as its error is large."""
         p, error = np.array(twin.forecast_m), np.array(twin.forecast_error_m)

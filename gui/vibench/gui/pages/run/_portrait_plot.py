@@ -54,8 +54,3 @@ class PortraitPlot(QWidget):
         """Forget the last run."""
         for item in (self._orbit, self._strobe, self._points):
             item.clear()
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.orbit.retheme(theme)
-        self.section.retheme(theme)

@@ -16,7 +16,7 @@ from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
 from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, Shown, SideAndPicture, UserActions
-from ...widgets import FILES, RUN, SentenceLabel, Theme, column, filled
+from ...widgets import FILES, RUN, SentenceLabel, column, filled
 from ._arm_card import ArmCard
 from ._hidden_motion_plot import HiddenMotionPlot
 from ._portrait_plot import PortraitPlot
@@ -118,11 +118,6 @@ class RunPage(Page):
     def _of_the_run(self) -> tuple[QWidget, ...]:
         card = self.watch_card
         return (self.time_histories, card.impacts, card.meters, *self._pictures.values())
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        for part in (self.time_histories, self.watch_card, self.hidden_motion, *self._pictures.values()):
-            part.retheme(theme)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         """Space freezes, M marks, PgDn reads on; all are left to fields and buttons that use them."""

@@ -55,7 +55,3 @@ class SpectrumPlot(QWidget):
         self._view = None
         for curve in self._curves:
             curve.clear()
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plot.retheme(theme)

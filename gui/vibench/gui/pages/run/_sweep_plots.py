@@ -56,10 +56,6 @@ class SweepPlot(QWidget):
         for curve in self.measured.values():
             curve.clear()
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plot.retheme(theme)
-
 
 def sweep_history(theme: Theme) -> SweepPlot:
     """Make the plot of Responses I and II."""

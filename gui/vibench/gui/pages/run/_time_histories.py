@@ -78,10 +78,8 @@ class TimeHistoryPlots(QWidget):
         self._span_s = span_s
 
     def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
+        """Make further plots in other colours."""
         self._theme = theme
-        for plot in self.plots:
-            plot.retheme(theme)
 
     def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
         """Have as many plots as channels; those that are there are used again, for a plot is slow to make."""

@@ -53,8 +53,3 @@ class TransmissibilityPlot(QWidget):
         for curve in (self._measured, self._coherence):
             curve.clear()
         self._band.set_data([], [], [])
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.magnitude.retheme(theme)
-        self.coherence.retheme(theme)

@@ -163,10 +163,6 @@ class WatchCard(QGroupBox):
         self.impacts.setText(f"{view.impacts}")
         self.meters.show_view(view)
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.meters.retheme(theme)
-
     def _lay_out(self) -> None:
         form = QFormLayout()
         for text, widget in (("Impacts", self.impacts), ("Histories show", self.span)):

@@ -65,11 +65,6 @@ class AnswerPlots(QWidget):
             partial(_draw_anew, plot, draw, progress) for plot, draw in zip(self.plots, draws, strict=True)
         ]
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        for plot in self.plots:
-            plot.retheme(theme)
-
     def _responses(self, progress: SimulationProgress) -> None:
         for number, model in enumerate(progress.models):
             self._responses_of(progress, model, number)

@@ -38,11 +38,6 @@ class ChainPicture:
         """All three."""
         return self.across, self.motion, self.energies
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        for plot in self.plots:
-            plot.retheme(theme)
-
     def show_answer(self, answer: ChainAnswer) -> None:
         """Draw what is there."""
         for plot in self.plots:

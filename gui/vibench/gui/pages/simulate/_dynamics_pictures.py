@@ -50,12 +50,6 @@ class _TwoPlots(QStackedWidget):
             plot.wipe()
         return pair
 
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        for pair in self.pairs.values():
-            for plot in pair:
-                plot.retheme(theme)
-
 
 class _PairPicture:
     """What pictures of two plots have alike."""
@@ -71,10 +65,6 @@ class _PairPicture:
     def plots(self, along: Parameter) -> tuple[Plot, Plot]:
         """Those over one parameter."""
         return self._plots.pairs[along]
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self._plots.retheme(theme)
 
 
 class BranchPicture(_PairPicture):

@@ -13,7 +13,7 @@ from vibench.analysis.simulation import Asked, PartialResult, Trouble
 
 from ...forms import JudgedForm
 from ...page import AppContext, Shown, SideAndPicture, Simulator
-from ...widgets import COMPARE, Notice, NoticeKind, SentenceLabel, Theme, boxed, column, push_button, row
+from ...widgets import COMPARE, Notice, NoticeKind, SentenceLabel, boxed, column, push_button, row
 
 Request = TypeVar("Request", bound=SpecimenChoice)
 Answer = TypeVar("Answer")
@@ -29,9 +29,6 @@ class AnswerPicture(Protocol[Shown_contra]):
 
     def show_answer(self, answer: Shown_contra) -> None:
         """Draw anew."""
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +95,6 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
     def left(self) -> None:
         """Keep how the tab is divided."""
         self._parts.keep()
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.picture.retheme(theme)
 
     def begin(self) -> None:
         """Ask what the form says."""

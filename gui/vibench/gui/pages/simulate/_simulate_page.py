@@ -29,7 +29,6 @@ from ...widgets import (
     NoticeKind,
     ReadTable,
     SentenceLabel,
-    Theme,
     TimedBar,
     boxed,
     column,
@@ -114,12 +113,6 @@ class SimulatePage(Page):
     def styled(self) -> tuple[QWidget, ...]:
         """Its tabs: each has as many fields as another page."""
         return (self._parts, *self._views)
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plots.retheme(theme)
-        for view in self._views:
-            view.retheme(theme)
 
     def begin(self) -> None:
         """Simulate what the form says."""

@@ -92,8 +92,3 @@ class PreviewPlots(QWidget):
         self.spectrum.show_everything()
         shown = seen.spectrum_hz >= min(_LEAST_HZ, float(seen.spectrum_hz[-1]))
         self._lines.setData(seen.spectrum_hz[shown], np.maximum(seen.spectrum_v[shown], floor_v))
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.time.retheme(theme)
-        self.spectrum.retheme(theme)

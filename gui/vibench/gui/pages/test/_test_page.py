@@ -25,7 +25,6 @@ from ...widgets import (
     Notice,
     NoticeKind,
     SentenceLabel,
-    Theme,
     boxed,
     clock,
     column,
@@ -164,11 +163,6 @@ class TestPage(Page):
             Shown(self.prediction, self._predicted_of, wanted),
             Shown(self.prediction_note, self._predicted_of, wanted),
         )
-
-    def retheme(self, theme: Theme) -> None:
-        """Draw in other colours."""
-        self.plots.retheme(theme)
-        self.prediction.retheme(theme)
 
     def left(self) -> None:
         """Keep the test for next time, and how the page is divided."""
