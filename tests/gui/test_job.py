@@ -13,7 +13,7 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Measurement
 from vibench.gui.page import AppContext, Settings
-from vibench.gui.page._user_actions import ABORT_KEY
+from vibench.gui.page._user_actions import ABORT_KEY, OPERATOR_STOP
 from vibench.gui.pages.rig._rig_choice import PACES
 from vibench.gui.widgets import COMPARE, FILES, RUN, TEST
 from vibench.gui.window._page_catalogue import PAGES
@@ -289,6 +289,12 @@ def test_a_hold_keeps_the_drive_and_stop_ramps_down(bench, qtbot):
     bench.banner.stop_wanted.emit()
     reach(qtbot, bench, EngineState.READY)
     assert recorded(bench).state == "stopped"
+    with open_recording(recorded(bench).file) as recording:
+        assert (recording.state, recording.reason) == ("stopped", OPERATOR_STOP)
+    qtbot.waitUntil(lambda: OPERATOR_STOP in bench.pages[RUN].summary.sentence, timeout=PATIENCE_MS)
+    said = [notice.text for notice in bench.strip.notices if "Campaign ended" in notice.text]
+    assert "1 stopped" in said[-1]
+    assert "carried out" not in bench.pages[RUN].summary.sentence + said[-1]
 
 
 def test_the_live_pictures_show_the_run(bench, qtbot):

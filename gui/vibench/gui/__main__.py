@@ -53,7 +53,7 @@ def _sign_of_life() -> "QLabel":
     from PySide6.QtWidgets import QApplication, QLabel  # noqa: PLC0415
 
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
-    application = QApplication.instance() or QApplication(sys.argv[:1])
+    application = QApplication.instance() or QApplication(["vibench"])
     label = QLabel("vibench is starting…", None, Qt.WindowType.SplashScreen)
     label.setWindowTitle("vibench")
     label.setMargin(2 * label.fontMetrics().height())

@@ -92,10 +92,11 @@ def record():
 def begin_recording():
     """Begin a recording that grows until somebody finishes it: gives its writer and its name so far."""
 
-    def begin(folder, name):
+    def begin(folder, name, samples=6400):
         plan = Dwell(amplitude_vpp=1.0, frequency_hz=260.0, settle_s=1.0, duration_s=8.0)
         writer = create_recording(folder / f"{name}.h5", _header(name, plan))
-        writer.append(Block(0, np.ones((len(ROLES), 6400)), ()))
+        if samples:
+            writer.append(Block(0, np.ones((len(ROLES), samples)), ()))
         return writer, folder / f"{name}.h5.part"
 
     return begin

@@ -8,6 +8,7 @@ from PySide6.QtGui import QDropEvent, QTextDocument
 from PySide6.QtWidgets import QApplication, QDialogButtonBox, QLabel, QMenu
 
 from vibench.acquisition import save_toml, shipped
+from vibench.gui.__main__ import NO_WINDOW, _sign_of_life, main
 from vibench.gui.widgets import COMPARE, DARK, FILES, QUEUE, RIG, TEST
 from vibench.gui.window._manual import show_about, show_manual
 from vibench.gui.window._settings_dialog import SettingsDialog
@@ -143,3 +144,17 @@ def test_help_is_offline_and_says_what_is_installed(window, qtbot):
     assert Path(manual.browser.source().toLocalFile()).name == "gui.md"
     manual.close()
     about.close()
+
+
+def test_a_bench_that_is_missing_is_refused_before_a_window_opens(tmp_path, capsys):
+    assert main(["--bench", str(tmp_path / "missing.toml")]) == NO_WINDOW
+    said = capsys.readouterr().err
+    assert "missing.toml" in said
+    assert len(said.splitlines()) == 1
+
+
+def test_what_says_that_the_window_is_coming_bears_its_name(qapp):
+    """The program's file stood there."""
+    label = _sign_of_life()
+    assert label.windowTitle() == "vibench"
+    label.close()

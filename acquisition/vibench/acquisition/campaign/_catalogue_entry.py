@@ -96,7 +96,8 @@ def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
         frequency_low_hz=low_hz,
         frequency_high_hz=high_hz,
         duration_s=recording.duration_s,
-        size_bytes=size_bytes,
+        # Room that a growing file has reserved holds nothing yet.
+        size_bytes=min(size_bytes, recording.stored_bytes) if recording.is_growing else size_bytes,
         bench_check=recording.check_text,
         results=", ".join(recording.result_names),
         operator=str(recording.confirmations.get("operator", "")),

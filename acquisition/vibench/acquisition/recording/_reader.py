@@ -110,10 +110,15 @@ class Recording(RecordingDescription):
         return self.samples / self.sample_rate_hz
 
     @property
+    def stored_bytes(self) -> int:
+        """Bytes of all samples so far, as they are written."""
+        return 4 * len(self.roles) * self.samples
+
+    @property
     def packing(self) -> float:
         """Bytes of the samples over those that the file takes for them: about 1.3 for noise of 20 bits."""
         stored = sum(self._open.file[role].id.get_storage_size() for role in self.roles)
-        return float(4 * len(self.roles) * self.samples / max(stored, 1))
+        return self.stored_bytes / max(stored, 1)
 
     @property
     def check_text(self) -> str:

@@ -39,6 +39,12 @@ _LEAST_RISE_DB = 3.0
 """A peak stands above the valley beside it by at least so much ..."""
 _LEAST_RISE_SD = 8.0
 """... and by so many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
+_CROWDS = ((1, 5.0), (2, 13.0))
+"""Chaotic motion makes many peaks: one with so many others within so many half widths is no mode."""
+_CROWD_RISE = 0.3
+"""Others count that rise by this share of what a peak must rise by."""
+_USUAL_HALF_WIDTH = 0.01
+"""Of the frequency; for a peak that does not fall by 3 dB on both sides."""
 _HALF_POWER = 1 / np.sqrt(2)
 _PER_NEPER_DB = 20 / np.log(10)
 
@@ -63,7 +69,9 @@ class CurvePeak:
 
 
 def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
-    """Find the highest peaks, in the order of frequency; none of branches, which fold there.
+    """Find the highest resonance peaks, in the order of frequency.
+
+    Branches have none, because they fold there; nor has a stretch where the motion is chaotic.
 
     Parameters
     ----------
@@ -79,26 +87,40 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
         return ()
     spread = np.nan_to_num(curve.relative_sd[known])
     least = _LEAST_RISE_DB / _PER_NEPER_DB
-    places, found = scipy.signal.find_peaks(height, prominence=least)
-    clear = found["prominences"] > np.maximum(least, _LEAST_RISE_SD * spread[places])
-    highest = sorted(places[clear], key=lambda place: -height[place])[:most]
-    return tuple(_peak(frequency_hz, height, curve.relative_sd[known], int(p)) for p in sorted(highest))
+    places, found = scipy.signal.find_peaks(height, prominence=_CROWD_RISE * least)
+    rise = found["prominences"] / np.maximum(least, _LEAST_RISE_SD * spread[places])
+    others_hz = frequency_hz[places[rise > _CROWD_RISE]]
+    peaks = []
+    for place in places[rise > 1.0]:
+        peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
+        away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
+        # It is itself one of them.
+        if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
+            peaks.append(peak)
+    highest = sorted(peaks, key=lambda each: -each.magnitude)[:most]
+    return tuple(sorted(highest, key=lambda each: each.frequency_hz))
 
 
-def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> CurvePeak:
+def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> tuple[CurvePeak, float]:
+    """Measure a peak; gives it, and the larger of its two half widths [Hz]."""
     x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
     bend, slope, top = np.polyfit(x - x[1], y, 2)
     offset = float(np.clip(-slope / (2 * bend), x[0] - x[1], x[2] - x[1])) if bend < 0 else 0.0
     peak = float(top + slope * offset + bend * offset**2)
-    return CurvePeak(
-        frequency_hz=float(np.exp(x[1] + offset)),
+    at_hz = float(np.exp(x[1] + offset))
+    ends_hz = _ends_hz(frequency_hz, height, place, peak + float(np.log(_HALF_POWER)))
+    found = CurvePeak(
+        frequency_hz=at_hz,
         magnitude=float(np.exp(peak)),
         relative_sd=float(spread[place]),
-        half_power_width_hz=_width_hz(frequency_hz, height, place, peak + float(np.log(_HALF_POWER))),
+        half_power_width_hz=None if ends_hz is None else ends_hz[1] - ends_hz[0],
     )
+    if ends_hz is None:
+        return found, _USUAL_HALF_WIDTH * at_hz
+    return found, max(at_hz - ends_hz[0], ends_hz[1] - at_hz)
 
 
-def _width_hz(frequency_hz: Reals, height: Reals, place: int, level: float) -> float | None:
+def _ends_hz(frequency_hz: Reals, height: Reals, place: int, level: float) -> tuple[float, float] | None:
     ends = []
     for step in (-1, 1):
         here = place
@@ -110,4 +132,5 @@ def _width_hz(frequency_hz: Reals, height: Reals, place: int, level: float) -> f
             return None
         share = (height[here] - level) / (height[here] - height[here + step])
         ends.append(frequency_hz[here] + share * (frequency_hz[here + step] - frequency_hz[here]))
-    return float(abs(ends[1] - ends[0]))
+    low_hz, high_hz = sorted(map(float, ends))
+    return low_hz, high_hz

@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import PositiveFloat, model_validator
+from pydantic import PositiveFloat, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
 
 from vibench.acquisition import ChosenFrom
 from vibench.sim import (
@@ -19,6 +20,12 @@ from vibench.sim import (
 
 SpecimenName = Annotated[str, ChosenFrom(shipped_specimens)]
 ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CONTACT_LAWS.values())])]
+
+
+def _at(field: str, error: ValueError) -> ValidationError:
+    """Give the error of one field, so that a form shows it there."""
+    said = PydanticCustomError("value_error", "{said}", {"said": str(error)})
+    return ValidationError.from_exception_data(field, [{"type": said, "loc": (field,), "input": None}])
 
 
 class SpecimenChoice(FrozenModel):
@@ -40,12 +47,21 @@ class SpecimenChoice(FrozenModel):
     @model_validator(mode="after")
     def _is_a_specimen(self) -> Self:
         """Read the description, and refuse here, in its own words, what cannot be built of it."""
-        if self.described is None:
-            found = SpecimenTable.model_validate(load_specimen(self.specimen).model_dump())
+        found = self.described
+        if found is None:
+            try:
+                found = SpecimenTable.model_validate(load_specimen(self.specimen).model_dump())
+            except ValueError as error:
+                raise _at("specimen", error) from error
             object.__setattr__(self, "described", found)
         else:
-            object.__setattr__(self, "specimen", self.described.name)
-        self.shaken  # noqa: B018 - making it is the check
+            object.__setattr__(self, "specimen", found.name)
+        try:
+            self.shaken  # noqa: B018 - making it is the check
+        except ValueError as error:
+            # With its own law it fails in the same way, unless the law is at fault.
+            self.specimen_under(found.contact)
+            raise _at("model", error) from error
         return self
 
     @property

@@ -1,26 +1,29 @@
 """Curves laid over one another, as they are compared in the window, for paper: always light."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..comparison import Curve, CurveOrigin, curve_difference, curve_peaks
+from ..comparison import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
 from ..model import CurveDifference
 from ..tables import Table, table
 from ._drawn import DrawnFigure
 from ._style import BOUNDS, LEVELS, MEASURED, frequency_axis, legend_above, magnitude_axis, new_figure, styled
 
+Dashes: TypeAlias = str | tuple[int, tuple[int, ...]]
 _HEIGHT_IN = 4.6
 _DIFFERENCE_IN = 1.4
-_STYLES = {
-    CurveOrigin.MEASURED: "-",
-    CurveOrigin.SIMULATED: "--",
-    CurveOrigin.PREDICTED: ":",
-    CurveOrigin.STABLE: "-",
-    CurveOrigin.UNSTABLE: "--",
+_STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
+    CurveOrigin.MEASURED: ("-", ":"),
+    CurveOrigin.SIMULATED: ("--", "-."),
+    CurveOrigin.PREDICTED: ((0, (9, 3)), (0, (5, 2, 1, 2, 1, 2))),
+    CurveOrigin.STABLE: ("-", ":"),
+    CurveOrigin.UNSTABLE: ("--", "-."),
 }
+"""Of the transmission or Response I, and of Response II."""
 _LONE = 1
 """A curve of one point is drawn as a mark."""
 _SINGLE_BAND = 0.2
@@ -52,8 +55,9 @@ def comparison_figure(
         figure = new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
         panels = figure.subplots(rows, 1, sharex=True, height_ratios=(3.2, 1.0)[:rows], squeeze=False)[:, 0]
         top: Axes = panels[0]
-        for number, curve in enumerate(curves):
-            _curve(top, curve, LEVELS[number % len(LEVELS)])
+        sources = list(dict.fromkeys(each.source for each in curves))
+        for curve in curves:
+            _curve(top, curve, LEVELS[sources.index(curve.source) % len(LEVELS)])
         magnitude_axis(top)
         top.set_ylim(*_heights(curves))
         top.set_ylabel("|x / U|  (m0 over base)")
@@ -86,7 +90,7 @@ def _curve(axes: Axes, curve: Curve, colour: str) -> None:
         curve.frequency_hz,
         curve.magnitude,
         color=colour,
-        linestyle="none" if lone else _STYLES[curve.origin],
+        linestyle="none" if lone else _STYLES[curve.origin][curve.response is CurveKind.RESPONSE_II],
         marker="o" if lone else None,
         markersize=5,
         linewidth=1.0,

@@ -16,6 +16,7 @@ from ._line_style import (
     Dash as Dash,
     LineStyle as LineStyle,
     curve_style as curve_style,
+    dashed_pen as dashed_pen,
 )
 from ._plot import (
     Plot as Plot,

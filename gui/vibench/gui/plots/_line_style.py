@@ -18,6 +18,8 @@ class Dash(Enum):
     DASHED = Qt.PenStyle.DashLine
     DOTTED = Qt.PenStyle.DotLine
     DASH_DOTTED = Qt.PenStyle.DashDotLine
+    DASH_DOT_DOTTED = Qt.PenStyle.DashDotDotLine
+    LONG = Qt.PenStyle.CustomDashLine
 
 
 @dataclass(frozen=True)
@@ -38,13 +40,29 @@ def curve_style(number: int, dash: Dash = Dash.SOLID) -> LineStyle:
 PREDICTED = LineStyle(lambda theme: theme.predicted, Dash.DASHED)
 LIMIT = LineStyle(lambda theme: "#b3261e" if theme.name == "light" else "#ff8a80", Dash.DASHED)
 GUIDE = LineStyle(lambda theme: theme.line, Dash.DOTTED)
-SIGNS = {Dash.SOLID: "━━━", Dash.DASHED: "╍╍╍", Dash.DOTTED: "┉┉┉", Dash.DASH_DOTTED: "━╸╺"}
+SIGNS = {
+    Dash.SOLID: "━━━",
+    Dash.DASHED: "╍╍╍",
+    Dash.DOTTED: "┉┉┉",
+    Dash.DASH_DOTTED: "━╸╺",
+    Dash.DASH_DOT_DOTTED: "━╺╺",
+    Dash.LONG: "━━ ━━",
+}
+_LONG = [9.0, 4.0]
+"""Dashes and gaps of `Dash.LONG`, in widths of the line."""
+
+
+def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
+    """Give a pen of a colour and a width, with these dashes."""
+    pen: QPen = pg.mkPen(colour, width=width, style=dash.value)
+    if dash is Dash.LONG:
+        pen.setDashPattern(_LONG)
+    return pen
 
 
 def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
     """Give the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
-    pen: QPen = pg.mkPen(line_style.colour(theme), width=ratio, style=line_style.dash.value)
-    return pen
+    return dashed_pen(line_style.colour(theme), ratio, line_style.dash)
 
 
 def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
@@ -52,7 +70,7 @@ def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
 
     Its dashes are as long on a fine screen as on a coarse one.
     """
-    pen: QPen = pg.mkPen(line_style.colour(theme), width=1, style=line_style.dash.value)
+    pen = dashed_pen(line_style.colour(theme), 1, line_style.dash)
     if line_style.dash is not Dash.SOLID and ratio > 1.0:
         pen.setDashPattern([ratio * part for part in pen.dashPattern()])
     return pen

@@ -21,6 +21,9 @@ from ._notice import (
     NoticeKind as NoticeKind,
     notice_of as notice_of,
 )
+from ._outcome_text import (
+    outcome_text as outcome_text,
+)
 from ._page_names import (
     COMPARE as COMPARE,
     FILES as FILES,
@@ -51,6 +54,7 @@ from ._theme import (
     style_sheet as style_sheet,
 )
 from ._timed_bar import (
+    ProgressBar as ProgressBar,
     TimedBar as TimedBar,
 )
 from ._units import (

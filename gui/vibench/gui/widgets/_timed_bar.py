@@ -2,6 +2,7 @@
 
 from time import monotonic
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QProgressBar
 
 from ._clock import clock
@@ -10,7 +11,19 @@ LEAST_S = 1.0
 """Before this much of it is done nobody can say how long the rest takes [s]."""
 
 
-class TimedBar(QProgressBar):
+class ProgressBar(QProgressBar):
+    """A bar whose words end in dots where they find no room; the tooltip says them whole."""
+
+    def text(self) -> str:
+        """Give as many of the words as fit."""
+        whole = super().text()
+        room = self.width() - self.fontMetrics().averageCharWidth()
+        shown = self.fontMetrics().elidedText(whole, Qt.TextElideMode.ElideRight, room)
+        self.setToolTip(whole if shown != whole else "")
+        return shown
+
+
+class TimedBar(ProgressBar):
     """Counts pieces of work; the time left follows from those that are done."""
 
     def __init__(self, name: str, pieces: str) -> None:

@@ -1,7 +1,6 @@
 """From nothing to a window on the screen, and from its end to the end of the process."""
 
 import gc
-import sys
 from importlib import import_module
 from pathlib import Path
 from threading import Thread
@@ -43,7 +42,7 @@ def _font() -> QFont:
 
 def open_window(bench: Path | None, settings: Path | None, starting: QLabel | None = None) -> int:
     """Show the window, in place of what says that it is starting, until it is closed; gives the exit code."""
-    app = application(sys.argv[:1])
+    app = application(["vibench"])
     kept = Settings(settings or default_settings_path())
     context = AppContext(kept)
     context.first_bench = None if bench is None else bench.resolve()

@@ -163,20 +163,28 @@ def test_what_cannot_be_analysed_or_written_says_so_and_spoils_nothing(working, 
     assert len(working.curves.curves) == known
 
 
-def test_measured_and_simulated_differ_in_colour_and_levels_are_told(page):
+def test_a_recording_has_one_colour_a_kind_one_dash_and_levels_are_told(page):
     frequency_hz = np.arange(100.0, 300.0)
     ones, none = np.ones_like(frequency_hz), np.full_like(frequency_hz, np.nan)
-    measured = Curve("sweep", CurveOrigin.MEASURED, CurveKind.RESPONSE_I, frequency_hz, ones, none)
-    twin = Curve("sweep", CurveOrigin.SIMULATED, CurveKind.RESPONSE_I, frequency_hz, ones, none)
-    page.add_prediction((measured, twin))
+    curves = {
+        (source, origin, kind): Curve(source, origin, kind, frequency_hz, ones, none)
+        for source in ("sweep", "other")
+        for origin in (CurveOrigin.MEASURED, CurveOrigin.SIMULATED, CurveOrigin.PREDICTED)
+        for kind in (CurveKind.RESPONSE_I, CurveKind.RESPONSE_II)
+    }
+    page.add_prediction(tuple(curves.values()))
     progress = SimulationProgress(5e-6, 2, "a scene")
     progress.add((SimulatedPoint("hertz", 150.0, 2.0, 1.0, 0, "periodic", None, 1e-6),))
     progress.add((SimulatedPoint("hertz", 250.0, 2.0, 1.0, 0, "periodic", None, 1e-6),))
     page.add_prediction(progress.curves())
-    colours = {name: page.curves.line_style(name).colour(DARK) for name in (measured, twin)}
-    assert len(set(colours.values())) == 2
+    styles = {key: page.curves.line_style(curve) for key, curve in curves.items()}
+    for source in ("sweep", "other"):
+        assert len({style.colour(DARK) for key, style in styles.items() if key[0] == source}) == 1
+        assert len({style.dash for key, style in styles.items() if key[0] == source}) == 6
+    assert len({style.colour(DARK) for style in styles.values()}) == 2
     assert any("5 µm" in each.name for each in page.curves.curves)
     page.pair_box._curve.setCurrentText(progress.curves()[0].name)
+    measured = curves["sweep", CurveOrigin.MEASURED, CurveKind.RESPONSE_I]
     page.pair_box._reference.setCurrentText(measured.name)
     assert "5 µm and as driven" in page.pair_box.said
 

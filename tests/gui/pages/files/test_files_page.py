@@ -1,5 +1,6 @@
 """The Files page lists, opens and zooms real recordings."""
 
+import re
 import shutil
 
 import h5py
@@ -16,7 +17,7 @@ from vibench.acquisition.recording import RecordingState, open_recording
 from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
 from vibench.gui.pages.files import FilesPage, _files_page
-from vibench.gui.pages.files._listing import made_levels
+from vibench.gui.pages.files._listing import listed, made_levels
 from vibench.gui.pages.files._recording_table import HEADINGS
 from vibench.gui.widgets import DARK
 
@@ -341,3 +342,38 @@ def test_a_file_that_was_deleted_leaves_the_list(shared_context, record, tmp_pat
     page._looked_s = 0.0
     page.refresh()
     waited(lambda: [each.path for each in page.table.recordings.entries] == [kept])
+
+
+def test_the_facts_say_a_state_once(opened, begin_recording, tmp_path):
+    writer, _ = begin_recording(tmp_path, "ended")
+    path = writer.finish(RecordingState.STOPPED, "stopped by the operator, in the window")
+    page = opened(path)
+    assert page._facts.sentence.startswith("■ stopped by the operator, in the window")
+
+
+def test_a_growing_file_shows_what_it_holds_and_not_what_it_has_reserved(begin_recording, tmp_path):
+    """512 MB were shown a second after a long run had begun."""
+    writer, part = begin_recording(tmp_path, "grows")
+    (entry,) = listed(tmp_path).recordings
+    assert entry.said.size_bytes == 3 * 6400 * 4 < part.stat().st_size
+    writer.finish(RecordingState.COMPLETE, "the plan was carried out")
+
+
+HINTS = (("broken.h5", "broken.h5"), ("whole.h5", "Reading|Working|Zoom in"), ("empty.h5", "no samples"))
+
+
+@pytest.mark.parametrize(("name", "hint"), HINTS)
+def test_no_picture_asks_for_a_recording_while_one_is_chosen(
+    page, folder, tmp_path, name, hint, begin_recording
+):
+    path = folder / name
+    if name == "empty.h5":
+        writer = begin_recording(tmp_path, "empty", samples=0)[0]
+        path = writer.finish(RecordingState.STOPPED, "stopped")
+    page.open_path(path)
+    for view in (page.pictures.hidden_motion, page.pictures.spectrogram):
+        page.pictures.setCurrentWidget(view)
+        page._open(path)
+        assert "Choose a recording" not in view.plot._hint
+        assert re.search(hint, view.plot._hint)
+    page.pictures.setCurrentWidget(page.time_histories)

@@ -119,3 +119,17 @@ def test_a_map_and_a_motion_of_another_specimen_lie_under_a_veil(page, waited):
     page.begin()
     assert page.map.image.image is None
     page.cancel()
+
+
+def test_before_a_map_the_axes_show_what_the_form_says_also_with_a_level(context, qtbot):
+    """With a recorded level they ran from 10 to 10^6 um."""
+    page = MapsPage(context)
+    qtbot.addWidget(page)
+    page.resize(900, 700)
+    page.show()
+    page._show_level(RecordedLevel("night", ((90.0, 4e-6), (300.0, 2e-5)), ()))
+    page.form.show_value(MapRequest(**SMALL))
+    qtbot.wait(50)
+    (left, right), (low, high) = page.map.in_sight
+    assert (left, right) == pytest.approx((100.0, 140.0))
+    assert (low, high) == pytest.approx((5e-6, 2e-5))

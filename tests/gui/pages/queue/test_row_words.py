@@ -3,8 +3,10 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from vibench.acquisition import load_campaign
-from vibench.acquisition.engine import EngineState
+from vibench.acquisition.engine import EngineState, RowStatus
 from vibench.gui.pages.queue._row_words import entry_rows, point_rows, preview_campaign
 
 CAMPAIGNS = Path(__file__).resolve().parents[4] / "campaigns"
@@ -30,3 +32,16 @@ def test_rows_say_levels_and_what_the_folder_holds_already(tmp_path):
     assert done in ([], ["recorded before"])
     whole = replace(seen, complete=frozenset(rows))
     assert {said for *_, said in point_rows(whole, (), EngineState.CLOSED)} == {"recorded before"}
+
+
+@pytest.mark.parametrize(
+    ("state", "reason", "said"),
+    [
+        ("stopped", "stopped by the operator, in the window", "stopped by the operator, in the window"),
+        ("failed", "the laser was lost", "failed: the laser was lost"),
+        ("queued", "", "queued"),
+    ],
+)
+def test_a_state_is_said_once(state, reason, said):
+    row = RowStatus(name="dwell", state=state, reason=reason, file="")
+    assert point_rows(None, (row,), EngineState.RUNNING)[0][3] == said

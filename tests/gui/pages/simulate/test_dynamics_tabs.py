@@ -1,7 +1,10 @@
 """The tabs Branches and Exponents of the Simulate page ask, draw, say error and cost, lay over recordings."""
 
+import re
+
 import numpy as np
 import pytest
+from PySide6.QtCore import QPoint, QRect
 
 from vibench.analysis import CurveOrigin
 from vibench.analysis.dynamics import (
@@ -165,3 +168,26 @@ def test_what_is_not_allowed_cannot_be_asked(page):
 def test_a_dark_theme_reaches_the_tabs(page):
     page.retheme(DARK)
     page.refresh()
+
+
+@pytest.mark.parametrize("name", ["branches", "spectrum", "chain"])
+def test_while_a_tab_still_looks_it_says_so_and_gives_no_answer(page, name):
+    """Branches said: no periodic motion was found; 0.0 s."""
+    view = getattr(page, name)
+    view.begin()
+    assert view.said.strip().startswith("Looking")
+    assert not re.search(r"[Nn]o |0\.0 s|not found", view.said)
+    view.cancel()
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_what_begins_a_computation_is_in_sight_at_every_size(page, qapp, place):
+    """Simulate lay below the fold at 1280 x 800, Find half below the edge of the Chain tab."""
+    for width, height in ((1040, 560), (1100, 640), (1300, 800)):
+        page.resize(width, height)
+        page.tabs.setCurrentIndex(place)
+        qapp.processEvents()
+        button = (page, *page._views)[place]._begin
+        corner = button.mapTo(page, QPoint(0, 0))
+        assert page.rect().contains(QRect(corner, button.size()))
+    page.tabs.setCurrentIndex(0)

@@ -9,6 +9,7 @@ from vibench.acquisition.plan import BranchContinuation, Dwell, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.gui.pages import test as test_room
 from vibench.gui.pages.test import _test_preview as preview
+from vibench.gui.pages.test._test_page import summary_text
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
 
@@ -42,3 +43,37 @@ def test_a_branch_that_the_fast_loop_does_not_hold_is_no_complete_test_and_the_p
     page._predicted(preview.predict_test(asked))
     assert page.summary.text().startswith("✖ whether the fast loop holds the branch is not known")
     assert not page.is_done
+
+
+def test_every_limit_that_is_passed_stands_among_the_reasons(page):
+    """49 of 45 N were missing beside an exceeded stroke."""
+    seen = preview.preview_test(
+        preview.TestPreview(
+            Measurement(
+                name="loud", excitation=Dwell(amplitude_vpp=20, frequency_hz=30, settle_s=1, duration_s=2)
+            ),
+            RIG,
+        )
+    )
+    passed = [check for check in seen.checks if not check.is_kept]
+    assert len(passed) > 1
+    said = summary_text(seen)
+    assert said.startswith("✖ ")
+    assert all(check.complaint() in said for check in passed)
+
+
+def test_another_name_asks_for_no_other_prediction_not_even_while_one_is_made(page, qtbot):
+    page.context.selection.choose_rig(RIG)
+    plan = Dwell(amplitude_vpp=0.05, frequency_hz=260, settle_s=1, duration_s=6)
+    page.form.show_value(Measurement(name="before", excitation=plan))
+    assert page.is_busy
+    asked = []
+    page._looking.ask = page._predicting.ask = asked.append
+    page.form.show_value(Measurement(name="after", excitation=plan))
+    assert asked == []
+    assert page.context.selection.measurement.name == "after"
+    page._looked(preview.preview_test(preview.TestPreview(page._wanted[0], RIG)))
+    assert all(each.is_true for each in page.shown)
+    assert page.is_done
+    page.form.show_value(Measurement(name="after", excitation=plan.model_copy(update={"duration_s": 7.0})))
+    assert len(asked) == 2

@@ -3,29 +3,30 @@
 from collections.abc import Callable
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QListWidget, QListWidgetItem
 
 from vibench.analysis import AnalysisError, Curve, CurveDifference, CurveKind, CurveOrigin, curve_difference
 
 from ...forms import Choice
-from ...plots import Dash, LineStyle, curve_style
+from ...plots import Dash, LineStyle, curve_style, dashed_pen
 from ...widgets import UNITS, SentenceLabel, Theme, paint_hint
 
 _DASHES = {
-    CurveOrigin.MEASURED: Dash.SOLID,
-    CurveOrigin.SIMULATED: Dash.DASHED,
-    CurveOrigin.PREDICTED: Dash.DASH_DOTTED,
-    CurveOrigin.STABLE: Dash.SOLID,
-    CurveOrigin.UNSTABLE: Dash.DASHED,
+    CurveOrigin.MEASURED: (Dash.SOLID, Dash.DOTTED),
+    CurveOrigin.SIMULATED: (Dash.DASHED, Dash.DASH_DOTTED),
+    CurveOrigin.PREDICTED: (Dash.LONG, Dash.DASH_DOT_DOTTED),
+    CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
+    CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
 }
+"""Of the transmission or Response I, and of Response II."""
 _SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
 """Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
 _SWATCH = (28, 12)
 
 
 class CurveList(QListWidget):
-    """Curves with a tick for those in the picture; colours follow source and origin, dashes the origin."""
+    """Curves with a tick for those in the picture: a colour for each source, a dash for each kind."""
 
     changed = Signal()
 
@@ -60,9 +61,11 @@ class CurveList(QListWidget):
             paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
 
     def line_style(self, curve: Curve) -> LineStyle:
-        """Colour of its source, dash of its origin."""
-        inks = list(dict.fromkeys(_ink(each) for each in self._curves))
-        return curve_style(inks.index(_ink(curve)), _DASHES[curve.origin])
+        """Colour of its source, dash of its kind."""
+        sources = list(dict.fromkeys(each.source for each in self._curves))
+        first, second = _DASHES[curve.origin]
+        dash = second if curve.response is CurveKind.RESPONSE_II else first
+        return curve_style(sources.index(curve.source), dash)
 
     def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
         """Put curves of a source in the place of those it had."""
@@ -117,11 +120,6 @@ class CurveList(QListWidget):
         self.changed.emit()
 
 
-def _ink(each: Curve) -> tuple[str, bool]:
-    """Name the colour of a curve: what a recording measured and what a model says to it have two."""
-    return each.source, each.origin is CurveOrigin.MEASURED
-
-
 def _is_of(each: Curve, source: str) -> bool:
     """Tell whether a curve is a recording's; steps up and down of one are two sources with one beginning."""
     return each.source == source or each.source in (f"{source} up", f"{source} down")
@@ -137,7 +135,7 @@ def _swatch(line_style: LineStyle, theme: Theme) -> QPixmap:
     picture.setDevicePixelRatio(ratio)
     picture.fill(QColor(theme.base))
     painter = QPainter(picture)
-    painter.setPen(QPen(QColor(line_style.colour(theme)), 2, line_style.dash.value))
+    painter.setPen(dashed_pen(line_style.colour(theme), 2, line_style.dash))
     painter.drawLine(1, _SWATCH[1] // 2, _SWATCH[0] - 1, _SWATCH[1] // 2)
     painter.end()
     return picture

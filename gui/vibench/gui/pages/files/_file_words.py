@@ -3,6 +3,8 @@
 from vibench.acquisition import printable
 from vibench.acquisition.recording import Recording, RecordingState, SealDepth, SealState
 
+from ...widgets import outcome_text
+
 _STATE_SYMBOLS: dict[str, str] = {
     RecordingState.COMPLETE: "✔",
     RecordingState.STOPPED: "■",
@@ -14,7 +16,11 @@ _STATE_SYMBOLS: dict[str, str] = {
 
 def state_text(state: str) -> str:
     """Symbol and word: never a colour alone."""
-    return f"{_STATE_SYMBOLS.get(state, '✖')} {state}"
+    return f"{_symbol(state)} {state}"
+
+
+def _symbol(state: str) -> str:
+    return _STATE_SYMBOLS.get(state, "✖")
 
 
 def size_text(size: int) -> str:
@@ -44,7 +50,7 @@ def role_text(role: str) -> str:
 def facts_text(recording: Recording) -> str:
     """Say in a line what a recording is."""
     parts = [
-        state_text(recording.state) + (f" ({recording.reason})" if recording.reason else ""),
+        f"{_symbol(recording.state)} {outcome_text(recording.state, recording.reason)}",
         recording.origin.value,
         duration_text(recording.duration_s),
         f"{recording.sample_rate_hz:g} samples/s, {len(recording.roles)} channels",

@@ -171,6 +171,7 @@ class FilesPage(Page):
         except RecordingError as error:
             self._title.setText(printable(path.name))
             self._facts.setText(printable(str(error)))
+            self.pictures.show_recording(None, printable(str(error)))
             self.context.say(notice_of(error))
             return
         self._opened = recording
@@ -204,12 +205,13 @@ class FilesPage(Page):
         if self._opened is None:
             return
         self._facts.setText(facts_text(self._opened))
-        self.pictures.show_recording(RecordingOverview(self._opened, levels))
+        hint = "Working it out…" if self._opened.samples else "This recording holds no samples."
+        self.pictures.show_recording(RecordingOverview(self._opened, levels), hint)
         self._pictured_path = self._opened.path
         self._say_view()
 
     def _close(self) -> None:
-        self.pictures.show_recording(None)
+        self.pictures.show_recording(None, "Reading the recording…")
         self._pictured_path = None
         if self._opened is not None:
             self._opened.close()

@@ -26,7 +26,7 @@ _WAIT_MS = 250
 """How long a view stands still before it is worked out."""
 _RELATIVE = PlotAxis("p = y - z", "m", short="p")
 _ANOTHER = "another file…"
-_CHOOSE = "Choose a recording in the list above."
+CHOOSE = "Choose a recording in the list above."
 
 
 class HiddenMotionView(QWidget):
@@ -59,7 +59,7 @@ class HiddenMotionView(QWidget):
         self._latest_request = LatestRequest(background, hidden_view, self._show, self._fail, _WAIT_MS, self)
         chosen = row(QLabel("Specimen"), self.specimen, self.find_numbers, 1)
         filled(QVBoxLayout(self), chosen, self.said, (self.plot, 1)).setContentsMargins(0, 4, 0, 0)
-        self._clear(_CHOOSE)
+        self._clear(CHOOSE)
 
     @property
     def is_busy(self) -> bool:
@@ -71,11 +71,11 @@ class HiddenMotionView(QWidget):
         """The picture, of the stretch in sight and what is chosen above it."""
         return Shown(self.plot, self._of, self._asked)
 
-    def show_recording(self, recording: Recording | None) -> None:
-        """Picture another recording from now on, or none."""
+    def show_recording(self, recording: Recording | None, hint: str) -> None:
+        """Picture another recording from now on, or none; until then the hint is shown."""
         self._recording = recording
         self._latest_request.drop()
-        self._clear(_CHOOSE)
+        self._clear(hint)
 
     def show_view(self, low_s: float, high_s: float) -> None:
         """Picture this stretch, when the picture is in sight."""

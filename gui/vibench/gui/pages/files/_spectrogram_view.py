@@ -25,7 +25,7 @@ from ...page import Shown
 from ...plots import FREQUENCY, LOG_FREQUENCY, TIME, Plot
 from ...widgets import ElidedLabel, Theme, filled, plain_unit
 from ._file_words import role_text
-from ._hidden_motion_view import HiddenMotionView
+from ._hidden_motion_view import CHOOSE, HiddenMotionView
 from ._time_histories import RecordingTimeHistories
 
 _WAIT_MS = 250
@@ -95,13 +95,13 @@ class SpectrogramView(QWidget):
         """The picture, of what the choices above it say."""
         return Shown(self.plot, self._of, self._asked)
 
-    def show_recording(self, recording: Recording | None) -> None:
-        """Picture another recording from now on, or none."""
+    def show_recording(self, recording: Recording | None, hint: str) -> None:
+        """Picture another recording from now on, or none; until then the hint is shown."""
         self._recording = recording
         self._latest_request.drop()
         self._asked = self._of = None
         for image in self._images.values():
-            image.clear("Choose a recording in the list above." if recording is None else "Working it out…")
+            image.clear(hint)
         roles = () if recording is None else recording.roles
         if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
             blocked = self.channel.blockSignals(True)
@@ -196,7 +196,7 @@ class _Image:
         self.bar = pg.ColorBarItem(colorMap=pg.colormap.get("viridis"), interactive=False, width=14)
         self.bar.setImageItem(self.item, insert_in=plot.getPlotItem())
         self.bar.axis.setWidth(_BAR_EM * plot.fontMetrics().height())
-        self.clear("Choose a recording in the list above.")
+        self.clear(CHOOSE)
 
     def clear(self, hint: str) -> None:
         """Show nothing, and say why."""
@@ -243,10 +243,11 @@ class Pictures(QTabWidget):
         self.addTab(self.hidden_motion, "Hi&dden motion")
         self.time_histories.range_changed.connect(self._show_view)
 
-    def show_recording(self, overview: RecordingOverview | None) -> None:
-        """Show another recording, or none."""
-        self.spectrogram.show_recording(None if overview is None else overview.recording)
-        self.hidden_motion.show_recording(None if overview is None else overview.recording)
+    def show_recording(self, overview: RecordingOverview | None, hint: str) -> None:
+        """Show another recording, or none; the hint says what comes, or why nothing does."""
+        recording = None if overview is None else overview.recording
+        for picture in (self.spectrogram, self.hidden_motion):
+            picture.show_recording(recording, hint)
         self.time_histories.show_recording(overview)
         self._show_view()
 

@@ -39,7 +39,7 @@ class MapPlot(QWidget):
         self.plot.addItem(self.image)
         self._mark = self.plot.dots(ON_TOP, size=10)
         self._levels = [self.plot.curve(ON_TOP)]
-        self._seen: MapPicture | None = None
+        self._range: tuple[tuple[float, float], tuple[float, float]] | None = None
         self.plot.scene().sigMouseClicked.connect(self._click)
         filled(QVBoxLayout(self), self.plot, margin=0)
 
@@ -51,22 +51,23 @@ class MapPlot(QWidget):
 
     def show_picture(self, picture: MapPicture, quantity: str) -> None:
         """Draw a map as far as it has come; axes follow only when its edges are others."""
-        is_elsewhere = self._seen is None or (self._seen.frequency_hz, self._seen.amplitude_m) != (
-            picture.frequency_hz,
-            picture.amplitude_m,
-        )
-        self._seen = picture
+        self.show_range(picture.frequency_hz, picture.amplitude_m)
         (left, right), (low, high) = picture.frequency_hz, picture.amplitude_m
         self.image.setImage(COLOURINGS[quantity](picture), autoLevels=False, levels=(0, 255))
         self.image.setRect(QRectF(left, log10(low), right - left, log10(high / low)))
         self.plot.with_hint("")
-        if is_elsewhere:
-            self.plot.setXRange(left, right, padding=0.0)
+
+    def show_range(self, frequency_hz: tuple[float, float], amplitude_m: tuple[float, float]) -> None:
+        """Let the axes show these frequencies and amplitudes; again the same, they stay where they are."""
+        if self._range != (frequency_hz, amplitude_m):
+            self._range = (frequency_hz, amplitude_m)
+            low, high = amplitude_m
+            self.plot.setXRange(*frequency_hz, padding=0.0)
             self.plot.setYRange(log10(low), log10(high), padding=0.0)
 
     def clear(self) -> None:
         """Show no map; the axes show the whole of the next one, wherever they were."""
-        self._seen = None
+        self._range = None
         self.image.clear()
         self.plot.with_hint(HINT)
 

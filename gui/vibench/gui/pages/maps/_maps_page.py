@@ -196,6 +196,8 @@ class MapsPage(Page):
         wanted = self.form.value
         for button in (self._begin, self._finer):
             button.setEnabled(wanted is not None)
+        if wanted is not None and self.picture is None:
+            self.map.show_range((wanted.start_hz, wanted.stop_hz), (wanted.lowest_m, wanted.highest_m))
         self.map.setEnabled(self._asked in (None, wanted))
         self.motion.setEnabled(self._motion_of in (None, self._motion_wanted))
 

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import (
     QCheckBox,
     QFileDialog,
     QGridLayout,
-    QProgressBar,
     QVBoxLayout,
 )
 
@@ -33,6 +32,7 @@ from ...widgets import (
     QUEUE,
     Notice,
     NoticeKind,
+    ProgressBar,
     ReadTable,
     SentenceLabel,
     boxed,
@@ -76,7 +76,7 @@ class QueuePage(Page):
         self.sweep = SweepForm()
         self.summary = SentenceLabel()
         self.summary.setAccessibleName("Summary of the campaign")
-        self.progress = QProgressBar()
+        self.progress = ProgressBar()
         self.progress.setAccessibleName("Progress of the campaign")
         self.progress.setRange(0, 1000)
         self.progress.setFormat("not running")

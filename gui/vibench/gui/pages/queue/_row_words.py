@@ -10,7 +10,7 @@ from vibench.acquisition.engine import DRIVING, EngineState, RowStatus
 from vibench.acquisition.plan import EXCITATION_KINDS, Campaign, duration_s, excitation_text
 from vibench.acquisition.rig import Rig
 
-from ...widgets import clock
+from ...widgets import clock, outcome_text
 
 SYMBOLS = {
     "queued": "○",
@@ -54,7 +54,7 @@ def point_rows(
                 SYMBOLS.get(row.state, "·"),
                 row.name,
                 levels.get(row.name, ""),
-                f"{row.state}  {row.reason}".strip(),
+                outcome_text(row.state, row.reason),
             )
             for row in rows
         ]

@@ -16,7 +16,7 @@ from vibench.analysis.live import LiveView
 
 from ...engine_link import measurement_called
 from ...page import KIND_VIEWS, OF_A_BAND, AppContext, LivePicture, Page, Shown, SideAndPicture, UserActions
-from ...widgets import FILES, RUN, SentenceLabel, column, filled
+from ...widgets import FILES, RUN, SentenceLabel, column, filled, outcome_text
 from ._arm_card import ArmCard
 from ._hidden_motion_plot import HiddenMotionPlot
 from ._portrait_plot import PortraitPlot
@@ -175,14 +175,7 @@ class RunPage(Page):
         self._ended = path
         status = self.context.bridge.status
         rows = () if status is None else status.rows
-        told = next(
-            (
-                row.reason if row.reason.startswith(row.state) else f"{row.state}: {row.reason}"
-                for row in rows
-                if row.file == str(path)
-            ),
-            "",
-        )
+        told = next((outcome_text(row.state, row.reason) for row in rows if row.file == str(path)), "")
         self.summary.setText(f"Last run: {path.name}, {told}")
         self.look_button.show()
 

@@ -7,7 +7,6 @@ from PySide6.QtWidgets import (
     QFormLayout,
     QGroupBox,
     QLabel,
-    QProgressBar,
     QPushButton,
     QSizePolicy,
     QVBoxLayout,
@@ -18,7 +17,7 @@ from vibench.acquisition.engine import DRIVING, EngineStatus, RunStatus, TwinSwi
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...forms import Choice, LineField
-from ...widgets import Theme, Tone, clock, filled, paint_hint, row
+from ...widgets import ProgressBar, Theme, Tone, clock, filled, paint_hint, row
 from ._time_histories import USUAL_SPAN_S, channel_word
 
 _ROW = 1.9
@@ -104,7 +103,7 @@ class WatchCard(QGroupBox):
 
     def __init__(self, theme: Theme) -> None:
         super().__init__("Watch")
-        self.progress = QProgressBar()
+        self.progress = ProgressBar()
         self.progress.setAccessibleName("Progress of the run")
         self.progress.setRange(0, 1000)
         self.progress.setFormat("no run yet")

@@ -83,6 +83,8 @@ def _load(check: LimitCheck, name: str) -> str:
 
 
 Asked = tuple[Measurement | None, Rig | None] | None
+NAMELESS = {"name": "test", "notes": ""}
+"""What is predicted of a test depends on neither."""
 LOOK_MS, PREDICT_MS = 200, 900
 """How long a test stands unchanged before it is previewed, and before it is simulated."""
 
@@ -97,8 +99,9 @@ class TestPage(Page):
         self._refusal = ""
         self._history: History[Measurement] = History()
         self._of: Asked = None
-        self._summary_of: Asked = self._of
-        self._predicted_of: Asked = self._of
+        self._asked: Asked = None
+        self._summary_of: Asked = None
+        self._predicted_of: Asked = None
         self._tests: tuple[NamedTest, ...] = ()
         self.choice = Choice()
         self.form = TestForm()
@@ -156,13 +159,20 @@ class TestPage(Page):
     @property
     def shown(self) -> tuple[Shown, ...]:
         """Loads, pictures and prediction, each of the test and rig it was worked out for."""
-        wanted = (self.form.value, self.context.selection.rig)
+        wanted = self._wanted
         return (
             Shown(self.summary, self._summary_of, wanted),
             *(Shown(each, self._of, wanted) for each in (self.plots, self.limits)),
             Shown(self.prediction, self._predicted_of, wanted),
             Shown(self.prediction_note, self._predicted_of, wanted),
         )
+
+    @property
+    def _wanted(self) -> tuple[Measurement | None, Rig | None]:
+        """The test, without its name, and the rig."""
+        value = self.form.value
+        nameless = None if value is None else value.model_copy(update=NAMELESS)
+        return nameless, self.context.selection.rig
 
     def left(self) -> None:
         """Keep the test for next time, and how the page is divided."""
@@ -172,15 +182,20 @@ class TestPage(Page):
             self.context.settings.keep_text(Remembered.TEST, toml_text(measurement))
 
     def _changed(self) -> None:
-        measurement, rig = self.form.value, self.context.selection.rig
-        if self._is_renamed(measurement, rig):
-            return
+        measurement, asked = self.form.value, self._wanted
+        seen = self.context.selection.prediction
         self.context.selection.choose_measurement(measurement)
-        self._preview, self._refusal = None, ""
         if measurement is not None:
             self._history.note(measurement)
+            if asked == self._asked:
+                # Another name alone: what is predicted of the test, or will be, stays.
+                if seen is not None:
+                    self.context.selection.keep_prediction(seen)
+                return
+        self._preview, self._refusal = None, ""
         # What stands there belongs to another test until its own has come.
-        self._summary_of = (measurement, rig)
+        self._asked = self._summary_of = asked
+        measurement, rig = asked
         for each in (self.limits, self.plots, self.prediction, self.prediction_note):
             each.setEnabled(False)
         if measurement is None or rig is None:
@@ -191,21 +206,6 @@ class TestPage(Page):
             return
         self._look_at(measurement, rig)
 
-    def _is_renamed(self, measurement: Measurement | None, rig: Rig | None) -> bool:
-        """Take over another name alone: what is predicted of the test stays."""
-        before, seen = self.context.selection.measurement, self.context.selection.prediction
-        if measurement is None or before is None or self._preview is None or seen is None:
-            return False
-        if measurement == before or measurement.model_copy(update={"name": before.name}) != before:
-            return False
-        if not self._of == self._summary_of == self._predicted_of == (before, rig):
-            return False
-        self.context.selection.choose_measurement(measurement)
-        self.context.selection.keep_prediction(seen)
-        self._history.note(measurement)
-        self._of = self._summary_of = self._predicted_of = (measurement, rig)
-        return True
-
     def _look_at(self, measurement: Measurement, rig: Rig) -> None:
         self.summary.setText("…")
         self._looking.ask(TestPreview(measurement, rig))
@@ -214,7 +214,7 @@ class TestPage(Page):
 
     def _looked(self, seen: MeasurementPreview) -> None:
         self._preview = seen
-        self._of = self._summary_of = (seen.measurement, self.context.selection.rig)
+        self._of = self._summary_of = self._asked
         self.summary.setText(summary_text(seen, self._refusal))
         for each in (self.limits, self.plots):
             each.setEnabled(True)
@@ -227,7 +227,7 @@ class TestPage(Page):
     def _predicted(self, prediction: TestPrediction) -> None:
         seen = prediction.motion
         self.context.selection.keep_prediction(seen)
-        self._predicted_of = (seen.measurement, self.context.selection.rig)
+        self._predicted_of = self._asked
         self._refusal = prediction.refusal
         if self._preview is not None:
             self.summary.setText(summary_text(self._preview, self._refusal))
@@ -248,7 +248,7 @@ class TestPage(Page):
     def _prediction_failed(self, error: BaseException) -> None:
         self.prediction.show_prediction(None)
         self.prediction_note.setEnabled(True)
-        self._predicted_of = (self.form.value, self.context.selection.rig)
+        self._predicted_of = self._asked
         self.prediction_note.setText(f"No prediction: {error}")
         self.expectation.setText("")
 

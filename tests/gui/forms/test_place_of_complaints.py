@@ -1,0 +1,31 @@
+"""What is wrong with a value is said at its field, also where only the whole model can find it out."""
+
+import pytest
+
+from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpectrumRequest
+from vibench.analysis.simulation import MapRequest, SimulationRequest
+from vibench.gui.forms import JudgedForm
+from vibench.gui.pages.simulate._dynamics_kinds import BRANCHES, CHAIN
+
+HIDDEN = BRANCHES.hidden | CHAIN.hidden
+GIVEN = {"start": 60.0, "stop": 62.0}
+"""What no request can do without."""
+
+
+@pytest.mark.parametrize(
+    "model", [SimulationRequest, MapRequest, BranchRequest, SpectrumRequest, ChainRequest]
+)
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [("specimen", "nothing", "no specimen is called"), ("model", "rubber", "Contact 'rubber' is not known")],
+)
+def test_an_unknown_specimen_or_law_is_complained_of_at_its_field(qapp, model, field, value, said):
+    form = JudgedForm(model, "scene", HIDDEN)
+    if field not in form.form.editors:
+        pytest.skip("the models of a simulation are a list")
+    form.form.show_content(GIVEN | {field: value})
+    assert form.value is None
+    assert said in form.form._rows[field].complaint.sentence
+    form.form.show_content(GIVEN)
+    assert form.value is not None
+    form.close()

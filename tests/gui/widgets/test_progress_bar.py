@@ -1,0 +1,22 @@
+"""What a bar says is never cut in the middle of a letter."""
+
+import pytest
+
+from vibench.gui.pages.run._watch_card import WatchCard
+from vibench.gui.widgets import LIGHT, ProgressBar, TimedBar
+
+WORDS = "ramping up as far as the first tenth, 11:22:33 left"
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_words_without_room_end_in_dots_and_are_whole_in_the_tooltip(qapp, number):
+    card = WatchCard(LIGHT)
+    bar = (ProgressBar(), TimedBar("bar", "points"), card.progress)[number]
+    bar.setValue(0)
+    bar.setFormat(WORDS)
+    bar.resize(120, 20)
+    assert bar.text().endswith("…")
+    assert bar.fontMetrics().horizontalAdvance(bar.text()) < 120
+    assert bar.toolTip() == WORDS
+    bar.resize(900, 20)
+    assert (bar.text(), bar.toolTip()) == (WORDS, "")
