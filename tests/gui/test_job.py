@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
@@ -12,6 +13,8 @@ from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMe
 from vibench.acquisition import open_recording
 from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import REJECTED
+from vibench.analysis import analyse
 from vibench.gui.page import AppContext, Settings
 from vibench.gui.page._user_actions import ABORT_KEY, OPERATOR_STOP
 from vibench.gui.pages.rig._rig_choice import PACES
@@ -327,6 +330,24 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     with open_recording(recorded(bench).file) as recording:
         assert any("tapped the table" in event.text for event in recording.events)
+
+
+def test_an_average_of_noise_is_rejected_while_it_is_played(bench, qtbot):
+    noise = {"kind": "white_noise", "amplitude_vpp": 0.2, "band_start_hz": 40, "band_stop_hz": 600}
+    noise |= {"realisations": 4, "settle_s": 1.0}
+    plan = {"name": "noise", "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": noise}
+    bench.pages[TEST].form.show_value(Measurement.model_validate(plan))
+    reach(qtbot, bench, EngineState.READY)
+    bench.user_actions.arm_test()
+    reach(qtbot, bench, EngineState.ARMED)
+    bench.user_actions.start()
+    card = bench.pages[RUN].watch_card
+    qtbot.waitUntil(lambda: card.averages.text() == "2 of 4", timeout=PATIENCE_MS)
+    card.reject_button.click()
+    reach(qtbot, bench, EngineState.READY)
+    with open_recording(recorded(bench).file) as recording:
+        assert [each.text for each in recording.events if each.kind == "mark"] == [REJECTED]
+    assert analyse(Path(recorded(bench).file)).analysis.response.periodic.realisations == 3
 
 
 def test_what_is_complained_of_goes_when_it_has_come_about(bench, qtbot):

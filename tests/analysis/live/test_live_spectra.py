@@ -83,3 +83,14 @@ def test_one_segment_has_no_transmission_and_none_no_spectrum():
 def test_settings_that_average_nothing_are_refused():
     with pytest.raises(InvalidRequest, match="1 segments"):
         SpectrumSettings(averages=1)
+
+
+def test_what_is_left_out_counts_no_more_and_what_comes_after_does():
+    rng = np.random.default_rng(5)
+    spectra = fed(rng.standard_normal((2, 10_000)), 1000)
+    spectra.add(np.full((2, 2000), 1e6, dtype=np.float32))
+    assert spectra.spectrum().amplitude_density.max() > 1e3
+    spectra.leave_out(3000 / RATE)
+    assert spectra.spectrum().amplitude_density.max() < 10.0
+    spectra.add(rng.standard_normal((2, 4000)).astype(np.float32))
+    assert spectra.frequency_response((0, 1), low_hz=100.0, high_hz=900.0) is not None

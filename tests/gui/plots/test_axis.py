@@ -2,9 +2,10 @@
 
 from math import log10
 
+import numpy as np
 import pytest
 
-from vibench.gui.plots import LOG_FREQUENCY, PlotAxis
+from vibench.gui.plots import LOG_FREQUENCY, PlotAxis, Scale
 from vibench.gui.plots._axis import AxisItem, logarithmic_ticks, number_text
 
 
@@ -37,3 +38,19 @@ def test_the_unit_stands_in_the_label_and_never_with_a_prefix_of_its_own(qapp):
 def test_metres_are_shown_as_micrometres(qapp):
     item = AxisItem("left", PlotAxis("Displacement", "µm", 1e6))
     assert item.tickStrings([0, 5e-6, 1e-5], 1.0, 5e-6) == ["0", "5", "10"]
+
+
+@pytest.mark.parametrize("scale", list(Scale))
+@pytest.mark.parametrize("side", ["bottom", "left"])
+def test_every_axis_has_two_numbers_at_least(qapp, scale, side):
+    rng = np.random.default_rng(4)
+    is_logarithmic = scale is Scale.LOGARITHMIC
+    item = AxisItem(side, PlotAxis("Length", "m", scale=scale))
+    item.setLogMode(x=is_logarithmic, y=is_logarithmic)
+    for _ in range(400):
+        span = 10.0 ** rng.uniform(-2, 1) if is_logarithmic else 10.0 ** rng.uniform(-9, 5)
+        low = rng.uniform(-8, 3) if is_logarithmic else span * rng.uniform(-5, 5)
+        size = rng.uniform(60, 1500)
+        (_, values), *_ = item.tickValues(low, low + span, size)
+        inside = [each for each in values if low <= each <= low + span]
+        assert len(inside) >= 2, (low, span, size)

@@ -7,7 +7,7 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import QLabel
 
-from vibench.gui.plots import LIMIT, LOG_FREQUENCY, TIME, Plot, PlotAxis, curve_style
+from vibench.gui.plots import LIMIT, LOG_FREQUENCY, TIME, LineStyle, Plot, PlotAxis, curve_style
 from vibench.gui.plots._axis import thinned
 from vibench.gui.plots._plot_actions import numbers_of, write_plot
 from vibench.gui.widgets import LIGHT, UNITS
@@ -264,3 +264,11 @@ def test_a_level_stays_at_its_value_when_the_scale_turns_and_hides_where_there_i
     plot.wipe()
     plot.turn_scale()
     assert plot.level(LIMIT, 10.0).value() == 1.0
+
+
+def test_the_bounds_of_the_curve_that_is_read_stand_beside_it(plot):
+    plot.curve(curve_style(0), "mass").setData([0.0, 1.0, 2.0], [0.001, 0.004, 0.001])
+    shade = LineStyle(lambda theme: theme.traces[0])
+    plot.band(shade, "mass").set_data([0.0, 1.0, 2.0], [0.0, 0.003, 0.0], [0.002, 0.006, 0.002])
+    plot.band(shade, "another").set_data([1.0], [0.5], [0.6])
+    assert "mass: 4 mm/s   bounds 3 mm/s to 6 mm/s" in read_at_one(plot)

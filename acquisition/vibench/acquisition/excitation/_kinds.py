@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from inspect import getdoc
 from types import MappingProxyType
 from typing import Annotated, TypeAlias, TypeVar, get_args
 
@@ -41,6 +42,7 @@ Excitation: TypeAlias = Annotated[
     Field(discriminator="kind"),
 ]
 Row = TypeVar("Row")
+_GROUPS = {Family.STEPPED: "steps"}
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,16 @@ class ExcitationKind:
     def label(self) -> str:
         """What a person reads."""
         return self.word.replace("_", " ")
+
+    @property
+    def about(self) -> str:
+        """What is played, in a line."""
+        return getdoc(self.plan).splitlines()[0]  # type: ignore[union-attr] # each has a docstring
+
+    @property
+    def group(self) -> str:
+        """Heading in a list of kinds."""
+        return "feedback" if self.is_feedback else _GROUPS.get(self.plan.family, self.plan.family.value)
 
     @property
     def title(self) -> str:

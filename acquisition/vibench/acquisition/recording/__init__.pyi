@@ -101,6 +101,7 @@ from ._segment_label import (
     SegmentLabel as SegmentLabel,
 )
 from ._tables import (
+    REJECTED as REJECTED,
     EventKind as EventKind,
 )
 from ._writer import (

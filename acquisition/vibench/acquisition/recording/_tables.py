@@ -38,6 +38,10 @@ class EventKind(StrEnum):
     SILENCE = "silence"
 
 
+REJECTED = "average rejected"
+"""Text of a mark: no result is taken from the realisation of noise that began last before it."""
+
+
 @dataclass(frozen=True)
 class Event:
     """Something that happened during the recording."""

@@ -105,6 +105,11 @@ class LiveSpectra:
             self._take(data[:, number * self._hop : number * self._hop + size])
         self._carry = data[:, whole * self._hop :].copy()
 
+    def leave_out(self, newest_s: float) -> None:
+        """Pass over the segments of the newest seconds."""
+        count = min(self._segments, self._is_used.size, int(np.ceil(newest_s * self._rate_hz / self._hop)))
+        self._is_used[(self._segments - 1 - np.arange(count)) % self._is_used.size] = False
+
     def _take(self, segment: Values) -> None:
         place = self._segments % self._settings.averages
         self._segments += 1

@@ -189,6 +189,11 @@ class LiveView:
             self._frequency_response = (self._spectra.segments, found)
         return self._frequency_response[1]
 
+    def leave_out(self, newest_s: float) -> None:
+        """Take spectra and transmission from samples before the newest seconds, and from those to come."""
+        self._spectra.leave_out(newest_s)
+        self._spectrum = self._frequency_response = (-1, None)
+
     def portrait(self) -> Portrait | None:
         """Give the orbit of the newest periods, and keep its Poincaré points; None without a sine."""
         if not self._has(DRIVE, RESPONSE):

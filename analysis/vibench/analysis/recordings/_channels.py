@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vibench.acquisition.recording import BridgedChannel, Recording
+from vibench.acquisition.recording import REJECTED, BridgedChannel, Recording, SegmentLabel
 
 from ..errors import NotEnoughData, UnusableData
 from ..signals import Complexes, Flags, Reals
@@ -106,12 +106,17 @@ class RecordedChannels:
         return np.asarray(response / base * delay)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Give the named parts of the record that hold samples."""
-        return tuple(
+        """Give the named parts of the record that hold samples, without averages that somebody rejected."""
+        found = tuple(
             Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
             for each in self.recording.segments
             if each.label == label and each.stop > each.start
         )
+        if label != SegmentLabel.REALISATION:
+            return found
+        marks = (each.sample for each in self.recording.events if each.text == REJECTED)
+        rejected = {max((each.start for each in found if each.start <= mark), default=-1) for mark in marks}
+        return tuple(each for each in found if each.start not in rejected)
 
     def read(self, start: int, stop: int) -> Reals:
         """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""

@@ -1,14 +1,14 @@
 """One editor for every kind of value that a plan may hold."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from enum import Enum
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt
 from PySide6.QtGui import QKeyEvent, QPaintEvent, QWheelEvent
-from PySide6.QtWidgets import QComboBox, QWidget
+from PySide6.QtWidgets import QComboBox, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
 from vibench.acquisition import ConfigurationError
 
@@ -98,28 +98,56 @@ class Choice(QComboBox):
             event.ignore()
 
 
+class _LineOnEach(QStyledItemDelegate):
+    """Writes the line on an entry beside it, where the list is open."""
+
+    def initStyleOption(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
+        """Add the line."""
+        super().initStyleOption(option, index)
+        line = index.data(Qt.ItemDataRole.ToolTipRole)
+        option.text = f"    {option.text}:  {line}" if line else option.text  # type: ignore[attr-defined]
+
+
 class ChoiceEditor:
     """One of a few values: nothing can be wrong."""
 
     complaint = ""
 
     def __init__(self, values: tuple[Any, ...], changed: Callable[..., None]) -> None:
-        self._values = values
         self._box = Choice()
         self._box.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for value in values:
-            self._box.addItem(str(value).replace("_", " "))
+            self._box.addItem(str(value).replace("_", " "), value)
         self._box.currentIndexChanged.connect(changed)
         self.widget = self._box
 
     def content(self) -> Any:
         """Give the chosen value."""
-        return self._values[self._box.currentIndex()]
+        return self._box.currentData()
 
     def show_content(self, content: Any) -> None:
         """Choose a value."""
-        if content in self._values:
-            self._box.setCurrentIndex(self._values.index(content))
+        place = self._box.findData(content)
+        if place >= 0 and content is not None:
+            self._box.setCurrentIndex(place)
+
+    def explain(self, lines: Mapping[str, tuple[str, str]]) -> None:
+        """List the values below headings, each with a line on it: heading and line by value."""
+        blocked, chosen = self._box.blockSignals(True), self.content()
+        self._box.clear()
+        for heading in dict.fromkeys(heading for heading, _ in lines.values()):
+            self._box.addItem(heading.upper())
+            self._box.model().item(self._box.count() - 1).setEnabled(False)
+            for value, (_, line) in (each for each in lines.items() if each[1][0] == heading):
+                self._box.addItem(value.replace("_", " "), value)
+                self._box.setItemData(self._box.count() - 1, line, Qt.ItemDataRole.ToolTipRole)
+        view = self._box.view()
+        view.setItemDelegate(_LineOnEach(self._box))
+        view.setMinimumWidth(view.sizeHintForColumn(0) + view.verticalScrollBar().sizeHint().width())
+        self.show_content(chosen)
+        self._box.blockSignals(blocked)
 
 
 class TextEditor:

@@ -10,7 +10,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
 
 from ..widgets import CHOICES, UNITS, SentenceLabel, filled
-from ._editor import ChoiceEditor, Editor, unwrapped, value_editor
+from ._editor import Choice, ChoiceEditor, Editor, unwrapped, value_editor
 from ._field_facts import FieldFacts, field_facts
 
 Loc = tuple[int | str, ...]
@@ -168,7 +168,10 @@ class GroupEditor:
         self._kinds = kinds
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
+        self._memories: dict[str, dict[str, Any]] = {}
+        """What each kind was left with."""
         self._usual: Mapping[str, Any] = {}
+        self._fresh: Mapping[str, Mapping[str, Any]] = {}
         if len(kinds) > 1:
             self._kind = ChoiceEditor(tuple(_kind_of(kind) for kind in kinds), self._turn)
             self._kind.widget.setAccessibleName(f"Kind of {facts.label.lower()}")
@@ -187,7 +190,7 @@ class GroupEditor:
         return self._form
 
     @property
-    def kind_choice(self) -> QWidget | None:
+    def kind_choice(self) -> Choice | None:
         """Where the kind is chosen, when there are several."""
         return None if self._kind is None else self._kind.widget
 
@@ -211,21 +214,36 @@ class GroupEditor:
         """Hand complaints on."""
         return self._form.complain(complaints)
 
-    def know(self, usual: Mapping[str, Any]) -> None:
-        """Give the fields of a new kind these values, by their names, where they would be empty."""
-        self._usual = usual
+    def know(
+        self,
+        usual: Mapping[str, Any],
+        fresh: Mapping[str, Mapping[str, Any]],
+        lines: Mapping[str, tuple[str, str]],
+    ) -> None:
+        """Give the fields of a new kind these values, by their names, where they would be empty.
+
+        Those that are fresh of a kind stand in place of what another kind was left with. The kinds are listed
+        below headings, each with a line on it.
+        """
+        self._usual, self._fresh = usual, fresh
+        assert self._kind is not None
+        self._kind.explain(lines)
 
     def _turn(self, *_: object) -> None:
         """Change the kind; fields of the same name keep their values."""
         assert self._kind is not None
-        self._memory = {**self._usual, **self._memory, **self._form.content()}
+        left = self._form.content()
+        self._memories[left["kind"]] = left
         chosen = self._kind.content()
+        known_of = self._memories.get(chosen, self._fresh.get(chosen, {}))
+        self._memory = {**self._usual, **self._memory, **left}
         model = next(kind for kind in self._kinds if _kind_of(kind) == chosen)
         self._layout.removeWidget(self._form)
         self._form.hide()
         self._form.deleteLater()
         self._form = self._new_form(model)
-        known = {name: value for name, value in self._memory.items() if name in model.model_fields}
+        begun = {**self._memory, **known_of}
+        known = {name: value for name, value in begun.items() if name in model.model_fields}
         self._form.show_content({name: value for name, value in known.items() if name not in _DRAWN})
         self._changed()
 

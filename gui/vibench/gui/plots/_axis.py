@@ -154,8 +154,9 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
     def _ticks(self, low: float, high: float, size: float) -> list[tuple[float, list[float]]]:
         if not self.logMode:
             factor = self._axis.shown.per_si
-            # The labelled level alone: each line of a grid costs time in every frame.
-            step, values = super().tickValues(low * factor, high * factor, size)[0]
+            # One labelled level alone: each line of a grid costs time in every frame.
+            levels = super().tickValues(low * factor, high * factor, size)
+            step, values = next((each for each in levels if len(each[1]) > 1), levels[-1])
             if self._is_upright:
                 step, values = thinned(step, values, self._most_labels(size))
             return [(step / factor, [value / factor for value in values])]

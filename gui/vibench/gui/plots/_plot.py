@@ -92,6 +92,9 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._legend_entries: list[tuple[LineStyle, str, str]] = []
         self.named_curves: list[tuple[str, pg.PlotDataItem]] = []
         """Every line and set of points, with its name in the legend, if it has one."""
+        self.bands: list[Band] = []
+        self.read_more: Callable[[float, float], str] = lambda _across, _up: ""
+        """What else is to be read at a place of the picture."""
         self._hint, self._is_empty = "", False
         self._blanked: tuple[AxisItem, ...] = (self.across, self.up)
         self.theme = theme
@@ -152,9 +155,10 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self._relegend()
         return item
 
-    def band(self, line_style: LineStyle) -> Band:
-        """Add an area between the bounds of a curve; the axes follow the curve alone."""
-        band = Band()
+    def band(self, line_style: LineStyle, of: str = "") -> Band:
+        """Add an area between the bounds of the curve of a name; the axes follow the curve alone."""
+        band = Band(of)
+        self.bands.append(band)
         self.addItem(band.item, ignoreBounds=True)
         self._line_style(line_style, lambda theme: band.paint(shade_of(line_style, theme)))
         return band
@@ -198,6 +202,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.addItem(self._grid, ignoreBounds=True)
         self._inked.clear()
         self.named_curves.clear()
+        self.bands.clear()
         self._levels.clear()
         self.reading.forget()
         self._legend_entries.clear()

@@ -69,6 +69,11 @@ class Reading:
         if nearest is not None:
             name, height = nearest
             said.append(f"{UNITS.told(name) or 'curve'}: {_shown(height, axes[1])}")
+            bounds = next((each.at(across) for each in self._plot.bands if name and each.of == name), None)
+            if bounds is not None:
+                said.append(f"bounds {_shown(bounds[0], axes[1])} to {_shown(bounds[1], axes[1])}")
+        if more := self._plot.read_more(*drawn):
+            said.append(more)
         if self._marked is not None:
             changes = [now - then for now, then in zip(self.place, self._marked, strict=True)]
             said.append("Δ " + ", ".join(map(_shown, changes, axes)))

@@ -6,7 +6,8 @@ import shutil
 import h5py
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtWidgets import QFileDialog, QInputDialog
 
 from vibench.acquisition import load_toml, shipped
 from vibench.acquisition.campaign import JournalPointState, ReasonCode
@@ -377,3 +378,44 @@ def test_no_picture_asks_for_a_recording_while_one_is_chosen(
         assert "Choose a recording" not in view.plot._hint
         assert re.search(hint, view.plot._hint)
     page.pictures.setCurrentWidget(page.time_histories)
+
+
+def test_the_wheel_zooms_the_spectrogram_and_the_pointer_reads_its_level(opened, waited, qtbot):
+    page = opened("whole.h5")
+    view = page.pictures.spectrogram
+    page.pictures.setCurrentWidget(view)
+    waited(lambda: not view.is_busy and view.image.item.image is not None)
+    view.plot.reading.show_at(QPointF(5.0, 260.0))
+    assert re.search(r"-?\d+\.\d dB re 1 \(m/s\)²/Hz", view.plot.reading.text)
+    before = page.time_histories.view_s
+    box = view.plot.getViewBox()
+    box.scaleBy(x=0.5)
+    box.sigRangeChangedManually.emit(box.state["mouseEnabled"])
+    after = page.time_histories.view_s
+    assert after[1] - after[0] == pytest.approx(0.5 * (before[1] - before[0]), rel=0.01)
+    waited(lambda: not view.is_busy)
+    assert view.image.item.mapRectToParent(view.image.item.boundingRect()).width() < 6
+    page.time_histories.show_all()
+    page.pictures.setCurrentWidget(page.time_histories)
+
+
+def test_a_recording_is_exported_for_others_and_keeps_notes(page, folder, tmp_path, waited, monkeypatch):
+    path = tmp_path / "mine.h5"
+    shutil.copyfile(folder / "whole.h5", path)
+    notices = []
+    page.context.noticed.connect(notices.append)
+    page.open_path(path)
+    waited(lambda: page.table.chosen_paths() == (path,))
+    for ending in ("uff", "mat", "csv"):
+        given = str(tmp_path / f"out.{ending}")
+        monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *_, given=given, **__: (given, ""))
+        page._export.click()
+        waited((tmp_path / f"out.{ending}").exists)
+    waited(lambda: len(notices) == 3)
+    assert all(each.what.startswith("Written: ") for each in notices)
+    for text in ("glue was still wet", "repeat it tomorrow"):
+        monkeypatch.setattr(QInputDialog, "getMultiLineText", lambda *_, text=text: (text, True))
+        page._note.click()
+        waited(lambda text=text: f"note: {text}" in page._facts.sentence)
+    assert "glue was still wet" in page._facts.sentence
+    page._go_to(folder)

@@ -5,8 +5,17 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.acquisition.engine import EngineState, EngineStatus, Supervision, TwinStatus, TwinSwitch
+from vibench.acquisition.engine import (
+    EngineState,
+    EngineStatus,
+    RunStatus,
+    Supervision,
+    TwinStatus,
+    TwinSwitch,
+)
+from vibench.acquisition.plan import RunState
 from vibench.gui.pages.run._hidden_motion_plot import HiddenMotionPlot
+from vibench.gui.pages.run._sweep_plots import sweep_history
 from vibench.gui.pages.run._watch_card import WatchCard
 
 STEP_S, STOPS_M = 1.6e-4, (-44e-6, 46e-6)
@@ -83,10 +92,32 @@ def test_without_a_twin_nothing_is_shown(picture):
 
 def test_the_switch_shows_whether_a_twin_is_on_and_asks_for_one(context, qtbot):
     card = WatchCard(context.theme)
-    card.show_status(status())
+    card.show_status(status(), 0)
     assert card.twin.isChecked()
     assert not card.twin.isEnabled()
     card.twin.setEnabled(True)
     with qtbot.waitSignal(card.twin_wanted) as asked:
         card.twin.click()
     assert asked.args == [TwinSwitch.OFF]
+
+
+def test_averages_begun_and_planned_are_shown_and_the_one_that_is_played_can_be_rejected(context, qtbot):
+    card = WatchCard(context.theme)
+    playing = RunStatus(
+        name="noise", number=1, count=1, file="noise.h5", run_state=RunState.RECORDING, segment="realisation",
+        numbers={"realisation": 3}, elapsed_s=20.0, total_s=60.0, campaign_elapsed_s=20.0,
+        campaign_total_s=60.0, amplitude_vpp=0.2, frequency_hz=None,
+    )  # fmt: skip
+    running = EngineStatus(state=EngineState.RUNNING, attendance=Supervision.ATTENDED, run=playing)
+    card.show_status(running, 10)
+    assert card.averages.text() == "4 of 10"
+    with qtbot.waitSignal(card.reject_wanted):
+        card.reject_button.click()
+    card.show_status(running.model_copy(update={"state": EngineState.READY}), 10)
+    assert card.averages.text() == "–"
+    assert not card.reject_button.isEnabled()
+
+
+def test_response_ii_is_drawn_beside_its_prediction(context):
+    plot = sweep_history(context.theme)
+    assert set(plot.measured) <= set(plot.predicted)

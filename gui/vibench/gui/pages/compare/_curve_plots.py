@@ -88,7 +88,7 @@ class CurvePlots(QWidget):
             return
         if np.isfinite(curve.relative_sd).any():
             shade = LineStyle(line_style.colour, Dash.SOLID, _BAND)
-            self.magnitudes.band(shade).set_data(*curve.band(_BAND_COLUMNS))
+            self.magnitudes.band(shade, curve.name).set_data(*curve.band(_BAND_COLUMNS))
         line = self.magnitudes.curve(line_style, curve.name)
         line.setData(curve.frequency_hz, curve.magnitude, connect="finite")
 

@@ -4,6 +4,7 @@ from vibench.acquisition import printable
 from vibench.acquisition.recording import Recording, RecordingState, SealDepth, SealState
 
 from ...widgets import outcome_text
+from ._listing import notes_of
 
 _STATE_SYMBOLS: dict[str, str] = {
     RecordingState.COMPLETE: "✔",
@@ -64,4 +65,5 @@ def facts_text(recording: Recording) -> str:
     if recording.gaps:
         lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
         parts.append(f"{lost} samples lost")
+    parts += [f"note: {each}" for each in notes_of(recording)]
     return printable("  ·  ".join(parts))

@@ -8,6 +8,7 @@ from time import monotonic
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import (
     QFileDialog,
+    QInputDialog,
     QLabel,
     QSplitter,
     QVBoxLayout,
@@ -36,10 +37,11 @@ from ...widgets import (
     row,
 )
 from ._file_words import facts_text
-from ._listing import Levels, Listing, listed, made_levels, thumbnails
+from ._listing import Levels, Listing, exported, listed, made_levels, noted, thumbnails
 from ._recording_table import CampaignChoice, RecordingTable
 from ._spectrogram_view import Pictures
 
+EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"
 LOOK_S = 2.0
 """From one look for files that have gone to the next."""
 
@@ -156,7 +158,8 @@ class FilesPage(Page):
 
     def _open_chosen(self) -> None:
         paths = self.table.chosen_paths()
-        self._compare.setEnabled(bool(paths))
+        for button in (self._compare, self._export, self._note):
+            button.setEnabled(bool(paths))
         if paths and (self._opened is None or self._opened.path != paths[0]):
             self._open(paths[0])
 
@@ -259,6 +262,29 @@ class FilesPage(Page):
         self._count.setText("◌ reading…")
         self.list_folder()
 
+    def _choose_export(self) -> None:
+        path = self.table.chosen_paths()[0]
+        wish = str(path.with_suffix(".uff"))
+        options = QFileDialog.Option.DontConfirmOverwrite
+        given, kind = QFileDialog.getSaveFileName(self, "Export", wish, EXPORTS, options=options)
+        if given:
+            suffix = kind[kind.index("*") + 1 : kind.index(")")]
+            self.export_to(path, Path(given) if Path(given).suffix else Path(given).with_suffix(suffix))
+
+    def export_to(self, path: Path, target: Path) -> None:
+        """Write a recording as the ending of the target says, elsewhere."""
+        self.context.background.ask(exported, self._exported, self._failed, path, target)
+
+    def _exported(self, files: tuple[Path, ...]) -> None:
+        self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
+
+    def _write_note(self) -> None:
+        text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "It is kept in the recording.")
+        if is_given and text.strip():
+            self.context.background.ask(
+                noted, self._choose, self._failed, self.table.chosen_paths()[0], text.strip()
+            )
+
     def _hand_to_compare(self) -> None:
         paths = self.table.chosen_paths()
         if paths:
@@ -300,7 +326,10 @@ class FilesPage(Page):
         self._compare = push_button(
             "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
         )
-        self._compare.setEnabled(False)
+        self._export = push_button("&Export…", "Write it for other programs", self._choose_export)
+        self._note = push_button("Add a &note…", "Keep a note in the recording", self._write_note)
+        for button in (self._compare, self._export, self._note):
+            button.setEnabled(False)
         bar = row(
             label,
             (self._folder_line, 3),
@@ -310,6 +339,8 @@ class FilesPage(Page):
             (search, 1),
             self._count,
             self._compare,
+            self._export,
+            self._note,
         )
         browser = column(bar, self._goes_to, self.table)
         browser.setAccessibleName("Browser")

@@ -12,10 +12,13 @@ from vibench.acquisition.campaign import (
     list_recordings,
     read_journal,
 )
-from vibench.acquisition.recording import JOURNAL_SUFFIX
+from vibench.acquisition.recording import JOURNAL_SUFFIX, Recording
 from vibench.analysis.live import OverviewLevel, Thumbnail, overview_levels, thumbnail
 
 Levels = dict[str, tuple[OverviewLevel, ...]]
+
+NOTE = "note"
+"""Name of a result that holds a note; further ones have numbers."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +95,30 @@ def _campaigns(folder: Path) -> Iterator[ListedCampaign]:
         files = frozenset(path.parent / each.file for each in points if each.file)
         name = path.name.removesuffix(JOURNAL_SUFFIX)
         yield ListedCampaign(name, tuple(each.state for each in points), files)
+
+
+def exported(path: Path, target: Path) -> tuple[Path, ...]:
+    """Write the samples of a recording as the ending of the target says; gives the files."""
+    from vibench.analysis.exchange import Format, excerpt, export_samples  # noqa: PLC0415 - slow to load
+
+    with open_recording(path) as recording:
+        return export_samples(excerpt(recording), Format(target.suffix[1:].lower()), target)
+
+
+def noted(path: Path, text: str) -> Path:
+    """Keep a note in a recording, beside those that it has."""
+    with open_recording(path) as recording:
+        recording.save_results(NOTE, {}, {"text": text}, roles=())
+    return path
+
+
+def notes_of(recording: Recording) -> tuple[str, ...]:
+    """Give the notes of the plan and those that were added, the oldest first."""
+    plan = str(recording.plan.get("notes", ""))
+    has_more = any(name.startswith(NOTE) for name in recording.result_names)
+    added = sorted(recording.results.values(), key=lambda each: each.saved_utc) if has_more else []
+    more = [str(each.settings.get("text", "")) for each in added if each.name.startswith(NOTE)]
+    return tuple(filter(None, (plan, *more)))
 
 
 def thumbnails(paths: tuple[Path, ...]) -> dict[Path, Thumbnail | None]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import QRectF
+from PySide6.QtCore import QPointF, QRectF, Signal
 from PySide6.QtGui import QShowEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
 
@@ -43,6 +43,9 @@ _SHOWN_DB = 80.0
 class SpectrogramView(QWidget):
     """Frequency over time; colours are spectral densities in decibels."""
 
+    zoomed = Signal(float, float)
+    """The stretch that the wheel or the mouse has brought into sight [s]."""
+
     def __init__(self, theme: Theme, background: Background) -> None:
         super().__init__()
         self.setAccessibleName("Spectrogram")
@@ -71,6 +74,8 @@ class SpectrogramView(QWidget):
             RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
         }
         self._images = {spacing: _Image(plot) for spacing, plot in self._plots.items()}
+        for plot in self._plots.values():
+            plot.getViewBox().sigRangeChangedManually.connect(self._zoom)
         self._lay_out()
         for choice in (self.channel, self.spacing, self.highest, self.line_width):
             choice.currentIndexChanged.connect(lambda _index: self._ask())
@@ -125,6 +130,10 @@ class SpectrogramView(QWidget):
         """Work out what nobody wanted while it was out of sight."""
         super().showEvent(event)
         self._ask()
+
+    def _zoom(self, *_: object) -> None:
+        low_s, high_s = self.plot.getViewBox().viewRange()[0]
+        self.zoomed.emit(float(low_s), float(high_s))
 
     @property
     def _spacing(self) -> RowSpacing:
@@ -192,7 +201,8 @@ class _Image:
         self._plot = plot
         self.item = pg.ImageItem(axisOrder="row-major")
         plot.addItem(self.item)
-        plot.setMouseEnabled(x=False, y=False)
+        plot.setMouseEnabled(x=True, y=False)
+        plot.read_more = self._level_at
         self.bar = pg.ColorBarItem(colorMap=pg.colormap.get("viridis"), interactive=False, width=14)
         self.bar.setImageItem(self.item, insert_in=plot.getPlotItem())
         self.bar.axis.setWidth(_BAR_EM * plot.fontMetrics().height())
@@ -204,6 +214,17 @@ class _Image:
         self.bar.hide()
         self._plot.with_hint(hint)
         self._plot.viewport().update()
+
+    def _level_at(self, across: float, up: float) -> str:
+        """Give the level of the pixel at a place, as it is drawn."""
+        if self.item.image is None:
+            return ""
+        place = self.item.mapFromParent(QPointF(across, up))
+        rows, columns = self.item.image.shape
+        row, column = int(np.floor(place.y())), int(np.floor(place.x()))
+        if not (0 <= row < rows and 0 <= column < columns):
+            return ""
+        return f"{self.item.image[row, column]:.1f} {self.bar.axis.labelText}"
 
     def show_picture(self, found: DensityPicture) -> None:
         """Draw it, in colours from the strongest line down."""
@@ -242,6 +263,7 @@ class Pictures(QTabWidget):
         self.hidden_motion = HiddenMotionView(theme, background)
         self.addTab(self.hidden_motion, "Hi&dden motion")
         self.time_histories.range_changed.connect(self._show_view)
+        self.spectrogram.zoomed.connect(self.time_histories.show_range)
 
     def show_recording(self, overview: RecordingOverview | None, hint: str) -> None:
         """Show another recording, or none; the hint says what comes, or why nothing does."""

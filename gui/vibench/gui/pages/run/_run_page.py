@@ -9,7 +9,8 @@ from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.acquisition.engine import EngineClient, EngineState, TwinSwitch
-from vibench.acquisition.plan import EXCITATION_KINDS
+from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
+from vibench.acquisition.recording import REJECTED
 from vibench.acquisition.rig import channels_of
 from vibench.analysis import MeasurementPrediction
 from vibench.analysis.live import LiveView
@@ -85,7 +86,8 @@ class RunPage(Page):
             # The buttons that had the focus are gone; without this the next list in the row would have it.
             self.setFocus()
         self._was_driving = self.context.bridge.is_driving
-        self.watch_card.show_status(status)
+        played = self._played
+        self.watch_card.show_status(status, 0 if played is None else played.excitation.stretches)
         if not self.watch_card.freeze.isChecked() and self.hidden_motion.isVisible():
             self.hidden_motion.show_status(status)
         view = self.context.bridge.view
@@ -146,9 +148,7 @@ class RunPage(Page):
     def _begin(self, view: LiveView) -> None:
         """Another run: clear the pictures, lay its prediction beneath, show what suits its excitation."""
         self._view = view
-        status = self.context.bridge.status
-        name = "" if status is None or status.run is None else status.run.name
-        measurement = measurement_called(self.context.bridge.campaign, name)
+        measurement = self._played
         prediction = self.context.selection.prediction
         if prediction is not None and (
             measurement is None or prediction.measurement.excitation != measurement.excitation
@@ -196,6 +196,19 @@ class RunPage(Page):
         if self.context.bridge.state in (EngineState.RUNNING, EngineState.HELD):
             self.context.bridge.order(EngineClient.mark, text)
 
+    @property
+    def _played(self) -> Measurement | None:
+        """The measurement that runs, where its plan is known."""
+        status = self.context.bridge.status
+        run = None if status is None else status.run
+        return None if run is None else measurement_called(self.context.bridge.campaign, run.name)
+
+    def _reject(self) -> None:
+        played, view = self._played, self.context.bridge.view
+        if played is not None and view is not None:
+            view.leave_out(played.excitation.playing_s / played.excitation.stretches)
+            self._mark(REJECTED)
+
     def _turn_twin(self, switch: TwinSwitch) -> None:
         self.context.bridge.order(EngineClient.turn_twin, switch)
         if switch is TwinSwitch.ON:
@@ -216,6 +229,7 @@ class RunPage(Page):
         self.arm_card.news.connect(lambda: self._parts.side.verticalScrollBar().setValue(0))
         self.context.is_armed_read = self._is_armed_read
         self.watch_card.mark_wanted.connect(self._mark)
+        self.watch_card.reject_wanted.connect(self._reject)
         # Until the next tick the picture of a run that has ended meanwhile would pass for that of this one.
         self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
         self.watch_card.twin_wanted.connect(self._turn_twin)

@@ -65,6 +65,7 @@ def sweep_history(theme: Theme) -> SweepPlot:
     made = SweepPlot("Responses", plot)
     made.predicted = {
         "response_i": plot.curve(PREDICTED, "I, simulated"),
+        "response_ii": plot.curve(LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "II, simulated"),
         "linear": plot.curve(curve_style(2, Dash.DOTTED), "linear, simulated"),
     }
     made.measured = {

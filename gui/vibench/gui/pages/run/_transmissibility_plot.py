@@ -9,6 +9,8 @@ from ...plots import FREQUENCY, PREDICTED, Dash, LineStyle, Plot, PlotAxis, Scal
 from ...widgets import Theme, filled
 from ._sweep_plots import show_predicted
 
+MEASURED = "measured, 95 % bounds"
+
 
 class TransmissibilityPlot(QWidget):
     """|x / U| over frequency."""
@@ -22,12 +24,13 @@ class TransmissibilityPlot(QWidget):
         self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
         self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
         self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
-        self._band = self.magnitude.band(LineStyle(lambda theme: theme.traces[0], filled=0.25))
+        shade = LineStyle(lambda theme: theme.traces[0], filled=0.25)
+        self._band = self.magnitude.band(shade, MEASURED)
         self._predicted = {
             "response_i": self.magnitude.curve(PREDICTED, "I under sines, simulated"),
             "linear": self.magnitude.curve(curve_style(2, Dash.DOTTED), "linear, simulated"),
         }
-        self._measured = self.magnitude.curve(curve_style(0), "measured, 95 % bounds")
+        self._measured = self.magnitude.curve(curve_style(0), MEASURED)
         self._coherence = self.coherence.curve(curve_style(0))
         self.coherence.setYRange(0, 1, padding=0.02)
         self.coherence.setXLink(self.magnitude)

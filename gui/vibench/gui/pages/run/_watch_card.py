@@ -17,7 +17,7 @@ from vibench.acquisition.engine import DRIVING, EngineStatus, RunStatus, TwinSwi
 from vibench.analysis.live import OVER_SHARE, Level, LevelVerdict, LiveView
 
 from ...forms import Choice, LineField
-from ...widgets import ProgressBar, Theme, Tone, clock, filled, paint_hint, row
+from ...widgets import ProgressBar, Theme, Tone, clock, filled, paint_hint, push_button, row
 from ._time_histories import USUAL_SPAN_S, channel_word
 
 _ROW = 1.9
@@ -98,6 +98,8 @@ class WatchCard(QGroupBox):
     """What is watched in numbers, and what may be done about the picture."""
 
     mark_wanted = Signal(str)
+    reject_wanted = Signal()
+    """Take no result from the average of noise that is played."""
     twin_wanted = Signal(object)
     """A `TwinSwitch`."""
 
@@ -128,6 +130,11 @@ class WatchCard(QGroupBox):
         self.twin.clicked.connect(
             lambda is_on: self.twin_wanted.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
         )
+        self.averages = QLabel("–")
+        self.averages.setToolTip("Averages of noise begun and planned")
+        self.reject_button = push_button(
+            "Reject this one", "Leave the average that is played out of all results", self.reject_wanted.emit
+        )
         self.mark = LineField("event")
         self.mark.setToolTip("What the mark in the recording says")
         self.mark_button = QPushButton("Mark  (M)")
@@ -144,11 +151,14 @@ class WatchCard(QGroupBox):
         """Ask for a mark with the text of the field."""
         self.mark_wanted.emit(self.mark.text().strip() or "event")
 
-    def show_status(self, status: EngineStatus | None) -> None:
-        """Show where the run stands."""
+    def show_status(self, status: EngineStatus | None, averages: int) -> None:
+        """Show where the run stands; so many averages of noise are planned, 0 for anything else."""
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)
+        begun = run.numbers.get("realisation") if run is not None and is_running and averages else None
+        self.reject_button.setEnabled(begun is not None)
+        self.averages.setText("–" if begun is None else f"{int(begun) + 1} of {averages}")
         self.twin.setEnabled(status is not None and status.bench is not None)
         self.twin.setChecked(status is not None and status.twin is not None)
         if run is not None and is_running:
@@ -164,11 +174,16 @@ class WatchCard(QGroupBox):
 
     def _lay_out(self) -> None:
         form = QFormLayout()
-        for text, widget in (("Impacts", self.impacts), ("Histories show", self.span)):
+        averages = row((self.averages, 1), self.reject_button)
+        for text, widget, field in (
+            ("Impacts", self.impacts, self.impacts),
+            ("Averages", self.averages, averages),
+            ("Histories show", self.span, self.span),
+        ):
             label = QLabel(text)
             label.setBuddy(widget)
             widget.setAccessibleName(text)
-            form.addRow(label, widget)
+            form.addRow(label, field)
         self.mark.setAccessibleName("Text of the mark")
         marks = row((self.mark, 1), self.mark_button)
         filled(QVBoxLayout(self), self.progress, form, self.meters, self.freeze, self.twin, marks)

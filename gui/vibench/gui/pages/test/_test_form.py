@@ -1,8 +1,10 @@
 """The form of one test, judged by the plan at every change."""
 
+from collections.abc import Mapping
+
 from PySide6.QtWidgets import QGroupBox
 
-from vibench.acquisition.plan import Measurement
+from vibench.acquisition.plan import EXCITATION_KINDS, Family, Measurement, rows_by_kind
 
 from ...forms import GroupEditor, JudgedForm
 
@@ -26,6 +28,17 @@ USUAL = {
 }
 """What a kind of test that needs a value, and was given none, begins with."""
 
+FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
+    {
+        Family.NOISE: {"duration_s": 60.0},
+        Family.SWEEP: {"duration_s": 60.0},
+        Family.DWELL: {"duration_s": 10.0},
+        Family.STEPPED: {},
+    },
+    {},
+)
+"""What a kind begins with, whatever the one before it had."""
+
 
 class TestForm(JudgedForm[Measurement]):
     """Every value of a measurement; `value` is None while one of them is not allowed."""
@@ -37,4 +50,13 @@ class TestForm(JudgedForm[Measurement]):
         limits.setTitle("Limits  (1 = the rig's own)")
         excitation = self.form.editors["excitation"]
         assert isinstance(excitation, GroupEditor)
-        excitation.know(USUAL)
+        lines = {word: (each.group, each.about) for word, each in EXCITATION_KINDS.items()}
+        excitation.know(USUAL, FRESH, lines)
+        choice = excitation.kind_choice
+        assert choice is not None
+        choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
+
+    def _rename(self, kind: str) -> None:
+        """Give a test of a new kind its name: the old one would say something else."""
+        self.form.editors["name"].show_content(kind)
+        self.form.changed.emit()

@@ -1,0 +1,27 @@
+"""An average of noise that the operator rejected counts for nothing."""
+
+from dataclasses import replace
+
+import pytest
+
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import REJECTED, EventKind
+from vibench.acquisition.recording._tables import Event
+from vibench.analysis.recordings import RecordedChannels
+
+
+@pytest.mark.parametrize(
+    ("seconds_after", "left"),
+    [(-0.1, {0, 1}), (0.1, {1}), (1.0, {1})],
+    ids=["before it begins", "while it is recorded", "while the next one settles"],
+)
+def test_no_result_is_taken_from_an_average_that_was_rejected(noise_file, seconds_after, left):
+    with open_recording(noise_file()) as recording:
+        first = next(each for each in recording.segments if each.label == "realisation")
+        sample = first.start + round(seconds_after * recording.sample_rate_hz)
+        mark = Event(sample, 0.0, EventKind.MARK, REJECTED)
+        marked = replace(recording, events=(*recording.events, mark))
+        found = RecordedChannels(marked).stretches("realisation")
+        assert {each.numbers["realisation"] for each in found} == left
+        ways = {each.label for each in recording.segments} - {"realisation"}
+        assert all(RecordedChannels(marked).stretches(each) for each in ways)

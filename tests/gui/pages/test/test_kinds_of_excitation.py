@@ -1,0 +1,71 @@
+"""The list of excitations is grouped and explained; each kind begins with a name and allowed values."""
+
+from pathlib import Path
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QStyleOptionViewItem
+
+from vibench.acquisition.plan import EXCITATION_KINDS, preview_measurement
+from vibench.acquisition.rig import load_rig
+from vibench.gui.pages.test._library import shipped_tests
+from vibench.gui.pages.test import _test_form
+
+RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
+
+
+@pytest.fixture
+def form(qapp, qtbot):
+    form = _test_form.TestForm()
+    qtbot.addWidget(form)
+    form.show_value(shipped_tests()[0].measurement)
+    return form
+
+
+def choose(form, word):
+    """Choose a kind as a person does."""
+    box = form.form.editors["excitation"].kind_choice
+    place = box.findData(word)
+    box.setCurrentIndex(place)
+    box.activated.emit(place)
+
+
+def test_kinds_stand_below_headings_that_cannot_be_chosen_with_a_line_on_each(form):
+    box = form.form.editors["excitation"].kind_choice
+    flags = [box.model().item(place).flags() for place in range(box.count())]
+    headings = [box.itemText(n) for n, each in enumerate(flags) if not each & Qt.ItemFlag.ItemIsEnabled]
+    assert headings == ["NOISE", "SWEEP", "DWELL", "STEPS", "FEEDBACK"]
+    assert {box.itemData(place) for place in range(box.count())} == {None, *EXCITATION_KINDS}
+    option = QStyleOptionViewItem()
+    index = box.model().index(box.findData("dwell"), 0)
+    box.view().itemDelegate().initStyleOption(option, index)
+    assert option.text.strip() == "dwell:  A sine at one frequency, recorded after it has settled."
+    assert box.currentData() == form.value.excitation.kind
+
+
+@pytest.mark.parametrize("word", EXCITATION_KINDS)
+def test_a_new_kind_has_its_name_and_values_that_the_rig_allows(form, word):
+    choose(form, "dwell" if word != "dwell" else "white_noise")
+    choose(form, word)
+    assert form.value is not None, form.complaint
+    assert form.value.name == word
+    seen = preview_measurement(form.value, RIG)
+    assert seen.is_allowed, [each.complaint() for each in seen.checks if not each.is_kept]
+
+
+def test_a_sweep_does_not_take_over_the_seconds_of_a_dwell_and_finds_its_own_again(form):
+    choose(form, "sine_sweep")
+    choose(form, "dwell")
+    form.form.editors["excitation"].form.editors["duration_s"].widget.set_value(3.0)
+    form.form.changed.emit()
+    choose(form, "sine_sweep")
+    assert form.value.excitation.duration_s == 60.0
+    choose(form, "dwell")
+    assert form.value.excitation.duration_s == 3.0
+    assert form.value.name == "dwell"
+
+
+def test_a_test_that_is_taken_over_keeps_its_name(form):
+    named = next(each for each in shipped_tests() if each.measurement.excitation.kind == "sine_sweep")
+    form.show_value(named.measurement)
+    assert form.value == named.measurement
