@@ -39,7 +39,7 @@ _LEAST_RISE_DB = 3.0
 """A peak stands above the valley beside it by at least so much ..."""
 _LEAST_RISE_SD = 8.0
 """... and by so many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
-_CROWDS = ((1, 5.0), (2, 13.0))
+_CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
 """Chaotic motion makes many peaks: one with so many others within so many half widths is no mode."""
 _CROWD_RISE = 0.3
 """Others count that rise by this share of what a peak must rise by."""

@@ -31,7 +31,7 @@ from ._page_catalogue import PAGES
 from ._window import Window
 
 SIZE = (1280, 800)
-OTHER_SIZES = ((1280, 720), (1920, 1080))
+OTHER_SIZES = ((1024, 700), (1920, 1080))
 """The smallest that everything must fit into, and a usual one; their pictures lie in folders of their own."""
 PATIENCE_S = 3600.0
 """On a busy machine; a picture of something half done would stand in the manual."""
