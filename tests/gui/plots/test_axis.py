@@ -54,3 +54,11 @@ def test_every_axis_has_two_numbers_at_least(qapp, scale, side):
         (_, values), *_ = item.tickValues(low, low + span, size)
         inside = [each for each in values if low <= each <= low + span]
         assert len(inside) >= 2, (low, span, size)
+
+
+def test_ticks_between_one_two_and_five_have_no_number_to_run_into_another(qapp):
+    item = AxisItem("bottom", LOG_FREQUENCY)
+    item.setLogMode(x=True, y=False)
+    written = [item.tickStrings(values, 1.0, step) for step, values in item.tickValues(1.7, 2.9, 400.0)]
+    assert set(written[0]) == {"100", "200", "500"}
+    assert set(written[1]) == {""}

@@ -65,6 +65,8 @@ LOG_FREQUENCY = PlotAxis("Frequency", "Hz", scale=Scale.LOGARITHMIC)
 TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
 """From one label to that above it, in heights of the font."""
+_MINOR = 0.01
+"""Distance that is told of ticks without a number."""
 _WIDE = "2000"
 """A label and the room beside it, on a logarithmic axis across."""
 
@@ -168,7 +170,7 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
 
     def tickStrings(self, values: Sequence[float], scale: float, spacing: float) -> list[str]:
         """Write the labels of ticks."""
-        if self._blankness is Blankness.BLANK:
+        if self._blankness is Blankness.BLANK or (self.logMode and spacing == _MINOR):
             return [""] * len(values)
         if not self.logMode:
             factor = self._axis.shown.per_si
@@ -217,7 +219,7 @@ def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]
         for m in range(1, 10)
         if m not in mantissas and low <= log10(m) + d <= high
     ]
-    return [(1.0, major), (0.1, minor)]
+    return [(1.0, major), (_MINOR, minor)]
 
 
 def _even(low: float, high: float) -> list[float]:

@@ -352,9 +352,10 @@ def test_the_facts_say_a_state_once(opened, begin_recording, tmp_path):
     assert page._facts.sentence.startswith("■ stopped by the operator, in the window")
 
 
-def test_a_growing_file_shows_what_it_holds_and_not_what_it_has_reserved(begin_recording, tmp_path):
+def test_a_growing_file_shows_what_it_holds_and_not_what_it_has_reserved(begin_recording, tmp_path, waited):
     """512 MB were shown a second after a long run had begun."""
     writer, part = begin_recording(tmp_path, "grows")
+    waited(lambda: writer.committed_samples == 6400)
     (entry,) = listed(tmp_path).recordings
     assert entry.said.size_bytes == 3 * 6400 * 4 < part.stat().st_size
     writer.finish(RecordingState.COMPLETE, "the plan was carried out")

@@ -34,7 +34,7 @@ def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shak
     view = pictures.hidden_motion
     with open_recording(shaken.path) as recording:
         levels = {role: kept_levels(recording, role) for role in recording.roles}
-        pictures.show_recording(RecordingOverview(recording, levels))
+        pictures.show_recording(RecordingOverview(recording, levels), "")
         waited(lambda: not view.is_busy)
         assert "Zoom in" in view.plot._hint
         pictures.time_histories.show_range(1.0, 1.4)
@@ -43,7 +43,7 @@ def test_p_is_drawn_between_its_stops_where_it_is_zoomed_to(shared_context, shak
         true = np.interp(time_s, np.arange(shaken.p.size) / 51_200, shaken.p)
         assert np.sqrt(np.mean((p - true) ** 2)) < 0.5e-6
         assert sorted(line.value() for line in view._stops) == pytest.approx([-45e-6, 45e-6])
-        pictures.show_recording(None)
+        pictures.show_recording(None, "")
     pictures.close()
 
 
@@ -62,7 +62,7 @@ def test_another_specimen_is_chosen_and_its_numbers_are_found(
     view = pictures.hidden_motion
     with open_recording(shaken.path) as recording:
         levels = {role: kept_levels(recording, role) for role in recording.roles}
-        pictures.show_recording(RecordingOverview(recording, levels))
+        pictures.show_recording(RecordingOverview(recording, levels), "")
         pictures.time_histories.show_range(0.6, 2.2)
         waited(lambda: "tracked in 100 %" in view.said.text())
         last = view.specimen.count() - 1
@@ -73,5 +73,5 @@ def test_another_specimen_is_chosen_and_its_numbers_are_found(
         view.find_numbers.click()
         waited(lambda: "upper gap (45.0" in view.said.text() or "upper gap (44.99" in view.said.text())
         assert "tracked in 100 %" in view.said.text()
-        pictures.show_recording(None)
+        pictures.show_recording(None, "")
     pictures.close()

@@ -32,7 +32,7 @@ class TransmissibilityPlot(QWidget):
         }
         self._measured = self.magnitude.curve(curve_style(0), MEASURED)
         self._coherence = self.coherence.curve(curve_style(0))
-        self.coherence.setYRange(0, 1, padding=0.02)
+        self.coherence.setYRange(0, 1, padding=0.3)
         self.coherence.setXLink(self.magnitude)
         # One frequency axis for both: the lower one's.
         self.magnitude.across.show_nothing()
