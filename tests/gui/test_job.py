@@ -150,18 +150,27 @@ def type_into_dialog(qtbot, text):
     return timer
 
 
-def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
-    """A second measurement is made, looked at, compared with the first one, and exported."""
+@pytest.mark.parametrize(("width", "height", "points"), [(1280, 720, 10), (1024, 700, 14)])
+def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path, qapp, width, height, points):
+    """Another measurement is made, looked at, compared with those before it, and exported."""
     key = partial(press, qtbot, bench)
     files, compare = bench.pages[FILES], bench.pages[COMPARE]
+    font = qapp.font()
+    font.setPointSize(points)
+    qapp.setFont(font)
+    qtbot.waitUntil(lambda: bench.is_themed, timeout=PATIENCE_MS)
+    bench.resize(width, height)
+    before = len(list(bench.context.folder.rglob("*.h5")))
     reach(qtbot, bench, EngineState.READY)
     key(Qt.Key.Key_Return, CONTROL)
     reach(qtbot, bench, EngineState.ARMED)
-    key(Qt.Key.Key_F5)
-    reach(qtbot, bench, EngineState.RUNNING)
+    while bench.context.bridge.state is EngineState.ARMED:
+        key(Qt.Key.Key_PageDown)
+        key(Qt.Key.Key_F5)
+        qtbot.waitUntil(lambda: not bench.context.bridge.is_ordering, timeout=PATIENCE_MS)
     reach(qtbot, bench, EngineState.READY)
     key(Qt.Key.Key_4, CONTROL)
-    qtbot.waitUntil(lambda: len(files.table.recordings.entries) == 2, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: len(files.table.recordings.entries) == before + 1, timeout=PATIENCE_MS)
     qtbot.waitUntil(lambda: bool(files.time_histories.plots), timeout=PATIENCE_MS)
     assert tab_to(qtbot, bench, files.time_histories) <= 3
     whole_s = files.time_histories.view_s[1]
@@ -173,12 +182,15 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
     key(Qt.Key.Key_A, CONTROL)
     key(Qt.Key.Key_M, ALT)
     qtbot.waitUntil(lambda: bench.page is compare)
-    qtbot.waitUntil(lambda: len(compare.curves.shown()) == 2, timeout=PATIENCE_MS)
+    qtbot.waitUntil(lambda: len(compare.curves.shown()) == before + 1, timeout=PATIENCE_MS)
     timer = type_into_dialog(qtbot, str(tmp_path / "overlay.svg"))
     key(Qt.Key.Key_X, ALT)
     qtbot.waitUntil((tmp_path / "overlay.svg").exists, timeout=PATIENCE_MS)
     assert not timer.isActive()
     qtbot.waitUntil(lambda: bench.strip.notices[-1].what.startswith("Written"), timeout=PATIENCE_MS)
+    assert (bench.width(), bench.height()) == (width, height)
+    font.setPointSize(10)
+    qapp.setFont(font)
 
 
 def test_the_whole_job_is_done_by_mouse_alone(bench, qtbot, tmp_path):

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QRect, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
 from PySide6.QtSvg import QSvgGenerator
-from PySide6.QtWidgets import QFileDialog, QMessageBox
+from PySide6.QtWidgets import QMessageBox
+
+from ..widgets import new_path
 
 if TYPE_CHECKING:
     from ._plot import Plot
@@ -37,13 +39,10 @@ def add_actions(plot: "Plot") -> None:
 
 def save_plot(plot: "Plot") -> None:
     """Ask where to, and write picture or numbers there."""
-    wish = f"{plot.accessibleName().lower().replace(' ', '_')}.png"
-    options = QFileDialog.Option.DontConfirmOverwrite
-    given, kind = QFileDialog.getSaveFileName(plot, "Save picture or numbers", wish, FILTERS, options=options)
-    if not given:
+    wish = Path(f"{plot.accessibleName().lower().replace(' ', '_')}.png")
+    path = new_path(plot, "Save picture or numbers", wish, FILTERS)
+    if path is None:
         return
-    path = Path(given)
-    path = path if path.suffix else path.with_suffix(kind[kind.index("*") + 1 : kind.index(")")])
     try:
         write_plot(plot, path)
     except OSError as error:

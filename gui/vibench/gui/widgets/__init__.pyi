@@ -16,6 +16,9 @@ from ._elided_label import (
 from ._hint import (
     paint_hint as paint_hint,
 )
+from ._new_path import (
+    new_path as new_path,
+)
 from ._notice import (
     Notice as Notice,
     NoticeKind as NoticeKind,

@@ -18,7 +18,7 @@ from vibench.analysis.dynamics import branch_curves
 
 from ...background import Job
 from ...page import AppContext, FileKind, Page, SideAndPicture
-from ...widgets import COMPARE, Notice, NoticeKind, column, filled, notice_of, push_button, row
+from ...widgets import COMPARE, Notice, NoticeKind, column, filled, new_path, notice_of, push_button, row
 from ._analysis_panel import AnalysisPanel
 from ._curve_list import CurveList, PairBox
 from ._curve_plots import CurvePlots
@@ -188,13 +188,9 @@ class ComparePage(Page):
         }
 
     def _choose_export(self, filters: str = FILTERS) -> None:
-        start = str(self.context.folder / ("comparison.html" if filters == REPORT else "comparison.svg"))
-        options = QFileDialog.Option.DontConfirmOverwrite
-        chosen, kind = QFileDialog.getSaveFileName(self, "Export", start, filters, options=options)
-        if chosen:
-            suffix = kind[kind.index("*") + 1 : kind.index(")")]
-            path = Path(chosen)
-            self.export_to(path if path.suffix else path.with_suffix(suffix))
+        wish = self.context.folder / ("comparison.html" if filters == REPORT else "comparison.svg")
+        if (path := new_path(self, "Export", wish, filters)) is not None:
+            self.export_to(path)
 
     def _build(self) -> None:
         self._parts = SideAndPicture(self.context, COMPARE, self._side(), self._picture())

@@ -32,6 +32,7 @@ from ...widgets import (
     SentenceLabel,
     column,
     filled,
+    new_path,
     notice_of,
     push_button,
     row,
@@ -264,16 +265,8 @@ class FilesPage(Page):
 
     def _choose_export(self) -> None:
         path = self.table.chosen_paths()[0]
-        wish = str(path.with_suffix(".uff"))
-        options = QFileDialog.Option.DontConfirmOverwrite
-        given, kind = QFileDialog.getSaveFileName(self, "Export", wish, EXPORTS, options=options)
-        if given:
-            suffix = kind[kind.index("*") + 1 : kind.index(")")]
-            self.export_to(path, Path(given) if Path(given).suffix else Path(given).with_suffix(suffix))
-
-    def export_to(self, path: Path, target: Path) -> None:
-        """Write a recording as the ending of the target says, elsewhere."""
-        self.context.background.ask(exported, self._exported, self._failed, path, target)
+        if (target := new_path(self, "Export", path.with_suffix(".uff"), EXPORTS)) is not None:
+            self.context.background.ask(exported, self._exported, self._failed, path, target)
 
     def _exported(self, files: tuple[Path, ...]) -> None:
         self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
@@ -326,7 +319,7 @@ class FilesPage(Page):
         self._compare = push_button(
             "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
         )
-        self._export = push_button("&Export…", "Write it for other programs", self._choose_export)
+        self._export = push_button("E&xport…", "Write it for other programs", self._choose_export)
         self._note = push_button("Add a &note…", "Keep a note in the recording", self._write_note)
         for button in (self._compare, self._export, self._note):
             button.setEnabled(False)
