@@ -150,6 +150,14 @@ def type_into_dialog(qtbot, text):
     return timer
 
 
+def read_and_start(qtbot, window):
+    """Read what will happen to its end, and start it."""
+    while window.context.bridge.state is EngineState.ARMED:
+        press(qtbot, window, Qt.Key.Key_PageDown)
+        press(qtbot, window, Qt.Key.Key_F5)
+        qtbot.waitUntil(lambda: not window.context.bridge.is_ordering, timeout=PATIENCE_MS)
+
+
 @pytest.mark.parametrize(("width", "height", "points"), [(1280, 720, 10), (1024, 700, 14)])
 def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path, qapp, width, height, points):
     """Another measurement is made, looked at, compared with those before it, and exported."""
@@ -164,10 +172,7 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path, qapp, w
     reach(qtbot, bench, EngineState.READY)
     key(Qt.Key.Key_Return, CONTROL)
     reach(qtbot, bench, EngineState.ARMED)
-    while bench.context.bridge.state is EngineState.ARMED:
-        key(Qt.Key.Key_PageDown)
-        key(Qt.Key.Key_F5)
-        qtbot.waitUntil(lambda: not bench.context.bridge.is_ordering, timeout=PATIENCE_MS)
+    read_and_start(qtbot, bench)
     reach(qtbot, bench, EngineState.READY)
     key(Qt.Key.Key_4, CONTROL)
     qtbot.waitUntil(lambda: len(files.table.recordings.entries) == before + 1, timeout=PATIENCE_MS)
@@ -352,7 +357,7 @@ def test_an_average_of_noise_is_rejected_while_it_is_played(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     bench.user_actions.arm_test()
     reach(qtbot, bench, EngineState.ARMED)
-    bench.user_actions.start()
+    read_and_start(qtbot, bench)
     card = bench.pages[RUN].watch_card
     qtbot.waitUntil(lambda: card.averages.text().endswith(" of 12"), timeout=PATIENCE_MS)
     card.reject_button.click()

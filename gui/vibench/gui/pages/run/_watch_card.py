@@ -130,6 +130,7 @@ class WatchCard(QGroupBox):
         self.twin.clicked.connect(
             lambda is_on: self.twin_wanted.emit(TwinSwitch.ON if is_on else TwinSwitch.OFF)
         )
+        self._begun = 0
         self.averages = QLabel("–")
         self.averages.setToolTip("Averages of noise begun and planned")
         self.reject_button = push_button(
@@ -156,9 +157,13 @@ class WatchCard(QGroupBox):
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)
-        begun = run.numbers.get("realisation") if run is not None and is_running and averages else None
-        self.reject_button.setEnabled(begun is not None)
-        self.averages.setText("–" if begun is None else f"{int(begun) + 1} of {averages}")
+        if run is None or not is_running or not averages:
+            self._begun = 0
+        else:
+            # While the next one settles, the last one counts.
+            self._begun = int(run.numbers.get("realisation", self._begun - 1)) + 1
+        self.reject_button.setEnabled(self._begun > 0)
+        self.averages.setText(f"{self._begun} of {averages}" if self._begun else "–")
         self.twin.setEnabled(status is not None and status.bench is not None)
         self.twin.setChecked(status is not None and status.twin is not None)
         if run is not None and is_running:
