@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtWidgets import (
     QFileDialog,
@@ -39,9 +38,6 @@ from ._limit_table import LimitTable
 from ._preview_plots import PredictionPlot, PreviewPlots
 from ._test_form import TestForm
 from ._test_preview import TestPrediction, TestPreview, predict_test, preview_test
-
-if TYPE_CHECKING:
-    pass
 
 _SHOWN = {
     BaseQuantity.STROKE: "stroke",
@@ -204,9 +200,6 @@ class TestPage(Page):
             what = self.form.complaint or "Choose a rig first (Ctrl+1)."
             self.summary.setText(f"✖ {what}")
             return
-        self._look_at(measurement, rig)
-
-    def _look_at(self, measurement: Measurement, rig: Rig) -> None:
         self.summary.setText("…")
         self._looking.ask(TestPreview(measurement, rig))
         self.prediction_note.setText("◌ simulating; the first time compiles the simulation, up to a minute")
