@@ -118,7 +118,7 @@ class Recording(RecordingDescription):
     def packing(self) -> float:
         """Bytes of the samples over those that the file takes for them: about 1.3 for noise of 20 bits."""
         stored = sum(self._open.file[role].id.get_storage_size() for role in self.roles)
-        return self.stored_bytes / max(stored, 1)
+        return float(self.stored_bytes / max(stored, 1))
 
     @property
     def check_text(self) -> str:

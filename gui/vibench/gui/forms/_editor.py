@@ -7,7 +7,7 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt
-from PySide6.QtGui import QKeyEvent, QPaintEvent, QWheelEvent
+from PySide6.QtGui import QKeyEvent, QPaintEvent, QStandardItemModel, QWheelEvent
 from PySide6.QtWidgets import QComboBox, QStyledItemDelegate, QStyleOptionViewItem, QWidget
 
 from vibench.acquisition import ConfigurationError
@@ -107,7 +107,7 @@ class _LineOnEach(QStyledItemDelegate):
         """Add the line."""
         super().initStyleOption(option, index)
         line = index.data(Qt.ItemDataRole.ToolTipRole)
-        option.text = f"    {option.text}:  {line}" if line else option.text  # type: ignore[attr-defined]
+        option.text = f"    {option.text}:  {line}" if line else option.text
 
 
 class ChoiceEditor:
@@ -137,9 +137,11 @@ class ChoiceEditor:
         """List the values below headings, each with a line on it: heading and line by value."""
         blocked, chosen = self._box.blockSignals(True), self.content()
         self._box.clear()
+        model = self._box.model()
+        assert isinstance(model, QStandardItemModel)
         for heading in dict.fromkeys(heading for heading, _ in lines.values()):
             self._box.addItem(heading.upper())
-            self._box.model().item(self._box.count() - 1).setEnabled(False)
+            model.item(model.rowCount() - 1).setEnabled(False)
             for value, (_, line) in (each for each in lines.items() if each[1][0] == heading):
                 self._box.addItem(value.replace("_", " "), value)
                 self._box.setItemData(self._box.count() - 1, line, Qt.ItemDataRole.ToolTipRole)

@@ -42,15 +42,6 @@ class _TwoPlots(QStackedWidget):
             self.pairs[along] = (first, second)
             self.addWidget(column((first, 1), (second, 1)))
 
-    @property
-    def widget(self) -> QWidget:
-        """Both plots."""
-        return self
-
-    def plots(self, along: Parameter) -> tuple[Plot, Plot]:
-        """Those over one parameter."""
-        return self.pairs[along]
-
     def cleared(self, along: Parameter) -> tuple[Plot, Plot]:
         """Bring the pair of a parameter to the front, empty."""
         self.setCurrentIndex(list(ACROSS).index(along))
@@ -60,19 +51,35 @@ class _TwoPlots(QStackedWidget):
         return pair
 
 
-class BranchPicture(_TwoPlots):
+class _PairPicture:
+    """What pictures of two plots have alike."""
+
+    def __init__(self, plots: _TwoPlots) -> None:
+        self._plots = plots
+
+    @property
+    def widget(self) -> QWidget:
+        """Both plots."""
+        return self._plots
+
+    def plots(self, along: Parameter) -> tuple[Plot, Plot]:
+        """Those over one parameter."""
+        return self._plots.pairs[along]
+
+
+class BranchPicture(_PairPicture):
     """Stable motions solid, unstable ones dashed; longer periods in other colours; special points marked."""
 
     def __init__(self, theme: Theme) -> None:
         axes = RESPONSES[0][1], RESPONSES[1][1]
         hint = "Periodic motions: stable ones solid, unstable ones dashed, as they are found."
         titles = ("Response I of branches", "Response II of branches")
-        super().__init__(theme, titles, axes, hint)
+        super().__init__(_TwoPlots(theme, titles, axes, hint))
 
     def show_answer(self, answer: BranchDiagram) -> None:
         """Draw every branch."""
         along = answer.request.along
-        pair = self.cleared(along)
+        pair = self._plots.cleared(along)
         named: set[str] = set()
         for line in answer.lines:
             for is_stable, piece in line.pieces():
@@ -95,18 +102,18 @@ class BranchPicture(_TwoPlots):
                 dots.setData(np.array(place), np.array([each.response_ii for each in found]))
 
 
-class SpectrumPicture(_TwoPlots):
+class SpectrumPicture(_PairPicture):
     """Six exponents with their intervals, and the dimension with its own."""
 
     def __init__(self, theme: Theme) -> None:
         hint = "All six Lyapunov exponents with their intervals, as they are found."
         titles = ("Exponents", "Kaplan-Yorke dimension")
-        super().__init__(theme, titles, (EXPONENT, DIMENSION), hint)
+        super().__init__(_TwoPlots(theme, titles, (EXPONENT, DIMENSION), hint))
 
     def show_answer(self, answer: ExponentSpectrum) -> None:
         """Draw what is there."""
         along = answer.request.along
-        upper, lower = self.cleared(along)
+        upper, lower = self._plots.cleared(along)
         if not answer.points:
             return
         place = answer.column("frequency_hz" if along is Parameter.FREQUENCY else "amplitude_m")
