@@ -18,6 +18,7 @@ from vibench.acquisition.recording import RecordingState, open_recording
 from vibench.acquisition.rig import Rig
 from vibench.analysis.live import thumbnail
 from vibench.gui.pages.files import FilesPage, _files_page
+from vibench.gui.pages.files._file_words import facts_text
 from vibench.gui.pages.files._listing import listed, made_levels
 from vibench.gui.pages.files._recording_table import HEADINGS
 from vibench.gui.widgets import DARK
@@ -345,11 +346,11 @@ def test_a_file_that_was_deleted_leaves_the_list(shared_context, record, tmp_pat
     waited(lambda: [each.path for each in page.table.recordings.entries] == [kept])
 
 
-def test_the_facts_say_a_state_once(opened, begin_recording, tmp_path):
+def test_the_facts_say_a_state_once(begin_recording, tmp_path):
     writer, _ = begin_recording(tmp_path, "ended")
     path = writer.finish(RecordingState.STOPPED, "stopped by the operator, in the window")
-    page = opened(path)
-    assert page._facts.sentence.startswith("■ stopped by the operator, in the window")
+    with open_recording(path) as recording:
+        assert facts_text(recording).startswith("■ stopped by the operator, in the window")
 
 
 def test_a_growing_file_shows_what_it_holds_and_not_what_it_has_reserved(begin_recording, tmp_path, waited):
