@@ -21,7 +21,7 @@ from vibench.acquisition.campaign import (
 )
 from vibench.acquisition.errors import CheckFailed, RecordingError
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
-from vibench.acquisition.recording import SealDepth, SealState
+from vibench.acquisition.recording import RecordingState, SealDepth, SealState
 from vibench.acquisition.stopping import Cause, StopRequest, StopSwitch
 
 
@@ -335,3 +335,48 @@ def test_without_a_journal_recordings_of_another_bench_are_not_taken_for_its_own
         run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME)
     made = run_campaign(other, RENAMED, folder, ExistingRecordings.RESUME, changed_bench="accept")
     assert {each.outcome for each in made} == {PointOutcome.KEPT}
+
+
+def refused_by_the_disk(bench, folder, stop):
+    """Carry the campaign out until the disk refuses the end of ``two``, which ``stop`` may cut short."""
+    switch = StopSwitch()
+
+    def refuse(stand):
+        if stand.name == "two":
+            (folder / "two.h5.tmp").mkdir(exist_ok=True)
+            if stop:
+                switch.ask(stop)
+
+    with pytest.raises(RecordingError, match=r"two\.h5 could not be written"):
+        run_campaign(bench, CAMPAIGN, folder, switch=switch, on_progress=refuse)
+    assert (folder / "two.h5.part").exists()
+
+
+@pytest.mark.parametrize("has_journal", [True, False])
+def test_what_the_disk_refused_once_is_recovered_beside_the_attempt_made_since(bench, tmp_path, has_journal):
+    refused_by_the_disk(bench, tmp_path, StopRequest.by(Cause.OPERATOR, "enough"))
+    made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.RECORDED, "two.2.h5")
+    assert (tmp_path / "two.h5.part").exists()
+    (tmp_path / "two.h5.tmp").rmdir()
+    if not has_journal:
+        (tmp_path / "c.campaign.sqlite").unlink()
+    made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.KEPT, "two.2.h5")
+    with open_recording(tmp_path / "two.h5") as recording:
+        assert recording.state is RecordingState.STOPPED
+        assert recording.samples > 0
+    assert list(tmp_path.glob("*.part")) == []
+
+
+@pytest.mark.parametrize("has_journal", [True, False])
+def test_a_complete_point_whose_end_the_disk_refuses_is_not_recorded_twice(bench, tmp_path, has_journal):
+    refused_by_the_disk(bench, tmp_path, None)
+    if not has_journal:
+        (tmp_path / "c.campaign.sqlite").unlink()
+    with pytest.raises(RecordingError, match=r"two\.h5"):
+        run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    (tmp_path / "two.h5.tmp").rmdir()
+    made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.KEPT, "two.h5")
+    assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]

@@ -3,7 +3,7 @@
 After a crash, journal and folder are brought together: what is true of the point that was running.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity, differences
 from ._journal import Journal, journal_path
 from ._journal_database import is_begun
-from ._journal_point import JournalPoint, JournalPointState, read_journal
+from ._journal_point import JournalPointState, read_journal
 from ._kept_recording import KeptRecording, looked_at
 from ._point_outcome import ChangedBench, ExistingRecordings, ReasonCode
 
@@ -38,22 +38,21 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
     for point in journal.points():
         if stop.request is not None:
             return
+        path = folder / point.file
+        has_part = part_of(path).exists()
+        attempts = {*attempts_in(folder, point.name), *([path] if point.file else [])}
+        errors = _recover(sorted(attempts), point.measurement)
         match point.state:
-            case JournalPointState.RUNNING:
-                journal.end(point.name, *_ended(point, folder))
-            case JournalPointState.FAILED | JournalPointState.INTERRUPTED if part_of(
-                folder / point.file
-            ).exists():  # the disk refused its end: it may be complete
-                journal.end(point.name, *_ended(point, folder))
-            case JournalPointState.DONE if not (folder / point.file).exists():
+            case JournalPointState.DONE if not path.exists():
                 journal.requeue(point.name, ReasonCode.GONE, f"{point.file} is no longer in the folder")
             case JournalPointState.DONE:
-                if part_of(folder / point.file).exists():  # the disk refused to forget it
-                    with suppress(RecordingError):
-                        recover(folder / point.file)
-                found = looked_at(folder / point.file, point.measurement, SealDepth.WHOLE)
+                found = looked_at(path, point.measurement, SealDepth.WHOLE)
                 if found.damage:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
+            case JournalPointState.RUNNING | JournalPointState.FAILED | JournalPointState.INTERRUPTED if (
+                has_part or point.state is JournalPointState.RUNNING
+            ):  # where the disk refused its end, it may be complete
+                journal.end(point.name, *_ended(path, point.measurement, errors))
 
 
 def found_recordings(
@@ -74,22 +73,34 @@ def found_recordings(
     return {name: kept for name, kept in found.items() if kept is not None}
 
 
-def _ended(point: JournalPoint, folder: Path) -> tuple[JournalPointState, ReasonCode, str, str]:
-    path = folder / point.file
-    try:
-        if part_of(path).exists():
+def _recover(attempts: Iterable[Path], measurement: Measurement) -> dict[str, str]:
+    """Recover every attempt at a point that was not finished; returns the errors by file name.
+
+    Raises RecordingError when that fails for a complete one, which the next attempt would record again.
+    """
+    errors: dict[str, str] = {}
+    for path in attempts:
+        if not part_of(path).exists():
+            with suppress(OSError):  # it was being prepared: not a sample is in it
+                tmp_of(path).unlink()
+            continue
+        try:
             recover(path)
-        tmp_of(path).unlink(missing_ok=True)  # alone it was being prepared: not a sample is in it
-        if path.exists():
-            return _judged(path, point.measurement)
-    except RecordingError as error:
-        return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {error}", ""
-    return (
-        JournalPointState.INTERRUPTED,
-        ReasonCode.PROGRAM_ENDED,
-        f"{PROGRAM_ENDED}, before anything was recorded",
-        "",
-    )
+        except RecordingError as error:
+            left = looked_at(part_of(path), measurement, SealDepth.QUICK)
+            if left.is_complete and left.is_of_this_plan and not path.exists():
+                raise
+            errors[path.name] = str(error)
+    return errors
+
+
+def _ended(
+    path: Path, measurement: Measurement, errors: Mapping[str, str]
+) -> tuple[JournalPointState, ReasonCode, str, str]:
+    if path.exists():
+        return _judged(path, measurement)
+    why = errors.get(path.name, "nothing was recorded")
+    return JournalPointState.INTERRUPTED, ReasonCode.PROGRAM_ENDED, f"{PROGRAM_ENDED}; {why}", ""
 
 
 def _judged(path: Path, measurement: Measurement) -> tuple[JournalPointState, ReasonCode, str, str]:
@@ -186,6 +197,8 @@ def opened_journal(
         case ExistingRecordings.RESUME if is_begun(path):
             return _gone_on_with(path, campaign, identity, folder, changed, stop)
         case ExistingRecordings.RESUME:
+            for point in campaign.points():
+                _recover(attempts_in(folder, point.name), point.measurement)
             found = found_recordings(campaign.points(), folder, SealDepth.WHOLE, stop)
             if changed is ChangedBench.REFUSE:
                 for kept in (each for each in found.values() if not each.damage):
