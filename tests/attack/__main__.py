@@ -21,7 +21,7 @@ from . import (
     recordings_mutants,
     toml_files,
 )
-from .tally import Attack, Shard, Tally, save, saved_tallies
+from .tally import Attack, Shard, Tally, saved_tallies
 
 TARGETS: dict[str, Attack] = {
     "toml": toml_files.attack,
@@ -44,12 +44,8 @@ def main() -> int:
     else:
         part, of = (int(each) for each in options.shard.split("/"))
         until_s = time.monotonic() + 60 * options.minutes
-        shard = Shard(options.seed, options.count, part - 1, of, until_s)
-        tallies = []
-        for name in options.target or TARGETS:
-            tallies.append(TARGETS[name](shard))
-            if options.save is not None:
-                save(tallies, options.save)
+        shard = Shard(options.seed, options.count, part - 1, of, until_s, options.save)
+        tallies = [TARGETS[name](shard) for name in options.target or TARGETS]
     for tally in tallies:
         print(tally.line())
         for finding in tally.findings:
@@ -74,7 +70,9 @@ def _options() -> argparse.Namespace:
         "--shard", default="1/1", metavar="I/N", help="only every Nth mutant, from the Ith on"
     )
     parser.add_argument("--minutes", type=float, default=inf, help="what is not begun by then is left out")
-    parser.add_argument("--save", type=Path, metavar="FILE.json", help="what this shard has seen")
+    parser.add_argument(
+        "--save", type=Path, metavar="FILE.json", help="keep what was seen, and go on from it"
+    )
     parser.add_argument(
         "--sum", type=Path, nargs="+", metavar="FILE.json", help="add up what shards have saved"
     )

@@ -18,9 +18,9 @@ def attack_commands(
     judge: Callable[[Case, Ending], tuple[str, ...]] = lambda _, ending: ending.faults,
 ) -> Tally:
     """Run the mutants of a shard, and tell what was found."""
-    tally = Tally(name)
+    tally = shard.tally(name)
     with CommandRunner() as runner:
-        for number, chance in shard.chances():
+        for number, chance in shard.chances(tally):
             case = mutant(chance)
             ending = runner.run(case)
             tally.count(ending.code, ending.took_s, ending.peak_bytes)

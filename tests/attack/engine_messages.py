@@ -166,11 +166,11 @@ LOOK_EVERY = 25
 
 def attack(shard: Shard) -> Tally:
     """Send broken messages to an engine without a bench, or with a virtual one as it comes."""
-    tally = Tally(NAME)
+    tally = shard.tally(NAME)
     words = ("vibench.acquisition.engine", "--attendance", "unattended", "--forgotten-s", "36000")
     with ServedProcess(*words) as process, closing(Trial(process)) as trial:
         known = ""
-        for number, chance in shard.chances():
+        for number, chance in shard.chances(tally):
             began_s = time.monotonic()
             faults: tuple[str, ...] = ()
             try:

@@ -281,13 +281,13 @@ LOOK_EVERY = 50
 
 def attack(shard: Shard) -> Tally:
     """Send broken messages to the virtual rig's instruments."""
-    tally = Tally(NAME)
+    tally = shard.tally(NAME)
     with (
         ServedProcess("vibench.cli", "serve-rig", "--address", "127.0.0.1:0") as process,
         closing(Trial(process)) as trial,
     ):
         before, known = process.descriptors, ""
-        for number, chance in shard.chances():
+        for number, chance in shard.chances(tally):
             began_s, found = time.monotonic(), ()
             try:
                 taken = trial.send(chance)

@@ -135,7 +135,7 @@ def faults(said: str, expected: str, took_s: float, peak_bytes: int) -> tuple[st
 
 def attack(shard: Shard) -> Tally:
     """Turn bits over."""
-    tally = Tally("flips")
+    tally = shard.tally("flips")
     with tempfile.TemporaryDirectory(prefix="vibench_flips_") as folder:
         expected: dict[str, Any] = {}
         for name, content in good_recordings().items():
@@ -146,7 +146,7 @@ def attack(shard: Shard) -> Tally:
                 expected[name] = judged(path)[0]
                 if expected[name].startswith(("refused", "traceback", "died")):
                     raise RuntimeError(f"{name} should be good, and was {expected[name]}")
-        for number, chance in shard.chances():
+        for number, chance in shard.chances(tally):
             name, place, content = flipped(number, chance)
             path = Path(folder, name)
             path.write_bytes(content)

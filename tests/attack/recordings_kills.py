@@ -233,9 +233,9 @@ def attacked(
 
 def attack(shard: Shard) -> Tally:
     """Kill campaigns; each number is one of them, and what is counted are kills."""
-    tally = Tally("kills")
+    tally = shard.tally("kills")
     with KilledCampaigns() as runs:
-        for number, chance in shard.chances():
+        for number, chance in shard.chances(tally):
             if said := attacked(runs, chance, tally):
                 tally.findings.append(Finding("kills", shard.seed, number, tuple(said[:5]), ""))
     return tally
@@ -243,13 +243,13 @@ def attack(shard: Shard) -> Tally:
 
 def attack_calls(shard: Shard) -> Tally:
     """Let exact system calls kill or fail; each number is one campaign, and what is counted are faults."""
-    tally = Tally("calls")
+    tally = shard.tally("calls")
     with tempfile.TemporaryDirectory(prefix="vibench_calls_") as folder:
         library = Path(folder) / "system_calls.so"
         source = Path(__file__).with_name("system_calls.c")
         subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl", "-lpthread"], check=True)
         with KilledCampaigns(library) as runs:
-            for number, chance in shard.chances():
+            for number, chance in shard.chances(tally):
                 if said := attacked(runs, chance, tally, kinds=CALL_KINDS):
                     tally.findings.append(Finding("calls", shard.seed, number, tuple(said[:5]), ""))
     return tally

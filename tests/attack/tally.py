@@ -1,4 +1,4 @@
-"""Mutants by number, in shards whose results are added up.
+"""Mutants by number, in shards whose results are saved after each and added up.
 
 Mutant ``n`` of a seed is the same in every shard and on every computer, so that a finding is named by two
 numbers and can be made again.
@@ -7,35 +7,11 @@ numbers and can be made again.
 import json
 import random
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from math import inf
 from pathlib import Path
 from typing import Any, Self
-
-
-@dataclass(frozen=True)
-class Shard:
-    """Which mutants of a seed are tried here: every ``of``-th of the first ``count``, from ``part`` on."""
-
-    seed: int
-    count: int
-    part: int = 0
-    of: int = 1
-    until_s: float = inf
-    """No further mutant is begun after this time of `time.monotonic`."""
-
-    @property
-    def numbers(self) -> range:
-        """Numbers of the mutants of this shard."""
-        return range(self.part, self.count, self.of)
-
-    def chances(self) -> Iterator[tuple[int, random.Random]]:
-        """Give each number with the source of chance that its mutant is made from."""
-        for number in self.numbers:
-            if time.monotonic() > self.until_s:
-                return
-            yield number, random.Random(f"{self.seed}:{number}")
 
 
 @dataclass(frozen=True)
@@ -61,6 +37,9 @@ class Tally:
     worst_s: float = 0.0
     worst_bytes: int = 0
     findings: list[Finding] = field(default_factory=list)
+    done: int = 0
+    """Numbers of the shard that were tried; one number may count several times."""
+    shard: str = ""
 
     def count(self, ending: object, took_s: float = 0.0, peak_bytes: int = 0) -> None:
         """Add one that was tried."""
@@ -79,6 +58,7 @@ class Tally:
         self.worst_s = max(self.worst_s, other.worst_s)
         self.worst_bytes = max(self.worst_bytes, other.worst_bytes)
         self.findings += other.findings
+        self.done += other.done
 
     def line(self) -> str:
         """Say it in one line."""
@@ -89,9 +69,54 @@ class Tally:
         )
 
 
-def save(tallies: Sequence[Tally], path: Path) -> None:
-    """Write what a shard has seen of each target, for `saved_tallies`."""
-    path.write_text(json.dumps([asdict(tally) for tally in tallies], indent=1), encoding="utf-8")
+@dataclass(frozen=True)
+class Shard:
+    """Which mutants of a seed are tried here: every ``of``-th of the first ``count``, from ``part`` on."""
+
+    seed: int
+    count: int
+    part: int = 0
+    of: int = 1
+    until_s: float = inf
+    """No further mutant is begun after this time of `time.monotonic`."""
+    saved: Path | None = None
+    """File that keeps the tallies of this shard after each mutant; those in it are not tried again."""
+
+    @property
+    def numbers(self) -> range:
+        """Numbers of the mutants of this shard."""
+        return range(self.part, self.count, self.of)
+
+    def tally(self, target: str) -> Tally:
+        """Return the tally of a target as the file has it, or a new one.
+
+        Raises ValueError when the file is of another seed or shard.
+        """
+        mine = f"{self.part + 1}/{self.of} of seed {self.seed}"
+        kept = () if self.saved is None or not self.saved.exists() else saved_tallies(self.saved)
+        found = next((each for each in kept if each.target == target), Tally(target, shard=mine))
+        if found.shard != mine:
+            raise ValueError(f"{self.saved} holds shard {found.shard}, not {mine}; give another file")
+        return found
+
+    def chances(self, tally: Tally) -> Iterator[tuple[int, random.Random]]:
+        """Give each number that is not in the tally, with the source of chance for its mutant."""
+        for number in self.numbers[tally.done :]:
+            if time.monotonic() > self.until_s:
+                return
+            yield number, random.Random(f"{self.seed}:{number}")
+            tally.done += 1
+            if self.saved is not None:
+                save(tally, self.saved)
+
+
+def save(tally: Tally, path: Path) -> None:
+    """Write what a shard has seen of a target into its file, which is whole at any moment."""
+    kept = saved_tallies(path) if path.exists() else []
+    tallies = [*(each for each in kept if each.target != tally.target), tally]
+    unfinished = path.with_suffix(".tmp")
+    unfinished.write_text(json.dumps([asdict(each) for each in tallies], indent=1), encoding="utf-8")
+    unfinished.replace(path)
 
 
 def saved_tallies(path: Path) -> list[Tally]:

@@ -43,7 +43,7 @@ def test_each_thing_that_may_not_be_is_a_fault(ending):
 
 def test_a_mutant_depends_on_its_seed_and_number_only():
     def mutants(shard):
-        return {number: mutated_toml(CAMPAIGNS[0], chance) for number, chance in shard.chances()}
+        return {number: mutated_toml(CAMPAIGNS[0], chance) for number, chance in shard.chances(Tally("toml"))}
 
     whole = mutants(Shard(7, 40))
     parts = [mutants(Shard(7, 40, part, 3)) for part in range(3)]
@@ -60,11 +60,29 @@ def test_shards_are_added_up(tmp_path):
     second.count(0, took_s=1.0, peak_bytes=7)
     second.count(1)
     second.findings.append(Finding("toml", 1, 2, ("a traceback",), "TypeError"))
-    save([second], tmp_path / "second.json")
+    save(second, tmp_path / "second.json")
     first.add(*saved_tallies(tmp_path / "second.json"))
     assert first == Tally("toml", 3, {"0": 2, "1": 1}, 2.0, 7, second.findings)
     with pytest.raises(ValueError, match="different targets"):
         first.add(Tally("imports"))
+
+
+def test_a_shard_goes_on_from_its_file(tmp_path):
+    path = tmp_path / "shard.json"
+
+    def tried(count, part=0):
+        shard = Shard(7, count, part, 2, saved=path)
+        tally = shard.tally("toml")
+        for number, _ in shard.chances(tally):
+            tally.count(number)
+            assert tally.done == (saved_tallies(path)[0].done if path.exists() else 0)
+        return tally
+
+    assert tried(3).codes == {"0": 1, "2": 1}
+    assert tried(7).codes == {"0": 1, "2": 1, "4": 1, "6": 1}
+    assert tried(7) == saved_tallies(path)[0]
+    with pytest.raises(ValueError, match="holds shard 1/2 of seed 7, not 2/2 of seed 7; give another file"):
+        tried(7, part=1)
 
 
 def test_mutants_of_nothing_are_mutants_too():
