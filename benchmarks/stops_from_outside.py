@@ -71,7 +71,7 @@ DEAD_MAN_S = 1.0
 LATE_S = 0.3
 """The witness looks that often on a busy computer [s]."""
 SHIM = Path(__file__).with_name("shim_of_conditions.c")
-ENDED_BY_ITSELF = ("folder gone", "disk full", "memory exhausted", "no threads")
+ENDED_BY_ITSELF = ("folder gone", "disk full", "memory exhausted")
 """Conditions that may end a run before its stop does, or keep its recording from being finished."""
 
 

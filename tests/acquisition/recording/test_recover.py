@@ -1,4 +1,5 @@
 import shutil
+import threading
 
 import h5py
 import numpy as np
@@ -53,6 +54,17 @@ def test_a_program_that_died_while_it_wrote_the_state_has_not_ended_its_recordin
         assert recording.state is RecordingState.INTERRUPTED
         np.testing.assert_array_equal(recording.read_counts("m0_velocity"), counts[1])
         assert [event.kind for event in recording.events] == ["interrupted"]
+
+
+def test_a_recording_is_finished_where_no_thread_can_be_started(tmp_path, abandoned, monkeypatch):
+    part, counts = abandoned(tmp_path)
+
+    def refuse(_):
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", refuse)
+    with open_recording(recover(part)) as recording:
+        np.testing.assert_array_equal(recording.read_counts("m0_velocity"), counts[1])
 
 
 def test_either_name_can_be_given(tmp_path, abandoned):

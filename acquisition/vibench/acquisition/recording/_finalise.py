@@ -66,11 +66,21 @@ def _compressed(pieces: Iterable[Counts], length: int) -> Iterator[bytes]:
     waiting: deque[Future[bytes]] = deque()
     with ThreadPoolExecutor(workers) as pool:
         for piece in pieces:
-            waiting.append(pool.submit(_chunk, piece, length))
+            waiting.append(_submitted(pool, piece, length))
             if len(waiting) > workers * IN_FLIGHT_PER_WORKER:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
+
+
+def _submitted(pool: ThreadPoolExecutor, piece: Counts, length: int) -> Future[bytes]:
+    """Compress a piece in the pool, or here where the system starts no more threads."""
+    try:
+        return pool.submit(_chunk, piece, length)
+    except RuntimeError:
+        compressed: Future[bytes] = Future()
+        compressed.set_result(_chunk(piece, length))
+        return compressed
 
 
 def _chunk(counts: Counts, length: int) -> bytes:
