@@ -1,9 +1,13 @@
 """Where files or memory run out, a command ends with one sentence and no traceback."""
 
+import re
 import subprocess
 import sys
 
 import pytest
+
+from vibench.cli.__main__ import COMMANDS
+from vibench.stop_files import SWITCH_OFF
 
 from .conftest import ENVIRONMENT
 
@@ -43,6 +47,43 @@ def test_a_measurement_with_few_files_ends_with_a_sentence(tmp_path, most):
     )
     assert "Traceback" not in ended.stderr
     assert (ended.returncode, ended.stderr.count("error: ")) in ((0, 0), (1, 1))
+
+
+@pytest.mark.parametrize(
+    ("most_mb", "arguments"),
+    [
+        (150, ("verify", ".")),
+        (200, ("specimen",)),
+        (250, ("measure", "tiny.toml", "--out", "out")),
+        (300, ("bench", "check")),
+        (450, ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "100")),
+        (1100, ("demo",)),
+    ],
+)
+def test_a_command_with_too_little_address_space_is_refused_before_its_libraries_are_loaded(
+    tmp_path, most_mb, arguments
+):
+    ended = limited(tmp_path, "RLIMIT_AS", 1_000_000 * most_mb, *arguments)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert re.fullmatch(
+        rf"error: this process may have {most_mb} MB of address space, and needs \d+ MB\. Nothing was done; "
+        r"raise the limit \(ulimit -v \d+\) and try again\.\n",
+        ended.stderr,
+    )
+
+
+def test_a_stop_that_finds_nobody_and_has_no_memory_to_look_further_says_to_switch_off(tmp_path):
+    ended = limited(tmp_path, "RLIMIT_AS", 100_000_000, "stop")
+    assert ended.returncode == 1
+    assert ended.stderr.endswith(f"{SWITCH_OFF}.\n")
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_is_refused_without_address_space(vibench_here, tmp_path, monkeypatch, name):
+    monkeypatch.setattr(resource, "getrlimit", lambda _: (100_000_000, resource.RLIM_INFINITY))
+    ended = vibench_here(name, cwd=tmp_path)
+    assert (ended.returncode, ended.stderr.count("\n")) == (1, 1)
+    assert "100 MB of address space" in ended.stderr
 
 
 @pytest.mark.parametrize(

@@ -40,6 +40,7 @@ from .host import (
     named as named,
     naming_its_extra as naming_its_extra,
     need_extra as need_extra,
+    need_space as need_space,
     printable as printable,
     save_toml as save_toml,
     schema_line as schema_line,

@@ -25,12 +25,14 @@ from vibench.acquisition import (
     Beside,
     CheckStopped,
     need_extra,
+    need_space,
     printable,
     shortened,
 )
 from vibench.analysis import AnalysisError
 from vibench.sim import UnreadableTomlError
 from vibench.sim.study import StudyError
+from vibench.stop_files import SWITCH_OFF
 
 from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
 from .exit_code import ExitCode
@@ -59,6 +61,10 @@ class Place:
     panel: Panel
     extras: tuple[str, ...] = ()
     """Extras that it needs before it does anything, the one that brings the others first."""
+    space_mb: int = 300
+    """Address space that its libraries and their threads take [MB]."""
+    advice: str = ""
+    """What to do where it cannot run."""
 
     def load(self) -> typer.Typer:
         """Import the command, alone in an application of its own."""
@@ -79,6 +85,8 @@ class LateCommand(TyperCommand):
 
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
         """Read the arguments as the command itself does."""
+        if not named.get("resilient_parsing"):
+            need_space(self._place.space_mb, self._place.advice)
         command = typer.main.get_command(self._place.load())
         command.name = self.name
         with told_in_full([] if named.get("resilient_parsing") else args):
@@ -149,6 +157,8 @@ def late_commands(places: Mapping[str, Place]) -> type[TyperGroup]:
     return LateCommands
 
 
+SIMULATION_MB, BENCH_MB = 1000, 2000
+"""Address space of commands that simulate or analyse (measured: 775), and that open a bench (1807) [MB]."""
 COMMANDS = {
     "demo": Place(
         "demo",
@@ -156,12 +166,14 @@ COMMANDS = {
         "Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report.",
         Panel.MEASURE,
         ("bench", "figures"),
+        space_mb=BENCH_MB,
     ),
     "measure": Place(
         "measure",
         "measure",
         "Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign.",
         Panel.MEASURE,
+        space_mb=BENCH_MB,
     ),
     "watch": Place(
         "watch",
@@ -174,12 +186,14 @@ COMMANDS = {
         "twin",
         "Follow the hidden motion of what an engine measures, and note when the specimen changes.",
         Panel.MEASURE,
+        space_mb=SIMULATION_MB,
     ),
     "stop": Place(
         "watch",
         "stop",
         "Stop all that engines, scripts and checks drive on this computer, campaigns and all.",
         Panel.MEASURE,
+        advice=f"{SWITCH_OFF}.",
     ),
     "release": Place(
         "watch",
@@ -193,6 +207,7 @@ COMMANDS = {
         "Open the window: connect, check, choose, preview, run, watch, compare.",
         Panel.MEASURE,
         ("gui",),
+        space_mb=BENCH_MB,
     ),
     "analyse": Place(
         "analyse",
@@ -200,6 +215,7 @@ COMMANDS = {
         "Analyse recordings, complete, interrupted or still growing, and write one HTML report.",
         Panel.ANALYSE,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "catalogue": Place(
         "catalogue",
@@ -213,6 +229,7 @@ COMMANDS = {
         "Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped.",
         Panel.ANALYSE,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "reproduce": Place(
         "reproduce",
@@ -220,6 +237,7 @@ COMMANDS = {
         "Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped.",
         Panel.ANALYSE,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "specimen": Place(
         "specimen",
@@ -232,6 +250,7 @@ COMMANDS = {
         "predict",
         "Predict the responses of m0 and of p over frequency.",
         Panel.PREDICT,
+        space_mb=SIMULATION_MB,
     ),
     "branches": Place(
         "branches",
@@ -239,6 +258,7 @@ COMMANDS = {
         "Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations.",
         Panel.PREDICT,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "spectrum": Place(
         "spectrum",
@@ -246,6 +266,7 @@ COMMANDS = {
         "Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension.",
         Panel.PREDICT,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "chain": Place(
         "chain",
@@ -253,12 +274,14 @@ COMMANDS = {
         "Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell.",
         Panel.PREDICT,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "study": Place(
         "study",
         "study",
         "Predict responses over every combination of what a file lists, longest first.",
         Panel.PREDICT,
+        space_mb=SIMULATION_MB,
     ),
     "map": Place(
         "map_motions",
@@ -266,6 +289,7 @@ COMMANDS = {
         "Map the motions over two parameters or two coordinates of the start, or along one parameter.",
         Panel.PREDICT,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "tradeoff": Place(
         "tradeoff",
@@ -273,12 +297,14 @@ COMMANDS = {
         "Measure what each accuracy costs and what error it makes, with and without impacts and in chaos.",
         Panel.PREDICT,
         ("figures",),
+        space_mb=SIMULATION_MB,
     ),
     "bench": Place(
         "bench",
         "bench",
         "Look at the instruments.",
         Panel.BENCH,
+        space_mb=BENCH_MB,
     ),
     "serve-rig": Place(
         "serve_rig",
@@ -286,6 +312,7 @@ COMMANDS = {
         "Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C.",
         Panel.BENCH,
         ("bench",),
+        space_mb=BENCH_MB,
     ),
     "export": Place(
         "export",
@@ -340,6 +367,7 @@ COMMANDS = {
         "warm",
         "Compile the simulation, and the virtual rig where it is installed, before the first use.",
         Panel.INSTALLATION,
+        space_mb=SIMULATION_MB,
     ),
     "doctor": Place(
         "doctor",

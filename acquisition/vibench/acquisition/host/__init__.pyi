@@ -15,6 +15,7 @@ from ._documentation import (
 from ._extras import (
     naming_its_extra as naming_its_extra,
     need_extra as need_extra,
+    need_space as need_space,
 )
 from ._follow_parent import (
     follow_parent as follow_parent,

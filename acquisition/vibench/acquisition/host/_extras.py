@@ -1,10 +1,11 @@
-"""Libraries that a plain installation leaves out, and the sentence where one of them is needed."""
+"""What a command needs of the installation and the computer, and the sentence where it is not there."""
 
+import sys
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from types import MappingProxyType
 
-from ..errors import MissingLibrary
+from ..errors import ConfigurationError, MissingLibrary
 
 EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
@@ -35,6 +36,34 @@ def need_extra(extra: str) -> None:
         # The parent first: finding a submodule of what is missing raises.
         if find_spec(library.partition(".")[0]) is None or find_spec(library) is None:
             raise _missing(library, extra)
+
+
+def need_space(megabytes: int, advice: str = "") -> None:
+    """Make sure that this process may have so much address space: libraries hang or abort where it runs out.
+
+    Parameters
+    ----------
+    megabytes
+        Address space that the libraries and their threads take [MB].
+    advice
+        What else to do where there is less, as a sentence.
+
+    Raises
+    ------
+    ConfigurationError
+        When the limit is lower.
+
+    """
+    if sys.platform == "win32":
+        return
+    import resource  # noqa: PLC0415 - POSIX only
+
+    most, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if most not in (resource.RLIM_INFINITY, -1) and most < 1_000_000 * megabytes:
+        raise ConfigurationError(
+            f"this process may have {most / 1e6:.0f} MB of address space, and needs {megabytes} MB. Nothing "
+            f"was done; raise the limit (ulimit -v {1000 * megabytes}) and try again. {advice}".rstrip()
+        )
 
 
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
