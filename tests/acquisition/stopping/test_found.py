@@ -1,8 +1,10 @@
 """What drives a bench is found and stopped, whatever lies in the state folder and happens to it."""
 
 import os
+import subprocess
 import sys
 from pathlib import Path
+from subprocess import PIPE
 from tempfile import TemporaryDirectory
 from threading import Event
 from time import monotonic
@@ -94,6 +96,22 @@ def test_who_is_announced_stays_so_when_the_state_folder_is_emptied(own_state):
         engines_folder().rename(own_state / "moved away")
         until(lambda: announced_programs(Program))
         assert stop_engine(programs_to_stop(None)[0], "abort", "smoke") is StopDelivery.TAKEN
+
+
+def test_what_a_killed_program_has_left_is_removed_when_the_next_one_begins():
+    script = (
+        "from vibench.acquisition import *; a = stop_on_signal(StopSwitch(), 'x'); a.__enter__(); input(1)"
+    )
+    with subprocess.Popen([sys.executable, "-uc", script], stdin=PIPE, stdout=PIPE) as process:
+        process.stdout.read(1)
+        (left,) = engines_folder().glob("*.json")
+        stop = left.with_suffix(".stop-ramp")
+        process.kill()
+        process.wait()
+        stop.touch()
+    with stop_on_signal(StopSwitch(), "dwell"):
+        assert {each.suffix for each in engines_folder().iterdir()} == {".json"}
+        assert not left.exists()
 
 
 def test_a_computer_that_gets_another_name_finds_its_own(monkeypatch):

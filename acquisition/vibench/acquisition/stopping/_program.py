@@ -153,6 +153,7 @@ class _Reached:
         """Let one more be reached; raises OSError when the state folder cannot be written."""
         with self._changing:
             if not self._inside:
+                announced_programs(Program)  # removes what killed programs have left
                 kept = KeptStops.of_this_process(self._press)
                 try:
                     self._announce(entry[1])
