@@ -12,6 +12,7 @@ from ._clock import (
 )
 from ._elided_label import (
     ElidedLabel as ElidedLabel,
+    plain_tip as plain_tip,
 )
 from ._hint import (
     paint_hint as paint_hint,

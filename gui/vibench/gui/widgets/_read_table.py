@@ -6,6 +6,7 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
 
+from ._elided_label import plain_lines, plain_tip
 from ._hint import paint_hint
 from ._table_copy import offer_copies
 from ._units import UNITS
@@ -81,8 +82,8 @@ class ReadTable(QTableWidget):
             for column, text in enumerate(row):
                 item = self.item(number, column)
                 if isinstance(item, QTableWidgetItem):
-                    item.setText(UNITS.told(text))
-                    item.setToolTip(UNITS.told(tips[number] if tips else text))
+                    item.setText(UNITS.told(plain_lines(text)))
+                    item.setToolTip(plain_tip(UNITS.told(tips[number] if tips else text)))
         self._later.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:

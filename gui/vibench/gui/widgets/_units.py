@@ -12,8 +12,11 @@ from math import floor, log10
 from types import MappingProxyType, MethodType
 from weakref import WeakMethod
 
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 from shiboken6 import isValid
+
+from ._elided_label import plain_lines, plain_tip
 
 STANDARD_GRAVITY = 9.80665
 """Of g [m/s²]; ISO 80000-3."""
@@ -171,6 +174,7 @@ class SentenceLabel(QLabel):
         super().__init__()
         self._sentence, self._tip = "", ""
         self.setWordWrap(True)
+        self.setTextFormat(Qt.TextFormat.PlainText)
         if rank:
             self.setProperty("rank", rank)
         self.setText(text)
@@ -197,5 +201,5 @@ class SentenceLabel(QLabel):
 
     def _tell(self) -> None:
         # A path is one word to Qt: unbroken it would be as wide as a window, or cut.
-        super().setText(_LONG_WORD.sub(_with_breaks, UNITS.told(self._sentence)))
-        super().setToolTip(UNITS.told(self._tip))
+        super().setText(_LONG_WORD.sub(_with_breaks, UNITS.told(plain_lines(self._sentence))))
+        super().setToolTip(plain_tip(UNITS.told(self._tip)))

@@ -10,7 +10,7 @@ from vibench.analysis import AnalysisError, Curve, CurveDifference, CurveKind, C
 
 from ...forms import Choice
 from ...plots import Dash, LineStyle, curve_style, dashed_pen
-from ...widgets import UNITS, SentenceLabel, Theme, paint_hint
+from ...widgets import UNITS, SentenceLabel, Theme, paint_hint, plain_tip
 
 _DASHES = {
     CurveOrigin.MEASURED: (Dash.SOLID, Dash.DOTTED),
@@ -113,7 +113,7 @@ class CurveList(QListWidget):
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             wanted = is_ticked(each)
             item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
-            item.setToolTip(UNITS.told(each.note))
+            item.setToolTip(plain_tip(UNITS.told(each.note)))
             item.setIcon(_swatch(self.line_style(each), self._theme))
             self.addItem(item)
         self.blockSignals(blocked)

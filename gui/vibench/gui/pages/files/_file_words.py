@@ -1,6 +1,5 @@
 """How sizes, times and states of recordings are written in a list."""
 
-from vibench.acquisition import printable
 from vibench.acquisition.recording import Recording, RecordingState, SealDepth, SealState
 
 from ...widgets import outcome_text
@@ -66,4 +65,4 @@ def facts_text(recording: Recording) -> str:
         lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
         parts.append(f"{lost} samples lost")
     parts += [f"note: {each}" for each in notes_of(recording)]
-    return printable("  ·  ".join(parts))
+    return "  ·  ".join(parts)

@@ -173,13 +173,13 @@ class FilesPage(Page):
         try:
             recording = open_recording(path)
         except RecordingError as error:
-            self._title.setText(printable(path.name))
-            self._facts.setText(printable(str(error)))
+            self._title.setText(path.name)
+            self._facts.setText(str(error))
             self.pictures.show_recording(None, printable(str(error)))
             self.context.say(notice_of(error))
             return
         self._opened = recording
-        self._title.setText(printable(recording.path.name))
+        self._title.setText(recording.path.name)
         if recording.path != path:
             # It was finished since it was listed.
             self._wanted = recording.path
@@ -341,7 +341,6 @@ class FilesPage(Page):
 
     def _viewer(self) -> QWidget:
         self._title = ElidedLabel("No recording is open")
-        self._title.setTextFormat(Qt.TextFormat.PlainText)
         self._title.setProperty("rank", "title")
         self._facts = SentenceLabel("Choose one in the list above.", rank="second")
         self._view = ElidedLabel()

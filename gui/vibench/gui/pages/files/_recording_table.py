@@ -23,7 +23,7 @@ from vibench.acquisition import printable
 from vibench.analysis.live import THUMBNAIL_COLUMNS, Thumbnail
 
 from ...forms import Choice
-from ...widgets import Theme, moment_text, offer_copies, paint_hint
+from ...widgets import Theme, moment_text, offer_copies, paint_hint, plain_tip
 from ._file_words import duration_text, size_text, state_text
 from ._listing import ListedCampaign, ListedRecording
 
@@ -158,7 +158,7 @@ class RecordingModel(QAbstractTableModel):
                 content = self._picture(entry.path)
             case Qt.ItemDataRole.ToolTipRole:
                 said = (str(entry.path), entry.said.reason, entry.said.notes)
-                content = "\n".join(map(printable, filter(None, said)))
+                content = plain_tip("\n".join(map(printable, filter(None, said))))
             case Qt.ItemDataRole.TextAlignmentRole if column in _NUMBERS:
                 content = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.AccessibleTextRole:
