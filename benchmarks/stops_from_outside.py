@@ -1,15 +1,17 @@
 """Is the generator's terminal silent after every stop, whatever the state, the condition and the cause?
 
     python benchmarks/stops_from_outside.py --seed 42 --count 300 --shard 1/2 --save stops_1.jsonl
+    python benchmarks/stops_from_outside.py --only window idle --seed 42 --save windows.jsonl
     python benchmarks/stops_from_outside.py --dead-man --seed 42 --count 60 --save kills.jsonl
     python benchmarks/stops_from_outside.py --sum stops_*.jsonl
 
 This process is the laboratory: the virtual rig on the wall's clock, and a witness at the generator's
 terminal. What drives is another process, which reaches the rig as it reaches real instruments: `vibench
-measure` on a terminal of its own, or the engine of a window. A cell is one run of its own process: it is
-brought into a state, the condition is made, the cause happens, and the witness waits for silence. Counted is
-from Enter: `vibench stop` is the installed command. Cells are drawn by the seed and written to ``--save`` one
-by one; those that stand there are not measured again. Linux only; two conditions need a C compiler.
+measure` on a terminal of its own, the window (offscreen), or another process that attends an engine. A cell
+is one run of its own process: it is brought into a state, the condition is made, the cause happens, and the
+witness waits for silence. Counted is from Enter: `vibench stop` is the installed command. Cells are drawn by
+the seed and written to ``--save`` one by one; those that stand there are not measured again. Linux only; two
+conditions need a C compiler.
 """
 
 import argparse
@@ -26,7 +28,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, astuple, dataclass
 from datetime import UTC, datetime
 from itertools import product
 from pathlib import Path
@@ -255,9 +257,9 @@ CAUSES: dict[str, tuple[Happening, float, tuple[str, ...]]] = {
     "stop --level off": (stop_by_command("off"), BLOCK_S + MARGIN_S + ENTER_S, SUBJECTS),
     "Ctrl-C once": (lambda each: each.type(b"\x03"), BLOCK_S + RAMP_S + MARGIN_S, ("measure",)),
     "Ctrl-C twice": (press_twice, BLOCK_S + RAMP_S + MARGIN_S, ("measure",)),
-    "window killed": (lambda each: each.process.kill(), WITHIN_ABORT_S, ("engine",)),
+    "window killed": (lambda each: each.process.kill(), WITHIN_ABORT_S, ("engine", "window")),
     "viewer gone": (
-        lambda each: each.process.send_signal(signal.SIGSTOP), 2.55 + WITHIN_ABORT_S, ("engine",)
+        lambda each: each.process.send_signal(signal.SIGSTOP), 2.55 + WITHIN_ABORT_S, ("engine", "window")
     ),
     "limit passed": (
         lambda each: each.virtual.faults.turn_amplifier_gain(40.0), RAMP_S + BLOCK_S + WITHIN_ABORT_S,
@@ -399,7 +401,7 @@ def kill_cells() -> list[Cell]:
 
 
 def drive(subject: str, rig_path: str, knobs: str, folder: str) -> None:
-    """Be the process that drives: `vibench measure`, or a window with its engine."""
+    """Be the process that drives: `vibench measure`, the window, or another one that attends an engine."""
     rig = Rig.model_validate_json(Path(rig_path).read_text())
     campaign = Path(folder).with_suffix(".toml")
     plan = Campaign.model_validate(PLAN)
@@ -409,17 +411,51 @@ def drive(subject: str, rig_path: str, knobs: str, folder: str) -> None:
         save_toml(rig, bench)
         given = ["--bench", str(bench), "--knobs", knobs, "--out", folder, "--check", "waived"]
         os.execv(VIBENCH, [VIBENCH, "measure", str(campaign), *given])
+    sheet = load_toml(Path(knobs), KnobSheet)
+    request = CampaignRequest(campaign=plan, folder=Path(folder), check=CheckRule.WAIVED)
+    if subject == "window":
+        show_window(rig, sheet, request)
     with start_engine() as engine:
         attendant = Attendant(engine.address)
-        engine.client.open(rig, load_toml(Path(knobs), KnobSheet))
+        engine.client.open(rig, sheet)
         while engine.client.status().state is EngineState.OPENING:
             attendant.live()
             time.sleep(0.02)
-        engine.client.arm_request(CampaignRequest(campaign=plan, folder=Path(folder), check=CheckRule.WAIVED))
+        engine.client.arm_request(request)
         engine.client.start()
         while True:
             attendant.live()
             time.sleep(0.02)
+
+
+def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
+    """Let the window open, arm and start, and stay until it is killed."""
+    os.environ["QT_QPA_PLATFORM"] = "offscreen"
+    from PySide6.QtCore import QTimer  # noqa: PLC0415 - of this subject only
+
+    from vibench.gui.page import AppContext, Settings  # noqa: PLC0415
+    from vibench.gui.window._open_window import application  # noqa: PLC0415
+    from vibench.gui.window._page_catalogue import PAGES  # noqa: PLC0415
+    from vibench.gui.window._window import Window  # noqa: PLC0415
+
+    app = application(["vibench"])
+    window = Window(AppContext(Settings(request.folder.with_suffix(".ini"))), PAGES)
+    window.show()
+    bridge = window.context.bridge
+    bridge.open(rig, sheet)
+    steps = {
+        EngineState.READY: lambda: bridge.arm(request),
+        EngineState.ARMED: lambda: bridge.order(EngineClient.start),
+    }
+
+    def go_on() -> None:
+        if bridge.state in steps:
+            steps.pop(bridge.state)()
+
+    timer = QTimer()
+    timer.timeout.connect(go_on)
+    timer.start(20)
+    app.exec()
 
 
 def compiled_shim(folder: Path) -> Path | None:
@@ -436,6 +472,7 @@ def campaign(options: argparse.Namespace, folder: Path) -> Iterable[Found]:
     number, count = (int(each) for each in options.shard.split("/"))
     chooser = random.Random(options.seed)
     cells = kill_cells() if options.dead_man else stop_cells()
+    cells = [each for each in cells if {*options.only} <= {*astuple(each)}]
     chooser.shuffle(cells)
     chosen = [(at, cell, chooser.uniform(0.0, 0.3)) for at, cell in enumerate(cells[: options.count])]
     done = {json.loads(line)["number"] for line in _lines(options.save)}
@@ -505,6 +542,7 @@ def main() -> None:
     parser.add_argument("--shard", default="1/1")
     parser.add_argument("--save", type=Path, default=Path("stops.jsonl"))
     parser.add_argument("--dead-man", action="store_true", help="kill runs whose drive ends by itself")
+    parser.add_argument("--only", nargs="+", default=(), metavar="WORD", help="cells that have these words")
     parser.add_argument("--sum", type=Path, nargs="+")
     parser.add_argument("--as", dest="drive", nargs=4, help=argparse.SUPPRESS)
     options = parser.parse_args()
