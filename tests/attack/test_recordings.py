@@ -65,11 +65,13 @@ def test_a_broken_recording_is_answered_by_a_sentence(count):
 
 
 @pytest.mark.skipif(sys.platform != "linux" or shutil.which("cc") is None, reason="preloads a C library")
-@pytest.mark.slow
+@pytest.mark.parametrize(
+    "faults", [pytest.param(9, marks=pytest.mark.attack), pytest.param(200, marks=pytest.mark.slow)]
+)
 @pytest.mark.timeout(7200)
-def test_what_exact_system_calls_do_loses_nothing_and_records_nothing_twice():
+def test_what_exact_system_calls_do_loses_nothing_and_records_nothing_twice(faults):
     tally, number, kinds = Tally("calls"), 0, recordings_kills.CALL_KINDS
-    while sum(tally.codes.get(kind, 0) for kind in kinds) < 200:
+    while sum(tally.codes.get(kind, 0) for kind in kinds) < faults:
         tally.add(recordings_kills.attack_calls(Shard(seed=42, count=number + 1, part=number)))
         number += 1
     assert tally.findings == []

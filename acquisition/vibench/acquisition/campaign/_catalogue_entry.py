@@ -36,7 +36,7 @@ class CatalogueEntry:
     """As in `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
     reason: str
     verdict: str
-    """``good``, or what is to be minded: ended early, near full scale, samples lost."""
+    """``good``, or what to look at: ended early, near full scale, samples lost."""
     started_utc: str = ""
     origin: str = ""
     kind: str = ""
@@ -129,17 +129,17 @@ def _number(value: object) -> float | None:
 
 
 def _verdict(recording: Recording, seal: SealCheck) -> str:
-    minded = [f"damaged: {seal.sentence}"] if seal.state is SealState.DAMAGED else []
+    concerns = [f"damaged: {seal.sentence}"] if seal.state is SealState.DAMAGED else []
     if recording.state is not RecordingState.COMPLETE:
-        minded.append(recording.state.value)
+        concerns.append(recording.state.value)
     if seal.state in (SealState.UNSEALED, SealState.SEAL_GONE):
-        minded.append("no seal" if seal.state is SealState.UNSEALED else "seal gone")
+        concerns.append("no seal" if seal.state is SealState.UNSEALED else "seal gone")
     if seal.state is SealState.OTHER_KEY:
-        minded.append("not signed with the key given")
+        concerns.append("not signed with the key given")
     roles = ", ".join(dict.fromkeys(each.channel for each in recording.overloads))
     if roles:
-        minded.append(f"near full scale: {roles}")
+        concerns.append(f"near full scale: {roles}")
     lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
     if lost:
-        minded.append(f"{lost} samples lost")
-    return "; ".join(minded) or GOOD
+        concerns.append(f"{lost} samples lost")
+    return "; ".join(concerns) or GOOD

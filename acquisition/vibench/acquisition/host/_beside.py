@@ -1,4 +1,4 @@
-"""What may hang, as a folder of a network does, is done beside whoever must not wait."""
+"""A background thread for jobs that may hang, such as writing to a network folder."""
 
 from collections import deque
 from collections.abc import Callable
@@ -9,38 +9,37 @@ from ..stopping import MEMORY_RESERVE
 
 
 class Beside:
-    """Does one thing after the other in a standing thread, which exists before anything drives.
+    """Runs jobs in order in one thread, which is started before anything drives.
 
-    A thread that is started when memory is exhausted may never report that it runs, and CPython waits for
-    that for ever.
+    CPython waits forever for a new thread that runs out of memory while it starts.
     """
 
     def __init__(self, name: str) -> None:
         self._jobs: deque[Callable[[], None]] = deque()
         self._is_busy = self._is_closing = False
         self._changed = Condition()
-        with suppress(RuntimeError):  # the system gives no more threads: what hangs no run is not done
+        with suppress(RuntimeError):  # the system gives no more threads: the jobs are left out
             Thread(target=self._run, name=name, daemon=True).start()
 
     @property
     def is_busy(self) -> bool:
-        """Whether it is still at something."""
+        """Whether a job is running or queued."""
         return self._is_busy
 
     def do(self, job: Callable[[], None]) -> None:
-        """Do this after all else; whoever asks does not wait. ``job`` raises nothing but MemoryError."""
+        """Queue a job and return at once. ``job`` raises nothing except MemoryError."""
         with self._changed:
             self._jobs.append(job)
             self._is_busy = True
             self._changed.notify_all()
 
     def wait(self, longest_s: float) -> None:
-        """Wait until all is done, but no longer."""
+        """Wait until every job is done, or for ``longest_s``."""
         with self._changed:
             self._changed.wait_for(lambda: not self._is_busy, longest_s)
 
     def close(self, longest_s: float) -> None:
-        """End the thread after all that is asked for; wait for that, but no longer."""
+        """End the thread after the last queued job; wait for that at most ``longest_s``."""
         with self._changed:
             self._is_closing = True
             self._changed.notify_all()

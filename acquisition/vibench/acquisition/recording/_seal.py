@@ -1,9 +1,9 @@
 """The seal of a recording: a checksum of everything in it, made at its end, by which any change shows.
 
 A manifest lists every group and dataset with two checksums: of its attributes, type and shape, and of its
-data. The SHA-256 of the manifest is the seal. Whoever gives a key has it signed too (HMAC, RFC 2104): a seal
-alone shows damage, since who can change the file can make a new one; a signature cannot be made without the
-key. ``docs/recording-format.md`` shows how a stranger checks it. Reasons: docs/decisions/0031-seals.md.
+data. The SHA-256 of the manifest is the seal. With a key it is signed too (HMAC, RFC 2104). A seal alone
+shows damage: anyone who can change the file can also make a new seal, but no signature without the key.
+``docs/recording-format.md`` shows how to check it without this package; reasons: decision 0031.
 """
 
 import hashlib
@@ -50,7 +50,7 @@ ChannelStates = dict[str, list["Hash"]]
 
 
 class SealDepth(StrEnum):
-    """How much of a recording is held against its seal."""
+    """How much of a recording is checked against its seal."""
 
     QUICK = "quick"
     """All attributes, texts and tables; no samples."""
@@ -58,7 +58,7 @@ class SealDepth(StrEnum):
 
 
 class SealState(StrEnum):
-    """What a recording's seal says."""
+    """Result of the check of a seal."""
 
     INTACT = "intact"
     DAMAGED = "damaged"
@@ -70,12 +70,12 @@ class SealState(StrEnum):
     UNFINISHED = "unfinished"
     """Still being recorded, or cut off: it is sealed when it is finished or recovered."""
     OTHER_KEY = "other_key"
-    """As it was sealed, but not with the key that was given."""
+    """Unchanged, but not signed with the key that was given."""
 
 
 @dataclass(frozen=True)
 class SealCheck:
-    """What was found of a seal."""
+    """Result of the check of a seal, with its sentence."""
 
     state: SealState
     sentence: str
@@ -84,14 +84,14 @@ class SealCheck:
 
 
 class SealKey:
-    """The secret that a user gives: whoever has it can sign, and tell what was signed with it."""
+    """A user's secret, which signs seals and checks signatures."""
 
     def __init__(self, secret: bytes) -> None:
         self._secret = secret
 
     @property
     def name(self) -> str:
-        """Tells keys apart, and does not give them away."""
+        """Public name of the key, derived from the secret."""
         return self.signature(b"name of this key")[:16]
 
     def signature(self, text: bytes) -> str:
@@ -144,9 +144,9 @@ def write_seal(file: h5py.File, known: Mapping[str, str], key: SealKey | None) -
 def check_seal(
     file: h5py.File, depth: SealDepth, key: SealKey | None, states: ChannelStates | None = None
 ) -> SealCheck:
-    """Hold a finished recording against its seal; ``states`` is filled with those of rows of numbers.
+    """Check a finished recording against its seal; fills ``states`` for datasets of numbers.
 
-    Without a seal the samples are held against the checksum of their channel.
+    Without a seal the samples are checked against the checksum of their channel.
     """
     if layout.SEAL not in file:
         return _without_seal(file, depth, key)
@@ -163,11 +163,11 @@ def check_seal(
     if differing:
         more = f" and {len(differing) - 3} more" if len(differing) > 3 else ""
         return SealCheck(SealState.DAMAGED, f"not as it was sealed: {', '.join(differing[:3])}{more}", seal)
-    return _judged_signature(text, [str(marks.get(each, "")) for each in (HMAC, KEY_ID)], key, seal)
+    return _signature_check(text, [str(marks.get(each, "")) for each in (HMAC, KEY_ID)], key, seal)
 
 
 def seal_of(file: h5py.File) -> str:
-    """Give the seal that a recording carries, unchecked; empty without one."""
+    """Return the seal of a recording, unchecked; empty without one."""
     return str(read_attributes(file[layout.SEAL]).get(SHA256, "")) if layout.SEAL in file else ""
 
 
@@ -177,7 +177,7 @@ def seal_result(group: h5py.Group, key: SealKey | None) -> None:
 
 
 def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
-    """Hold a result against its own seal."""
+    """Check a result against its own seal."""
     try:
         marks = read_attributes(group)
         said, signature, key_id = (str(marks.get(each, "")) for each in RESULT_MARKS)
@@ -190,7 +190,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
         return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
     if _sha256(text.encode()) != said:
         return SealCheck(SealState.DAMAGED, "not as it was sealed", said)
-    return _judged_signature(text, [signature, key_id], key, said)
+    return _signature_check(text, [signature, key_id], key, said)
 
 
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
@@ -205,7 +205,7 @@ def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
 
 
 def _sealed_objects(file: h5py.File) -> Iterator[tuple[str, h5py.HLObject]]:
-    """Everything but the seal itself and what is added later."""
+    """Iterate over all objects except the seal and the results, which are added later."""
     for path, item in walk(file):
         if path.split("/")[1] not in (layout.SEAL, layout.RESULTS):
             yield path, item
@@ -260,7 +260,7 @@ def _data_sha256(item: h5py.HLObject, states: list["Hash"] | None = None) -> str
 
 
 def _data_or_nothing(item: h5py.Dataset, states: list["Hash"]) -> str:
-    """Give a word that is no checksum where data cannot be read."""
+    """Return a checksum, or a word that is none where data cannot be read."""
     try:
         return _data_sha256(item, states)
     except OSError:
@@ -275,12 +275,12 @@ def _result_text(group: h5py.Group) -> str:
 
 
 def is_of_a_sealing_version(file: h5py.File) -> bool:
-    """Whether a finished file has what every version writes that seals, and no earlier one."""
+    """Whether a finished file was written by a version that seals every recording."""
     return not {layout.SEAL, layout.OVERVIEW, layout.VIEW}.isdisjoint(file)
 
 
 def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> SealCheck:
-    """Say what is left to go by: the channels' own checksums, which hold no scale, table or plan."""
+    """Check the channels' own checksums, which cover no scale, table or plan."""
     roles = str(read_attributes(file).get("roles", "")).split() if depth is SealDepth.WHOLE else ()
     try:
         other = [role for role in roles if _data_sha256(file[role]) != read_attributes(file[role])["sha256"]]
@@ -306,13 +306,13 @@ def _marks(text: str, key: SealKey | None, names: tuple[str, str, str]) -> dict[
 
 
 def _unsealed(excuse: str, key: SealKey | None) -> SealCheck:
-    """Whoever takes away a seal could say what they like: where a key is given, that is no excuse."""
+    """Report a missing seal; with a key it is an error, because a forger could have removed the seal."""
     if key is None:
         return SealCheck(SealState.UNSEALED, f"it has no seal: {excuse}", "")
     return SealCheck(SealState.OTHER_KEY, f"it has no seal, and none by the key given ({key.name})", "")
 
 
-def _judged_signature(text: str, signed: list[str], key: SealKey | None, seal: str) -> SealCheck:
+def _signature_check(text: str, signed: list[str], key: SealKey | None, seal: str) -> SealCheck:
     signature, key_id = signed
     if key is None:
         also = f"; signed with the key {key_id}, which was not given" if key_id else ""

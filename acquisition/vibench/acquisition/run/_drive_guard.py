@@ -1,4 +1,4 @@
-"""Silences a drive whose run stands still, whatever holds the run up."""
+"""Watches a run, and silences its drive when the run reads no more blocks."""
 
 from collections.abc import Callable
 from time import monotonic
@@ -9,26 +9,26 @@ from ._acquisition_loop import BLOCK_S
 from ._drive import Drive
 
 STANDSTILL_BLOCKS = 50
-"""A run is silenced that has read nothing for so many blocks: half of what a converter's buffer holds."""
+"""Blocks without reading after which a drive is silenced: half of what a converter's buffer holds."""
 STOPPED_BLOCKS = 15
-"""The same once somebody has asked for a stop."""
+"""The same after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
-"""A round that took longer was not the run's fault: the whole process stood still or waited."""
+"""Longest time between two looks that counts [s]: in a longer one the whole process was halted."""
 
 
 class DriveGuard(ClosedOnLeaving):
-    """Has all that silencing needs before the drive begins: a thread, memory, and the request to end.
+    """Holds what silencing needs before the drive begins: a thread, memory, and the request to end.
 
-    A run tells it when its drive begins, and of every block. From then on the drive counts as on, for whoever
-    stops this process, until its output was read back as off.
+    The run calls it when its drive begins and after every block. From then on a stop of this process counts
+    the drive as on, until its output was read back as off.
     """
 
     def __init__(
         self, drive: Drive, switch: StopSwitch, is_heard: Callable[[], bool] = lambda: False
     ) -> None:
-        """``is_heard``: whether the drive was still measured after its output was told to be off.
+        """``is_heard``: whether the drive was still measured after its output was switched off.
 
-        Raises AcquisitionError when there is no memory to be held back, or no thread.
+        Raises AcquisitionError when the system gives no memory for the reserve, or no thread.
         """
         MEMORY_RESERVE.hold()
         self._drive = drive
@@ -52,7 +52,7 @@ class DriveGuard(ClosedOnLeaving):
         DRIVES_ON.note_advance()
 
     def silence(self) -> None:
-        """Silence the drive as `Drive.silence` does; where memory is short, with what was held back."""
+        """Silence the drive with `Drive.silence`; where memory is exhausted, release the reserve first."""
         self._is_leaving = True
         try:
             self._drive.silence()
@@ -63,7 +63,7 @@ class DriveGuard(ClosedOnLeaving):
         self._confirm()
 
     def close(self) -> None:
-        """End the watch. Legal at any time; a drive whose silence nobody has confirmed stays known as on."""
+        """End the watch. Legal at any time; a drive whose silence is not confirmed still counts as on."""
         self._watchdog.close()
 
     def _look(self) -> None:
