@@ -39,20 +39,9 @@ def need_extra(extra: str) -> None:
 
 
 def need_space(megabytes: int, advice: str = "") -> None:
-    """Make sure that this process may have so much address space: libraries hang or abort where it runs out.
+    """Require address space for the libraries and their threads [MB]: they hang or abort where it runs out.
 
-    Parameters
-    ----------
-    megabytes
-        Address space that the libraries and their threads take [MB].
-    advice
-        What else to do where there is less, as a sentence.
-
-    Raises
-    ------
-    ConfigurationError
-        When the limit is lower.
-
+    Raises ConfigurationError where the limit is lower; ``advice`` is its last sentence.
     """
     if sys.platform == "win32":
         return
