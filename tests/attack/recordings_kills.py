@@ -221,7 +221,7 @@ def attacked(
                 continue
             if ended["code"] != -signal.SIGKILL:
                 tally.count(f"not reached, exit {ended['code']}")
-                said += [ended["err"]] if ended["code"] else []
+                said += [f"run {attempt} ended with {ended['code']}: {ended['err']}"] if ended["code"] else []
                 break
             tally.count(kind, ended["took_s"])
         kept = kept_in(out) if out.exists() else Kept({}, {})
