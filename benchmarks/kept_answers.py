@@ -62,7 +62,7 @@ def answers(path: Path) -> dict[str, float | str | None]:
         said["motion"] = WITHHELD if kind == "undecided" else kind
     if hasattr(analysis, "collisions"):
         said["collisions"] = "collides" if analysis.collisions.regions else "does not collide"
-        if getattr(analysis.collisions, "is_too_fast", np.zeros(1)).any():
+        if getattr(analysis.collisions, "too_fast_hz", ()):
             said["collisions"] = WITHHELD
     return said
 

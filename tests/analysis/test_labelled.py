@@ -191,6 +191,8 @@ PURE_HERE = {
     "DwellResponse.is_clear",
     "DwellResponse.slow_change",
     "SteppedResponse.slow_change",
+    "SweepResponse.linear_residual",
+    "SweepResponse.steady_over_swept",
     "Divergence.size",
     "Divergence.last",
     "Collisions.samples",

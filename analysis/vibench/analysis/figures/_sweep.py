@@ -141,12 +141,11 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
 def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
     """Say where the masses collided, with bounds, and what the simulation says."""
     found = analysis.response
-    rate = found.sweep_rate_hz_per_s
     amplitudes = 1e6 * found.drive_amplitude_m
     said = [
         (
             f"Sweep at {analysis.excitation.amplitude_vpp:g} Vpp from {found.frequency_hz[0]:.0f} to "
-            f"{found.frequency_hz[-1]:.0f} Hz at {rate:.3g} Hz/s; the base moved by A0 = "
+            f"{found.frequency_hz[-1]:.0f} Hz, {analysis.rate_text}; the base moved by A0 = "
             f"{amplitudes[0]:.3g} µm at the beginning and {amplitudes[-1]:.3g} µm at the end."
         ),
         f"Grey: {regions_text(analysis.collisions)}.",
@@ -171,8 +170,10 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
 
 def regions_text(found: Collisions) -> str:
     """Say in words where a sweep collided."""
+    unclear = " and ".join(f"from {first:.1f} to {last:.1f} Hz" for first, last in found.too_fast_hz)
+    unclear = f"; {unclear} the sweep was too fast to tell ringing from collisions" if unclear else ""
     if not found.regions:
-        return "the masses did not collide"
+        return f"no collisions were found{unclear}" if unclear else "the masses did not collide"
     parts = []
     for region in found.regions:
         start, stop = region.start, region.stop
@@ -183,7 +184,7 @@ def regions_text(found: Collisions) -> str:
         first = "the sweep's beginning" if region.reaches_start else begin
         last = "the sweep's end" if region.reaches_stop else end
         parts.append(f"from {first} to {last}")
-    return f"the masses collide {' and '.join(parts)}"
+    return f"the masses collide {' and '.join(parts)}{unclear}"
 
 
 def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, ...]:

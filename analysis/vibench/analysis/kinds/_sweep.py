@@ -9,7 +9,7 @@ from vibench.acquisition.recording import SegmentLabel
 from ..comparison import sweep_traces
 from ..frequency_response import FrequencyResponseRequest
 from ..model import Draw, SimulatedChannels, SweepOverlay, sweep_endings, sweep_overlay, sweep_quantities
-from ..recordings import Channels, RecordingFacts, measurement_checks
+from ..recordings import Channels, RecordingFacts, known_specimen, measurement_checks
 from ..sine import (
     CollisionRegion,
     Collisions,
@@ -29,7 +29,7 @@ from ._analysis_kind import AnalysisKind, Json
 def _analyse(
     facts: RecordingFacts, channels: Channels, plan: Sweep, _: FrequencyResponseRequest
 ) -> SweepAnalysis:
-    response, picture = measured_sweep(channels, plan)
+    response, picture = measured_sweep(channels, plan, known_specimen(facts.bench))
     colliding = collisions(response)
     jumps = smooth_jumps(response, colliding)
     checks = (*measurement_checks(facts), played_check(response, plan))
@@ -37,7 +37,7 @@ def _analyse(
 
 
 def _draw(analysis: SweepAnalysis, channels: SimulatedChannels) -> Draw[SweepResponse]:
-    found, _ = measured_sweep(channels, analysis.excitation)
+    found, _ = measured_sweep(channels, analysis.excitation, known_specimen(analysis.facts.bench))
     colliding = collisions(found)
     impacts = channels.played_impacts(SegmentLabel.SWEEP)
     return Draw(found, sweep_quantities(found, colliding), sweep_endings(colliding), *impacts)
@@ -55,7 +55,9 @@ def _measured(analysis: SweepAnalysis) -> Json:
         "largest_response_i": float(np.max(found.response_i)),
         "largest_response_ii": float(found.response_ii[top]),
         "largest_response_ii_at_hz": float(found.frequency_hz[top]),
+        "steady_over_swept_linear": found.steady_over_swept,
         "collision_regions": _regions(analysis.collisions),
+        "collisions_not_determined_hz": analysis.collisions.too_fast_hz,
         "jumps": [
             {
                 **named(each, "frequency_hz", "lower_hz", "upper_hz", "time_s", "before", "after", "decibel"),

@@ -25,6 +25,7 @@ from ._checks import (
 from ._facts import (
     RecordingFacts as RecordingFacts,
     described_specimen as described_specimen,
+    known_specimen as known_specimen,
     plan_of as plan_of,
     recording_facts as recording_facts,
     specimen_of as specimen_of,

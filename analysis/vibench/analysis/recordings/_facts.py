@@ -133,6 +133,11 @@ def specimen_of(bench: Mapping[str, Any]) -> Specimen:
     return described_specimen(bench).specimen()
 
 
+def known_specimen(bench: Mapping[str, Any]) -> Specimen | None:
+    """Build the specimen that the bench configuration describes; None where it says nothing."""
+    return specimen_of(bench) if bench.get("specimen") else None
+
+
 def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
     """Give the specimen that the bench configuration describes; the paper's where it says nothing.
 

@@ -33,8 +33,8 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
     """Say where the masses collide, measured and simulated."""
     plan = result.analysis.excitation
     yield (
-        f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz: "
-        f"{regions_text(result.analysis.collisions)}."
+        f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz, "
+        f"{result.analysis.rate_text}: {regions_text(result.analysis.collisions)}."
     )
     if result.laid is not None:
         yield f"Simulated: {regions_text(result.laid.collisions)}{agreement_text(result.laid)}."

@@ -130,7 +130,8 @@ def _collision_rows(result: SweepResult) -> Iterator[tuple[str, ...]]:
     measured = result.analysis.collisions.regions
     simulated = () if result.laid is None else result.laid.collisions.regions
     if not measured and not simulated:
-        yield name, "no collision", ABSENT, ABSENT, ABSENT, _PAPER_COLLISION
+        found = "not determined" if result.analysis.collisions.too_fast_hz else "no collision"
+        yield name, found, ABSENT, ABSENT, ABSENT, _PAPER_COLLISION
     for number in range(max(len(measured), len(simulated))):
         cells = [name]
         for regions in (measured, simulated):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from ..errors import InvalidRequest
 from ..signals import Flags, Reals
@@ -14,13 +15,14 @@ _NOISE_FACTOR = 4.0
 """Residual over noise: an interval's rms of hundreds of samples scatters by a few percent only."""
 _DISTORTION = 0.02
 """Residual over order 1 that a smooth motion may have: harmonics above the third of amplifier and shaker."""
-_RINGS_ON = 0.003
-"""The same of a fast sweep, per hertz a second: each step of its frequency rings the modes nearby.
-
-0.0022 to 0.0025 in linear motion of the paper's specimen, at 18 to 60 Hz/s alike.
-"""
-_RINGS_AT_MOST = 0.2
-"""What collides leaves more, however fast the sweep."""
+_RINGING = 2.0
+"""Residual over that of the specimen without contact in the same sweep, which its description may miss."""
+_TOO_FAST = 0.2
+"""Residual over order 1 that collisions exceed in most intervals: ringing that may be more can hide them."""
+_IMPACTS = 0.1
+"""Orders 2 and 3 over order 1 of impacts; ringing leaves at most 0.05."""
+_ENOUGH = 0.25
+"""Part of a run in which impacts show themselves so, where no specimen tells how it rings."""
 _SMOOTH_AT_MOST = 0.1
 """A tenth of order 1 unexplained is no smooth motion, whatever the quietest intervals of a sweep show."""
 _QUIET_QUANTILE = 0.1
@@ -82,6 +84,9 @@ class Collisions(Labelled):
     is_unexplained: Flags
     """Intervals that leave more than the sensors' noise and distortion explain, shape (intervals,): what
     rattles from a sweep's beginning to its end passes for the bench's own noise."""
+    too_fast_hz: tuple[tuple[float, float], ...]
+    """Ends of stretches, in the order of time, in which the specimen may ring as much as collisions would:
+    whether the masses collide there is not determined."""
     noise_rms: float
     """Noise that the threshold allows for [m/s]."""
 
@@ -89,36 +94,46 @@ class Collisions(Labelled):
 def collisions(sweep: SweepResponse) -> Collisions:
     """Find where the motion stops being a smooth, slowly varying sine.
 
-    Impacts break the motion: they leave velocity that no order of the drive explains. An interval
-    collides when this residual is above 4 times the noise and above 2 % of order 1, or above what rings of
-    its steps where a sweep is faster than 7 Hz/s. The noise is the larger of what the sixth difference of
-    the samples shows and of the quietest tenth of the sweep (as far as that may be smooth at all). Single
-    intervals, such as drop-outs of the laser, are outvoted by their neighbourhood.
+    Impacts break the motion: they leave velocity that no order of the drive explains. So does a fast sweep,
+    because resonances that it has passed ring on. An interval collides when this residual is above 4 times
+    the noise, above 2 % of order 1, and above twice that of the specimen without contact under the recorded
+    base motion. The noise is the larger of what the sixth difference of the samples shows and of the quietest
+    tenth of the sweep (as far as that may be smooth at all). Single intervals, such as drop-outs of the laser,
+    are outvoted by their neighbourhood. Where orders 2 and 3 show impacts, they do not ring; where no
+    specimen is known, they must.
     """
     residual = sweep.velocity.residual_rms
     fundamental = np.abs(sweep.velocity.order(1.0))
     noise = _noise(sweep, residual, fundamental)
-    ringing = min(_RINGS_ON * abs(sweep.sweep_rate_hz_per_s), _RINGS_AT_MOST)
-    smooth = max(_DISTORTION, ringing) * fundamental
-    threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
-    above = residual > threshold
     votes = max(1, round(_VOTE_S / sweep.interval_s))
-    if votes >= above.size:
+    if votes >= residual.size:
         raise InvalidRequest(
-            f"the sweep has {above.size} intervals of {sweep.interval_s:g} s; finding collisions needs "
+            f"the sweep has {residual.size} intervals of {sweep.interval_s:g} s; finding collisions needs "
             f"more than {votes}"
         )
-    runs = _merged(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s))
-    trimmed = [_trimmed(above, first, last, votes) for first, last in runs]
+    ringing = _RINGING * np.nan_to_num(sweep.linear_residual)
+    impacts = np.hypot(*(np.abs(sweep.velocity.order(each)) for each in (2.0, 3.0))) > _IMPACTS * fundamental
+    # Within a vote: resonances may lie a little beside where the specimen's description puts them.
+    most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))
+    smooth = np.maximum(_DISTORTION, most) * fundamental
+    threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
+    above = residual > threshold
+    is_known = bool(np.isfinite(sweep.linear_residual).all())
     inside = np.zeros(above.size, dtype=np.bool_)
-    for first, last in trimmed:
-        inside[first : last + 1] = True
+    regions = []
+    for run in _merged(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s)):
+        first, last = _trimmed(above, *run, votes)
+        if is_known or np.mean(impacts[first : last + 1]) >= _ENOUGH:
+            regions.append(_region(sweep, residual / threshold, first, last))
+            inside[first : last + 1] = True
+    hz, is_unclear = sweep.frequency_hz, _majority(above | (ringing > _TOO_FAST), votes) & ~inside
     return Collisions(
-        regions=tuple(_region(sweep, residual / threshold, first, last) for first, last in trimmed),
+        regions=tuple(regions),
         residual_rms=residual,
         threshold=threshold,
         is_colliding=inside,
         is_unexplained=residual > np.hypot(_NOISE_FACTOR * sweep.noise_rms, smooth),
+        too_fast_hz=tuple((float(hz[first]), float(hz[last])) for first, last in _runs(is_unclear)),
         noise_rms=noise,
     )
 

@@ -3,6 +3,7 @@
 The phase of a recorded sine drive: the clock that a sweep and a dwell are analysed by.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
@@ -12,7 +13,15 @@ import numpy as np
 from scipy import fft
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
-from ..signals import Decimator, Quantity, Reals, converted_signal, decimation_factor, disturbed_samples
+from ..signals import (
+    Complexes,
+    Decimator,
+    Quantity,
+    Reals,
+    converted_signal,
+    decimation_factor,
+    disturbed_samples,
+)
 from ..tables import Labelled
 from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_lift, tracked_orders
 
@@ -99,6 +108,9 @@ _BAND_BELOW = 0.25
 """Displacement is kept down to this part of the lowest drive frequency: half orders pass, drift does not."""
 _BAND_ABOVE = 0.3
 """... and up to this part of the decimated rate, where the decimation is still flat at the band's edge."""
+_LINEAR_ABOVE = 5.5
+"""Linear motion is computed up to this part of the highest drive frequency: its order 5 is within."""
+_STEADY_POINTS = 10_001
 _ROOM = 1.1
 """Intervals are longer than orders need by this much: the first one may begin a little below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
@@ -148,12 +160,20 @@ class SweepResponse(Labelled):
     """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
     noise_rms: float
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
+    linear_residual: Reals
+    """Residual over order 1 of the specimen without contact in this sweep, NaN where no specimen is known."""
+    steady_over_swept: float
+    """Largest Response II of the specimen without contact, under steady sines over in this sweep; or NaN."""
     interval_s: float
 
     @property
     def sweep_rate_hz_per_s(self) -> float:
         """Mean rate of the sweep; negative downwards."""
         return float(np.polyfit(self.time_s, self.frequency_hz, 1)[0])
+
+
+Transmission = Callable[[Reals], Complexes]
+"""Displacement of m0 over that of the base against frequency [Hz], both of shape (lines,)."""
 
 
 class SweepSums:
@@ -229,18 +249,21 @@ class SweepSums:
         )
         self._carry = data[count * full :].copy()
 
-    def response(self, *, delay_s: float = 0.0) -> SweepResponse:
+    def response(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweepResponse:
         """Analyse everything added; the sums take no more blocks afterwards.
 
         Parameters
         ----------
         delay_s
             By how much the response channel lags the base channel [s].
+        linear
+            Transmission of the specimen without contact, which is swept in the same way for comparison.
 
         """
         self._parts.append(self._decimator.finish())
         whole = np.concatenate(self._parts, axis=1)
-        data = whole[:, self._before // self._factor : whole.shape[1] - self._after // self._factor]
+        inside = slice(self._before // self._factor, whole.shape[1] - self._after // self._factor)
+        data = whole[:, inside]
         count = data.shape[1] // self._interval
         extremes = np.concatenate(self._extremes or [np.empty((3, 0))], axis=1)
         upper, lower, noise = extremes[:, :count]
@@ -251,6 +274,13 @@ class SweepSums:
         velocity, base = track(data[_RESPONSE]), track(data[_BASE])
         frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
         noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
+        residual, ratio = np.full(upper.size, np.nan), np.nan
+        if linear is not None:
+            swept = track(self._linear_velocity(whole[_BASE], linear)[inside])
+            residual = swept.residual_rms / np.abs(swept.order(1.0))
+            played_hz = np.linspace(frequency_hz.min(), frequency_hz.max(), _STEADY_POINTS)
+            of_base = np.abs(swept.order(1.0) / base.order(1.0))
+            ratio = float(np.max(np.abs(linear(played_hz))) / np.max(2 * np.pi * frequency_hz * of_base))
         return self._scaled(
             whole[_RESPONSE],
             velocity,
@@ -260,7 +290,20 @@ class SweepSums:
             self._harmonics(data[_RESPONSE], phase),
             noise_density,
             delay_s,
+            (residual, ratio),
         )
+
+    def _linear_velocity(self, base: Reals, linear: Transmission) -> Reals:
+        """Return the velocity of the specimen without contact, under the recorded acceleration of the base."""
+        # Padded, so that what rings after the end does not come before the beginning.
+        padded = fft.next_fast_len(2 * base.size, real=True)
+        frequency_hz = fft.rfftfreq(padded, 1 / self._rate_hz)
+        low_hz, high_hz = _BAND_BELOW * self._low_hz, _LINEAR_ABOVE * self._high_hz
+        kept = np.flatnonzero((frequency_hz > low_hz) & (frequency_hz < high_hz))
+        spectrum = fft.rfft(base, padded)
+        moved = np.zeros_like(spectrum)
+        moved[kept] = spectrum[kept] * linear(frequency_hz[kept]) / (2j * np.pi * frequency_hz[kept])
+        return np.asarray(fft.irfft(moved, padded)[: base.size])
 
     def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
         """Displacement at many orders, in intervals that are long enough to tell them apart."""
@@ -284,6 +327,7 @@ class SweepSums:
         harmonics: tuple[TrackedOrders, Reals],
         noise_density: float,
         delay_s: float,
+        linear: tuple[Reals, float],
     ) -> SweepResponse:
         omega = 2 * np.pi * frequency_hz
         fundamental = ORDERS.index(1.0)
@@ -327,6 +371,8 @@ class SweepSums:
             sd_response_ii=np.abs(ratio) * relative,
             phase_rad=np.angle(ratio),
             noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
+            linear_residual=linear[0],
+            steady_over_swept=linear[1],
             interval_s=self._interval / self._rate_hz,
         )
 

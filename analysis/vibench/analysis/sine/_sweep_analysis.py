@@ -7,6 +7,7 @@ import numpy as np
 
 from vibench.acquisition.plan import HeldSweep, SineSweep
 from vibench.acquisition.recording import SegmentLabel
+from vibench.sim import Specimen, base_transmissibility
 
 from ..errors import NotEnoughData
 from ..recordings import (
@@ -24,6 +25,7 @@ from ._sweep import SweepResponse, SweepSums
 Sweep = SineSweep | HeldSweep
 _BLOCK = 1 << 20
 _RESPONSE = 2
+_LEAD_S = 5.0
 _SPECTROGRAM_ORDER = 3.2
 """A spectrogram shows the drive's third harmonic at the sweep's end."""
 
@@ -39,6 +41,16 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
     """Of Response II, between a smooth motion and another."""
     spectrogram: Spectrogram
     """Of the recorded velocity."""
+
+    @property
+    def rate_text(self) -> str:
+        """How fast the sweep was, and how far its responses are from steady ones where that is known."""
+        text = f"swept at {abs(self.response.sweep_rate_hz_per_s):.3g} Hz/s"
+        more = self.response.steady_over_swept - 1
+        if np.isnan(more) or self.collisions.regions:
+            return text
+        beside = f"{100 * abs(more):.2g} % {'above' if more > 0 else 'below'} the largest of this sweep"
+        return f"{text}; the largest steady Response II of the described linear specimen lies {beside}"
 
 
 def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
@@ -73,8 +85,13 @@ def _is_whole(channels: Channels, first: int, last: int) -> bool:
     return first >= 0 and last <= channels.samples and not np.isnan(channels.read(first, last)).any()
 
 
-def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spectrogram]:
-    """Analyse what there is of a sweep, whichever way it ran, and picture its velocity."""
+def measured_sweep(
+    channels: Channels, sweep: Sweep, specimen: Specimen | None = None
+) -> tuple[SweepResponse, Spectrogram]:
+    """Analyse what there is of a sweep, whichever way it ran, and picture its velocity.
+
+    The ``specimen``, where one is known, is swept without contact for comparison.
+    """
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
     ends = sorted((sweep.start_hz, sweep.stop_hz))
     rate = channels.sample_rate_hz
@@ -84,9 +101,12 @@ def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spe
     reach = min(sums.neighbour_samples, stretch.samples // 4)
     start = stretch.start + (0 if _is_whole(channels, stretch.start - reach, stretch.start) else reach)
     stop = stretch.stop - (0 if _is_whole(channels, stretch.stop, stretch.stop + reach) else reach)
+    # What the specimen still rings of began before the sweep.
+    lead = reach * max(1, min(round(_LEAD_S * rate), start) // max(reach, 1))
+    lead = lead if _is_whole(channels, start - lead, start - reach) else reach
     picture = SpectrogramSums(rate, stretch.samples, highest_hz=highest_hz)
     for begin, end, add in (
-        (start - reach, start, sums.add_neighbour),
+        (start - lead, start, sums.add_neighbour),
         (start, stop, sums.add),
         (stop, stop + reach, sums.add_neighbour),
     ):
@@ -100,7 +120,8 @@ def measured_sweep(channels: Channels, sweep: Sweep) -> tuple[SweepResponse, Spe
                 )
             add(block)
             picture.add(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
-    found = sums.response(delay_s=channels.response_delay_s)
+    linear = None if specimen is None else lambda at_hz: base_transmissibility(specimen, at_hz)[:, 0]
+    found = sums.response(delay_s=channels.response_delay_s, linear=linear)
     sensors = channels.response_gain(found.frequency_hz)
     corrected = replace(
         found,

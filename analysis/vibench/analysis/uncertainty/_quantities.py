@@ -220,6 +220,7 @@ def _largest(
     laid: AbstractOverlay[Any] | None,
 ) -> Iterator[Budget]:
     stated = stated_of(facts.bench)
+    rate = f", swept at {abs(found.sweep_rate_hz_per_s):.3g} Hz/s" if isinstance(found, SweepResponse) else ""
     error, sd = found.noise_error_i, found.sd_response_ii
     for name, values, scatter, source in (
         (RESPONSE_I, found.response_i, error, "noise that lifts a maximum"),
@@ -238,7 +239,7 @@ def _largest(
             own.append(_of_base(float(found.sd_drive_amplitude_m[top]), float(found.drive_amplitude_m[top])))
             if isinstance(found, SweepResponse) and not _ENDS <= top < values.size - _ENDS:
                 own.append(Contribution(Cause.CHANCE, None, "where intervals begin decides at a sweep's end"))
-        yield Budget(f"largest {name}, at {at}", value, "", (*_ratio(stated), *own))
+        yield Budget(f"largest {name}, at {at}{rate}", value, "", (*_ratio(stated), *own))
 
 
 def _drawn(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
