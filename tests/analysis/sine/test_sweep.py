@@ -1,7 +1,7 @@
 """Sweeps: the recorded drive is the clock, orders come apart, envelopes and responses are what was put in."""
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +14,7 @@ from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings import Stretch, Verdict
 from vibench.analysis.signals import Decimator
-from vibench.analysis.sine import SweepSums, measured_sweep, played_check
+from vibench.analysis.sine import SweepSums, collisions, measured_sweep, played_check
 from vibench.analysis.sine._sweep import drive_phase
 from vibench.analysis.tones import tracked_orders
 
@@ -37,6 +37,7 @@ class Recorded:
     stop: int
     sample_rate_hz: float = RATE
     response_delay_s: float = 0.0
+    bridges: np.ndarray = field(default_factory=lambda: np.empty(0))
 
     @property
     def samples(self):
@@ -56,6 +57,10 @@ class Recorded:
         """Give drive, base and response."""
         return self.data[:, start:stop]
 
+    def bridged(self, start, stop):
+        """Give the bridges."""
+        return np.isin(np.arange(start, stop), self.bridges)
+
 
 @pytest.mark.parametrize("lost", [(), (8000,), (57_500,), (8000, 57_500)], ids=str)
 def test_samples_that_were_lost_beside_a_sweep_spoil_none_of_it(lost):
@@ -70,6 +75,39 @@ def test_samples_that_were_lost_beside_a_sweep_spoil_none_of_it(lost):
     np.testing.assert_allclose(found.time_s, (found.frequency_hz - 167.5) / 27.5, atol=0.01)
     assert found.time_s.size == 60 if not lost else 54 < found.time_s.size < 60
     assert played_check(found, plan).verdict is Verdict.PASSED
+
+
+def bridged_sweep(per_s, seed=1):
+    """A sine of 1 m in displacement, whose bridges swing to 3 times its speed."""
+    time, phase = sweep(8.0, 140, 360)
+    speed = np.gradient(phase, time)
+    data = np.stack((np.cos(phase), -np.cos(phase) * speed**2, -np.sin(phase) * speed))
+    rng = np.random.default_rng(seed)
+    first = rng.integers(round(RATE), round(7 * RATE), round(6 * per_s))
+    bridges = (first[:, np.newaxis] + np.arange(12)).ravel()
+    data[2, bridges] = -3 * np.max(speed)
+    plan = SineSweep(amplitude_vpp=1, start_hz=167.5, stop_hz=332.5, duration_s=6.0)
+    return Recorded(data, round(RATE), round(7 * RATE), bridges=bridges), plan, np.max(speed)
+
+
+@pytest.mark.parametrize("per_s", [0.5, 2, 5])
+def test_bridges_over_dropouts_are_no_maxima_of_a_sweep(per_s):
+    recorded, plan, fastest = bridged_sweep(per_s)
+    found, _ = measured_sweep(recorded, plan)
+    assert not found.is_clear.all()
+    assert np.isfinite(found.response_i).mean() > 0.5
+    assert found.response_i[found.largest(found.response_i)] == pytest.approx(1.0, abs=0.03)
+    assert found.response_ii[found.largest(found.response_ii)] == pytest.approx(1.0, abs=0.02)
+    assert np.nanmax(found.peak_displacement_m) < 1.05
+    assert np.max(found.upper) < 1.01 * fastest
+    assert np.max(-found.lower) < 1.01 * fastest
+    assert collisions(found).regions == ()
+
+
+def test_a_sweep_with_dropouts_everywhere_is_refused():
+    recorded, plan, _ = bridged_sweep(60)
+    with pytest.raises(UnusableData, match="refocus the laser"):
+        measured_sweep(recorded, plan)
 
 
 def test_the_first_and_last_intervals_know_what_was_before_and_after_them():

@@ -2,8 +2,6 @@
 
 from dataclasses import asdict
 
-import numpy as np
-
 from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison import sweep_traces
@@ -45,14 +43,14 @@ def _draw(analysis: SweepAnalysis, channels: SimulatedChannels) -> Draw[SweepRes
 
 def _measured(analysis: SweepAnalysis) -> Json:
     found = analysis.response
-    top = int(np.argmax(found.response_ii))
+    top = found.largest(found.response_ii)
     return {
         "start_hz": float(found.frequency_hz[0]),
         "stop_hz": float(found.frequency_hz[-1]),
         "sweep_rate_hz_per_s": found.sweep_rate_hz_per_s,
         "drive_amplitude_start_m": float(found.drive_amplitude_m[0]),
         "drive_amplitude_stop_m": float(found.drive_amplitude_m[-1]),
-        "largest_response_i": float(np.max(found.response_i)),
+        "largest_response_i": float(found.response_i[found.largest(found.response_i)]),
         "largest_response_ii": float(found.response_ii[top]),
         "largest_response_ii_at_hz": float(found.frequency_hz[top]),
         "steady_over_swept_linear": found.steady_over_swept,

@@ -98,11 +98,12 @@ def collisions(sweep: SweepResponse) -> Collisions:
     because resonances that it has passed ring on. An interval collides when this residual is above 4 times
     the noise, above 2 % of order 1, and above twice that of the specimen without contact under the recorded
     base motion. The noise is the larger of what the sixth difference of the samples shows and of the quietest
-    tenth of the sweep (as far as that may be smooth at all). Single intervals, such as drop-outs of the laser,
-    are outvoted by their neighbourhood. Where orders 2 and 3 show impacts, they do not ring; where no
-    specimen is known, they must.
+    tenth of the sweep (as far as that may be smooth at all). Single intervals are outvoted by their
+    neighbourhood, and those with drop-outs of the laser are taken as their neighbours. Orders 2 and 3 above
+    a tenth of order 1 show impacts, not ringing; where no specimen is known, they must be seen.
     """
-    residual = sweep.velocity.residual_rms
+    whole = np.flatnonzero(sweep.is_clear)
+    residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
     fundamental = np.abs(sweep.velocity.order(1.0))
     noise = _noise(sweep, residual, fundamental)
     votes = max(1, round(_VOTE_S / sweep.interval_s))

@@ -13,9 +13,11 @@ import numpy as np
 from scipy import fft
 
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
+from ..recordings import far_from
 from ..signals import (
     Complexes,
     Decimator,
+    Flags,
     Quantity,
     Reals,
     converted_signal,
@@ -24,6 +26,7 @@ from ..signals import (
 )
 from ..tables import Labelled
 from ..tones import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, noise_lift, tracked_orders
+from ._dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
 """Kept around the drive's band, as a fraction of its ends; the outer half is the filter's edge."""
@@ -111,6 +114,8 @@ _BAND_ABOVE = 0.3
 _LINEAR_ABOVE = 5.5
 """Linear motion is computed up to this part of the highest drive frequency: its order 5 is within."""
 _STEADY_POINTS = 10_001
+_BRIDGE_PERIODS = 3.0
+"""Periods of the band's lower edge after which a bridge that swings to three times the motion is below 2 %."""
 _ROOM = 1.1
 """Intervals are longer than orders need by this much: the first one may begin a little below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
@@ -149,7 +154,7 @@ class SweepResponse(Labelled):
     peak_displacement_m: Reals
     """Largest |x| in the interval [m]."""
     response_i: Reals
-    """Largest |x| over the drive amplitude."""
+    """Largest |x| over the drive amplitude, clear of drop-outs; NaN where they leave too little."""
     noise_bias_i: Reals
     noise_error_i: Reals
     """By how much noise is expected to have lifted Response I."""
@@ -158,6 +163,8 @@ class SweepResponse(Labelled):
     sd_response_ii: Reals
     phase_rad: Reals
     """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    is_clear: Flags
+    """Intervals without a drop-out, shape (intervals,)."""
     noise_rms: float
     """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
     linear_residual: Reals
@@ -165,6 +172,10 @@ class SweepResponse(Labelled):
     steady_over_swept: float
     """Largest Response II of the specimen without contact, under steady sines over in this sweep; or NaN."""
     interval_s: float
+
+    def largest(self, response: Reals) -> int:
+        """Return the place of the largest value among the intervals without a drop-out."""
+        return int(np.nanargmax(np.where(self.is_clear, response, np.nan)))
 
     @property
     def sweep_rate_hz_per_s(self) -> float:
@@ -211,7 +222,8 @@ class SweepSums:
         """Samples that were added beside the sweep."""
         self._decimator = Decimator(3, self._factor)
         self._parts: list[Reals] = []
-        self._carry = np.empty(0)
+        self._carry = np.empty((2, 0))
+        self._bridged: list[Flags] = []
         self._extremes: list[Reals] = []
 
     @property
@@ -220,7 +232,7 @@ class SweepSums:
         disturbed = disturbed_samples(self._rate_hz, _BAND_BELOW * self._low_hz)
         return self._factor * self._interval * ceil(disturbed / self._interval)
 
-    def add_neighbour(self, block: Reals) -> None:
+    def add_neighbour(self, block: Reals, bridged: Flags | None = None) -> None:
         """Take what was recorded right before the sweep, or right after it.
 
         Velocity becomes displacement with what was before it and came after it: without them the largest |x|
@@ -231,23 +243,29 @@ class SweepSums:
         else:
             self._before += block.shape[1]
         self._parts.append(self._decimator.add(block))
+        self._bridged.append(np.zeros(block.shape[1], dtype=np.bool_) if bridged is None else bridged)
 
-    def add(self, block: Reals) -> None:
-        """Take the next samples of the sweep: rows drive voltage, base acceleration, response velocity."""
+    def add(self, block: Reals, bridged: Flags | None = None) -> None:
+        """Take the next samples of the sweep: rows drive voltage, base acceleration, response velocity.
+
+        ``bridged`` are those at which the response is a bridge over a drop-out; none by default.
+        """
         if block.shape[0] != 3:
             raise InvalidRequest(f"a block has {block.shape[0]} rows; a sweep takes drive, base and response")
         self._parts.append(self._decimator.add(block))
+        self._bridged.append(np.zeros(block.shape[1], dtype=np.bool_) if bridged is None else bridged)
         full = self._interval * self._factor
-        data = np.concatenate((self._carry, block[_RESPONSE]))
-        count = data.size // full
-        whole = data[: count * full].reshape(count, full)
+        seen = np.where(self._bridged[-1], 0.0, block[_RESPONSE])
+        data = np.concatenate((self._carry, np.stack((block[_RESPONSE], seen))), axis=1)
+        count = data.shape[1] // full
+        whole, seen = data[:, : count * full].reshape(2, count, full)
         noise = np.zeros((count, full - _NOISE_DIFFERENCE.size + 1))
         for tap, weight in enumerate(_NOISE_DIFFERENCE):
             noise += weight * whole[:, tap : tap + noise.shape[1]]
         self._extremes.append(
-            np.stack((whole.max(axis=1), whole.min(axis=1), np.sqrt(np.mean(noise**2, axis=1))))
+            np.stack((seen.max(axis=1), seen.min(axis=1), np.sqrt(np.mean(noise**2, axis=1))))
         )
-        self._carry = data[count * full :].copy()
+        self._carry = data[:, count * full :].copy()
 
     def response(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweepResponse:
         """Analyse everything added; the sums take no more blocks afterwards.
@@ -291,10 +309,17 @@ class SweepSums:
             noise_density,
             delay_s,
             (residual, ratio),
+            self._bridges()[inside][: upper.size * self._interval].reshape(-1, self._interval),
         )
 
+    def _bridges(self) -> Flags:
+        """Return which decimated samples hold some of a bridge over a drop-out."""
+        bridged = np.concatenate(self._bridged)
+        bridged = np.append(bridged, np.zeros(-bridged.size % self._factor, dtype=np.bool_))
+        return np.asarray(bridged.reshape(-1, self._factor).any(axis=1))
+
     def _linear_velocity(self, base: Reals, linear: Transmission) -> Reals:
-        """Return the velocity of the specimen without contact, under the recorded acceleration of the base."""
+        """Return the velocity [m/s] without contact under the recorded acceleration of the base [m/s2]."""
         # Padded, so that what rings after the end does not come before the beginning.
         padded = fft.next_fast_len(2 * base.size, real=True)
         frequency_hz = fft.rfftfreq(padded, 1 / self._rate_hz)
@@ -328,6 +353,7 @@ class SweepSums:
         noise_density: float,
         delay_s: float,
         linear: tuple[Reals, float],
+        bridged: Flags,
     ) -> SweepResponse:
         omega = 2 * np.pi * frequency_hz
         fundamental = ORDERS.index(1.0)
@@ -344,7 +370,9 @@ class SweepSums:
         count = frequency_hz.size
         swept = displacement.samples[self._before // self._factor :][: count * self._interval]
         intervals = swept.reshape(count, self._interval)
-        peak_m = np.max(np.abs(intervals), axis=1)
+        clear = far_from(bridged.ravel(), round(_BRIDGE_PERIODS * self._rate_hz / low_hz)).reshape(bridged.shape)
+        peak_m = np.max(np.abs(intervals), axis=1, where=clear, initial=0.0)
+        peak_m[np.mean(clear, axis=1) < LEAST_CLEAR] = np.nan
         noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
         independent = 2 * np.sqrt(low_hz * high_hz) * self._interval / self._rate_hz
         bias_m, error_m = np.transpose([noise_lift(each, noise_m, independent) for each in intervals])
@@ -371,6 +399,7 @@ class SweepSums:
             sd_response_ii=np.abs(ratio) * relative,
             phase_rad=np.angle(ratio),
             noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
+            is_clear=~bridged.any(axis=1),
             linear_residual=linear[0],
             steady_over_swept=linear[1],
             interval_s=self._interval / self._rate_hz,

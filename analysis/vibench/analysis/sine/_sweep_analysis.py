@@ -9,7 +9,7 @@ from vibench.acquisition.plan import HeldSweep, SineSweep
 from vibench.acquisition.recording import SegmentLabel
 from vibench.sim import Specimen, base_transmissibility
 
-from ..errors import NotEnoughData
+from ..errors import NotEnoughData, UnusableData
 from ..recordings import (
     AbstractAnalysis,
     Channels,
@@ -19,6 +19,7 @@ from ..recordings import (
 )
 from ..spectra import Spectrogram, SpectrogramSums
 from ._collision_region import Collisions
+from ._dwell import LEAST_CLEAR
 from ._jumps import Jump, jumps
 from ._sweep import SweepResponse, SweepSums
 
@@ -118,10 +119,16 @@ def measured_sweep(
                     f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
                     "across a hole; measure again"
                 )
-            add(block)
+            add(block, channels.bridged(first, min(first + _BLOCK, end)))
             picture.add(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
     linear = None if specimen is None else lambda at_hz: base_transmissibility(specimen, at_hz)[:, 0]
     found = sums.response(delay_s=channels.response_delay_s, linear=linear)
+    if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
+        raise UnusableData(
+            f"the vibrometer lost its light often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
+            f"intervals are without a drop-out, and {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser "
+            "and measure again"
+        )
     sensors = channels.response_gain(found.frequency_hz)
     corrected = replace(
         found,

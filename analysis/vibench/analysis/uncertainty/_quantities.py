@@ -194,7 +194,7 @@ def sd_of_largest(maxima: Reals) -> float:
 def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
     """Give base amplitude and largest Responses of a sweep, with where they are."""
     found = analysis.response
-    top = int(np.argmax(found.response_ii))
+    top = found.largest(found.response_ii)
     # What no noise of a sensor explains may be chaos, of which one sweep shows one draw.
     collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
     stated = stated_of(analysis.facts.bench)
@@ -226,9 +226,13 @@ def _largest(
         (RESPONSE_I, found.response_i, error, "noise that lifts a maximum"),
         (RESPONSE_II, found.response_ii, sd, "parts of the interval"),
     ):
-        top = int(np.argmax(values))
+        top = found.largest(values) if isinstance(found, SweepResponse) else int(np.argmax(values))
         value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
         own = [scattered(Cause.NOISE, float(scatter[top]), value, source)]
+        if isinstance(found, SweepResponse):
+            is_hidden = ~found.is_clear | np.isnan(found.response_i)
+            if np.any(found.response_ii[is_hidden] > found.response_ii[top]):
+                own.append(Contribution(Cause.CHANCE, None, "drop-outs may hide the largest value"))
         if collides[top]:
             is_long = name == RESPONSE_II and isinstance(found, SteppedResponse)
             of_window = replace(own[0], cause=Cause.CHANCE) if is_long else _UNTOLD
