@@ -16,7 +16,7 @@ from ..tables import Labelled
 from ._divergence import Divergence, divergence
 from ._embedding import embedded
 from ._period import Points, is_settled, shortest_period, slow_share
-from ._surrogates import SurrogateTest, surrogate_test
+from ._surrogates import SurrogateTest, gaussianised, surrogate_test
 from ._torus import Rotation, is_torus, mains_hz, rotation
 from ._zero_one import FEWEST, ZeroOne, zero_one
 
@@ -65,6 +65,8 @@ _LARGEST_HUM = 0.1
 _LOW_PERIOD = 4
 """Period doublings reach it; a drive of twice the mains' frequency makes hum repeat as soon."""
 CHAOTIC_K = 0.9
+_SURELY = 3.0
+"""Standard deviations, from tenths of a record, by which a bound lies below a slope."""
 _DELAYS = 3
 _STEPS = 8
 
@@ -96,13 +98,6 @@ class Evidence:
     surrogates: SurrogateTest | None = None
     divergence: Divergence | None = None
 
-    @property
-    def exponent_per_s(self) -> tuple[float, float] | None:
-        """Largest Lyapunov exponent and its standard deviation; None where the data resolve none."""
-        if self.divergence is None or not self.divergence.is_resolved:
-            return None
-        return self.divergence.exponent * self.drive_hz, self.divergence.sd_exponent * self.drive_hz
-
 
 @dataclass(frozen=True, eq=False)
 class MotionVerdict(Labelled):
@@ -113,6 +108,19 @@ class MotionVerdict(Labelled):
     evidence: Evidence
     period: int | None = None
     """Drive periods after which a periodic motion repeats."""
+
+    @property
+    def least_exponent_per_s(self) -> float | None:
+        """Lower bound on the largest Lyapunov exponent of a chaotic motion; None where the data resolve none.
+
+        Noise and the size of the motion flatten the slope that neighbours part with, by up to a half, and
+        nothing in a record tells how much. Points that scatter for other reasons part as well.
+        """
+        parting = self.evidence.divergence
+        if self.kind is not MotionKind.CHAOTIC or parting is None or not parting.is_resolved:
+            return None
+        least = parting.exponent - _SURELY * parting.sd_exponent
+        return least * self.evidence.drive_hz if least > 0.0 else None
 
 
 def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionVerdict:
@@ -245,6 +253,9 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
         )
     line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
     test, noise_test = zero_one(line, seed=seed), surrogate_test(line, seed=seed)
+    for each in points.value.T:
+        if noise_test.rejects_linear_noise:
+            noise_test = surrogate_test(gaussianised(each), seed=seed)
     parting = _parting(points)
     return _judged(
         replace(evidence, zero_one=test, surrogates=noise_test, divergence=parting), test, noise_test
@@ -279,7 +290,11 @@ def _judged(evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest) -> Mot
 def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
     """Nothing but linear noise is seen: about a fixed point if it is small, else who can say."""
     if evidence.spread > SMALL:
-        return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
+        return _undecided(
+            "linear noise, or a static nonlinearity of it, explains the points as well "
+            f"(p = {noise_test.p:.2f})",
+            evidence,
+        )
     why = (
         f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit like linear noise "
         f"(p = {noise_test.p:.2f}), though by more than the vibrometer's own"

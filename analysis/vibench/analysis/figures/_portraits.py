@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from ..chaos import MotionKind, MotionVerdict
 from ..sine import DwellAnalysis
-from ..tables import Table, named, plus_minus, table
+from ..tables import Table, named, table
 from ._drawn import DrawnFigure
 from ._style import BOUNDS, SIMULATED, legend_above, new_figure, prefixed, styled
 
@@ -80,9 +80,8 @@ def _caption(rising: Sequence[DwellAnalysis]) -> str:
     for each in rising:
         verdict = each.motion.verdict
         text = f"{each.excitation.amplitude_vpp:g} Vpp: {verdict_text(verdict)} ({verdict.why})"
-        exponent = verdict.evidence.exponent_per_s
-        if exponent is not None:
-            text += f", largest exponent {plus_minus(exponent[0], 2 * exponent[1])} per second"
+        if verdict.least_exponent_per_s is not None:
+            text += f", largest exponent at least {verdict.least_exponent_per_s:.3g} per second"
         said.append(text)
     return (
         "Velocity over displacement of m0 (grey) and one point at the same phase of every recorded drive "

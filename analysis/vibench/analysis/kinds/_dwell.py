@@ -106,7 +106,6 @@ def _measured(analysis: DwellAnalysis) -> Json:
 
 def _motion(verdict: MotionVerdict) -> Json:
     evidence = verdict.evidence
-    exponent, sd_exponent = evidence.exponent_per_s or (None, None)
     return {
         "kind": verdict.kind.value,
         "why": verdict.why,
@@ -118,8 +117,7 @@ def _motion(verdict: MotionVerdict) -> Json:
         "zero_one_k": None if evidence.zero_one is None else evidence.zero_one.k,
         "surrogates_p": None if evidence.surrogates is None else evidence.surrogates.p,
         "turns_per_period": None if evidence.rotation is None else evidence.rotation.turns_per_period,
-        "lyapunov_per_s": exponent,
-        "sd_lyapunov_per_s": sd_exponent,
+        "least_lyapunov_per_s": verdict.least_exponent_per_s,
     }
 
 

@@ -19,6 +19,7 @@ from ..sine import (
     Steps,
     frequency_check,
     level_summary,
+    settled_check,
     stepped_response,
 )
 from ..tables import named
@@ -61,7 +62,8 @@ def _stepped(
         planned_hz = np.array(
             [each.numbers["frequency_hz"] for each in channels.stretches(label)], dtype=float
         )
-        checks = (*measurement_checks(facts), frequency_check(response.frequency_hz, planned_hz))
+        frequency = frequency_check(response.frequency_hz, planned_hz)
+        checks = (*measurement_checks(facts), frequency, settled_check(response))
         return SteppedSineAnalysis(facts, checks, plan, response)
 
     def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:

@@ -48,6 +48,7 @@ from ._stepped_response import (
     SteppedResponse as SteppedResponse,
     SteppedSineAnalysis as SteppedSineAnalysis,
     Steps as Steps,
+    settled_check as settled_check,
     stepped_response as stepped_response,
 )
 from ._sweep import (

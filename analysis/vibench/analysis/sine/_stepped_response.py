@@ -19,7 +19,9 @@ from ..errors import NotEnoughData
 from ..recordings import (
     AbstractAnalysis,
     Channels,
+    Check,
     Stretch,
+    Verdict,
 )
 from ..signals import Integers, Reals
 from ..tables import Labelled
@@ -145,6 +147,18 @@ def _repeats_after(motion: Reals, period_samples: float) -> int:
     shifts = np.rint(np.arange(1.0, motion.size / period_samples - 1.0) * period_samples).astype(int)
     apart = [np.sum((motion[shift : shift + period] - motion[:period]) ** 2) for shift in shifts]
     return int(shifts[np.argmin(apart)]) if apart else motion.size
+
+
+def settled_check(response: SteppedResponse) -> Check:
+    """Warn of steps whose response still changed while they were recorded."""
+    changing_hz = response.frequency_hz[np.isnan(response.slow_change)]
+    if not changing_hz.size:
+        return Check("Steps settled", Verdict.PASSED, "no response changed steadily during its step")
+    text = (
+        f"{changing_hz.size} of {response.frequency_hz.size} responses still changed during their steps, "
+        f"first at {changing_hz[0]:.6g} Hz, and their bounds are not stated; let them settle for longer"
+    )
+    return Check("Steps settled", Verdict.WARNING, text)
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,7 +115,7 @@ _LINEAR_ABOVE = 5.5
 """Linear motion is computed up to this part of the highest drive frequency: its order 5 is within."""
 _STEADY_POINTS = 10_001
 _BRIDGE_PERIODS = 3.0
-"""Periods of the band's lower edge after which a bridge that swings to three times the motion is below 2 %."""
+"""Periods of the band's lower edge after which a bridge of three times the motion's size is below 2 %."""
 _ROOM = 1.1
 """Intervals are longer than orders need by this much: the first one may begin a little below the band."""
 _DRIVE, _BASE, _RESPONSE = range(3)
@@ -370,7 +370,9 @@ class SweepSums:
         count = frequency_hz.size
         swept = displacement.samples[self._before // self._factor :][: count * self._interval]
         intervals = swept.reshape(count, self._interval)
-        clear = far_from(bridged.ravel(), round(_BRIDGE_PERIODS * self._rate_hz / low_hz)).reshape(bridged.shape)
+        clear = far_from(bridged.ravel(), round(_BRIDGE_PERIODS * self._rate_hz / low_hz)).reshape(
+            bridged.shape
+        )
         peak_m = np.max(np.abs(intervals), axis=1, where=clear, initial=0.0)
         peak_m[np.mean(clear, axis=1) < LEAST_CLEAR] = np.nan
         noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
