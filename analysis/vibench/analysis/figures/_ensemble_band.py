@@ -62,7 +62,7 @@ def run_text(laid: AbstractOverlay[Any]) -> str:
             f"Rig and specimen simulated together under the {run.driven.value}, {run.draws} draws from "
             f"slightly different starts, {run.impact_rate_hz:.0f} impacts per second"
         ),
-        *(each.sentence for each in laid.ensemble),
+        *laid.agreement,
     ]
     ending = [] if laid.escape is None else [laid.escape.sentence]
     known = [run.why] if run.why else []
@@ -73,7 +73,7 @@ def agreement_text(laid: AbstractOverlay[Any]) -> str:
     """Say where the measurement lies within the draws, to go on a sentence; nothing under a base motion."""
     if not laid.run.driven.by_voltage:
         return ""
-    said = [each.sentence for each in laid.ensemble]
+    said = [*laid.agreement]
     if laid.escape is not None:
         said.append(laid.escape.sentence)
     return "".join(f"; {each}" for each in said)

@@ -62,6 +62,15 @@ class AbstractOverlay(Labelled, Generic[R]):
         """What has draws and is not compared."""
         return ()
 
+    @property
+    def agreement(self) -> tuple[str, ...]:
+        """Which quantities disagree with the twin, where any does, then each of them in numbers."""
+        outside = [each.name for each in self.ensemble if not each.agrees]
+        compared = sum(each.compared > 0 for each in self.ensemble)
+        headline = [f"{len(outside)} of {compared} quantities disagree with the twin: {', '.join(outside)}"]
+        ordered = sorted(self.ensemble, key=lambda each: each.agrees)
+        return (*(headline if outside else []), *(each.sentence for each in ordered))
+
     def quantity(self, name: str) -> EnsembleCurve | None:
         """Give one quantity that has draws; None where it has none."""
         return next((each for each in (*self.ensemble, *self.shown) if each.name == name), None)
