@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks.noise_verdicts import noise_points
 from vibench.analysis import AnalysisError, motion_verdict
 from vibench.analysis.chaos import MotionKind, Points
 from vibench.analysis.chaos._period import shortest_period
-from vibench.sim import Harmonic, gong2025
+from vibench.sim import Harmonic, gong2025, lyapunov_exponent
 from vibench.sim.motion import stroboscopic_section
 
 DRIVE_HZ = 260.0
@@ -164,6 +165,83 @@ def test_chaos_among_impacts_is_found_in_windows_of_five_seconds():
     kinds = [motion_verdict(Points(each, QUIET), 260.0).kind for each in np.split(points, 6)]
     assert set(kinds) <= {MotionKind.CHAOTIC, MotionKind.UNDECIDED}
     assert kinds.count(MotionKind.CHAOTIC) >= 5
+
+
+def duffing(periods, damping=0.3, force=0.5, turn=1.2, steps=60):
+    """Points and largest exponent per period of x'' + damping x' - x + x^3 = force cos(turn t)."""
+
+    def rate(t, motion):
+        x, v, dx, dv = motion
+        return np.array(
+            [v, x - x**3 - damping * v + force * np.cos(turn * t), dv, (1 - 3 * x * x) * dx - damping * dv]
+        )
+
+    h = 2 * np.pi / turn / steps
+    motion, points, grown = (
+        np.array([0.1, 0.2, 1.0, 0.0]),
+        np.empty((periods + 100, 2)),
+        np.empty(periods + 100),
+    )
+    for period in range(periods + 100):
+        for step in range(steps):
+            t = (period * steps + step) * h
+            one = rate(t, motion)
+            two = rate(t + h / 2, motion + h / 2 * one)
+            three = rate(t + h / 2, motion + h / 2 * two)
+            four = rate(t + h, motion + h * three)
+            motion = motion + h / 6 * (one + 2 * two + 2 * three + four)
+        points[period], size = motion[:2], np.hypot(*motion[2:])
+        grown[period] = np.log(size)
+        motion[2:] /= size
+    return points[100:], float(np.mean(grown[100:]))
+
+
+def known_exponent(name):
+    """Points of a chaotic motion, and its exponent per period."""
+    if name == "duffing":
+        return duffing(1500)
+    if name == "henon":
+        points = np.empty((1500, 2))
+        x, y = 0.1, 0.3
+        for each in points:
+            x, y = 1 - 1.4 * x * x + y, 0.3 * x
+            each[:] = x, y
+        return points, 0.4192
+    drive = Harmonic(260.0, 19e-6)
+    exponent = lyapunov_exponent(gong2025(), drive, duration_s=20.0)
+    points = stroboscopic_section(gong2025(), drive, 1900)[400:, [0, 3]]
+    return points, exponent.exponent_per_s / drive.frequency_hz
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("name", ["duffing", "henon", "stops"])
+def test_the_exponent_of_points_is_no_less_than_is_said(name):
+    """Of the Duffing oscillator 83.9 +- 2.1 or, in more noise, 66.3 +- 2.3 per second was said for 142.5."""
+    points, exponent = known_exponent(name)
+    points = points / (np.sqrt(2) * points.std(axis=0))
+    rng = np.random.default_rng(1)
+    said = 0
+    for noise in (0.0, 1e-3, 1e-2, 3e-2):
+        seen = points + noise * rng.standard_normal(points.shape)
+        least = motion_verdict(Points(seen, np.full(2, noise)), DRIVE_HZ).least_exponent_per_s
+        if least is not None:
+            said += 1
+            assert 0 < least <= exponent * DRIVE_HZ
+    assert said or name == "stops"
+
+
+def test_points_that_only_scatter_have_no_exponent():
+    rng = np.random.default_rng(2)
+    found = motion_verdict(Points(rng.standard_normal((600, 2)), QUIET), DRIVE_HZ)
+    assert (found.kind, found.least_exponent_per_s) == (MotionKind.UNDECIDED, None)
+
+
+@pytest.mark.parametrize("number", range(4))
+def test_noise_behind_a_static_nonlinearity_is_not_chaotic(number):
+    """Narrow-band noise through a cubic was chaotic in 6 of 6 cases."""
+    _, points = noise_points(number, seed=2)
+    found = motion_verdict(points, DRIVE_HZ)
+    assert found.kind is MotionKind.UNDECIDED, found.why
 
 
 def test_a_period_is_the_shortest_and_needs_several_repeats():

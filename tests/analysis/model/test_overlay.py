@@ -1,5 +1,7 @@
 """The simulation over a recording of that same simulation: where the motion is regular they are one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,23 @@ def test_a_sweep_and_its_simulation_begin_to_collide_within_a_hertz_and_agree_be
     assert simulated.low_hz == pytest.approx(measured.low_hz, abs=1.0)
     before = (laid.difference.frequency_hz < measured.low_hz - 3) & (laid.difference.frequency_hz > 230)
     assert np.max(np.abs(laid.difference.decibel[before])) < 0.02
+
+
+def test_what_disagrees_with_the_twin_is_said_first(sweep_file):
+    _, laid = laid_over(sweep_file)
+    (curve, *_) = laid.ensemble
+    draws = 1 + 1e-3 * np.random.default_rng(1).standard_normal((9, 1))
+    one = np.ones(1)
+    fine = [
+        replace(curve, name=f"fine {each}", frequency_hz=260 * one, measured=one, draws=draws)
+        for each in "abc"
+    ]
+    odd = replace(fine[0], name="odd", measured=1.01 * one)
+    found = replace(laid, ensemble=(*fine, odd)).agreement
+    assert found[0] == "1 of 4 quantities disagree with the twin: odd"
+    assert found[1].startswith("odd 1.01 is not the twin's")
+    assert len(found) == 5
+    assert replace(laid, ensemble=tuple(fine)).agreement[0].startswith("fine a")
 
 
 def test_weak_noise_and_its_simulation_agree_on_every_line(noise_file):

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.plan import Dwell
+from vibench.acquisition.plan import Dwell, SteppedSine
 from vibench.analysis import Simulation, analyse_files, budgets_of
 from vibench.analysis.chaos import MotionKind
+from vibench.analysis.recordings import Verdict
 from vibench.analysis.sine._slow_change import slow_change
 
 A0_M, GAIN, HZ, SECONDS = 1e-6, 5.0, 260.0, 12.5
@@ -87,6 +88,54 @@ def test_a_transient_that_decays_has_no_long_period(dwell):
     """It was "every 11 periods"."""
     verdict = dwell(lambda time_s: 1 + 0.02 * np.exp((-0.2 + 2j * np.pi * 23.6) * time_s)).analysis.motion
     assert verdict.verdict.period in {None, 1}
+
+
+MODE_HZ, SETTLE_S, RECORD_S = 200.0, 3.0, 1.0
+
+
+def unsettled_step(module, folder, hz, damping, seed):
+    """Record a step of 1 s, 3 s after its begin; give its result, and Response I and II of a settled one."""
+    rng = np.random.default_rng(seed)
+    motion, time_s = module.sine(SETTLE_S + RECORD_S + 1, hz, A0_M), module.times(SETTLE_S + RECORD_S + 1)
+    gain = 1 / (1 - (hz / MODE_HZ) ** 2 + 2j * damping * hz / MODE_HZ)
+    decay = np.exp((2j * np.pi * MODE_HZ * np.sqrt(1 - damping**2) - damping * 2 * np.pi * MODE_HZ) * time_s)
+    forced = np.exp(2j * np.pi * hz * time_s) - np.exp(1j * rng.uniform(-0.5, 0.5)) * decay
+    moved = A0_M * np.imag(gain * forced)
+    velocity = np.gradient(moved) * 2 * np.pi * hz / np.sin(2 * np.pi * hz / module.RATE)
+    velocity += 1e-6 * rng.standard_normal(velocity.size)
+    plan = SteppedSine(
+        amplitude_vpp=2 * module.VOLTS_PER_METRE * A0_M,
+        frequencies_hz=(hz,),
+        settle_s=SETTLE_S,
+        record_s=RECORD_S,
+    )
+    part = module.Part("step", SETTLE_S, SETTLE_S + RECORD_S, {"frequency_hz": hz, "direction": "up"})
+    module.write_recording(folder, plan, motion, velocity, [part], name=f"step{seed}")
+    (result,) = analyse_files([folder / f"step{seed}.h5"], "steps", Simulation.LEFT_OUT).results
+    return result, abs(gain)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_step_that_has_not_settled_is_told_to_change_or_has_a_bound_that_holds(
+    synthetic_module, tmp_path, seed
+):
+    """44.38 +- 0.51 was said instead of 49.97, and 246.6 +- 0.58 instead of 249.8."""
+    rng = np.random.default_rng(seed)
+    hz, damping = (
+        ((198.0, 5e-4), (199.6, 1e-3))[seed]
+        if seed < 2
+        else (rng.uniform(195, 205), 10 ** rng.uniform(-4, -2))
+    )
+    result, truth = unsettled_step(synthetic_module, tmp_path, hz, damping, seed)
+    for name in ("Response I", "Response II"):
+        (budget,) = (each for each in budgets_of(result) if each.quantity.startswith(f"largest {name},"))
+        if not {"noise", "chance"} & {
+            each.cause.value for each in budget.contributions if each.relative is None
+        }:
+            assert abs(budget.value - truth) <= budget.expanded + 1e-3 * truth
+    (check,) = (each for each in result.analysis.checks if each.what == "Steps settled")
+    is_changing = bool(np.isnan(result.analysis.response.slow_change).any())
+    assert (check.verdict is Verdict.WARNING) == is_changing
 
 
 def test_random_scatter_of_parts_is_no_slow_change_and_a_trend_is():

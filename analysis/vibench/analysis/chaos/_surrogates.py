@@ -26,6 +26,14 @@ class SurrogateTest:
     surrogates: tuple[float, ...]
     spectrum_error: float
     """Largest relative error of a surrogate's spectrum."""
+    least_margin: float = 0.0
+    """Margin below which the statistic is chance."""
+
+    @property
+    def margin(self) -> float:
+        """How far the statistic lies below the surrogates' mean, in their standard deviations."""
+        away = float(np.mean(self.surrogates)) - self.statistic
+        return away / max(float(np.std(self.surrogates, ddof=1)), np.finfo(np.float64).tiny)
 
     @property
     def p(self) -> float:
@@ -41,7 +49,8 @@ class SurrogateTest:
     @property
     def rejects_linear_noise(self) -> bool:
         """Whether the series is more than linear noise."""
-        return self.is_valid and self.p <= 1 / (len(self.surrogates) + 1)
+        is_lowest = self.p <= 1 / (len(self.surrogates) + 1)
+        return self.is_valid and is_lowest and self.margin >= self.least_margin
 
 
 def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
