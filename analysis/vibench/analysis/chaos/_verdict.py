@@ -260,6 +260,11 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
         weakest, strongest = max(bent, key=lambda each: each.p), max(bent, key=lambda each: each.margin)
         is_more = weakest.rejects_linear_noise
         noise_test = replace(strongest, least_margin=_BEYOND_CHANCE) if is_more else weakest
+        if not noise_test.rejects_linear_noise:
+            return _undecided(
+                f"noise behind a static nonlinearity explains the points as well (p = {noise_test.p:.2f})",
+                replace(evidence, zero_one=test, surrogates=noise_test),
+            )
     parting = _parting(points)
     return _judged(
         replace(evidence, zero_one=test, surrogates=noise_test, divergence=parting), test, noise_test
@@ -294,11 +299,7 @@ def _judged(evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest) -> Mot
 def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
     """Nothing but linear noise is seen: about a fixed point if it is small, else who can say."""
     if evidence.spread > SMALL:
-        return _undecided(
-            "linear noise, or a static nonlinearity of it, explains the points as well "
-            f"(p = {noise_test.p:.2f})",
-            evidence,
-        )
+        return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
     why = (
         f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit like linear noise "
         f"(p = {noise_test.p:.2f}), though by more than the vibrometer's own"

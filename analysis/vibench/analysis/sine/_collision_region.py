@@ -17,7 +17,7 @@ _DISTORTION = 0.02
 """Residual over order 1 that a smooth motion may have: harmonics above the third of amplifier and shaker."""
 _RINGING = 2.0
 """Residual over that of the specimen without contact in the same sweep, which its description may miss."""
-_TOO_FAST = 0.2
+_TOO_FAST = 0.5
 """Residual over order 1 that collisions exceed in most intervals: ringing that may be more can hide them."""
 _IMPACTS = 0.1
 """Orders 2 and 3 over order 1 of impacts; ringing leaves at most 0.05."""

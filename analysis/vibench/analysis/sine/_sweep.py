@@ -401,7 +401,7 @@ class SweepSums:
             sd_response_ii=np.abs(ratio) * relative,
             phase_rad=np.angle(ratio),
             noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
-            is_clear=~bridged.any(axis=1),
+            is_clear=np.asarray(~bridged.any(axis=1)),
             linear_residual=linear[0],
             steady_over_swept=linear[1],
             interval_s=self._interval / self._rate_hz,
