@@ -255,23 +255,24 @@ def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
         )
     line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
     test, noise_test = zero_one(line, seed=seed), surrogate_test(line, seed=seed)
+    bent_test = noise_test
     if noise_test.rejects_linear_noise:
         bent = [surrogate_test(gaussianised(each), seed=seed) for each in points.value.T]
         weakest, strongest = max(bent, key=lambda each: each.p), max(bent, key=lambda each: each.margin)
         is_more = weakest.rejects_linear_noise
-        noise_test = replace(strongest, least_margin=_BEYOND_CHANCE) if is_more else weakest
-        if not noise_test.rejects_linear_noise:
-            return _undecided(
-                f"noise behind a static nonlinearity explains the points as well (p = {noise_test.p:.2f})",
-                replace(evidence, zero_one=test, surrogates=noise_test),
-            )
+        bent_test = replace(strongest, least_margin=_BEYOND_CHANCE) if is_more else weakest
     parting = _parting(points)
     return _judged(
-        replace(evidence, zero_one=test, surrogates=noise_test, divergence=parting), test, noise_test
+        replace(evidence, zero_one=test, surrogates=bent_test, divergence=parting),
+        test,
+        noise_test,
+        bent_test,
     )
 
 
-def _judged(evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest) -> MotionVerdict:
+def _judged(
+    evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest, bent_test: SurrogateTest
+) -> MotionVerdict:
     if not noise_test.is_valid:
         return _undecided(
             f"surrogates missed the spectrum by {100 * noise_test.spectrum_error:.0f} %, so linear noise "
@@ -280,6 +281,11 @@ def _judged(evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest) -> Mot
         )
     if not noise_test.rejects_linear_noise:
         return _noisy(evidence, noise_test)
+    if not bent_test.rejects_linear_noise:
+        return _undecided(
+            f"noise behind a static nonlinearity explains the points as well (p = {bent_test.p:.2f})",
+            evidence,
+        )
     if test.is_oversampled:
         return _undecided(
             f"neighbouring points resemble each other ({test.neighbour_correlation:.2f}), which the 0-1 test "
