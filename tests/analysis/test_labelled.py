@@ -191,6 +191,7 @@ PURE_HERE = {
     "DwellResponse.is_clear",
     "DwellResponse.slow_change",
     "SteppedResponse.slow_change",
+    "SurrogateTest.least_margin",
     "SweepResponse.linear_residual",
     "SweepResponse.steady_over_swept",
     "Divergence.size",
