@@ -1,6 +1,6 @@
 // The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
 // calls, so that threads may share tables. What is given is checked, and refused with a code.
-#include "run.hpp"
+#include "tangent.hpp"
 
 #if defined(_WIN32)
 #define VIBENCH_API extern "C" __declspec(dllexport)
@@ -56,7 +56,24 @@ bool is_usable(const Record &record) {
   bool has_times = record.impact_room == 0 || record.impact_times != nullptr;
   return has_samples && has_times && record.samples_kept >= 0 && record.samples_kept <= record.sample_room &&
          record.impacts >= 0 && record.impacts <= record.impact_room && record.steps_left >= 0 &&
-         record.steps_left <= MOST_STEPS && is_finite(record.start);
+         record.steps_left <= MOST_STEPS && is_finite(record.start) && record.watch >= 0 && record.watch < WATCHES;
+}
+
+bool is_usable(const Tangent &tangent) {
+  if (tangent.changes < 1 || tangent.changes > 6) return false;
+  for (const auto &row : tangent.rows)
+    for (double number : row)
+      if (!is_finite(number)) return false;
+  return true;
+}
+
+bool is_usable(const Readings &readings) {
+  bool has_room = readings.room == 0 || (readings.growth != nullptr && readings.impacts != nullptr &&
+                                         readings.motions != nullptr);
+  for (int i = 0; i < 6; i++)
+    if (!is_positive(readings.metric[i][i])) return false;
+  return has_room && readings.made >= 0 && readings.made <= readings.room && readings.parts > 0 &&
+         is_positive(readings.interval) && readings.interval * double(readings.room) < 1e12;
 }
 
 bool is_tolerance(double tolerance) { return tolerance > 0.0 && tolerance < 1.0; }
@@ -67,6 +84,7 @@ Motion<double> motion_of(const State &state) {
   motion.clock = {state.clock_high, state.clock_low, 0.0};
   motion.contact = {state.root,       state.rate,       state.side, state.step,
                     state.root_scale, state.rate_scale, state.pace};
+  for (double &growth : motion.growth) growth = 0.0;
   return motion;
 }
 
@@ -96,18 +114,48 @@ Outcome with_stops(Motion<T> &motion, const Tables &t, double tolerance, Record 
   }
 }
 
+bool is_usable(const State &state, double until, double tolerance) {
+  return is_tolerance(tolerance) && magnitude(until) < LATEST && magnitude(state.clock_high) < LATEST &&
+         is_finite(state.clock_low) && (state.side == 0.0 || magnitude(state.side) == 1.0);
+}
+
+Outcome advance(State &state, const Tables &tables, double until, double tolerance, Record &record) {
+  Motion<double> motion = motion_of(state);
+  Outcome outcome = with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
+  keep(state, motion);
+  return outcome;
+}
+
+template <int M>
+Outcome advance(State &state, Tangent &tangent, const Tables &tables, double until, double tolerance,
+                Record &record) {
+  Motion<Dual<double, M>> motion = with_changes<M>(motion_of(state), tangent);
+  Outcome outcome = with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
+  keep(state, values_of(motion));
+  keep_changes(tangent, motion);
+  return outcome;
+}
+
+// One change, or room for six: the same source, compiled twice.
+Outcome advance(State &state, Tangent &tangent, const Tables &tables, double until, double tolerance,
+                Record &record) {
+  if (tangent.changes == 1) return advance<1>(state, tangent, tables, until, tolerance, record);
+  return advance<6>(state, tangent, tables, until, tolerance, record);
+}
+
 }  // namespace
 
 // The text of all structures, in the order of `vibench_size_of`.
 VIBENCH_API const char *vibench_structure(int64_t index) {
   constexpr const char *TEXTS[] = {Specimen_text, LinearMotion_text, HeldMotion_text, Drive_text, CollisionShapes_text,
-                                   Scene_text,    State_text,        Record_text};
-  return index >= 0 && index < 8 ? TEXTS[index] : nullptr;
+                                   Scene_text,    State_text,        Record_text,     Tangent_text, Readings_text};
+  return index >= 0 && index < 10 ? TEXTS[index] : nullptr;
 }
 VIBENCH_API int64_t vibench_size_of(int64_t index) {
   constexpr int64_t SIZES[] = {sizeof(Specimen),        sizeof(LinearMotion), sizeof(HeldMotion), sizeof(Drive),
-                               sizeof(CollisionShapes), sizeof(Scene),        sizeof(State),      sizeof(Record)};
-  return index >= 0 && index < 8 ? SIZES[index] : 0;
+                               sizeof(CollisionShapes), sizeof(Scene),        sizeof(State),      sizeof(Record),
+                               sizeof(Tangent),         sizeof(Readings)};
+  return index >= 0 && index < 10 ? SIZES[index] : 0;
 }
 VIBENCH_API int64_t vibench_size_of_tables() { return sizeof(Tables); }
 
@@ -134,12 +182,35 @@ VIBENCH_API int64_t vibench_start(const Tables *tables, State *state, double tol
 // Advances `state` to the instant `until` [s], and fills `record`; an `Outcome`.
 VIBENCH_API int64_t vibench_run(const Tables *tables, State *state, double until, double tolerance, Record *record) {
   if (tables == nullptr || state == nullptr || record == nullptr) return REFUSED;
-  if (!is_tolerance(tolerance) || !(magnitude(until) < LATEST) || !is_usable(*record)) return REFUSED;
-  if (!(magnitude(state->clock_high) < LATEST) || !is_finite(state->clock_low)) return REFUSED;
-  if (!(state->side == 0.0 || magnitude(state->side) == 1.0)) return REFUSED;
-  Motion<double> motion = motion_of(*state);
-  Outcome outcome =
-      with_stops(motion, *tables, tolerance, *record, [&](auto &run) { return run.advance(until); });
-  keep(*state, motion);
-  return outcome;
+  if (!is_usable(*state, until, tolerance) || !is_usable(*record)) return REFUSED;
+  return advance(*state, *tables, until, tolerance, *record);
+}
+
+// Does the same, and carries the changes of `tangent` along.
+VIBENCH_API int64_t vibench_run_with_tangent(const Tables *tables, State *state, double until, double tolerance,
+                                             Record *record, Tangent *tangent) {
+  if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr) return REFUSED;
+  if (!is_usable(*state, until, tolerance) || !is_usable(*record) || !is_usable(*tangent)) return REFUSED;
+  return advance(*state, *tangent, *tables, until, tolerance, *record);
+}
+
+// Takes readings of how the changes grow, up to reading `last`; an `Outcome`.
+VIBENCH_API int64_t vibench_take_readings(const Tables *tables, State *state, double tolerance, Record *record,
+                                          Tangent *tangent, Readings *readings, int64_t last) {
+  if (tables == nullptr || state == nullptr || record == nullptr || tangent == nullptr || readings == nullptr)
+    return REFUSED;
+  if (!is_usable(*state, 0.0, tolerance) || !is_usable(*record) || !is_usable(*tangent)) return REFUSED;
+  if (!is_usable(*readings) || last > readings->room) return REFUSED;
+  return take_readings(*state, *record, *tangent, *readings, last, [&](double until) {
+    return advance(*state, *tangent, *tables, until, tolerance, *record);
+  });
+}
+
+// The largest |p| while no stop is touched, from now on [m]: free phasors only shrink. Infinite on a stop.
+VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
+  if (tables == nullptr || state == nullptr || state->side != 0.0) return INFINITE;
+  Clock<double> clock{state->clock_high, state->clock_low, 0.0};
+  Phasor phasors[PHASORS];
+  start_flight(phasors, state->motion, drive_phasor(clock, 0.0, *tables), tables->flight);
+  return PhasorSum<PHASORS>(phasors, tables->flight.path, tables->flight).reach;
 }

@@ -140,9 +140,9 @@ template <class T> inline void move_on(Collision<T> &c, const CollisionTables &t
   }
 }
 
-template <class T> INLINE void drop_slopes(Collision<double> &values, const Collision<T> &c) {
-  if constexpr (is_dual<T>) values.motion = c.motion.value, values.course = c.course.value;
-  else values.motion = c.motion, values.course = c.course;
+template <class T> INLINE Collision<double> values_of(const Collision<T> &c) {
+  return {value_of(c.depths),  value_of(c.force),    value_of(c.motion), value_of(c.after), value_of(c.course),
+          value_of(c.moments), value_of(c.duration), c.unit,             c.pace,            c.press};
 }
 
 // Carries a motion that has just touched the stop on `side` to the end of its collision. Returns false, with
@@ -163,7 +163,7 @@ inline bool collide(Collision<T> &c, T *motion, double side, const Complex<T> &d
   c.motion = gathered(begins);
   c.course = times(t.onto_p, c.motion);
   Collision<double> values;
-  drop_slopes(values, c);
+  values.motion = value_of(c.motion), values.course = value_of(c.course);
   values.unit = w * w;
   values.pace = values.unit / speed;
   double press = 2.0 * values.course[2] * t.fastest * t.fastest * values.pace / speed;

@@ -82,9 +82,11 @@ inline void begin_contact(Contact<T> &c, const T *motion, double side, double to
 // k0 U + c0 dU/dt as a polynomial about the middle of a stretch [N].
 struct BaseForce {
   double middle, terms[8];
+  Phasor drive;  // the drive's phasor at the middle
 
   BaseForce(const Clock<double> &clock, double middle_s, const Tables &t) : middle(middle_s) {
-    Phasor term = t.drive.force * drive_phasor(clock, middle, t);
+    drive = drive_phasor(clock, middle, t);
+    Phasor term = t.drive.force * drive;
     for (int k = 0; k < 8; k++) {
       terms[k] = term.re;
       term = term * Phasor{0.0, t.omega / (k + 1)};

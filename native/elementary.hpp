@@ -1,4 +1,4 @@
-// exp, sine and cosine, from additions and multiplications in a fixed order: the same digits on every processor.
+// exp, logarithm, sine and cosine, from additions and multiplications in a fixed order: the same digits on every processor.
 // Cody and Waite, Software Manual for the Elementary Functions (1980): x is reduced by a constant in two or three
 // parts, of which the first have so few digits that their products are exact. Errors are below 1.5 units in the
 // last place (native/test_engine.cpp compares with libm).
@@ -21,6 +21,19 @@ inline double exponential(double x) {
   sum = (sum * r + 1.0) * r;  // exp(r) - 1, whose rounding is small beside 1
   double power = __builtin_bit_cast(double, (int64_t(twos) + 1023) << 52);
   return (1.0 + sum) * power;
+}
+
+// Natural logarithm of a positive number: of its power of two, and 2 artanh((f - 1) / (f + 1)) of the rest as a series.
+inline double logarithm(double x) {
+  if (!(x > 0.0) || !is_finite(x)) return x == 0.0 ? -INFINITE : x > 0.0 ? x : x - x;
+  double scale = 0.0;
+  if (x < 1e-290) x *= 0x1p300, scale = -300.0;
+  int64_t bits = __builtin_bit_cast(int64_t, x), exponent = (bits >> 52) - 1023;
+  double f = __builtin_bit_cast(double, bits - (exponent << 52));
+  if (f > 1.4142135623730951) f *= 0.5, exponent++;
+  double s = (f - 1.0) / (f + 1.0), square = s * s, sum = 0.0;  // |s| < 0.172
+  for (int k = 23; k >= 3; k -= 2) sum = (sum + 1.0 / k) * square;
+  return (double(exponent) + scale) * 6.93147180559945309417e-01 + 2.0 * (s + s * sum);
 }
 
 struct CosineSine {

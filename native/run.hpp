@@ -1,8 +1,7 @@
 // A run: flight, contact, flight, ... up to an instant. One source for a motion and for its derivatives.
 #pragma once
-#include "collision.hpp"
-#include "contact.hpp"
 #include "held.hpp"
+#include "observe.hpp"
 
 namespace vibench {
 
@@ -24,7 +23,31 @@ template <class T> struct Motion {
   T at[6];  // x, y, z, vx, vy, vz [m, m/s]
   Clock<T> clock;
   Contact<T> contact;
+  double growth[6];  // of each derivative: the logarithm of a factor that was taken out of it
 };
+
+INLINE Motion<double> values_of(const Motion<double> &motion) { return motion; }
+template <int M> inline Motion<double> values_of(const Motion<Dual<double, M>> &motion) {
+  const auto &c = motion.contact;
+  Motion<double> values{{}, {motion.clock.high, motion.clock.low, 0.0}, {}, {}};
+  for (int i = 0; i < 6; i++) values.at[i] = motion.at[i].value;
+  values.contact = {c.w.value, c.r.value, c.side, c.step, c.root_scale, c.rate_scale, c.pace};
+  return values;
+}
+
+// Moves a factor that has become very large or small from the derivatives into its logarithm: their products with
+// anything physical stay finite.
+template <int M> inline void keep_in_range(Motion<Dual<double, M>> &motion) {
+  constexpr double LARGEST = 1e100, SMALLEST = 1e-100;
+  for (int k = 0; k < M; k++) {
+    double size = 0.0;
+    for (const auto &number : motion.at) size = larger(size, magnitude(number.slope[k]));
+    if (!(size > LARGEST || (size < SMALLEST && size > 0.0)) || !is_finite(size)) continue;
+    for (auto &number : motion.at) number.slope[k] /= size;
+    motion.contact.w.slope[k] /= size, motion.contact.r.slope[k] /= size, motion.clock.slip.slope[k] /= size;
+    motion.growth[k] += logarithm(size);
+  }
+}
 
 constexpr int64_t MOST_STEPS = 2000000000;  // of flight in a run
 constexpr int64_t RESOLVED_STEP = 50;       // steps of flight that a contact counts as: it takes as long
@@ -38,18 +61,15 @@ INLINE int64_t steps_of(double length, double grid) {
 template <class T, class Stops> class Run {
  public:
   Run(Motion<T> &motion, const Tables &tables, const Stops &stops, double tolerance, Record &record)
-      : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record) {}
+      : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record), observer{record, tables} {}
 
-  // Advances the motion to the instant `until` [s]. Samples on the way change nothing of it.
+  // Advances the motion to the instant `until` [s]. What is kept or observed on the way changes nothing of it.
   Outcome advance(double until) {
-    for (;;) {
-      T longest = time_until(m.clock, until);
-      if (!(value_of(longest) > 0.0)) return REACHED_END;
-      if (!is_finite(value_of(m.at[X] + m.at[Y] + m.at[Z]))) return NOT_FINITE;
-      if (record.steps_left <= 0) return TOO_LONG;
-      Outcome outcome = m.contact.side == 0.0 ? fly_on(until, longest) : stay(until, longest);
-      if (outcome != REACHED_END) return outcome;
-    }
+    if (!observer.wants_lines()) return go_on(until);
+    Observer::End begin = end_now();
+    Outcome outcome = go_on(until);
+    observer.add_lines(begin, end_now());
+    return outcome;
   }
 
   // Decides from the displacements whether a motion that is given starts on a stop.
@@ -70,11 +90,24 @@ template <class T, class Stops> class Run {
   }
 
  private:
+  Outcome go_on(double until) {
+    for (;;) {
+      T longest = time_until(m.clock, until);
+      if (!(value_of(longest) > 0.0)) return REACHED_END;
+      if (!is_finite(value_of(m.at[X] + m.at[Y] + m.at[Z]))) return NOT_FINITE;
+      if (record.steps_left <= 0) return TOO_LONG;
+      Outcome outcome = m.contact.side == 0.0 ? fly_on(until, longest) : stay(until, longest);
+      if (outcome != REACHED_END) return outcome;
+      if constexpr (is_dual<T>) keep_in_range(m);
+    }
+  }
+
   Motion<T> &m;
   const Tables &t;
   const Stops &stops;
   double tolerance;
   Record &record;
+  Observer observer;
   Complex<T> drive;             // the drive's phasor now, where it is known
   bool is_drive_known = false;
 
@@ -90,7 +123,12 @@ template <class T, class Stops> class Run {
   }
   Complex<T> drive_now() const { return is_drive_known ? drive : drive_phasor(m.clock, constant<T>(0.0), t); }
   Clock<double> clock_value() const { return {m.clock.high, m.clock.low, 0.0}; }
-  static constexpr bool is_sampled = !is_dual<T>;
+  Observer::End end_now() const {
+    Motion<double> now = values_of(m);
+    Observer::End end{{}, now.clock, drive_phasor(now.clock, 0.0, t)};
+    __builtin_memcpy(end.motion, now.at, sizeof end.motion);
+    return end;
+  }
 
   // ---- Flight
 
@@ -119,9 +157,10 @@ template <class T, class Stops> class Run {
         length = length + later_touch();
         land(landed, phasors, length);
       }
-    if constexpr (is_sampled) keep_samples(flight.length, [&](double later, double *sample) {
+    if (observer.is_on()) observer.see_flight(values, clock_value(), flight.length);
+    keep_samples(flight.length, [&](double later, double *sample) {
       Phasor there[PHASORS];
-      propagate(there, phasors, later, drive_phasor(m.clock, later, t), t.flight);
+      propagate(there, values, later, drive_phasor(clock_value(), later, t), t.flight);
       place(sample, there, t.flight);
     });
     record.steps_left -= steps_of(flight.length, t.flight.grid);
@@ -157,6 +196,7 @@ template <class T, class Stops> class Run {
       Phasor values[PHASORS];
       copy_values(values, landed, t.flight);
       m.contact.side = rebound(m.at, side, closed_gap(values, t), tolerance, t) ? side : 0.0;
+      observer.see_impact(value_of(m.at[VY] - m.at[VZ]) - rate, values[t.flight.modes]);
     } else {
       // The touch was found a hair before or after the gap closed: w begins at zero.
       begin_contact(m.contact, m.at, side, tolerance, t);
@@ -189,9 +229,14 @@ template <class T, class Stops> class Run {
     place(m.at, landed, t.held);
     m.at[Y] = m.at[Y] + rests;
     if (held.ends == FlightEnd::TOUCHES) m.at[Y] = slopes_only(m.at[Y]) + (value_of(m.at[Z]) + side * gap);
-    if constexpr (is_sampled) keep_samples(held.length, [&](double later, double *sample) {
+    if (observer.is_on()) {
+      Phasor ends[PHASORS];
+      copy_values(ends, landed, t.held);
+      observer.see_held(values, ends, clock_value(), side, held.length);
+    }
+    keep_samples(held.length, [&](double later, double *sample) {
       Phasor there[PHASORS];
-      propagate(there, phasors, later, drive_phasor(m.clock, later, t), t.held);
+      propagate(there, values, later, drive_phasor(clock_value(), later, t), t.held);
       place(sample, there, t.held);
       sample[Y] += rests;
     });
@@ -204,14 +249,19 @@ template <class T, class Stops> class Run {
 
   Outcome stay_pressed(double until, const T &longest) {
     record.steps_left -= RESOLVED_STEP;
-    Motion<T> before = m;
+    bool is_sampled = record.samples_kept < record.sample_room;
+    Motion<double> before;
+    if (is_sampled) before = values_of(m);
     if constexpr (Stops::whole_collisions)
       if (value_of(m.contact.w) == 0.0) {
         Collision<T> collision;
-        if (collide(collision, m.at, m.contact.side, drive_now(), value_of(longest), tolerance, t)) {
-          m.contact.side = 0.0;
+        Complex<T> now = drive_now();
+        if (collide(collision, m.at, m.contact.side, now, value_of(longest), tolerance, t)) {
           double length = value_of(collision.duration);
-          if constexpr (is_sampled) sample_contact(before, length, BaseForce(clock_value(), 0.5 * length, t));
+          if (observer.is_on())
+            observer.see_collision(values_of(collision), m.contact.side, {value_of(now.re), value_of(now.im)});
+          m.contact.side = 0.0;
+          if (is_sampled) sample_contact(before, length, BaseForce(clock_value(), 0.5 * length, t));
           pass(collision.duration);
           return REACHED_END;
         }
@@ -221,17 +271,20 @@ template <class T, class Stops> class Run {
     // Instants of the clock depend on nothing; the start of this stretch does.
     T begin = m.clock.slip, tau = begin;
     T limit = constant<T>(is_last ? value_of(longest) : 2.0 * base.middle);
-    switch (advance_contact(m.contact, m.at, tau, limit, base, stops.force, tolerance, t, [](auto &&...) {})) {
+    auto seen = [&](const auto &steps, const T &h) {
+      if (observer.is_on()) observer.see_step(steps, value_of(h), m.contact);
+    };
+    switch (advance_contact(m.contact, m.at, tau, limit, base, stops.force, tolerance, t, seen)) {
       case ContactEnd::LOST: return NOT_FINITE;
       case ContactEnd::STALLED: return STALLED;
       case ContactEnd::HELD:
-        if constexpr (is_sampled) sample_contact(before, value_of(tau), base);
+        if (is_sampled) sample_contact(before, value_of(tau), base);
         if (is_last) arrive(until);
         else pass(tau - begin);
         return REACHED_END;
       case ContactEnd::LEFT: break;
     }
-    if constexpr (is_sampled) sample_contact(before, value_of(tau), base);
+    if (is_sampled) sample_contact(before, value_of(tau), base);
     pass(tau - begin);
     return REACHED_END;
   }
@@ -249,7 +302,7 @@ template <class T, class Stops> class Run {
   }
 
   // Samples of a contact come from a second run from where it began, which lands on each of them.
-  void sample_contact(Motion<T> &shadow, double length, const BaseForce &base) {
+  void sample_contact(Motion<double> &shadow, double length, const BaseForce &base) {
     double reached = 0.0;
     keep_samples(length, [&](double later, double *sample) {
       if (shadow.contact.side != 0.0 && later > reached)

@@ -96,8 +96,8 @@ template <int M> INLINE Dual<double, M> square_root(const Dual<double, M> &x) {
 }
 
 // The value alone: all that decides (a touch, a step, the end of an iteration) is decided by it.
-INLINE double value_of(double x) { return x; }
-template <int M> INLINE double value_of(const Dual<double, M> &x) { return x.value; }
+template <Plain A> INLINE A value_of(const A &x) { return x; }
+template <class A, int M> INLINE A value_of(const Dual<A, M> &x) { return x.value; }
 
 // A number that depends on nothing.
 template <class T> INLINE T constant(double value) {
@@ -181,6 +181,9 @@ template <class A> INLINE Complex<A> operator-(const Complex<A> &x, const Comple
   return {x.re - y.re, x.im - y.im};
 }
 template <class A> INLINE Complex<A> conjugate(const Complex<A> &x) { return {x.re, -x.im}; }
+INLINE Phasor quotient(const Phasor &x, const Phasor &y) {
+  return (1.0 / (y.re * y.re + y.im * y.im)) * (x * conjugate(y));
+}
 INLINE double magnitude(const Phasor &x) { return square_root(x.re * x.re + x.im * x.im); }
 // Re(x y): what the phasor y does to a motion of unit shape x.
 template <class A> INLINE A real_of_product(const Complex<A> &x, const Phasor &y) { return x.re * y.re - x.im * y.im; }

@@ -84,6 +84,14 @@ STRUCTURE(CollisionShapes,
   double durations[41][7];     // by press; columns as `DurationColumn` names them
 )
 
+// What is observed of a stretch of a run; `Record::watch`.
+enum Watch : int64_t {
+  WATCH_NOTHING,
+  WATCH_PEAKS,
+  WATCH_PEAKS_AND_LINES,
+  WATCHES,
+};
+
 STRUCTURE(Scene,
   Specimen specimen;
   Drive drive;
@@ -114,6 +122,27 @@ STRUCTURE(Record,
   double *impact_times;        // [impact_room]; a run ends when it is full
   int64_t impact_room, impacts;
   int64_t steps_left;          // that a run may still make
+  int64_t watch;               // one of `Watch`
+  double peak_x, peak_p;       // largest |x| and |p| [m]
+  Phasor line_x, line_p;       // integrals of x and p against exp(-i (omega t + phase)) [m s]
+)
+
+// Small changes of a motion, carried along with it: the exact derivative of the flow in some directions.
+STRUCTURE(Tangent,
+  int64_t changes;             // 1 to 6
+  double rows[6][6];           // x, y, z, vx, vy, vz of each
+  double growth[6];            // of each: the logarithm of a factor that was taken out of its row
+)
+
+// How changes grow from instant to instant: made orthonormal in a metric at even intervals, and read.
+STRUCTURE(Readings,
+  double interval;             // [s]; reading k is due at (k + 1) interval
+  int64_t parts;               // of an interval, after each of which changes are made orthonormal
+  double metric[6][6];
+  double *growth;              // [room][changes]: the logarithm of the factor by which each grew
+  int64_t *impacts;            // [room]: in each interval
+  double *motions;             // [room][6]: x, y, z, vx, vy, vz at its end
+  int64_t room, made;
 )
 
 }  // namespace vibench

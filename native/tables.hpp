@@ -19,6 +19,7 @@ struct LinearTables {
   double squares[PHASORS];   // |l_j|^2
   Phasor shapes[PHASORS][6];
   Phasor path[PHASORS];      // what a unit phasor adds to p
+  Phasor across[PHASORS];    // and to x
   Phasor rows[MODES][6];
   double ahead[PHASORS][2][AHEAD];   // exp(l_j grid n), n = 1 ... 16
   double series[PHASORS][2][AHEAD];  // Taylor coefficients of exp(l_j t)
@@ -34,7 +35,15 @@ struct CollisionTables {
   double powers[TERMS][WIDE][WIDE];  // [m][j][i]: what number j adds to number i, (A / fastest)^m / m!
   double struck[TERMS][WIDE];        // the same of a unit of contact force
   double onto_p[WIDE][TERMS];        // what number j adds to the m-th term of p
+  double onto_x[WIDE][TERMS];        // and of x
   const CollisionShapes *shapes;
+};
+
+// (i omega - A)^-1 of eq. 1 as s' = A s + b f, where f pushes p back: what the integrals of s' and f against the drive
+// add to those of x and p.
+struct LineTables {
+  Phasor across[6], path[6];
+  Phasor struck_x, struck_p;  // [m s / (N s)]
 };
 
 struct Tables {
@@ -45,6 +54,7 @@ struct Tables {
   double omega;         // [rad/s]
   LinearTables flight;
   LinearTables held;
+  LineTables lines;
   Phasor pulls[PHASORS];
   double let_go, rests;
   CollisionTables collision;
@@ -68,6 +78,7 @@ inline void fill_linear_tables(LinearTables &t, const LinearMotion &motion, doub
       if (!is_drive) t.rows[j][i] = motion.rows[j][i];
     }
     t.path[j] = t.shapes[j][Y] - t.shapes[j][Z];
+    t.across[j] = t.shapes[j][X];
   }
   t.grid = LONGEST_TURN / fastest;
   for (int j = 0; j <= t.modes; j++) {
@@ -121,7 +132,23 @@ inline void fill_collision_tables(CollisionTables &t, const Scene &scene, const 
     factorial *= m + 1.0;
   }
   for (int m = 0; m < TERMS; m++)
-    for (int j = 0; j < WIDE; j++) t.onto_p[j][m] = t.powers[m][j][P];
+    for (int j = 0; j < WIDE; j++) t.onto_p[j][m] = t.powers[m][j][P], t.onto_x[j][m] = t.powers[m][j][AT_X];
+}
+
+// From the modes: half of each and half of its conjugate, a real one with itself.
+inline void fill_line_tables(LineTables &lines, const LinearTables &t, const Specimen &s) {
+  lines = {};
+  Phasor drive = t.rates[t.modes], half{0.5, 0.0};
+  for (int j = 0; j < t.modes; j++) {
+    Phasor near = quotient(half, drive - t.rates[j]), far = quotient(half, drive - conjugate(t.rates[j]));
+    for (int i = 0; i < 6; i++) {
+      Phasor x = t.across[j] * t.rows[j][i], p = t.path[j] * t.rows[j][i];
+      lines.across[i] = lines.across[i] + near * x + far * conjugate(x);
+      lines.path[i] = lines.path[i] + near * p + far * conjugate(p);
+    }
+  }
+  lines.struck_x = (1.0 / s.m2) * lines.across[VZ] - (1.0 / s.m1) * lines.across[VY];
+  lines.struck_p = (1.0 / s.m2) * lines.path[VZ] - (1.0 / s.m1) * lines.path[VY];
 }
 
 inline void fill_tables(Tables &t, const Scene &scene) {
@@ -132,6 +159,7 @@ inline void fill_tables(Tables &t, const Scene &scene) {
   t.drive = scene.drive;
   t.omega = 2.0 * PI * scene.drive.frequency;
   fill_linear_tables(t.flight, scene.flight, t.omega);
+  fill_line_tables(t.lines, t.flight, s);
   if (s.law == SPRINGS || s.law == RIGID) fill_linear_tables(t.held, scene.held.motion, t.omega);
   else t.held = {};
   __builtin_memcpy(t.pulls, scene.held.pulls, sizeof t.pulls);

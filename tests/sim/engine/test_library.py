@@ -12,6 +12,8 @@ from vibench.sim.engine import (
     Engine,
     EngineError,
     NativeRun,
+    RunRecord,
+    Watch,
     check_known_answer,
     library_path,
     native_engine,
@@ -35,11 +37,13 @@ def build():
 def final_motions(engine):
     for law in ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8"):
         for drive in (Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6)):
-            run = NativeRun(
-                gong2025(contact=law), drive, np.zeros(6), 3e-7, most_impacts=10_000, engine=engine
-            )
-            run.advance(0.3)
-            yield run.motion
+            run = NativeRun(gong2025(contact=law), drive, np.zeros(6), 3e-7, engine=engine)
+            record = RunRecord(10_000, engine=engine)
+            record.watch(Watch.PEAKS_AND_LINES)
+            run.carry(np.eye(6))
+            run.advance(0.1, record)
+            seen = (record.peak_x_m, record.peak_p_m, record.area_x.real, record.area_p.imag)
+            yield np.concatenate([run.motion, seen, np.ravel(run.changes)])
 
 
 def test_every_family_that_runs_here_gives_the_same_digits(build):
@@ -79,8 +83,8 @@ def test_threads_share_tables_and_give_the_same_motion():
     engine, specimen, drive = native_engine(), gong2025(), Harmonic(130.0, 20e-6)
 
     def motion(_):
-        run = NativeRun(specimen, drive, np.zeros(6), 3e-7, most_impacts=1000, engine=engine)
-        run.advance(0.2)
+        run = NativeRun(specimen, drive, np.zeros(6), 3e-7, engine=engine)
+        run.advance(0.2, RunRecord(1000))
         return run.motion
 
     with ThreadPoolExecutor(4) as pool:
@@ -99,7 +103,7 @@ def test_a_scene_with_numbers_that_no_specimen_has_is_refused():
 def test_an_instant_that_is_no_number_is_refused():
     run = NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 3e-7)
     with pytest.raises(ValueError, match="instant must be finite"):
-        run.advance(np.nan)
+        run.advance(np.nan, RunRecord(0))
     with pytest.raises(ValueError, match="tolerance"):
         NativeRun(gong2025(), Harmonic(130.0, 20e-6), np.zeros(6), 0.0)
 

@@ -31,8 +31,13 @@ from ._processor import (
     usable_families as usable_families,
 )
 from ._run import (
+    DIRECTIONS as DIRECTIONS,
+    GrowthReadings as GrowthReadings,
     NativeRun as NativeRun,
+    RunRecord as RunRecord,
+    Watch as Watch,
     check_known_answer as check_known_answer,
+    most_impacts as most_impacts,
     native_engine as native_engine,
 )
 from ._scene import (

@@ -40,9 +40,13 @@ class Engine:
         self._declare("vibench_size_of_tables", ctypes.c_int64)
         self._declare("vibench_prepare", ctypes.c_int64, _Pointer, _Pointer)
         self._declare("vibench_start", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double)
-        self._declare(
-            "vibench_run", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double, ctypes.c_double, _Pointer
-        )
+        number, count = ctypes.c_double, ctypes.c_int64
+        run = (_Pointer, _Pointer, number, number, _Pointer)
+        self._declare("vibench_run", count, *run)
+        self._declare("vibench_run_with_tangent", count, *run, _Pointer)
+        filled = (_Pointer, _Pointer, _Pointer)
+        self._declare("vibench_take_readings", count, _Pointer, _Pointer, number, *filled, count)
+        self._declare("vibench_reach", number, _Pointer, _Pointer)
         self._types = self._read_structures()
 
     def _declare(self, name: str, result: type, *arguments: type) -> None:
@@ -88,14 +92,44 @@ class Engine:
         return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
 
     def run(
-        self, tables: Tables, state: Structure, until_s: float, tolerance: float, record: Structure
+        self,
+        tables: Tables,
+        state: Structure,
+        until_s: float,
+        tolerance: float,
+        record: Structure,
+        tangent: Structure | None = None,
     ) -> int:
-        """Advance ``state`` and fill ``record``; returns the number of an `Outcome`, or -1 when refused."""
+        """Advance ``state``, carry ``tangent`` along, and fill ``record``.
+
+        Returns the number of an `Outcome`, or -1 when refused.
+        """
+        run = (tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data)
+        if tangent is None:
+            return int(self._library.vibench_run(*run))
+        return int(self._library.vibench_run_with_tangent(*run, tangent.ctypes.data))
+
+    def take_readings(
+        self,
+        tables: Tables,
+        state: Structure,
+        tolerance: float,
+        record: Structure,
+        tangent: Structure,
+        readings: Structure,
+        last: int,
+    ) -> int:
+        """Advance up to reading ``last``, and fill ``readings``; returns as `run` does."""
+        filled = (each.ctypes.data for each in (record, tangent, readings))
         return int(
-            self._library.vibench_run(
-                tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data
+            self._library.vibench_take_readings(
+                tables.ctypes.data, state.ctypes.data, tolerance, *filled, last
             )
         )
+
+    def reach(self, tables: Tables, state: Structure) -> float:
+        """Return the largest abs(p) while no stop is touched [m]; infinite on a stop."""
+        return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
 
 
 def library_path() -> Path:

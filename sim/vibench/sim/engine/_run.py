@@ -1,7 +1,10 @@
 """A motion of a specimen under a harmonic drive, advanced by the native engine. SI units."""
 
 import math
+from copy import copy
+from enum import IntEnum
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,8 +13,16 @@ from ..model import Accuracy, Harmonic, Outcome, Specimen, gong2025
 from ._library import Engine, EngineError, library_path
 from ._scene import scene_of, shapes_for
 
+Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
-"""Steps of flight in a run: seconds of work, and two days of the paper's specimen."""
+"""Steps of flight in a run: seconds of work, and two days of the paper's specimen. One whose fastest mode is
+a million times faster than its drive would be followed for weeks."""
+MOST_IMPACTS = 1 << 26
+"""In one run: the memory of their times is half a gigabyte (none until they happen)."""
+SPARE_IMPACTS = 100
+"""Allowed on top of the rate, for short runs."""
+DIRECTIONS = 6
+"""Of a state: the most small changes that can be carried along."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -26,8 +37,91 @@ KNOWN_TO = 1e-6
 """Of 100 um and 0.1 m/s."""
 
 
+class Watch(IntEnum):
+    """What is observed on the way."""
+
+    NOTHING = 0
+    PEAKS = 1
+    """Extremes of x and p."""
+    PEAKS_AND_LINES = 2
+    """Their components at the drive frequency as well."""
+
+
+class RunRecord:
+    """What a run fills on its way. None of it changes a step."""
+
+    def __init__(
+        self,
+        most_impacts: int,
+        *,
+        start_s: float = 0.0,
+        sample_rate_hz: float = 1.0,
+        samples: int = 0,
+        steps: int = MOST_STEPS,
+        engine: Engine | None = None,
+    ) -> None:
+        """Make room for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
+        self._samples = np.zeros((samples, DIRECTIONS))
+        self._times = np.zeros(most_impacts)
+        self.structure = record = (native_engine() if engine is None else engine).new("Record")
+        """As the engine takes it."""
+        record["start"], record["sample_rate"] = start_s, sample_rate_hz
+        record["samples"], record["sample_room"] = self._samples.ctypes.data, samples
+        record["impact_times"], record["impact_room"] = self._times.ctypes.data, most_impacts
+        record["steps_left"] = steps
+
+    def watch(self, what: Watch) -> None:
+        """Observe this from now on."""
+        self.structure["watch"] = what
+
+    @property
+    def impacts(self) -> int:
+        """Contacts that began, so far."""
+        return int(self.structure["impacts"])
+
+    @property
+    def impact_times_s(self) -> Floats:
+        """When they began."""
+        return self._times[: self.impacts]
+
+    @property
+    def samples(self) -> Floats:
+        """x, y, z, vx, vy, vz at the samples so far, shape (n, 6)."""
+        return self._samples[: int(self.structure["samples_kept"])]
+
+    def all_samples(self, last: ArrayLike) -> Floats:
+        """Return every sample there is room for: those that rounding puts beyond the end are ``last``."""
+        self._samples[int(self.structure["samples_kept"]) :] = last
+        return self._samples
+
+    @property
+    def steps_left(self) -> int:
+        """Steps that may still be made."""
+        return int(self.structure["steps_left"])
+
+    @property
+    def peak_x_m(self) -> float:
+        """Largest abs(x) observed."""
+        return float(self.structure["peak_x"])
+
+    @property
+    def peak_p_m(self) -> float:
+        """Largest abs(p) observed."""
+        return float(self.structure["peak_p"])
+
+    @property
+    def area_x(self) -> complex:
+        """Integral of x exp(-i (omega t + phase)), where lines were observed [m s]."""
+        return complex(self.structure["line_x"])
+
+    @property
+    def area_p(self) -> complex:
+        """The same of p."""
+        return complex(self.structure["line_p"])
+
+
 class NativeRun:
-    """One motion: where it is, and what was filled on its way."""
+    """One motion: where it is, and the small changes that are carried along with it."""
 
     def __init__(
         self,
@@ -37,9 +131,6 @@ class NativeRun:
         tolerance: float,
         *,
         start_time_s: float = 0.0,
-        sample_rate_hz: float = 0.0,
-        samples: int = 0,
-        most_impacts: int = 0,
         engine: Engine | None = None,
     ) -> None:
         """Start from x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
@@ -47,36 +138,71 @@ class NativeRun:
         Raises ValueError when the engine refuses the specimen, the drive or the start.
         """
         self._engine = engine = native_engine() if engine is None else engine
-        self._tolerance = tolerance
         # The tables point into the shapes, which therefore live as long.
         self._shapes = shapes_for(engine, specimen)
         self._tables = engine.prepare(scene_of(engine, specimen, drive, self._shapes))
-        self._samples = np.zeros((samples, 6))
-        self._times = np.zeros(most_impacts)
-        self._state, self._record = engine.new("State"), engine.new("Record")
-        self._state["motion"], self._state["clock_high"] = initial_state, start_time_s
-        record = self._record
-        record["start"], record["sample_rate"] = start_time_s, sample_rate_hz
-        record["samples"], record["sample_room"] = self._samples.ctypes.data, samples
-        record["impact_times"], record["impact_room"] = self._times.ctypes.data, most_impacts
-        record["steps_left"] = MOST_STEPS
-        if engine.start(self._tables, self._state, tolerance) != 0:
-            msg = f"A tolerance of {tolerance} is not allowed: it must lie between 0 and 1."
+        self._tangent = engine.new("Tangent")
+        self._state = engine.new("State")
+        self._state["clock_high"] = start_time_s
+        self.tolerance = tolerance
+        """Relative error allowed in a step of a contact."""
+        self.place(initial_state)
+
+    def place(self, motion: ArrayLike) -> None:
+        """Put the motion to x, y, z, vx, vy, vz, shape (6,), now; a stop that is reached is found."""
+        self._state["motion"] = motion
+        if self._engine.start(self._tables, self._state, self.tolerance) != 0:
+            msg = f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1."
             raise ValueError(msg)
 
-    def advance(self, until_s: float) -> Outcome:
+    def apart(self, tolerance: float | None = None) -> Self:
+        """Return the same motion, to be followed apart; with a tolerance of its own, without changes."""
+        twin = copy(self)
+        twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
+        if tolerance is not None:
+            twin.tolerance = tolerance
+            twin.carry(np.empty((0, DIRECTIONS)))
+        return twin
+
+    def carry(self, changes: Floats) -> None:
+        """Carry small changes of the state along from now on, shape (n, 6); none when n = 0."""
+        self._tangent["changes"] = len(changes)
+        self._tangent["rows"][: len(changes)] = changes
+        self._tangent["growth"] = 0.0
+
+    @property
+    def changes(self) -> Floats:
+        """What became of the changes, shape (n, 6), over exp(`growth`)."""
+        return np.array(self._tangent["rows"][: int(self._tangent["changes"])])
+
+    @property
+    def growth(self) -> Floats:
+        """Logarithm of a factor of each change, shape (n,)."""
+        return np.array(self._tangent["growth"][: int(self._tangent["changes"])])
+
+    def advance(self, until_s: float, record: RunRecord) -> Outcome:
         """Advance to an instant [s]; one that has passed already changes nothing.
 
         Raises ValueError when the engine refuses the instant.
         """
-        code = self._engine.run(self._tables, self._state, until_s, self._tolerance, self._record)
+        tangent = self._tangent if self._tangent["changes"] > 0 else None
+        code = self._engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
         if code < 0:
             msg = f"The native engine refuses to advance to {until_s} s: the instant must be finite."
             raise ValueError(msg)
         return Outcome(code)
 
+    def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
+        """Advance up to reading ``last`` of how the changes grow."""
+        return Outcome(
+            self._engine.take_readings(
+                *(self._tables, self._state, self.tolerance, record.structure),
+                *(self._tangent, readings.structure, last),
+            )
+        )
+
     @property
-    def motion(self) -> NDArray[np.float64]:
+    def motion(self) -> Floats:
         """x, y, z, vx, vy, vz now, shape (6,)."""
         return np.array(self._state["motion"])
 
@@ -85,15 +211,61 @@ class NativeRun:
         """How far the motion has come."""
         return float(self._state["clock_high"])
 
-    @property
-    def impact_times_s(self) -> NDArray[np.float64]:
-        """When m1 touched a stop, so far."""
-        return self._times[: int(self._record["impacts"])]
+    def pass_over(self, length_s: float) -> None:
+        """Let time pass, in which the motion comes back to its state."""
+        clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
+        self._state["clock_high"] = high = math.fsum(clock)
+        self._state["clock_low"] = math.fsum((*clock, -high))
 
     @property
-    def samples(self) -> NDArray[np.float64]:
-        """x, y, z, vx, vy, vz at the samples so far, shape (n, 6)."""
-        return self._samples[: int(self._record["samples_kept"])]
+    def is_in_flight(self) -> bool:
+        """No stop is touched now."""
+        return bool(self._state["side"] == 0.0)
+
+    @property
+    def reach_m(self) -> float:
+        """Largest abs(p) from now on, as long as no stop is touched; infinite on a stop."""
+        return self._engine.reach(self._tables, self._state)
+
+
+class GrowthReadings:
+    """How changes grow from instant to instant, made orthonormal in a metric."""
+
+    def __init__(self, changes: int, room: int, interval_s: float, parts: int, metric: Floats) -> None:
+        """Make room for readings at whole numbers of ``interval_s``, each cut in equal ``parts``."""
+        self._growth = np.zeros((room, changes))
+        self._impacts = np.zeros(room, np.int64)
+        self._motions = np.zeros((room, DIRECTIONS))
+        self.structure = readings = native_engine().new("Readings")
+        """As the engine takes it."""
+        readings["interval"], readings["parts"], readings["metric"] = interval_s, parts, metric
+        readings["growth"], readings["impacts"] = self._growth.ctypes.data, self._impacts.ctypes.data
+        readings["motions"], readings["room"] = self._motions.ctypes.data, room
+
+    @property
+    def made(self) -> int:
+        """Readings so far."""
+        return int(self.structure["made"])
+
+    @property
+    def growth(self) -> Floats:
+        """Logarithm of the factor by which each change grew in each interval, shape (n, m)."""
+        return self._growth[: self.made]
+
+    @property
+    def impacts(self) -> NDArray[np.int64]:
+        """In each interval, shape (n,)."""
+        return self._impacts[: self.made]
+
+    @property
+    def motions(self) -> Floats:
+        """x, y, z, vx, vy, vz at each interval's end, shape (n, 6)."""
+        return self._motions[: self.made]
+
+
+def most_impacts(rate_hz: float, duration_s: float) -> int:
+    """Return how many impacts a run may have that strikes at most so often on average."""
+    return min(math.ceil(rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)
 
 
 @lru_cache(maxsize=1)
@@ -110,10 +282,8 @@ def native_engine() -> Engine:
 def check_known_answer(engine: Engine) -> None:
     """Refuse an engine that was compiled wrongly, which can be silent and fast."""
     specimen, drive = gong2025(contact="hunt_crossley:0.5"), Harmonic(130.0, 20e-6)
-    run = NativeRun(
-        specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance, most_impacts=100, engine=engine
-    )
-    outcome = run.advance(KNOWN_DURATION_S)
+    run = NativeRun(specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance, engine=engine)
+    outcome = run.advance(KNOWN_DURATION_S, RunRecord(100, engine=engine))
     off = np.abs(run.motion - KNOWN_MOTION) / np.repeat([1e-4, 0.1], 3)
     if outcome is not Outcome.REACHED_END or not math.isfinite(off.max()) or off.max() > KNOWN_TO:
         msg = f"{engine.path} answers a known scene wrongly, by {off.max():.1e}: rebuild it, or report this."

@@ -1,0 +1,294 @@
+// What is observed while a run goes by, without keeping the motion: extremes of x and p, and what the stops add to
+// their lines at the drive's frequency. All of it is seen by values alone, and none of it changes a step.
+#pragma once
+#include "collision.hpp"
+#include "contact.hpp"
+
+namespace vibench {
+
+constexpr int SECANTS = 4;            // to an extreme: its value then errs by less than rounding
+constexpr int APEX_SECANTS = 6;       // to where a contact in steps is deepest
+constexpr double SMALL_EXPONENT = 1e-3;  // below it (exp(q) - 1) / q is a series whose fifth term is rounding
+constexpr double ABOVE_POINTS = 1.03;  // the largest depth is at most this many times the largest at the points
+
+// ---- Extremes
+
+// Largest magnitude of a polynomial on [low, high], on which it turns once at most; `best` if that is larger.
+inline double series_peak(double best, const double *series, double low, double high) {
+  ValueAndRate first = polynomial_at(series, low), last = polynomial_at(series, high);
+  best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
+  for (int n = 0; n < SECANTS && first.rate * last.rate < 0.0; n++) {
+    double tau = low - first.rate * (high - low) / (last.rate - first.rate);
+    ValueAndRate now = polynomial_at(series, tau);
+    best = larger(best, magnitude(now.value));
+    if (now.rate * first.rate > 0.0) low = tau, first = now;
+    else high = tau, last = now;
+  }
+  return best;
+}
+
+// The same of the cubic through both ends of a step with their rates.
+inline double cubic_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
+  double rise = (last.value - first.value) / step;
+  double series[AHEAD] = {first.value, first.rate, (3.0 * rise - 2.0 * first.rate - last.rate) / step,
+                          (first.rate + last.rate - 2.0 * rise) / (step * step)};
+  if (first.rate * last.rate < 0.0) return series_peak(best, series, 0.0, step);
+  return larger(best, larger(magnitude(first.value), magnitude(last.value)));
+}
+
+// Whether a step on which a motion turns may beat `best`: it stays below the tangents of both ends.
+INLINE bool may_peak(double best, const ValueAndRate &first, const ValueAndRate &last, double step) {
+  double above = smaller(magnitude(first.value) + step * magnitude(first.rate),
+                         magnitude(last.value) + step * magnitude(last.rate));
+  return first.rate * last.rate < 0.0 && above > best;
+}
+
+template <int N> INLINE ValueAndRate value_and_rate(const PhasorSum<N> &sum) {
+  double rate = 0.0;
+  for (int j = 0; j < N && j <= sum.tables.modes; j++) rate += real_of_product(sum.terms[j], sum.tables.rates[j]);
+  return {sum.now(), rate};
+}
+
+// Largest magnitude of one displacement over a linear motion of `length` seconds. A grid step is looked at only
+// where the bound on the acceleration lets it beat `best`, and closely only where the rate changes its sign.
+template <int N>
+inline double linear_peak(double best, const Phasor *shape, const Phasor *phasors, const Clock<double> &clock,
+                          double length, const LinearTables &t, const Tables &tables) {
+  double h = t.grid, done = 0.0, series[AHEAD];
+  Phasor now[PHASORS];
+  for (;;) {
+    if (done > 0.0) propagate(now, phasors, done, drive_phasor(clock, done, tables), t);
+    else __builtin_memcpy(now, phasors, (t.modes + 1) * sizeof(Phasor));
+    PhasorSum<N> sum(now, shape, t);
+    if (sum.reach <= best) return best;
+    double excess = sum.bound * h * h / 8.0;
+    int steps = whole_steps(length - done, h, RUN_OF_STEPS);
+    for (int made = 0; made < steps;) {
+      if (magnitude(sum.now()) + excess <= best) {
+        made += sum.march(steps - made, excess - best, best - excess);
+        if (made == steps) break;
+      }
+      PhasorSum<N> before = sum;
+      ValueAndRate first = value_and_rate(before);
+      sum.turn(1);
+      made++;
+      ValueAndRate last = value_and_rate(sum);
+      best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
+      if (may_peak(best, first, last, h)) {
+        before.rows(t.series).store(series);
+        best = series_peak(best, series, 0.0, h);
+      }
+    }
+    done += steps * h;
+    if (steps == RUN_OF_STEPS) continue;
+    sum.rows(t.series).store(series);
+    ValueAndRate first = value_and_rate(sum), last = polynomial_at(series, length - done);
+    best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
+    return may_peak(best, first, last, length - done) ? series_peak(best, series, 0.0, length - done) : best;
+  }
+}
+
+INLINE double peak_of(double best, const Phasor *shape, const Phasor *phasors, const Clock<double> &clock,
+                      double length, const LinearTables &t, const Tables &tables) {
+  if (t.modes == 3) return linear_peak<4>(best, shape, phasors, clock, length, t, tables);
+  return linear_peak<PHASORS>(best, shape, phasors, clock, length, t, tables);
+}
+
+// ---- Impulses against the drive: integrals of the push f on p times exp(-i (omega t + phase)) [N s]
+
+// Integral over `length` of what grows as exp(rate t) from `first` to `last`.
+INLINE Phasor integral(const Phasor &rate, double length, const Phasor &first, const Phasor &last) {
+  Phasor exponent = length * rate;
+  if (exponent.re * exponent.re + exponent.im * exponent.im < SMALL_EXPONENT * SMALL_EXPONENT) {
+    Phasor sum{1.0 / 24.0, 0.0}, one{1.0, 0.0};
+    sum = (1.0 / 6.0) * one + exponent * sum;
+    sum = 0.5 * one + exponent * sum;
+    return length * (first * (one + exponent * sum));
+  }
+  return quotient(last - first, rate);
+}
+
+// Integral of Re sum weights_j e_j against the drive, e_j turning from `first` to `last`.
+inline Phasor line_of(const Phasor *weights, const Phasor *first, const Phasor *last, double length,
+                      const LinearTables &t) {
+  Phasor drive = t.rates[t.modes], sum{0.0, 0.0};
+  Phasor before = 0.5 * conjugate(first[t.modes]), after = 0.5 * conjugate(last[t.modes]);
+  for (int j = 0; j <= t.modes; j++) {
+    Phasor against = conjugate(t.rates[j]) - drive;
+    sum = sum + weights[j] * integral(t.rates[j] - drive, length, first[j] * before, last[j] * after) +
+          conjugate(weights[j]) *
+              integral(against, length, conjugate(first[j]) * before, conjugate(last[j]) * after);
+  }
+  return sum;
+}
+
+// ---- What a run has seen
+
+struct Observer {
+  Record &record;
+  const Tables &t;
+  Phasor impulse{0.0, 0.0};  // of the push on p, positive on the stop at positive p, against the drive
+
+  bool is_on() const { return record.watch != WATCH_NOTHING; }
+  bool wants_lines() const { return record.watch == WATCH_PEAKS_AND_LINES; }
+
+  void see_flight(const Phasor *phasors, const Clock<double> &clock, double length) {
+    record.peak_x = peak_of(record.peak_x, t.flight.across, phasors, clock, length, t.flight, t);
+    // Between stops p is nowhere larger than at a stop.
+    if (record.peak_p < larger(t.specimen.lower_gap, t.specimen.upper_gap))
+      record.peak_p = peak_of(record.peak_p, t.flight.path, phasors, clock, length, t.flight, t);
+  }
+
+  // m1 on a stop that holds it, or that is a spring. The phasors know nothing of the constant part of p.
+  void see_held(const Phasor *first, const Phasor *last, const Clock<double> &clock, double side, double length) {
+    double gap = gap_at(t.specimen, side), rests = t.rests * gap;
+    record.peak_x = peak_of(record.peak_x, t.held.across, first, clock, length, t.held, t);
+    record.peak_p = larger(record.peak_p, gap);
+    if (t.specimen.law == SPRINGS)
+      record.peak_p = rests + peak_of(record.peak_p - rests, t.held.path, first, clock, length, t.held, t);
+    if (!wants_lines()) return;
+    double push = t.specimen.law == SPRINGS ? t.specimen.linear_stiffness : t.pair;  // per pull
+    Phasor begun = conjugate(first[t.held.modes]), ended = conjugate(last[t.held.modes]);
+    Phasor at_rest = integral({0.0, -t.omega}, length, begun, ended);
+    impulse = impulse + push * (line_of(t.pulls, first, last, length, t.held) - (side * t.let_go * gap) * at_rest);
+  }
+
+  // An impact on a rigid stop, which changes d(p)/dt by `jump` [m/s].
+  void see_impact(double jump, const Phasor &drive) {
+    if (wants_lines()) impulse = impulse - (t.pair * jump) * conjugate(drive);
+  }
+
+  void see_collision(const Collision<double> &c, double side, const Phasor &drive) {
+    const CollisionTables &of = t.collision;
+    double gap = gap_at(t.specimen, side);
+    see_x_of(c);
+    double deepest = c.unit * of.shapes->durations[c.press][DEEPER];
+    if (gap + deepest * ABOVE_POINTS * largest(c.depths) > record.peak_p)
+      record.peak_p = larger(record.peak_p, gap + deepest * top_of(times(of.shapes->about_middle, c.depths)));
+    if (!wants_lines()) return;
+    Vector<POINTS> angle = (t.omega * c.duration) * Vector<POINTS>::load(of.shapes->heights), q = angle * angle;
+    Vector<POINTS> force = (side * c.duration) * Vector<POINTS>::load(of.shapes->weights) * c.force;
+    // Angles are below LONGEST_COLLISION: to 3e-11.
+    Vector<POINTS> cosine = 1.0 + q * (-0.5 + q * (1.0 / 24 + q * (-1.0 / 720 + q * (1.0 / 40320))));
+    Vector<POINTS> sine = angle * (1.0 + q * (-1.0 / 6 + q * (1.0 / 120 + q * (-1.0 / 5040 + q * (1.0 / 362880)))));
+    impulse = impulse + Phasor{total(force * cosine), -total(force * sine)} * conjugate(drive);
+  }
+
+  // One accepted step of a contact, from `steps.point` to `steps.trial`, `h` long in s.
+  template <class T, class Force>
+  void see_step(const ContactSteps<T, Force> &steps, double h, const Contact<T> &c) {
+    const auto &from = steps.point, &to = steps.trial;
+    ValueAndRate first{value_of(from[CX]), value_of(from[CVX])}, last{value_of(to[CX]), value_of(to[CVX])};
+    record.peak_x = cubic_peak(record.peak_x, first, last, value_of(to[TIME]) - value_of(from[TIME]));
+    double gap = steps.rates.gap, deepest = larger(value_of(from[W]), value_of(to[W]));
+    if (value_of(from[R]) > 0.0 && value_of(to[R]) < 0.0) deepest = larger(deepest, apex_of(steps, h, c.rate_scale));
+    record.peak_p = larger(record.peak_p, gap + deepest * deepest);
+    if (wants_lines()) impulse = impulse + impulse_of(steps, h);
+  }
+
+  // Lines of x and p over a stretch, from what moved at its ends and from the impulse. With s' = A s + b f + drive and
+  // u = s - steady: (i omega - A) integral(u e^-i.) = b impulse - [u e^-i.].
+  struct End {
+    double motion[6];
+    Clock<double> clock;
+    Phasor drive;
+  };
+  void add_lines(const End &first, const End &last) {
+    if (!wants_lines()) return;
+    double length = (last.clock.high - first.clock.high) + (last.clock.low - first.clock.low);
+    Phasor begun = conjugate(first.drive), ended = conjugate(last.drive);
+    Phasor twice = quotient(begun * begun - ended * ended, {0.0, 4.0 * t.omega});
+    Phasor x = impulse * t.lines.struck_x, p = impulse * t.lines.struck_p;
+    for (int i = 0; i < 6; i++) {
+      const Phasor &steady = t.flight.shapes[t.flight.modes][i];
+      Phasor change = (last.motion[i] - real_of_product(last.drive, steady)) * ended -
+                      (first.motion[i] - real_of_product(first.drive, steady)) * begun;
+      x = x - change * t.lines.across[i], p = p - change * t.lines.path[i];
+    }
+    const Phasor &steady_x = t.flight.across[t.flight.modes], &steady_p = t.flight.path[t.flight.modes];
+    record.line_x = record.line_x + x + (0.5 * length) * steady_x + twice * conjugate(steady_x);
+    record.line_p = record.line_p + p + (0.5 * length) * steady_p + twice * conjugate(steady_p);
+    impulse = {0.0, 0.0};
+  }
+
+ private:
+  // A polynomial of depth about the middle of a collision: its largest value.
+  static double top_of(const Vector<TERMS> &terms) {
+    constexpr double FARTHEST_TOP = 0.5;  // from the middle of phi: eight terms hold a depth there to 1e-7
+    double at = 0.0, value = 0.0;
+    for (int n = 0; n < SECANTS; n++) {
+      double slope = 0.0, bend = 0.0;
+      for (int k = TERMS - 1; k > 0; k--) {
+        bend = bend * at + slope;
+        slope = slope * at + k * terms[k];
+      }
+      at = smaller(FARTHEST_TOP, larger(-FARTHEST_TOP, at - slope / bend));
+    }
+    for (int k = TERMS - 1; k >= 0; k--) value = value * at + terms[k];
+    return value;
+  }
+
+  // x in a whole collision: where it turns, looked for between the points.
+  void see_x_of(const Collision<double> &c) {
+    const CollisionTables &of = t.collision;
+    ValueAndRate first{c.motion[AT_X], c.motion[X_RATE]}, last{c.after[AT_X], c.after[X_RATE]};
+    record.peak_x = larger(record.peak_x, larger(magnitude(first.value), magnitude(last.value)));
+    if (!may_peak(record.peak_x, first, last, c.duration)) return;
+    Vector<TERMS> course = times(of.onto_x, c.motion);
+    double turn = of.fastest * c.duration, factor = turn;
+    Vector<POINTS> turns = turn * Vector<POINTS>::load(of.shapes->heights);
+    // A force reaches x by way of m2 and a damper: two integrals later.
+    Vector<POINTS> x = first.value + series_at_points<double>(course, turns) +
+                       pushed<double>(c.force, 2, SLOW_TERMS, AT_X, c.duration, of);
+    Vector<POINTS> rate(0.0);
+    for (int m = TERMS - 1; m > 0; m--) rate = rate * turns + (m * of.fastest * course[m]);
+    for (int m = 2; m < SLOW_TERMS; m++) {
+      factor *= turn;
+      rate = rate + (m * factor * of.struck[m][AT_X]) * times(of.shapes->shares[m - 1], c.force);
+    }
+    double before = 0.0;
+    for (int k = 0; k < POINTS; k++) {
+      ValueAndRate next{x[k], rate[k]};
+      record.peak_x = cubic_peak(record.peak_x, first, next, c.duration * (of.shapes->heights[k] - before));
+      before = of.shapes->heights[k], first = next;
+    }
+    record.peak_x = cubic_peak(record.peak_x, first, last, c.duration * (1.0 - before));
+  }
+
+  // Where a step of a contact turns it is taken again, up to r = 0; returns w there.
+  template <class T, class Force>
+  double apex_of(const ContactSteps<T, Force> &steps, double h, double rate_scale) const {
+    const auto &r = steps.rates;
+    ContactSteps<double, Force> again{{r.t, r.base, r.force, r.side, r.gap}, steps.tolerance, {}, {}, {}};
+    for (int q = 0; q < UNKNOWNS; q++) again.point[q] = value_of(steps.point[q]);
+    again.rates(again.point, again.stages[0]);
+    double low = 0.0, high = h, before = again.point[R], after = value_of(steps.trial[R]), deepest = 0.0;
+    for (int n = 0; n < APEX_SECANTS; n++) {
+      double part = low + (high - low) * before / (before - after);
+      again.take(part);
+      double rate = again.trial[R];
+      deepest = larger(deepest, again.trial[W]);
+      if (magnitude(rate) < 1e-7 * rate_scale) break;
+      if (rate > 0.0) low = part, before = rate;
+      else high = part, after = rate;
+    }
+    return deepest;
+  }
+
+  // The step's own quadrature of f dt = side F w ds against the drive, by the stages of the method.
+  template <class T, class Force> Phasor impulse_of(const ContactSteps<T, Force> &steps, double h) const {
+    const BaseForce &base = steps.rates.base;
+    Phasor sum{0.0, 0.0};
+    for (int j = 0; j < STAGES; j++) {
+      if (END_WEIGHTS[j] == 0.0) continue;
+      double w = value_of(steps.stages[j][TIME]), r = 2.0 * value_of(steps.stages[j][W]), passed = 0.0;
+      for (int i = 0; i < j; i++) passed += STAGE_WEIGHTS[j][i] * value_of(steps.stages[i][TIME]);
+      double time = value_of(steps.point[TIME]) + h * passed;
+      auto [cosine, sine] = cosine_sine_near_zero(t.omega * (time - base.middle), 0.0);
+      sum = sum + (END_WEIGHTS[j] * w * steps.rates.force(w, r)) * Phasor{cosine, -sine};
+    }
+    return (steps.rates.side * h) * (sum * conjugate(base.drive));
+  }
+};
+
+}  // namespace vibench

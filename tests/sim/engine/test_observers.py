@@ -1,0 +1,63 @@
+"""What a run observes on its way, against sums over dense samples of the same motion."""
+
+import numpy as np
+import pytest
+
+from vibench.sim import Harmonic, gong2025
+from vibench.sim.engine import NativeRun, RunRecord, Watch
+
+LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "rigid:0", "linear")
+PERIODS, SAMPLES = 6, 120_000
+
+
+def observed(law, tolerance, drive):
+    """A record of whole periods after a transient, and the samples of the same stretch."""
+    begin_s, end_s = 0.02, 0.02 + PERIODS / drive.frequency_hz
+    run = NativeRun(gong2025(contact=law), drive, np.zeros(6), tolerance)
+    rate_hz = SAMPLES / (end_s - begin_s)
+    record = RunRecord(10_000, start_s=begin_s, sample_rate_hz=rate_hz, samples=SAMPLES + 1)
+    run.advance(begin_s, record)
+    record.watch(Watch.PEAKS_AND_LINES)
+    run.advance(end_s, record)
+    return record, record.all_samples(run.motion), begin_s + np.arange(SAMPLES + 1) / rate_hz
+
+
+@pytest.mark.parametrize("tolerance", [3e-7, 1e-10])
+@pytest.mark.parametrize("law", LAWS)
+def test_peaks_and_lines_are_those_of_the_samples(law, tolerance):
+    drive = Harmonic(130.0, 20e-6, 0.7)
+    record, states, time_s = observed(law, tolerance, drive)
+    assert record.impacts > 10 or law == "linear"
+    x, p = states[:, 0], states[:, 1] - states[:, 2]
+    against = np.exp(-1j * (2.0 * np.pi * drive.frequency_hz * time_s + drive.phase_rad))
+    for values, peak, area in ((x, record.peak_x_m, record.area_x), (p, record.peak_p_m, record.area_p)):
+        # A peak lies between two samples.
+        assert np.abs(values).max() <= peak * (1.0 + 1e-12)
+        assert np.abs(values).max() == pytest.approx(peak, rel=5e-5)
+        assert abs(area - np.trapezoid(values * against, time_s)) < 3e-8 * abs(area)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_what_is_observed_changes_no_step(law):
+    drive = Harmonic(260.0, 5e-6)
+    motions = []
+    for watch in Watch:
+        run, record = NativeRun(gong2025(contact=law), drive, np.zeros(6), 3e-7), RunRecord(10_000)
+        record.watch(watch)
+        run.advance(0.3, record)
+        motions.append(run.motion)
+    for motion in motions[1:]:
+        np.testing.assert_array_equal(motion, motions[0])
+
+
+def test_lines_of_two_stretches_add_up():
+    drive, records = Harmonic(130.0, 20e-6), []
+    for ends_s in ((0.1,), (0.03, 0.0312345, 0.1)):
+        run, record = NativeRun(gong2025(), drive, np.zeros(6), 1e-10), RunRecord(10_000)
+        record.watch(Watch.PEAKS_AND_LINES)
+        for end_s in ends_s:
+            run.advance(end_s, record)
+        records.append(record)
+    whole, parts = records
+    assert parts.area_x == pytest.approx(whole.area_x, rel=1e-8)
+    assert parts.area_p == pytest.approx(whole.area_p, rel=1e-8)
