@@ -43,11 +43,23 @@ bool is_usable(const Specimen &s) {
   return s.restitution >= 0.0 && s.restitution <= 1.0;
 }
 
+bool is_usable(const PowerTerms &law) {
+  if (!is_positive(law.reference) || law.terms < 1 || law.terms > MOST_POWERS) return false;
+  int64_t previous = 1;
+  for (int i = 0; i < int(law.terms); i++) {
+    bool is_odd_and_higher = law.exponents[i] % 2 == 1 && law.exponents[i] > previous && law.exponents[i] <= 1001;
+    if (!is_odd_and_higher || !is_positive(law.forces[i])) return false;
+    previous = law.exponents[i];
+  }
+  return true;
+}
+
 bool is_usable(const Scene &scene) {
   const Specimen &s = scene.specimen;
   if (!is_usable(s) || !is_usable(scene.flight) || !is_positive(scene.drive.frequency)) return false;
   if (!is_finite_phasor(scene.drive.start) || !is_finite_phasor(scene.drive.force)) return false;
   if (s.law == HERTZ && scene.collisions == nullptr) return false;
+  if (s.law == POWERS && (scene.power_shapes == nullptr || !is_usable(scene.power))) return false;
   return (s.law != SPRINGS && s.law != RIGID) || is_usable(scene.held.motion);
 }
 
@@ -84,6 +96,8 @@ Motion<double> motion_of(const State &state) {
   motion.clock = {state.clock_high, state.clock_low, 0.0};
   motion.contact = {state.root,       state.rate,       state.side, state.step,
                     state.root_scale, state.rate_scale, state.pace};
+  motion.powers.level = state.level;
+  __builtin_memcpy(motion.powers.sizes, state.sizes, sizeof state.sizes);
   for (double &growth : motion.growth) growth = 0.0;
   return motion;
 }
@@ -94,6 +108,8 @@ void keep(State &state, const Motion<double> &motion) {
   const Contact<double> &c = motion.contact;
   state.root = c.w, state.rate = c.r, state.side = c.side, state.step = c.step;
   state.root_scale = c.root_scale, state.rate_scale = c.rate_scale, state.pace = c.pace;
+  state.level = motion.powers.level;
+  __builtin_memcpy(state.sizes, motion.powers.sizes, sizeof state.sizes);
 }
 
 // Calls `act` with a run of the motion under the stops of the specimen.
@@ -110,13 +126,18 @@ Outcome with_stops(Motion<T> &motion, const Tables &t, double tolerance, Record 
     case YIELDING: return with(YieldingStops<YieldingForce>{{s.linear_stiffness, s.contact_stiffness, s.loss}});
     case SPRINGS: return with(SpringStops{});
     case RIGID: return with(HardStops{});
+    case POWERS: {
+      PowerRun<T> run(motion, t, tolerance, record);
+      return act(run);
+    }
     default: return REFUSED;
   }
 }
 
 bool is_usable(const State &state, double until, double tolerance) {
   return is_tolerance(tolerance) && magnitude(until) < LATEST && magnitude(state.clock_high) < LATEST &&
-         is_finite(state.clock_low) && (state.side == 0.0 || magnitude(state.side) == 1.0);
+         is_finite(state.clock_low) && (state.side == 0.0 || magnitude(state.side) == 1.0) &&
+         state.level >= 0.0 && state.level <= LEVELS;
 }
 
 Outcome advance(State &state, const Tables &tables, double until, double tolerance, Record &record) {
@@ -148,21 +169,31 @@ Outcome advance(State &state, Tangent &tangent, const Tables &tables, double unt
 // The text of all structures, in the order of `vibench_size_of`.
 VIBENCH_API const char *vibench_structure(int64_t index) {
   constexpr const char *TEXTS[] = {Specimen_text, LinearMotion_text, HeldMotion_text, Drive_text, CollisionShapes_text,
+                                   PowerTerms_text, PowerShapes_text,
                                    Scene_text,    State_text,        Record_text,     Tangent_text, Readings_text};
-  return index >= 0 && index < 10 ? TEXTS[index] : nullptr;
+  return index >= 0 && index < 12 ? TEXTS[index] : nullptr;
 }
 VIBENCH_API int64_t vibench_size_of(int64_t index) {
   constexpr int64_t SIZES[] = {sizeof(Specimen),        sizeof(LinearMotion), sizeof(HeldMotion), sizeof(Drive),
-                               sizeof(CollisionShapes), sizeof(Scene),        sizeof(State),      sizeof(Record),
+                               sizeof(CollisionShapes), sizeof(PowerTerms),   sizeof(PowerShapes),
+                               sizeof(Scene),           sizeof(State),        sizeof(Record),
                                sizeof(Tangent),         sizeof(Readings)};
-  return index >= 0 && index < 10 ? SIZES[index] : 0;
+  return index >= 0 && index < 12 ? SIZES[index] : 0;
 }
-VIBENCH_API int64_t vibench_size_of_tables() { return sizeof(Tables); }
+// Bytes of the tables of a `Law`.
+VIBENCH_API int64_t vibench_size_of_tables(int64_t law) {
+  return sizeof(Tables) + (law == POWERS ? sizeof(PowerTables) : 0);
+}
 
-// Fills `tables`, of vibench_size_of_tables() bytes; the shapes of collisions must outlive them.
+// Fills `tables`, of vibench_size_of_tables(law) bytes; the shapes of collisions and steps must outlive them.
 VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
   if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
   fill_tables(*tables, *scene);
+  if (scene->specimen.law == POWERS) {
+    PowerTables *power = reinterpret_cast<PowerTables *>(tables + 1);
+    fill_power_tables(*power, *scene, tables->flight, tables->omega);
+    tables->power = power;
+  }
   return REACHED_END;
 }
 

@@ -2,7 +2,7 @@
 // their lines at the drive's frequency. All of it is seen by values alone, and none of it changes a step.
 #pragma once
 #include "collision.hpp"
-#include "contact.hpp"
+#include "motion.hpp"
 
 namespace vibench {
 
@@ -290,5 +290,21 @@ struct Observer {
     return (steps.rates.side * h) * (sum * conjugate(base.drive));
   }
 };
+
+// Runs `act`, which advances the motion, and adds the lines of the stretch.
+template <class T, class Act>
+inline Outcome observed(Observer &observer, const Motion<T> &motion, const Tables &t, const Act &act) {
+  if (!observer.wants_lines()) return act();
+  auto now = [&] {
+    Motion<double> values = values_of(motion);
+    Observer::End end{{}, values.clock, drive_phasor(values.clock, 0.0, t)};
+    __builtin_memcpy(end.motion, values.at, sizeof end.motion);
+    return end;
+  };
+  Observer::End begin = now();
+  Outcome outcome = act();
+  observer.add_lines(begin, now());
+  return outcome;
+}
 
 }  // namespace vibench

@@ -1,7 +1,7 @@
 // A run: flight, contact, flight, ... up to an instant. One source for a motion and for its derivatives.
 #pragma once
 #include "held.hpp"
-#include "observe.hpp"
+#include "power_law.hpp"
 
 namespace vibench {
 
@@ -19,58 +19,13 @@ struct HertzStops : YieldingStops<HertzForce> {
 struct SpringStops {};  // exact, with modes of their own
 struct HardStops {};    // Newton's restitution, and sticking
 
-template <class T> struct Motion {
-  T at[6];  // x, y, z, vx, vy, vz [m, m/s]
-  Clock<T> clock;
-  Contact<T> contact;
-  double growth[6];  // of each derivative: the logarithm of a factor that was taken out of it
-};
-
-INLINE Motion<double> values_of(const Motion<double> &motion) { return motion; }
-template <int M> inline Motion<double> values_of(const Motion<Dual<double, M>> &motion) {
-  const auto &c = motion.contact;
-  Motion<double> values{{}, {motion.clock.high, motion.clock.low, 0.0}, {}, {}};
-  for (int i = 0; i < 6; i++) values.at[i] = motion.at[i].value;
-  values.contact = {c.w.value, c.r.value, c.side, c.step, c.root_scale, c.rate_scale, c.pace};
-  return values;
-}
-
-// Moves a factor that has become very large or small from the derivatives into its logarithm: their products with
-// anything physical stay finite.
-template <int M> inline void keep_in_range(Motion<Dual<double, M>> &motion) {
-  constexpr double LARGEST = 1e100, SMALLEST = 1e-100;
-  for (int k = 0; k < M; k++) {
-    double size = 0.0;
-    for (const auto &number : motion.at) size = larger(size, magnitude(number.slope[k]));
-    if (!(size > LARGEST || (size < SMALLEST && size > 0.0)) || !is_finite(size)) continue;
-    for (auto &number : motion.at) number.slope[k] /= size;
-    motion.contact.w.slope[k] /= size, motion.contact.r.slope[k] /= size, motion.clock.slip.slope[k] /= size;
-    motion.growth[k] += logarithm(size);
-  }
-}
-
-constexpr int64_t MOST_STEPS = 2000000000;  // of flight in a run
-constexpr int64_t RESOLVED_STEP = 50;       // steps of flight that a contact counts as: it takes as long
-
-// Grid steps that a flight counts as; all of them where its length or its grid is no number.
-INLINE int64_t steps_of(double length, double grid) {
-  double steps = length / grid;
-  return steps >= 0.0 && steps < double(MOST_STEPS) ? 1 + int64_t(steps) : MOST_STEPS;
-}
-
 template <class T, class Stops> class Run {
  public:
   Run(Motion<T> &motion, const Tables &tables, const Stops &stops, double tolerance, Record &record)
       : m(motion), t(tables), stops(stops), tolerance(tolerance), record(record), observer{record, tables} {}
 
   // Advances the motion to the instant `until` [s]. What is kept or observed on the way changes nothing of it.
-  Outcome advance(double until) {
-    if (!observer.wants_lines()) return go_on(until);
-    Observer::End begin = end_now();
-    Outcome outcome = go_on(until);
-    observer.add_lines(begin, end_now());
-    return outcome;
-  }
+  Outcome advance(double until) { return observed(observer, m, t, [&] { return go_on(until); }); }
 
   // Decides from the displacements whether a motion that is given starts on a stop.
   void place_on_its_side() {
@@ -123,12 +78,6 @@ template <class T, class Stops> class Run {
   }
   Complex<T> drive_now() const { return is_drive_known ? drive : drive_phasor(m.clock, constant<T>(0.0), t); }
   Clock<double> clock_value() const { return {m.clock.high, m.clock.low, 0.0}; }
-  Observer::End end_now() const {
-    Motion<double> now = values_of(m);
-    Observer::End end{{}, now.clock, drive_phasor(now.clock, 0.0, t)};
-    __builtin_memcpy(end.motion, now.at, sizeof end.motion);
-    return end;
-  }
 
   // ---- Flight
 
@@ -158,7 +107,7 @@ template <class T, class Stops> class Run {
         land(landed, phasors, length);
       }
     if (observer.is_on()) observer.see_flight(values, clock_value(), flight.length);
-    keep_samples(flight.length, [&](double later, double *sample) {
+    keep_samples(record, clock_value(), flight.length, [&](double later, double *sample) {
       Phasor there[PHASORS];
       propagate(there, values, later, drive_phasor(clock_value(), later, t), t.flight);
       place(sample, there, t.flight);
@@ -234,7 +183,7 @@ template <class T, class Stops> class Run {
       copy_values(ends, landed, t.held);
       observer.see_held(values, ends, clock_value(), side, held.length);
     }
-    keep_samples(held.length, [&](double later, double *sample) {
+    keep_samples(record, clock_value(), held.length, [&](double later, double *sample) {
       Phasor there[PHASORS];
       propagate(there, values, later, drive_phasor(clock_value(), later, t), t.held);
       place(sample, there, t.held);
@@ -291,20 +240,10 @@ template <class T, class Stops> class Run {
 
   // ---- Samples
 
-  // Keeps the samples that fall into the next `length` seconds: `place_sample(later, sample)` writes one.
-  template <class PlaceSample> void keep_samples(double length, const PlaceSample &place_sample) {
-    while (record.samples_kept < record.sample_room) {
-      double later = time_until(clock_value(), record.start + double(record.samples_kept) / record.sample_rate);
-      if (later > length) return;
-      place_sample(later, record.samples + 6 * record.samples_kept);
-      record.samples_kept++;
-    }
-  }
-
   // Samples of a contact come from a second run from where it began, which lands on each of them.
   void sample_contact(Motion<double> &shadow, double length, const BaseForce &base) {
     double reached = 0.0;
-    keep_samples(length, [&](double later, double *sample) {
+    keep_samples(record, clock_value(), length, [&](double later, double *sample) {
       if (shadow.contact.side != 0.0 && later > reached)
         advance_contact(shadow.contact, shadow.at, reached, later, base, stops.force, tolerance, t, [](auto &&...) {});
       __builtin_memcpy(sample, shadow.at, sizeof shadow.at);

@@ -11,6 +11,8 @@
 
 namespace vibench {
 
+constexpr int MOST_POWERS = 6;  // terms of a power law
+
 // Places of a motion: absolute displacements [m] and velocities [m/s] of m0, m1, m2.
 enum { X, Y, Z, VX, VY, VZ };
 
@@ -21,6 +23,7 @@ enum Law : int64_t {
   YIELDING,  // (linear_stiffness d + contact_stiffness d^(3/2)) (1 + loss dd/dt) at the penetration d
   SPRINGS,   // linear_stiffness d alone: exact, with modes of its own
   RIGID,
+  POWERS,    // sums of odd powers of p, at every p; `PowerTerms`
   LAWS,
 };
 
@@ -84,6 +87,25 @@ STRUCTURE(CollisionShapes,
   double durations[41][7];     // by press; columns as `DurationColumn` names them
 )
 
+// F = sum forces_i (p / reference)^exponents_i at every p: the continuous substitute of stops (eq. 3).
+STRUCTURE(PowerTerms,
+  double reference;            // [m]
+  int64_t terms;               // 1 to 6
+  int64_t exponents[6];        // odd, ascending, from 3
+  double forces[6];            // [N]
+)
+
+// Sums over Gauss's points of a step from 0 to 1, the same for every law: `vibench.sim.engine` makes them.
+STRUCTURE(PowerShapes,
+  double points[8], weights[8];
+  double shares[32][8][8];     // [m][k][i]: integral up to point i of (c_i - s)^m of what is 1 at point k alone
+  double ends[32][8];          // [m][k]: the same up to the end
+  double at_start[8], at_end[8];  // the polynomial through the points, there
+  double course[9][8];         // what a value at a point, the last at the end, adds to powers of (s - 1)
+  double point_weights[8];     // barycentric, of the points alone
+  double instants[10], instant_weights[10], instant_slopes[10];  // start, points and end, as one polynomial
+)
+
 // What is observed of a stretch of a run; `Record::watch`.
 enum Watch : int64_t {
   WATCH_NOTHING,
@@ -97,10 +119,12 @@ STRUCTURE(Scene,
   Drive drive;
   LinearMotion flight;
   HeldMotion held;             // no modes where the law does not hold m1
+  PowerTerms power;            // of the law POWERS
   const CollisionShapes *collisions;
+  const PowerShapes *power_shapes;
 )
 
-// Where a motion is. Valid in flight and in contact; the last seven serve a contact.
+// Where a motion is. Valid in flight and in contact.
 STRUCTURE(State,
   double motion[6];            // x, y, z, vx, vy, vz [m, m/s]
   double clock_high, clock_low;  // time is their exact sum [s]
@@ -111,6 +135,8 @@ STRUCTURE(State,
   double root_scale;           // how large w will become [m^0.5]
   double rate_scale;           // how large r will become [m/s]
   double pace;                 // w over r, as large as they will become [s/m^0.5]
+  double level;                // under a power law: one more than that of the next step; 0 before the first
+  double sizes[3];             // how large p, x, z have lately been there [m]
 )
 
 // What a run fills on its way. None of it changes a step.

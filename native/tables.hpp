@@ -46,6 +46,8 @@ struct LineTables {
   Phasor struck_x, struck_p;  // [m s / (N s)]
 };
 
+struct PowerTables;
+
 struct Tables {
   Specimen specimen;
   double pair;          // m1 m2 / (m1 + m2), the mass that a collision feels [kg]
@@ -58,6 +60,7 @@ struct Tables {
   Phasor pulls[PHASORS];
   double let_go, rests;
   CollisionTables collision;
+  const PowerTables *power;  // right behind these tables; of a power law
 };
 
 INLINE double gap_at(const Specimen &specimen, double side) {
@@ -110,27 +113,34 @@ inline void fill_equations(double (&A)[WIDE][WIDE], double (&b)[WIDE], const Spe
   b[P_RATE] = -inverse_pair, b[Z_RATE] = 1.0 / s.m2;
 }
 
-inline void fill_collision_tables(CollisionTables &t, const Scene &scene, const LinearTables &flight) {
+// The Taylor series of exp(A t), in units of 1 / fastest, and of what a unit of force does.
+template <int N>
+inline void fill_series(double (&powers)[N][WIDE][WIDE], double (&struck)[N][WIDE], double fastest,
+                        const Scene &scene) {
   double A[WIDE][WIDE], b[WIDE], power[WIDE][WIDE] = {}, factorial = 1.0;
   fill_equations(A, b, scene.specimen, scene.drive);
-  t.shapes = scene.collisions;
-  t.fastest = LONGEST_TURN / flight.grid;
   for (int i = 0; i < WIDE; i++) power[i][i] = 1.0;
-  for (int m = 0; m < TERMS; m++) {
+  for (int m = 0; m < N; m++) {
     for (int i = 0; i < WIDE; i++) {
-      t.struck[m][i] = 0.0;
+      struck[m][i] = 0.0;
       for (int j = 0; j < WIDE; j++) {
-        t.powers[m][j][i] = power[i][j] / factorial;
-        t.struck[m][i] += power[i][j] / factorial * b[j];
+        powers[m][j][i] = power[i][j] / factorial;
+        struck[m][i] += power[i][j] / factorial * b[j];
       }
     }
     double next[WIDE][WIDE] = {};
     for (int i = 0; i < WIDE; i++)
       for (int j = 0; j < WIDE; j++)
-        for (int k = 0; k < WIDE; k++) next[i][j] += A[i][k] / t.fastest * power[k][j];
+        for (int k = 0; k < WIDE; k++) next[i][j] += A[i][k] / fastest * power[k][j];
     __builtin_memcpy(power, next, sizeof power);
     factorial *= m + 1.0;
   }
+}
+
+inline void fill_collision_tables(CollisionTables &t, const Scene &scene, const LinearTables &flight) {
+  t.shapes = scene.collisions;
+  t.fastest = LONGEST_TURN / flight.grid;
+  fill_series(t.powers, t.struck, t.fastest, scene);
   for (int m = 0; m < TERMS; m++)
     for (int j = 0; j < WIDE; j++) t.onto_p[j][m] = t.powers[m][j][P], t.onto_x[j][m] = t.powers[m][j][AT_X];
 }
@@ -154,6 +164,7 @@ inline void fill_line_tables(LineTables &lines, const LinearTables &t, const Spe
 inline void fill_tables(Tables &t, const Scene &scene) {
   const Specimen &s = scene.specimen;
   t.specimen = s;
+  t.power = nullptr;
   t.pair = s.m1 * s.m2 / (s.m1 + s.m2);
   t.inverse0 = 1.0 / s.m0, t.inverse2 = 1.0 / s.m2, t.inverse_pair = 1.0 / t.pair;
   t.drive = scene.drive;

@@ -18,6 +18,7 @@ template <int M> inline Motion<Dual<double, M>> with_changes(const Motion<double
   contact.side = c.side, contact.step = c.step;
   contact.root_scale = c.root_scale, contact.rate_scale = c.rate_scale, contact.pace = c.pace;
   contact.w.value = c.w, contact.r.value = c.r;
+  motion.powers = plain.powers;
   for (int k = 0; k < M && k < int(tangent.changes); k++) {
     const double(&row)[6] = tangent.rows[k];
     for (int i = 0; i < 6; i++) motion.at[i].slope[k] = row[i];

@@ -2,7 +2,7 @@
 //
 //     g++ -std=c++20 -O1 -g -fsanitize=address,undefined native/test_engine.cpp -o test_engine && ./test_engine FILE ...
 //
-// Each file holds the bytes of a Scene and of its CollisionShapes; tests/sim/engine/test_native_program.py makes them.
+// Each file holds the bytes of a Scene, its CollisionShapes and its PowerShapes; tests/sim/engine/test_native_program.py makes them.
 #include "api.cpp"
 
 #include <cmath>
@@ -105,15 +105,18 @@ int main(int count, char **names) {
   for (int n = 1; n < count; n++) {
     Scene scene;
     CollisionShapes shapes;
+    PowerShapes power_shapes;
     std::FILE *file = std::fopen(names[n], "rb");
     bool is_read = file != nullptr && std::fread(&scene, sizeof scene, 1, file) == 1 &&
-                   std::fread(&shapes, sizeof shapes, 1, file) == 1;
+                   std::fread(&shapes, sizeof shapes, 1, file) == 1 &&
+                   std::fread(&power_shapes, sizeof power_shapes, 1, file) == 1;
     if (file != nullptr) std::fclose(file);
     expect(is_read, "a scene can be read", n);
     if (!is_read) continue;
-    scene.collisions = &shapes;
-    Tables tables;
-    expect(vibench_prepare(&scene, &tables) == REACHED_END, "a scene is accepted", n);
+    scene.collisions = &shapes, scene.power_shapes = &power_shapes;
+    std::vector<double> memory(size_t(vibench_size_of_tables(scene.specimen.law)) / sizeof(double));
+    const Tables &tables = *reinterpret_cast<Tables *>(memory.data());
+    expect(vibench_prepare(&scene, reinterpret_cast<Tables *>(memory.data())) == REACHED_END, "a scene is accepted", n);
     int before = failures;
     test_duals_are_derivatives(tables, 0.03, 3e-7);
     test_duals_are_derivatives(tables, 0.03, 1e-10);

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine import Engine, EngineError, scene_of, shapes_for
+from vibench.sim.engine import Engine, EngineError, collision_structure, power_structure, scene_of
 
 STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
 STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
-POINTERS = {"collisions", "samples", "impact_times"}
-LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear")
+POINTERS = {"collisions", "power_shapes", "samples", "impact_times"}
+LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "power:5", "power:3+5+7")
 CODES = {-1, 0, 1, 2, 3, 4}
 
 
@@ -35,8 +35,10 @@ def spoil(structure, draws):
 def call(engine, draws):
     """Run one scene of which something may be broken; returns its code."""
     specimen = gong2025(contact=str(draws.choice(LAWS)))
-    shapes = shapes_for(engine, gong2025())
-    scene = scene_of(engine, specimen, Harmonic(draws.uniform(50.0, 500.0), 2e-5), shapes)
+    scene = scene_of(engine, specimen, Harmonic(draws.uniform(50.0, 500.0), 2e-5))
+    # A law that is spoiled may need either.
+    scene["collisions"] = collision_structure(engine).ctypes.data
+    scene["power_shapes"] = power_structure(engine).ctypes.data
     state, record = engine.new("State"), engine.new("Record")
     samples, times = np.zeros((50, 6)), np.zeros(40)
     record["sample_rate"], record["samples"] = 1e4, samples.ctypes.data

@@ -11,7 +11,17 @@ from vibench.sim.engine import NativeRun, RunRecord
 
 UNITS = np.repeat([1e-4, 0.1], 3)
 """Of an error: 100 um and 0.1 m/s."""
-LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "rigid:0.2", "rigid:0", "linear")
+LAWS = (
+    "hertz",
+    "hunt_crossley:0.5",
+    "linear_gap",
+    "rigid:0.8",
+    "rigid:0.2",
+    "rigid:0",
+    "linear",
+    "power:5",
+    "power:47",
+)
 DRIVES = [(130.0, 20e-6, 0.3), (100.0, 5e-6, 0.3), (260.0, 5e-6, 0.05), (300.0, 50e-6, 0.012)]
 
 

@@ -19,7 +19,6 @@ from vibench.sim.engine import (
     native_engine,
     parse_structures,
     scene_of,
-    shapes_for,
     usable_families,
 )
 
@@ -35,7 +34,7 @@ def build():
 
 
 def final_motions(engine):
-    for law in ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8"):
+    for law in ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "power:5", "power:3+5+7"):
         for drive in (Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6)):
             run = NativeRun(gong2025(contact=law), drive, np.zeros(6), 3e-7, engine=engine)
             record = RunRecord(10_000, engine=engine)
@@ -94,7 +93,7 @@ def test_threads_share_tables_and_give_the_same_motion():
 
 def test_a_scene_with_numbers_that_no_specimen_has_is_refused():
     engine, specimen = native_engine(), gong2025()
-    scene = scene_of(engine, specimen, Harmonic(130.0, 20e-6), shapes_for(engine, specimen))
+    scene = scene_of(engine, specimen, Harmonic(130.0, 20e-6))
     scene["specimen"]["m0"] = np.nan
     with pytest.raises(ValueError, match="scene is not allowed"):
         engine.prepare(scene)

@@ -2,7 +2,7 @@
 
 `NativeRun` follows one motion of a specimen under a harmonic drive. The library is chosen by processor and
 loaded once; first it must answer a known scene (docs/decisions/0077-native-engine.md). Python prepares what
-is needed once per run: modal forms and the shapes of collisions. Power laws and other drives follow.
+is needed once per run: modal forms, and the shapes of collisions and steps. Other drives follow.
 """
 
 import lazy_loader

@@ -27,6 +27,12 @@ from ._library import (
     EngineError as EngineError,
     library_path as library_path,
 )
+from ._power_shapes import (
+    AT_END as AT_END,
+    AT_START as AT_START,
+    POINTS_AT as POINTS_AT,
+    POWER_SHARES as POWER_SHARES,
+)
 from ._processor import (
     usable_families as usable_families,
 )
@@ -41,8 +47,9 @@ from ._run import (
     native_engine as native_engine,
 )
 from ._scene import (
+    collision_structure as collision_structure,
+    power_structure as power_structure,
     scene_of as scene_of,
-    shapes_for as shapes_for,
 )
 from ._structures import (
     Structure as Structure,

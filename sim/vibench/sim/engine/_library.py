@@ -37,7 +37,7 @@ class Engine:
         self._library = ctypes.CDLL(str(path))
         self._declare("vibench_structure", ctypes.c_char_p, ctypes.c_int64)
         self._declare("vibench_size_of", ctypes.c_int64, ctypes.c_int64)
-        self._declare("vibench_size_of_tables", ctypes.c_int64)
+        self._declare("vibench_size_of_tables", ctypes.c_int64, ctypes.c_int64)
         self._declare("vibench_prepare", ctypes.c_int64, _Pointer, _Pointer)
         self._declare("vibench_start", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double)
         number, count = ctypes.c_double, ctypes.c_int64
@@ -77,11 +77,12 @@ class Engine:
         return np.zeros((), self._types[name])
 
     def prepare(self, scene: Structure) -> Tables:
-        """Make the tables of a scene; its shapes of collisions must outlive them.
+        """Make the tables of a scene; its shapes of collisions and steps must outlive them.
 
         Raises ValueError when the engine refuses a number of the scene.
         """
-        tables = np.zeros(int(self._library.vibench_size_of_tables()) // 8, np.float64)
+        size = int(self._library.vibench_size_of_tables(int(scene["specimen"]["law"])))
+        tables = np.zeros(size // 8, np.float64)
         if self._library.vibench_prepare(scene.ctypes.data, tables.ctypes.data) != 0:
             msg = "This scene is not allowed: numbers must be finite, masses and springs positive."
             raise ValueError(msg)

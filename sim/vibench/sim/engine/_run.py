@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model import Accuracy, Harmonic, Outcome, Specimen, gong2025
 from ._library import Engine, EngineError, library_path
-from ._scene import scene_of, shapes_for
+from ._scene import scene_of
 
 Floats = NDArray[np.float64]
 MOST_STEPS = 2_000_000_000
@@ -138,9 +138,7 @@ class NativeRun:
         Raises ValueError when the engine refuses the specimen, the drive or the start.
         """
         self._engine = engine = native_engine() if engine is None else engine
-        # The tables point into the shapes, which therefore live as long.
-        self._shapes = shapes_for(engine, specimen)
-        self._tables = engine.prepare(scene_of(engine, specimen, drive, self._shapes))
+        self._tables = engine.prepare(scene_of(engine, specimen, drive))
         self._tangent = engine.new("Tangent")
         self._state = engine.new("State")
         self._state["clock_high"] = start_time_s

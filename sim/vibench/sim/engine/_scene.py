@@ -3,7 +3,7 @@
 import cmath
 import math
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,17 +34,30 @@ from ._collision_shapes import (
     collision_shapes,
 )
 from ._library import Engine
+from ._power_shapes import (
+    AT_END,
+    AT_START,
+    COURSE,
+    GAUSS_POINTS,
+    GAUSS_WEIGHTS,
+    INSTANT_SLOPES,
+    INSTANT_WEIGHTS,
+    INSTANTS,
+    POINT_WEIGHTS,
+    POINTS_AT,
+    POWER_SHARES,
+)
 from ._structures import Structure
 
-NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID = range(5)
+NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)
 """`Law` in native/structures.hpp."""
 Phasors = NDArray[np.complex128]
 
 
-def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic, shapes: Structure | None) -> Structure:
-    """Fill a `Scene` of native/structures.hpp; ``shapes`` from `shapes_for`.
+def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
+    """Fill a `Scene` of native/structures.hpp.
 
-    Raises ValueError when two modes coincide, or the law acts at every p.
+    Raises ValueError when two modes coincide.
     """
     scene = engine.new("Scene")
     omega = 2.0 * math.pi * drive.frequency_hz
@@ -59,18 +72,34 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic, shapes: Struct
             _fill_rigid(scene["held"], specimen, omega, drive.amplitude_m)
         case LinearGap(stiffness=stop):
             _fill_springs(scene, specimen, stop, omega, drive.amplitude_m)
-    if shapes is not None:
-        scene["collisions"] = shapes.ctypes.data
+        case PowerLaw(reference=reference, terms=terms):
+            power = scene["power"]
+            power["reference"], power["terms"] = reference, len(terms)
+            power["exponents"][: len(terms)] = [exponent for exponent, _ in terms]
+            power["forces"][: len(terms)] = [force for _, force in terms]
+            scene["power_shapes"] = power_structure(engine).ctypes.data
+        case Hertz():
+            scene["collisions"] = collision_structure(engine).ctypes.data
     return scene
 
 
-def shapes_for(engine: Engine, specimen: Specimen) -> Structure | None:
-    """Return the solved collisions that runs of a specimen need; None for laws other than Hertz's."""
-    return _collision_structure(engine) if isinstance(specimen.contact, Hertz) else None
+# The tables of a run point into these, so that they live as long as the process.
+@cache
+def power_structure(engine: Engine) -> Structure:
+    """Return the `PowerShapes` of native/structures.hpp."""
+    shapes = engine.new("PowerShapes")
+    shapes["points"], shapes["weights"] = POINTS_AT, GAUSS_WEIGHTS
+    shapes["shares"] = POWER_SHARES[:, :, :GAUSS_POINTS]
+    shapes["ends"] = POWER_SHARES[:, :, GAUSS_POINTS]
+    shapes["at_start"], shapes["at_end"], shapes["course"] = AT_START, AT_END, COURSE
+    shapes["point_weights"], shapes["instants"] = POINT_WEIGHTS, INSTANTS
+    shapes["instant_weights"], shapes["instant_slopes"] = INSTANT_WEIGHTS, INSTANT_SLOPES
+    return shapes
 
 
-@lru_cache(maxsize=4)
-def _collision_structure(engine: Engine) -> Structure:
+@cache
+def collision_structure(engine: Engine) -> Structure:
+    """Return the `CollisionShapes` of native/structures.hpp."""
     solved = engine.new("CollisionShapes")
     solved["shares"] = SHARES[:, :, :POINTS]
     solved["ends"] = SHARES[:, :, POINTS].T
@@ -101,8 +130,7 @@ def _fill_specimen(target: Structure, specimen: Specimen) -> None:
         case RigidStops(restitution=restitution):
             target["law"], target["restitution"] = RIGID, restitution
         case PowerLaw():
-            msg = "The native engine does not know power laws yet: use the compiled kernels."
-            raise ValueError(msg)
+            target["law"] = POWERS
         case _:
             target["law"] = YIELDING
 

@@ -1,0 +1,67 @@
+// Where a motion is, between two steps of a run, and what is kept of it on the way.
+#pragma once
+#include "contact.hpp"
+
+namespace vibench {
+
+// What a run under a power law goes on with.
+struct PowerMemory {
+  double level;     // one more than that of the next step; 0 before the first
+  double sizes[3];  // how large p, x, z have lately been [m]
+};
+
+template <class T> struct Motion {
+  T at[6];  // x, y, z, vx, vy, vz [m, m/s]
+  Clock<T> clock;
+  Contact<T> contact;
+  PowerMemory powers;
+  double growth[6];  // of each derivative: the logarithm of a factor that was taken out of it
+};
+
+INLINE Motion<double> values_of(const Motion<double> &motion) { return motion; }
+template <int M> inline Motion<double> values_of(const Motion<Dual<double, M>> &motion) {
+  const auto &c = motion.contact;
+  Motion<double> values{{}, {motion.clock.high, motion.clock.low, 0.0}, {}, motion.powers, {}};
+  for (int i = 0; i < 6; i++) values.at[i] = motion.at[i].value;
+  values.contact = {c.w.value, c.r.value, c.side, c.step, c.root_scale, c.rate_scale, c.pace};
+  return values;
+}
+
+// Moves a factor that has become very large or small from the derivatives into its logarithm: their products with
+// anything physical stay finite. Returns whether anything changed.
+template <int M> inline bool keep_in_range(Motion<Dual<double, M>> &motion) {
+  constexpr double LARGEST = 1e100, SMALLEST = 1e-100;
+  bool is_changed = false;
+  for (int k = 0; k < M; k++) {
+    double size = 0.0;
+    for (const auto &number : motion.at) size = larger(size, magnitude(number.slope[k]));
+    if (!(size > LARGEST || (size < SMALLEST && size > 0.0)) || !is_finite(size)) continue;
+    for (auto &number : motion.at) number.slope[k] /= size;
+    motion.contact.w.slope[k] /= size, motion.contact.r.slope[k] /= size, motion.clock.slip.slope[k] /= size;
+    motion.growth[k] += logarithm(size);
+    is_changed = true;
+  }
+  return is_changed;
+}
+
+constexpr int64_t MOST_STEPS = 2000000000;  // of flight in a run
+constexpr int64_t RESOLVED_STEP = 50;       // steps of flight that a contact counts as: it takes as long
+
+// Grid steps that a flight counts as; all of them where its length or its grid is no number.
+INLINE int64_t steps_of(double length, double grid) {
+  double steps = length / grid;
+  return steps >= 0.0 && steps < double(MOST_STEPS) ? 1 + int64_t(steps) : MOST_STEPS;
+}
+
+// Keeps the samples that fall into the next `length` seconds: `place_sample(later, sample)` writes one.
+template <class PlaceSample>
+inline void keep_samples(Record &record, const Clock<double> &clock, double length, const PlaceSample &place_sample) {
+  while (record.samples_kept < record.sample_room) {
+    double later = time_until(clock, record.start + double(record.samples_kept) / record.sample_rate);
+    if (later > length) return;
+    place_sample(later, record.samples + 6 * record.samples_kept);
+    record.samples_kept++;
+  }
+}
+
+}  // namespace vibench
