@@ -14,11 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from vibench.sim import Accuracy, Harmonic, gong2025, lyapunov_exponent
+from vibench.sim.engine import NativeRun, RunRecord
 from vibench.sim.exponents import Precision
-from vibench.sim.kernels import clock_at
-from vibench.sim.motion import new_record
-from vibench.sim.slots import unit_tangent
-from vibench.sim.stepping import advance_harmonic, harmonic_tables, new_state
 
 REPEATS = 5
 COST_S = 10.0
@@ -37,12 +34,12 @@ AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 
 def run(specimen, drive, changes):
     """Follow ``changes`` small changes for a while; gives processor seconds and impacts."""
-    tables = harmonic_tables(specimen, drive)
-    state = new_state(specimen)
-    record = new_record(0.0, COST_S, None, 1e4)._replace(tangent=unit_tangent()[:changes].copy())
+    moving = NativeRun(specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance)
+    moving.carry(np.eye(6)[:changes])
+    record = RunRecord(round(1e4 * COST_S))
     start = time.process_time()
-    advance_harmonic(state, clock_at(0.0), COST_S, tables, Accuracy.STANDARD.tolerance, record)
-    return time.process_time() - start, int(record.counts[1])
+    moving.advance(COST_S, record)
+    return time.process_time() - start, record.impacts
 
 
 def report_cost():

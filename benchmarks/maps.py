@@ -143,7 +143,7 @@ def in_lanes(runs: list[FollowedRun], periods: list[int]) -> list[LaneRun]:
     """Follow motions side by side."""
     specimen = runs[0].specimen
     return follow_in_lanes(
-        specimen, STANDARD, [each.flight for each in runs], [each.state for each in runs], periods
+        specimen, STANDARD, [each.drive for each in runs], [each.state for each in runs], periods
     )
 
 

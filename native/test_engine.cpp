@@ -31,7 +31,7 @@ double units_in_last_place(double found, double exact) {
 }
 
 void test_elementary_functions_are_those_of_libm() {
-  double worst_exp = 0, worst_turn = 0, worst_root = 0;
+  double worst_exp = 0, worst_log = 0, worst_turn = 0, worst_root = 0;
   for (int n = 0; n < 200000; n++) {
     double x = draw(-700, 700);
     worst_exp = std::fmax(worst_exp, units_in_last_place(exponential(x), std::exp(x)));
@@ -40,9 +40,11 @@ void test_elementary_functions_are_those_of_libm() {
     worst_turn = std::fmax(worst_turn, units_in_last_place(cosine, std::cos(angle)));
     worst_turn = std::fmax(worst_turn, units_in_last_place(sine, std::sin(angle)));
     double y = std::exp(x), root = fifth_root(y);
+    worst_log = std::fmax(worst_log, units_in_last_place(logarithm(y), std::log(y)));
     worst_root = std::fmax(worst_root, std::fabs(root * root * root * root * root / y - 1));
   }
   expect(worst_exp <= 1.5, "exp is right to 1.5 units in the last place", worst_exp);
+  expect(worst_log <= 4, "the logarithm is right to 4 units in the last place", worst_log);
   expect(worst_turn <= 1.5, "sine and cosine are right to 1.5 units in the last place", worst_turn);
   expect(worst_root <= 3e-15, "the fifth root is right to rounding", worst_root);
   expect(exponential(0) == 1 && exponential(-INFINITY) == 0, "exp at its ends", 0);
@@ -57,6 +59,64 @@ void test_products_keep_what_they_round_off() {
     double a = draw(1, 1000), b = draw(0, 1e6), product = a * b;
     expect(product_error(a, b, product) == std::fma(a, b, -product), "product_error is exact", a);
   }
+}
+
+// Newton's method, which is trusted where p surely does not turn, against the careful search.
+void test_a_touch_is_the_one_that_the_careful_search_finds() {
+  constexpr double GAP = 45e-6, LENGTH = 4e-5;
+  const double lowest_gaps[] = {GAP, 0.3 * GAP, INFINITE};
+  for (int n = 0; n < 20000; n++) {
+    // Turning terms like those of a flight: a derivative is at most the fastest rate times the one before.
+    double series[AHEAD] = {}, bound = 0.0, reach = GAP, lowest = lowest_gaps[n % 3], length = draw(0.05, 1) * LENGTH;
+    for (int term = 0; term < 3; term++) {
+      double rate = LONGEST_TURN / LENGTH * draw(0.05, 1), size = 2 * GAP * draw(0, 1), phase = draw(0, 2 * PI);
+      double factor = size;
+      for (int k = 0; k < AHEAD; k++) {
+        series[k] += factor * std::cos(phase + 0.5 * PI * k);
+        factor *= rate / (k + 1);
+      }
+      bound += size * rate * rate, reach += size;
+    }
+    series[0] = smaller(GAP, larger(-lowest, draw(-1, 1) * GAP));
+    series[1] += draw(-3, 3) * GAP / LENGTH;
+    Room room{lowest, GAP, bound, reach};
+    double careful = first_contact(series, length, room), quick = first_touch(series, length, room);
+    if (careful == NEVER || quick == NEVER) {
+      // One may find at the very end what the other leaves to the next stretch.
+      expect(careful == quick || std::fmax(careful, quick) > length * (1 - 1e-9), "both find a touch", careful - quick);
+      continue;
+    }
+    double slope = std::fabs(polynomial_at(series, careful).rate);
+    expect(std::fabs(quick - careful) * slope < 2e-16 + 2e-15 * slope, "both find the same touch", quick - careful);
+  }
+}
+
+double worst_of_products(const double (&rows)[6][6], int count, const Metric &metric) {
+  double worst = 0.0;
+  for (int i = 0; i < count; i++)
+    for (int j = 0; j < count; j++) worst = std::fmax(worst, std::fabs(inner(rows[i], rows[j], metric) - (i == j)));
+  return worst;
+}
+
+void test_changes_become_orthonormal_and_a_lost_one_is_replaced() {
+  Metric metric = {};
+  for (int i = 0; i < 6; i++) metric[i][i] = draw(0.5, 100);
+  for (int i = 1; i < 6; i++) metric[i][i - 1] = metric[i - 1][i] = draw(-0.3, 0.3);
+  for (int n = 0; n < 1000; n++) {
+    double rows[6][6], size = std::exp(draw(-14, 14)), logarithms[6] = {}, volume[6] = {};
+    for (auto &row : rows)
+      for (double &number : row) number = size * draw(-1, 1);
+    double first = std::sqrt(inner(rows[0], rows[0], metric));
+    orthonormalise(rows, 6, metric, logarithms);
+    expect(worst_of_products(rows, 6, metric) < 1e-12, "rows are orthonormal", n);
+    expect(std::fabs(logarithms[0] - std::log(first)) < 1e-13, "a length is kept as its logarithm", n);
+    orthonormalise(rows, 6, metric, volume);
+    for (double each : volume) expect(std::fabs(each) < 1e-12, "orthonormal rows do not change", each);
+  }
+  double rows[6][6] = {{1, 2, 3}, {-2, -4, -6}, {0, 1, 0}}, logarithms[6] = {};
+  orthonormalise(rows, 3, metric, logarithms);
+  expect(logarithms[1] == -INFINITY && std::isfinite(logarithms[0] + logarithms[2]), "a row is lost", logarithms[1]);
+  expect(worst_of_products(rows, 3, metric) < 1e-12, "a lost row is replaced", 0);
 }
 
 Motion<double> at_rest() { return {}; }
@@ -102,6 +162,8 @@ void test_duals_are_derivatives(const Tables &tables, double until, double toler
 int main(int count, char **names) {
   test_elementary_functions_are_those_of_libm();
   test_products_keep_what_they_round_off();
+  test_a_touch_is_the_one_that_the_careful_search_finds();
+  test_changes_become_orthonormal_and_a_lost_one_is_replaced();
   for (int n = 1; n < count; n++) {
     Scene scene;
     CollisionShapes shapes;

@@ -40,7 +40,7 @@ def test_peaks_and_lines_are_those_of_the_samples(law, tolerance):
     x, p = states[:, 0], states[:, 1] - states[:, 2]
     against = np.exp(-1j * (2.0 * np.pi * drive.frequency_hz * time_s + drive.phase_rad))
     for values, peak, area in ((x, record.peak_x_m, record.area_x), (p, record.peak_p_m, record.area_p)):
-        # A peak lies between two samples; within a step under a power law these err by a part of the tolerance.
+        # A peak lies between two samples; those within a step of a power law err by a part of the tolerance.
         assert np.abs(values).max() <= peak * (1.0 + tolerance)
         assert np.abs(values).max() == pytest.approx(peak, rel=5e-5)
         assert abs(area - np.trapezoid(values * against, time_s)) < 3e-8 * abs(area)

@@ -13,21 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vibench.sim import Accuracy, Harmonic, Outcome, Specimen
+from vibench.sim.engine import NativeRun, RunRecord, most_impacts
 from vibench.sim.exponents import BlockedMean, blocked_mean
 from vibench.sim.exponents._lyapunov import intervals_to_skip
 from vibench.sim.exponents._tangent_run import energy_metric, interval_for
-from vibench.sim.kernels import Floats, Table, Vector, clock_at, dot, kernel
-from vibench.sim.motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
-from vibench.sim.slots import REACHED_END, Record
-from vibench.sim.stepping import (
-    HarmonicTables,
-    Workspace,
-    advance_by_law,
-    harmonic_tables,
-    new_state,
-    place_on_its_side,
-    workspace_for,
-)
+from vibench.sim.kernels import Floats
+from vibench.sim.motion import MAX_IMPACT_RATE_HZ, start_motion
 
 DISTANCE = 1e-7
 """Of the two motions after each return, over the state's scale: far above the error of a run at reference
@@ -73,54 +64,22 @@ def two_trajectory_exponent(
     size = DISTANCE * min(specimen.gaps_m) * math.sqrt(metric[0, 0])
     apart = np.cos(np.arange(1.0, HALF + 1.0)) / np.sqrt(np.diag(metric))
     apart *= size / math.sqrt(float(apart @ metric @ apart))
-    first, second = (new_state(specimen, motion, accuracy) for motion in (start, start + apart))
-    growth = np.zeros(count)
-    record = new_record(0.0, 2.0 * (settle_s + duration_s), None, max_impact_rate_hz)
-    tables = harmonic_tables(specimen, drive)
-    workspace = workspace_for(len(tables.flight.rates), record.observations, None)
-    code = _part(
-        first, second, interval.length_s, tables, accuracy.tolerance, record, metric, size, growth, workspace
+    record = RunRecord(most_impacts(max_impact_rate_hz, 2.0 * (settle_s + duration_s)))
+    first, second = (
+        NativeRun(specimen, drive, motion, accuracy.tolerance) for motion in (start, start + apart)
     )
-    rates = growth / interval.length_s
-    if code != Outcome.REACHED_END:
-        return TwoTrajectoryExponent(math.nan, math.nan, None, rates, Outcome(code))
-    mean = blocked_mean(rates[skipped:])
-    return TwoTrajectoryExponent(mean.mean, mean.standard_error, mean, rates, Outcome(code))
-
-
-@kernel
-def _part(
-    first: Vector,
-    second: Vector,
-    interval: float,
-    tables: HarmonicTables,
-    tolerance: float,
-    record: Record,
-    metric: Table,
-    size: float,
-    growth: Vector,
-    workspace: Workspace,
-) -> int:
-    """Advance two motions interval by interval, each time bringing the second back to its distance."""
-    here, there, apart = clock_at(0.0), clock_at(0.0), np.zeros(HALF)
-    flight, par, power = tables.flight, tables.flight.par, tables.power
-    laws = (power, tables.steps, tables.held, tables.collisions)
-    for k in range(len(growth)):
-        until = (k + 1.0) * interval
-        code = advance_by_law(first, here, until, flight, tolerance, record, *laws, None, workspace)
-        code = max(
-            code,
-            advance_by_law(second, there, until, flight, tolerance, record, *laws, None, workspace),
-        )
-        if code != REACHED_END:
-            return code
-        for i in range(HALF):
-            apart[i] = second[i] - first[i]
-        distance = math.sqrt(dot(apart, apart, metric))
+    growth = np.zeros(count)
+    for k in range(count):
+        for run in (first, second):
+            outcome = run.advance((k + 1.0) * interval.length_s, record)
+            if outcome is not Outcome.REACHED_END:
+                return TwoTrajectoryExponent(math.nan, math.nan, None, growth / interval.length_s, outcome)
+        here, apart = first.motion, second.motion - first.motion
+        distance = math.sqrt(apart @ metric @ apart)
         growth[k] = math.log(distance / size)
-        for i in range(HALF):
-            second[i] = first[i] + apart[i] * size / distance
         # Both begin the interval in the same manner, or the step control's memory would be a difference.
-        place_on_its_side(first, par, power, par.restitution, tolerance)
-        place_on_its_side(second, par, power, par.restitution, tolerance)
-    return REACHED_END
+        first.place(here)
+        second.place(here + apart * size / distance)
+    rates = growth / interval.length_s
+    mean = blocked_mean(rates[skipped:])
+    return TwoTrajectoryExponent(mean.mean, mean.standard_error, mean, rates, Outcome.REACHED_END)

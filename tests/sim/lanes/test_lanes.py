@@ -9,7 +9,6 @@ from llvmlite.binding import get_host_cpu_features
 from numba import njit
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.flight import flight_tables
 from vibench.sim.lanes import follow_in_lanes, lanes_serve
 from vibench.sim.lanes._flight import march_lanes
 from vibench.sim.lanes._rows import LANES, ROWS, TERMS
@@ -20,9 +19,7 @@ SPECIMEN = gong2025()
 
 
 def followed(specimen, drives, starts, periods, tolerance=STANDARD):
-    return follow_in_lanes(
-        specimen, tolerance, [flight_tables(specimen, each) for each in drives], starts, periods
-    )
+    return follow_in_lanes(specimen, tolerance, drives, starts, periods)
 
 
 def random_scenes(count, seed):

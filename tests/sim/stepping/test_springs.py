@@ -5,7 +5,8 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
 from vibench.sim.accuracy_benchmark._independent_solution import STATE_UNITS, independent_state, state_error
-from vibench.sim.scene._followed_run import FollowedRun, ObservedQuantities, Samples
+from vibench.sim.engine import Watch
+from vibench.sim.scene._followed_run import FollowedRun, Samples
 
 DRIVES = [Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6), Harmonic(311.0, 40e-6, 0.7)]
 GAPS = [45e-6, (20e-6, 60e-6)]
@@ -49,7 +50,7 @@ def test_peaks_and_lines_are_those_of_close_samples_and_change_nothing():
     run = settled(drive, GAPS[1])
     watched, sampled = run.apart(), run.apart()
     until_s, count = run.time_s + 4.0 / drive.frequency_hz, 80_000
-    seen = watched.follow(until_s, ObservedQuantities.PEAKS_AND_LINES)
+    seen = watched.follow(until_s, Watch.PEAKS_AND_LINES)
     states = sampled.follow(
         until_s, samples=Samples(run.time_s, count * drive.frequency_hz / 4.0, count)
     ).states
@@ -89,7 +90,7 @@ def test_a_small_change_is_carried_as_the_difference_of_two_runs():
     run = settled(drive, GAPS[1])
     until_s = run.time_s + 2.3 / drive.frequency_hz
     run.follow_tangent()
-    begins, change = run.state, run._tangent[0, :6].copy()
+    begins, change = run.state, run._run.changes[0]
     step = 1e-6 / np.linalg.norm(change / run._scales)
     ends = []
     for sign in (1.0, -1.0):
@@ -97,7 +98,7 @@ def test_a_small_change_is_carried_as_the_difference_of_two_runs():
         other.follow(until_s)
         ends.append(other.state)
     run.follow(until_s)
-    carried = np.exp(run._tangent[0, 6]) * run._tangent[0, :6]
+    carried = np.exp(run._run.growth[0]) * run._run.changes[0]
     difference = (ends[0] - ends[1]) / (2.0 * step)
     off = np.linalg.norm((carried - difference) / run._scales)
     assert off < 1e-4 * np.linalg.norm(carried / run._scales)

@@ -68,13 +68,9 @@ def collide_cell(
     """
     collisions = CollisionTables(
         known.fastest,
-        known.onto_x,
-        known.onto_p,
-        known.powers,
         struck,
         known.shares,
         known.ends,
-        known.weights,
         known.heights,
         known.shapes,
         known.durations,

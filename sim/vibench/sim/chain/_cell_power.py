@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from ..contact import ARGUMENT, DEEPEST
+from ..engine import AT_END, AT_START, POINTS_AT, POWER_SHARES
 from ..kernels import (
     Table,
     Vector,
@@ -22,19 +23,7 @@ from ..kernels import (
     store,
     total,
 )
-from ..power_law import (
-    AT_END,
-    AT_START,
-    FIT,
-    MOST_SUBSTITUTIONS,
-    POINTS_AT,
-    SHARES,
-    TRY_LONGER,
-    WALL_TURN,
-    power_force,
-    power_forces,
-    stiffest_rate,
-)
+from ..power_law import power_force, power_forces, stiffest_rate
 from ._cell_contact import PUSHED, SUMMARY_ONLY, log_moment, motion_in_series
 from ._cell_flow import (
     MEMORY,
@@ -53,9 +42,17 @@ from ._cell_flow import (
 POINTS = len(POINTS_AT)
 GAIN, FORCE, ROWS = 0, POINTS, POINTS + 1
 """Rows of a memory: what the force at one point adds to p at all of them; the force there."""
-_AT_POINTS: Table = np.ascontiguousarray(SHARES[:MOMENTS, :, :POINTS])
-_AT_END: Table = np.ascontiguousarray(SHARES[:MOMENTS, :, POINTS])
+_AT_POINTS: Table = np.ascontiguousarray(POWER_SHARES[:MOMENTS, :, :POINTS])
+_AT_END: Table = np.ascontiguousarray(POWER_SHARES[:MOMENTS, :, POINTS])
 """Integrals of (t_i - t)^m times the polynomial that is 1 at point k alone; shape (m, k, i), (m, k)."""
+FIT = 1e4
+"""Allowed misfit of the force's polynomial at the ends of a step, over the tolerance: as motion that it would
+make, over the size of the motion."""
+MOST_SUBSTITUTIONS = 30
+TRY_LONGER = 0.015
+"""A step is followed by a longer one if its misfit was this part of what is allowed."""
+WALL_TURN = 5.0
+"""A step turns the stiffest spring on its way by this much at most, or it might pass a wall unseen [rad]."""
 FADING = 0.999
 """How much of a past size of p is left after a step."""
 FINER = 0.01

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..engine import MOST_IMPACTS, SPARE_IMPACTS
 from ..flight import SERIES_TERMS
 from ..kernels import Complex, Floats, Table, clock_at
 from ..model import Accuracy, AccuracyWord, Drive, Harmonic, Outcome, chosen
 from ..motion import (
     MAX_IMPACT_RATE_HZ,
     ROUNDING,
-    SPARE_IMPACTS,
     Trajectory,
     check_impact_rate,
     check_times,
@@ -32,8 +32,6 @@ from ._windows import drive_term, fill_observed, law_of
 
 MOST_CELL_WINDOWS = 10**10
 """Windows of a run times its cells: hours."""
-MOST_IMPACTS = 1 << 26
-"""As of one specimen: beyond, their times fill the memory."""
 STATES_PER_CELL = 2 * MASSES_PER_CELL
 """x, y, z, vx, vy, vz."""
 

@@ -4,7 +4,6 @@ from ._collision import (
     LEAST_TOLERANCE as LEAST_TOLERANCE,
     LONGEST as LONGEST,
     Collision as Collision,
-    collide as collide,
     depth_of_fresh as depth_of_fresh,
     find_collision as find_collision,
     new_collision as new_collision,
@@ -25,14 +24,8 @@ from ._fit import (
 )
 from ._observer import (
     deepest_of as deepest_of,
-    observe_collision as observe_collision,
 )
 from ._tables import (
     CollisionTables as CollisionTables,
-    collision_tables as collision_tables,
     collisions_in_a_course as collisions_in_a_course,
-)
-from ._variation import (
-    collision_memory as collision_memory,
-    propagate_tangent_collision as propagate_tangent_collision,
 )

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import ROOT_FLOOR, gap_of
+from ..contact import ROOT_FLOOR
 from ..engine import (
     BY_DAMPER,
     BY_JERK,
@@ -32,12 +32,11 @@ from ..engine import (
     TERMS,
     TO_DURATION,
 )
-from ..flight import AT_X, AT_Z, COSINE, P_RATE, SINE, WIDE, X_RATE, Z_RATE, FlightTables, P
+from ..flight import WIDE, P
 from ..kernels import (
     SimdVector,
     Table,
     Vector,
-    eight_of_eight,
     eight_of_sixteen,
     inlined,
     root,
@@ -46,9 +45,7 @@ from ..kernels import (
     store,
     total,
 )
-from ..model import VX, VY, VZ, X, Y, Z
-from ..slots import RATE, ROOT, ROOT_SCALE, SIDE, Parameters
-from ._sums import at_heights, move_on, pushed
+from ._sums import at_heights, pushed
 from ._tables import CollisionTables
 
 LEAST_TOLERANCE = 1e-7
@@ -103,39 +100,6 @@ def new_collision() -> Collision:
 
 
 @inlined
-def collide(
-    state: Vector,
-    drive: complex,
-    longest: float,
-    tolerance: float,
-    tables: FlightTables,
-    collisions: CollisionTables,
-    collision: Collision,
-) -> float:
-    """Carry a state that has just begun a contact to its end; gives the time that took, or zero: not done.
-
-    ``drive`` is exp(i (omega t + phase)) now.
-    """
-    speed, par = state[RATE], tables.par
-    deepest = depth_of_fresh(state[ROOT], state[ROOT_SCALE], speed, longest, tolerance, collisions)
-    if deepest == 0.0:
-        return 0.0
-    _see_from_its_side(collision.motion, state, drive)
-    store(collision.course, 0, eight_of_eight(collisions.onto_p, 0, collision.motion))
-    gap = gap_of(state[SIDE], par.lower, par.upper)
-    duration = find_collision(
-        collision, speed, deepest, longest, tolerance, par.contact_stiffness, gap, collisions
-    )
-    if duration == 0.0:
-        return 0.0
-    move_on(collision.after, collision.motion, collision.moments, duration, collisions)
-    if not collision.after[P_RATE] < 0.0:
-        return 0.0
-    _leave(state, collision.after, par)
-    return duration
-
-
-@inlined
 def depth_of_fresh(
     root: float,
     root_scale: float,
@@ -169,30 +133,6 @@ def find_collision(
     if not 0.0 < duration < min(longest, LONGEST_TURN / collisions.fastest):
         return 0.0
     return duration
-
-
-@inlined
-def _see_from_its_side(motion: Vector, state: Vector, drive: complex) -> None:
-    side = state[SIDE]
-    motion[P], motion[P_RATE] = side * (state[Y] - state[Z]), state[RATE]
-    motion[AT_X], motion[AT_Z] = side * state[X], side * state[Z]
-    motion[X_RATE], motion[Z_RATE] = side * state[VX], side * state[VZ]
-    motion[COSINE], motion[SINE] = side * drive.real, side * drive.imag
-
-
-@inlined
-def _leave(state: Vector, after: Vector, par: Parameters) -> None:
-    """Stand on the stop, about to leave it."""
-    side = state[SIDE]
-    state[X], state[Z], state[VX], state[VZ] = (
-        side * after[AT_X],
-        side * after[AT_Z],
-        side * after[X_RATE],
-        side * after[Z_RATE],
-    )
-    state[Y] = state[Z] + side * gap_of(side, par.lower, par.upper)
-    state[VY] = state[VZ] + side * after[P_RATE]
-    state[ROOT], state[RATE], state[SIDE] = 0.0, after[P_RATE], 0.0
 
 
 @inlined

@@ -1,7 +1,7 @@
 """Sums over the points of a collision, and over the terms of what is slow beside it. SI units."""
 
 from ..engine import TERMS
-from ..kernels import SimdVector, Vector, eight, eight_of_eight, inlined, sixteen_of_sixteen, store
+from ..kernels import SimdVector, Vector, inlined, sixteen_of_sixteen
 from ._tables import CollisionTables
 
 
@@ -30,17 +30,3 @@ def pushed(
             factor * collisions.struck[term, place] * sixteen_of_sixteen(collisions.shares[term], 0, force)
         )
     return value
-
-
-@inlined
-def move_on(
-    after: Vector, before: Vector, moments: Vector, duration: float, collisions: CollisionTables
-) -> None:
-    """Write what becomes of a motion under a force with such moments."""
-    turn, factor = collisions.fastest * duration, 1.0
-    value = eight(before, 0) + duration * moments[0] * eight(collisions.struck, 0)
-    for term in range(1, TERMS):
-        factor *= turn
-        moved = eight_of_eight(collisions.powers[term], 0, before)
-        value += factor * (moved + duration * moments[term] * eight(collisions.struck, term))
-    store(after, 0, value)

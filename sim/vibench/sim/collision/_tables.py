@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..engine import ABOUT_MIDDLE, HEIGHTS, POINTS, SHARES, TERMS, collision_shapes
-from ..flight import AT_X, WIDE, P, linear_series
+from ..flight import WIDE
 from ..kernels import Table, Vector, kernel_without_refcount
-from ..model import Hertz, Specimen
 
 
 class CollisionTables(NamedTuple):
@@ -18,12 +17,6 @@ class CollisionTables(NamedTuple):
 
     fastest: float
     """Largest rate of the modes and the drive [1/s]."""
-    onto_x: Table
-    """As `onto_p`, of x."""
-    onto_p: Table
-    """Shape (j, m): what the j-th number of the motion adds to the m-th term of p in fastest * t."""
-    powers: Table
-    """As `vibench.sim.flight`, shape (m, j, i)."""
     struck: Table
     """Shape (m, i)."""
     shares: Table
@@ -31,8 +24,6 @@ class CollisionTables(NamedTuple):
     alone; time over the duration."""
     ends: Table
     """Shape (k, m): the same up to the end."""
-    weights: Vector
-    """Of the points in an integral over the duration."""
     heights: Vector
     """Times of the points over the duration."""
     shapes: Table
@@ -64,36 +55,17 @@ def top_of(terms: Vector) -> float:
     return value
 
 
-def collision_tables(
-    specimen: Specimen, omega: float, force: complex, rates: Vector
-) -> CollisionTables | None:
-    """Make the numbers of collisions under a drive; None for laws other than Hertz's."""
-    if not isinstance(specimen.contact, Hertz):
-        return None
-    linear = linear_series(specimen, omega, force, rates, TERMS)
-    return _with_shapes(linear.fastest, linear.powers, linear.struck)
-
-
 def collisions_in_a_course(fastest: float) -> CollisionTables:
     """Make the numbers of collisions whose course without force is known as a series of p, as in a chain.
 
     ``struck`` is left to fill in: what a unit impulse adds to the m-th term of p in fastest * t, column P.
     """
-    nothing = np.zeros((TERMS, WIDE, WIDE))
-    return _with_shapes(fastest, nothing, nothing[0])
-
-
-def _with_shapes(fastest: float, powers: Table, struck: Table) -> CollisionTables:
     shapes, durations = collision_shapes()
     return CollisionTables(
         fastest=fastest,
-        onto_x=np.ascontiguousarray(powers[:, :, AT_X].T),
-        onto_p=np.ascontiguousarray(powers[:, :, P].T),
-        powers=powers,
-        struck=struck,
+        struck=np.zeros((TERMS, WIDE)),
         shares=np.ascontiguousarray(SHARES[:, :, :POINTS]),
         ends=np.ascontiguousarray(SHARES[:, :, POINTS].T),
-        weights=np.ascontiguousarray(SHARES[0, :, POINTS]),
         heights=HEIGHTS,
         shapes=shapes,
         durations=durations,

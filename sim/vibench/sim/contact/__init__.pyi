@@ -4,7 +4,6 @@ from ._contact import (
     HELD as HELD,
     LANDING as LANDING,
     LEFT as LEFT,
-    LOG_COLUMNS as LOG_COLUMNS,
     LOGGED as LOGGED,
     MOST_STEPS as MOST_STEPS,
     NEAR as NEAR,
@@ -18,7 +17,6 @@ from ._contact import (
     contact_workspace as contact_workspace,
     foreseen_collision as foreseen_collision,
     gather as gather,
-    log_for as log_for,
     step_factor as step_factor,
 )
 from ._end import (
@@ -50,9 +48,4 @@ from ._flow import (
 )
 from ._observer import (
     hermite_peak as hermite_peak,
-    observe_contact as observe_contact,
-)
-from ._variation import (
-    propagate_tangent_steps as propagate_tangent_steps,
-    tangent_workspace as tangent_workspace,
 )

@@ -14,8 +14,6 @@ from ._flow import (
     CX,
     CZ,
     POINT,
-    SPARE,
-    STAGES,
     TRIAL,
     WIDTH,
     WORK_ROWS,
@@ -54,32 +52,14 @@ PRESSED = 0.7
 NEAR = 0.1
 """A hair before the exit, over the last w and the square root of the tolerance: what is left out there, the
 third power of it, is far less than the tolerance."""
-LOG_ROWS = 256
-LOGGED, DEEPEST, STAGES_ONLY = range(3)
-"""Places of a log's first row: how many steps' ends are in the rows below; the largest w so far; 1 when no
-deepest point is wanted, only the stages."""
-LOG_COLUMNS = 5
-LOG_TIME, LOG_X, LOG_VX, LOG_P, LOG_RATE, LOG_STEP = range(LOG_COLUMNS + 1)
-"""Columns of the rows below: time, x, vx, p and dp/dt at the ends of the accepted steps."""
-LOG_STAGE_T, LOG_STAGE_W = LOG_STEP + 1, LOG_STEP + 1 + STAGES
-"""Further columns of a wide log, from LOG_STEP on, about the step that begins at a row: its length in s, and
-the rates of t and w at its stages, from which a small change of the motion is carried along exactly."""
-WIDE_LOG_COLUMNS = LOG_STEP + 1 + 2 * STAGES
+LOGGED, DEEPEST = range(2)
+"""Places of the first row of a cell's log: how many ends of steps are in the rows below; the largest w."""
 
 
 @kernel
 def contact_workspace() -> Table:
     """Memory that one run (one thread) hands to every contact."""
     return np.zeros((WORK_ROWS, WIDTH))
-
-
-def log_for(observations: Vector, tangent: Table | None) -> Table:
-    """Make the log of contacts that a tally (as `vibench.sim.flight` says) or a tangent needs."""
-    if tangent is not None and len(tangent) > 0:
-        wide = np.zeros((LOG_ROWS, WIDE_LOG_COLUMNS))
-        wide[0, STAGES_ONLY] = 1.0 if observations[0] == 0.0 else 0.0
-        return wide
-    return np.zeros((LOG_ROWS if observations[0] != 0.0 else 0, LOG_COLUMNS))
 
 
 @kernel_without_refcount
@@ -161,59 +141,6 @@ def _scatter(work: Table, state: Vector, par: Parameters) -> None:
 
 
 @kernel_without_refcount
-def _start_log(log: Table, work: Table, side: float, par: Parameters) -> None:
-    if len(log) > 0:
-        log[0, LOGGED] = 0.0
-        log[0, DEEPEST] = work[POINT, W]
-        _log_point(log, work, side, par)
-
-
-@kernel_without_refcount
-def _log_point(log: Table, work: Table, side: float, par: Parameters) -> None:
-    """Add the accepted point as the log's next row."""
-    at = work[POINT]
-    log[0, LOGGED] += 1.0
-    row = int(log[0, LOGGED])
-    log[row, LOG_TIME], log[row, LOG_X], log[row, LOG_VX] = at[T], at[CX], at[CVX]
-    log[row, LOG_P], log[row, LOG_RATE] = (
-        side * (gap_of(side, par.lower, par.upper) + at[W] * at[W]),
-        side * at[R],
-    )
-
-
-@kernel_without_refcount
-def log_stages(log: Table, work: Table, step: float) -> None:
-    """Add the stages of the step just taken to the row of its start, if the log is wide enough."""
-    if log.shape[1] == WIDE_LOG_COLUMNS:
-        row = log[int(log[0, LOGGED])]
-        row[LOG_STEP] = step
-        for stage in range(STAGES):
-            row[LOG_STAGE_T + stage], row[LOG_STAGE_W + stage] = work[stage, T], work[stage, W]
-
-
-@kernel_without_refcount
-def _log_apex(
-    log: Table, work: Table, step: float, side: float, force: Vector, middle: float, par: Parameters
-) -> None:
-    """Note the deepest point of the step just taken; where r turns, step to r = 0 exactly."""
-    log[0, DEEPEST] = max(log[0, DEEPEST], work[TRIAL, W])
-    before, after = work[POINT, R], work[TRIAL, R]
-    if not before > 0.0 > after:
-        return
-    copy_row(work[SPARE], work[TRIAL])
-    low, high = 0.0, step
-    for _ in range(APEX_SECANTS):
-        part = low + (high - low) * before / (before - after)
-        trial_step(work, part, side, force, middle, par)
-        log[0, DEEPEST] = max(log[0, DEEPEST], work[TRIAL, W])
-        if work[TRIAL, R] > 0.0:
-            low, before = part, work[TRIAL, R]
-        else:
-            high, after = part, work[TRIAL, R]
-    copy_row(work[TRIAL], work[SPARE])
-
-
-@kernel_without_refcount
 def step_factor(error: float) -> float:
     """Next step over this one. The eighth root as three square roots; an error of NaN shrinks."""
     if not error < 1e300:
@@ -224,7 +151,7 @@ def step_factor(error: float) -> float:
 
 
 @kernel_without_refcount
-def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends are one loop
+def advance_contact(  # noqa: C901 - a step control and its three ends are one loop
     state: Vector,
     tau: float,
     limit: float,
@@ -233,7 +160,6 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
     par: Parameters,
     tolerance: float,
     work: Table,
-    log: Table,
 ) -> tuple[int, float]:
     """Advance a contact until m1 leaves the stop or the time reaches ``limit``, whichever is first.
 
@@ -249,9 +175,6 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
         Relative error allowed in a step, on w and r.
     work
         From `contact_workspace`.
-    log
-        Filled with the accepted steps, for who observes the contact; no rows keep nothing. A full log
-        ends the call with HELD before the limit.
 
     Returns
     -------
@@ -263,7 +186,6 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
     longest = state[PACE] * step_scale(tolerance)
     near = NEAR * math.sqrt(tolerance)
     gather(work, state, tau)
-    _start_log(log, work, side, par)
     if tau >= limit:
         return HELD, tau
     contact_rates(work[POINT], work[0], side, force, middle, par)
@@ -289,17 +211,9 @@ def advance_contact(  # noqa: C901, PLR0912 - a step control and its three ends 
             # Time runs backwards where w < 0: the step leapt over the exit and came back.
             step *= 0.5
             continue
-        if len(log) > 0:
-            log_stages(log, work, taken)
-            if log[0, STAGES_ONLY] == 0.0:
-                _log_apex(log, work, taken, side, force, middle, par)
         copy_row(work[POINT], work[TRIAL])
         if code == LEFT:
             work[POINT, W] = 0.0
-        if len(log) > 0:
-            _log_point(log, work, side, par)
-            if code < 0 and log[0, LOGGED] + 1 == len(log):
-                code = HELD
         if code >= 0:
             _scatter(work, state, par)
             state[STEP] = step

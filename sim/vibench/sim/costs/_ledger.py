@@ -15,7 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Self
 
-from ..kernels import SOURCES
+from ..engine import physics_digest
 from ..operating_system import state_folder, state_place
 
 MEMORY = 30
@@ -150,7 +150,13 @@ def _read(path: Path) -> dict[str, _Kind]:
 @cache
 def cost_ledger() -> CostLedger:
     """Give the ledger of this machine, these versions and sources; it is saved when the process ends."""
-    about = (platform.node(), platform.machine(), platform.python_version(), version("numba"), SOURCES)
+    about = (
+        platform.node(),
+        platform.machine(),
+        platform.python_version(),
+        version("numba"),
+        physics_digest(),
+    )
     name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]
     with contextlib.suppress(OSError):  # nothing is learnt then
         state_folder()

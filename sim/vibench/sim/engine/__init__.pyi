@@ -38,6 +38,9 @@ from ._processor import (
 )
 from ._run import (
     DIRECTIONS as DIRECTIONS,
+    MOST_IMPACTS as MOST_IMPACTS,
+    MOST_STEPS as MOST_STEPS,
+    SPARE_IMPACTS as SPARE_IMPACTS,
     GrowthReadings as GrowthReadings,
     NativeRun as NativeRun,
     RunRecord as RunRecord,
@@ -45,11 +48,15 @@ from ._run import (
     check_known_answer as check_known_answer,
     most_impacts as most_impacts,
     native_engine as native_engine,
+    refuse_inside_a_stop as refuse_inside_a_stop,
 )
 from ._scene import (
     collision_structure as collision_structure,
     power_structure as power_structure,
     scene_of as scene_of,
+)
+from ._sources import (
+    physics_digest as physics_digest,
 )
 from ._structures import (
     Structure as Structure,

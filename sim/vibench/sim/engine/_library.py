@@ -154,6 +154,15 @@ def library_path() -> Path:
     raise EngineError(msg)
 
 
+def native_digest() -> str:
+    """Return the digest of the native sources, in a checkout and in an installed wheel; empty if unknown."""
+    digest = sources_digest()
+    if digest is not None:
+        return digest
+    found = sorted(FOLDER.glob("engine-*"))
+    return found[0].stem.split("-")[2] if found else ""
+
+
 def sources_digest() -> str | None:
     """Return the digest of the native sources; None where there are none, as in an installed wheel."""
     if not BUILD.is_file():

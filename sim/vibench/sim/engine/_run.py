@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Accuracy, Harmonic, Outcome, Specimen, gong2025
+from ..model import Accuracy, Harmonic, Outcome, RigidStops, Specimen, Y, Z, gong2025
 from ._library import Engine, EngineError, library_path
 from ._scene import scene_of
 
@@ -23,6 +23,10 @@ SPARE_IMPACTS = 100
 """Allowed on top of the rate, for short runs."""
 DIRECTIONS = 6
 """Of a state: the most small changes that can be carried along."""
+INSIDE = 1e-9
+"""A start this part of the displacements beyond a rigid stop is taken to be on it: their rounding."""
+IN_CONTACT = ("side", "root", "rate", "step", "root_scale", "rate_scale", "pace")
+"""What a contact that is under way goes on with, as native/structures.hpp declares it."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -138,6 +142,7 @@ class NativeRun:
         Raises ValueError when the engine refuses the specimen, the drive or the start.
         """
         self._engine = engine = native_engine() if engine is None else engine
+        self._specimen = specimen
         self._tables = engine.prepare(scene_of(engine, specimen, drive))
         self._tangent = engine.new("Tangent")
         self._state = engine.new("State")
@@ -147,11 +152,22 @@ class NativeRun:
         self.place(initial_state)
 
     def place(self, motion: ArrayLike) -> None:
-        """Put the motion to x, y, z, vx, vy, vz, shape (6,), now; a stop that is reached is found."""
+        """Put the motion to x, y, z, vx, vy, vz, shape (6,), now; a stop that is reached is found.
+
+        Raises ValueError when the motion is inside a rigid stop.
+        """
         self._state["motion"] = motion
+        refuse_inside_a_stop(self._state["motion"], self._specimen)
         if self._engine.start(self._tables, self._state, self.tolerance) != 0:
             msg = f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1."
             raise ValueError(msg)
+
+    def continue_from(self, state: Floats, time_s: float) -> None:
+        """Be at a motion, shape (6,), at an instant; with a contact under way, shape (13,)."""
+        self._state["motion"] = state[:DIRECTIONS]
+        self._state["clock_high"], self._state["clock_low"] = time_s, 0.0
+        for name, value in zip(IN_CONTACT, state[DIRECTIONS:], strict=False):
+            self._state[name] = value
 
     def apart(self, tolerance: float | None = None) -> Self:
         """Return the same motion, to be followed apart; with a tolerance of its own, without changes."""
@@ -259,6 +275,21 @@ class GrowthReadings:
     def motions(self) -> Floats:
         """x, y, z, vx, vy, vz at each interval's end, shape (n, 6)."""
         return self._motions[: self.made]
+
+
+def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
+    """Raise ValueError when a motion begins beyond a rigid stop."""
+    if not isinstance(specimen.contact, RigidStops):
+        return
+    lower, upper = specimen.gaps_m
+    p = float(motion[Y] - motion[Z])
+    beyond = max(p - upper, -p - lower)
+    if beyond > INSIDE * (min(lower, upper) + float(np.abs(motion[:3]).sum())):
+        msg = (
+            f"A start at y - z = {p} m is not allowed: rigid stops stand at {-lower} and {upper} m; "
+            "start between them."
+        )
+        raise ValueError(msg)
 
 
 def most_impacts(rate_hz: float, duration_s: float) -> int:

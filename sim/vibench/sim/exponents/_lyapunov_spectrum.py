@@ -11,13 +11,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import stdtrit
 
+from ..engine import DIRECTIONS
 from ..kernels import Floats
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen, state_matrix
 from ..motion import MAX_IMPACT_RATE_HZ, state_scales
-from ..slots import UNITS
 from ._blocking import BlockedMean, blocked_mean
 from ._lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
 from ._settling import FinalMotion, settling
@@ -69,13 +69,13 @@ class LyapunovSpectrum:
     def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
         """Bounds of the dimension, by the fewest blocks of all exponents; never outside 0 to 6."""
         reach = float(self._reach(confidence).max()) * self.dimension_standard_error
-        return max(0.0, self.dimension - reach), min(float(UNITS), self.dimension + reach)
+        return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
 
     def _reach(self, confidence: float) -> Floats:
         if not 0.0 < confidence < 1.0:
             msg = f"A confidence of {confidence} is not allowed: it must lie between 0 and 1."
             raise ValueError(msg)
-        return np.asarray(stdtrit(np.maximum(self.blocks - 1, 1), 0.5 + 0.5 * confidence))
+        return np.asarray(scipy.special.stdtrit(np.maximum(self.blocks - 1, 1), 0.5 + 0.5 * confidence))
 
 
 def lyapunov_spectrum(
@@ -98,11 +98,18 @@ def lyapunov_spectrum(
     interval = interval_for(specimen, drive, interval_s)
     skipped = intervals_to_skip(interval, duration_s, settle_s)
     run = run_with_tangent(
-        specimen, drive, UNITS, settle_s + duration_s, interval, accuracy, initial_state, max_impact_rate_hz
+        specimen,
+        drive,
+        DIRECTIONS,
+        settle_s + duration_s,
+        interval,
+        accuracy,
+        initial_state,
+        max_impact_rate_hz,
     )
     length = interval.length_s
     if run.outcome is not Outcome.REACHED_END:
-        nothing = np.full(UNITS, math.nan)
+        nothing = np.full(DIRECTIONS, math.nan)
         parts = _Taken(
             nothing,
             nothing,
@@ -136,7 +143,7 @@ def lyapunov_spectrum(
     )
 
 
-ONE_BLOCK = np.ones(UNITS, dtype=np.int64)
+ONE_BLOCK = np.ones(DIRECTIONS, dtype=np.int64)
 
 
 class _Taken(NamedTuple):
@@ -158,7 +165,9 @@ def _taken(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -
         system, _ = state_matrix(specimen)
         decays = np.sort(np.linalg.eigvals(system).real)[::-1]
         verdict = verdict_of(float(decays[0]), 0.0)
-        return _Taken(decays, np.zeros(UNITS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since)
+        return _Taken(
+            decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
+        )
     # A motion that settles late may leave little to average: never less than half of what was asked for.
     since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
     rates = run.rates[since:]

@@ -9,17 +9,14 @@ natural norm: free motion can only shrink in it, so that what grows was made to 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..flight import FlightTables, start_flight
-from ..kernels import Floats, Table, Vector, clock_at, kernel, orthonormal_rows, orthonormalise
-from ..model import Accuracy, Harmonic, Outcome, Specimen
-from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion
-from ..slots import GROWTH, IMPACTS, REACHED_END, SIDE, TANGENT_SIZE, PowerTerms, Record
-from ..stepping import HarmonicTables, Workspace, advance_by_law, harmonic_tables, new_state, workspace_for
+from ..engine import GrowthReadings, NativeRun, RunRecord, most_impacts
+from ..kernels import Floats, Table
+from ..model import Accuracy, Harmonic, Outcome, Specimen, modal_form
+from ..motion import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
 """Several changes are made orthogonal at least this often, in radians and decays of the fastest mode: they
@@ -62,14 +59,6 @@ def interval_for(specimen: Specimen, drive: Harmonic, about_s: float | None = No
     return Interval(periods / drive.frequency_hz, periods)
 
 
-class Readings(NamedTuple):
-    """What a run with a tangent fills, one row an interval."""
-
-    growth: Table
-    impacts: NDArray[np.int64]
-    section: Table
-
-
 @dataclass(frozen=True, eq=False)
 class TangentRun:
     """How small changes of a motion grew, interval by interval."""
@@ -110,56 +99,39 @@ def run_with_tangent(
 
     The run ends with the last interval that fits, or where ``enough`` says so.
     """
-    tables = harmonic_tables(specimen, drive)
+    check_impact_rate(max_impact_rate_hz)
     count = interval.count_in(duration_s)
-    state = new_state(specimen, start_motion(initial_state), accuracy)
+    run = NativeRun(specimen, drive, start_motion(initial_state), accuracy.tolerance)
     metric = energy_metric(specimen)
-    record = new_record(0.0, duration_s, None, max_impact_rate_hz)
-    tangent = starting_changes(metric, changes)
-    record = record._replace(tangent=tangent)
-    readings = Readings(np.zeros((count, changes)), np.zeros(count, np.int64), np.zeros((count, 6)))
-    clock = clock_at(0.0)
-    workspace = workspace_for(len(tables.flight.rates), record.observations, tangent)
-    parts = _parts(tables.flight, interval.length_s) if changes > 1 else 1
-    made, code = 0, REACHED_END
+    run.carry(starting_changes(metric, changes))
+    record = RunRecord(most_impacts(max_impact_rate_hz, duration_s))
+    parts = _parts(specimen, interval.length_s) if changes > 1 else 1
+    readings = GrowthReadings(changes, count, interval.length_s, parts, metric)
+    outcome = Outcome.REACHED_END
     stride = count if enough is None else math.ceil(count / CHECKS)
-    while made < count and code == REACHED_END:
-        last = min(count, made + stride)
-        code, made = _take_readings(
-            state,
-            clock,
-            interval.length_s,
-            parts,
-            made,
-            last,
-            tables,
-            accuracy.tolerance,
-            record,
-            tangent,
-            metric,
-            readings,
-            workspace,
-        )
-        if enough is not None and enough(readings.growth[:made]):
+    while readings.made < count and outcome is Outcome.REACHED_END:
+        outcome = run.read(readings, min(count, readings.made + stride), record)
+        if enough is not None and enough(readings.growth):
             break
     return TangentRun(
         interval=interval,
-        growth=readings.growth[:made],
-        impacts=readings.impacts[:made],
-        section=readings.section[:made],
-        impact_times_s=record.impact_times[: record.counts[IMPACTS]].copy(),
-        is_quiet=bool(_is_quiet(state, clock, tables.flight, tables.power)),
-        final_state=state[:6].copy(),
-        end_time_s=float(clock[0]),
-        outcome=Outcome(code),
+        growth=readings.growth,
+        impacts=readings.impacts,
+        section=readings.motions,
+        impact_times_s=record.impact_times_s.copy(),
+        # Free phasors only shrink.
+        is_quiet=run.reach_m < min(specimen.gaps_m),
+        final_state=run.motion,
+        end_time_s=run.time_s,
+        outcome=outcome,
     )
 
 
-def _parts(tables: FlightTables, interval_s: float) -> int:
+def _parts(specimen: Specimen, interval_s: float) -> int:
     """In how many parts an interval is cut so that no change is lost among the others."""
-    modes = tables.rates[:-1]
+    modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
-    return math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY))
+    return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
 
 
 def energy_metric(specimen: Specimen) -> Table:
@@ -173,52 +145,6 @@ def starting_changes(metric: Table, changes: int) -> Table:
     """Make changes in general directions, the same in every run, orthonormal in the metric."""
     size = len(metric)
     general = np.cos(np.outer(np.arange(1.0, changes + 1.0), np.arange(1.0, size + 1.0)))
-    rows = orthonormal_rows(general / np.sqrt(np.diag(metric)), metric)
-    return np.hstack([rows, np.zeros((changes, TANGENT_SIZE - GROWTH))])
-
-
-@kernel
-def _take_readings(
-    state: Vector,
-    clock: Vector,
-    interval: float,
-    parts: int,
-    first: int,
-    last: int,
-    tables: HarmonicTables,
-    tolerance: float,
-    record: Record,
-    tangent: Table,
-    metric: Table,
-    readings: Readings,
-    workspace: Workspace,
-) -> tuple[int, int]:
-    """Advance from interval to interval; returns an `Outcome` code and the first that was not completed."""
-    laws = (tables.power, tables.steps, tables.held, tables.collisions)
-    for k in range(first, last):
-        before = record.counts[IMPACTS]
-        for part in range(parts):
-            until = (k + (part + 1.0) / parts) * interval
-            code = advance_by_law(
-                state, clock, until, tables.flight, tolerance, record, *laws, tangent, workspace
-            )
-            if code != REACHED_END:
-                return code, k
-            readings.growth[k] += tangent[:, GROWTH]
-            orthonormalise(tangent[:, :GROWTH], metric, readings.growth[k])
-            tangent[:, GROWTH] = 0.0
-        readings.impacts[k] = record.counts[IMPACTS] - before
-        readings.section[k] = state[:GROWTH]
-    return REACHED_END, last
-
-
-@kernel
-def _is_quiet(state: Vector, clock: Vector, tables: FlightTables, power: PowerTerms | None) -> int:
-    """Say (1 or 0) whether it is certain that m1 will never touch a stop: free phasors only shrink."""
-    if power is not None or state[SIDE] != 0.0:
-        return 0
-    phasors, reach = np.empty(len(tables.rates), np.complex128), 0.0
-    start_flight(phasors, state, clock, tables)
-    for j in range(len(phasors)):
-        reach += abs(phasors[j] * tables.path[j])
-    return 1 if reach < min(tables.par.lower, tables.par.upper) else 0
+    root = np.linalg.cholesky(metric)
+    rows, lengths = np.linalg.qr((general / np.sqrt(np.diag(metric)) @ root).T)
+    return np.linalg.solve(root.T, rows * np.sign(np.diag(lengths))).T

@@ -22,16 +22,7 @@ from ._flight import (
     GRID_TURN as GRID_TURN,
     LIFTS_OFF as LIFTS_OFF,
     OUT_OF_RANGE as OUT_OF_RANGE,
-    RUN_OF_STEPS as RUN_OF_STEPS,
     TOUCHES as TOUCHES,
-    FlightTables as FlightTables,
-    drive_phasor as drive_phasor,
-    fill_base_force as fill_base_force,
-    flight_tables as flight_tables,
-    fly as fly,
-    place_on_phasors as place_on_phasors,
-    propagate_phasors as propagate_phasors,
-    start_flight as start_flight,
 )
 from ._linear_series import (
     AT_X as AT_X,
@@ -44,17 +35,11 @@ from ._linear_series import (
     Z_RATE as Z_RATE,
     P as P,
     linear_series as linear_series,
-    read_change as read_change,
-    write_change as write_change,
 )
 from ._observer import (
-    observe_flight as observe_flight,
     series_peak as series_peak,
 )
 from ._series import (
     fill_flight_series as fill_flight_series,
     place_on_series as place_on_series,
-)
-from ._variation import (
-    propagate_tangent_flight as propagate_tangent_flight,
 )

@@ -126,17 +126,6 @@ NEWTON = 6
 
 
 @inlined
-def first_touch(
-    series: Vector, length: float, lowest: float, highest: float, bound: float, scale: float
-) -> float:
-    """Find the first touch as `first_contact` does, on a stretch of at most `LONGEST_TURN`."""
-    touch = _touch_without_turning(series, length, lowest, highest, bound, scale)
-    if touch == UNPROVED:
-        touch = first_contact(series, length, lowest, highest, bound, scale)
-    return touch
-
-
-@inlined
 def _touch_without_turning(
     series: Vector, length: float, lowest: float, highest: float, bound: float, scale: float
 ) -> float:

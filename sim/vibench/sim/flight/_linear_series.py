@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels import Table, Vector, inlined
-from ..model import VX, VY, VZ, Specimen, X, Y, Z
+from ..kernels import Table, Vector
+from ..model import Specimen
 
 WIDE = 8
 """Numbers of the motion."""
@@ -63,20 +63,3 @@ def _rates(specimen: Specimen, omega: float, force: complex) -> Table:
     rates[Z_RATE] = (press - pull) / m2
     rates[COSINE, SINE], rates[SINE, COSINE] = -omega, omega
     return rates
-
-
-@inlined
-def write_change(out: Vector, change: Vector) -> None:
-    """Write a change as the numbers of the motion; the drive has none."""
-    for i in range(WIDE):
-        out[i] = 0.0
-    out[P], out[P_RATE] = change[Y] - change[Z], change[VY] - change[VZ]
-    out[AT_X], out[X_RATE] = change[X], change[VX]
-    out[AT_Z], out[Z_RATE] = change[Z], change[VZ]
-
-
-@inlined
-def read_change(change: Vector, motion: Vector) -> None:
-    """Write a change from the numbers of the motion."""
-    change[X], change[Z], change[Y] = motion[AT_X], motion[AT_Z], motion[AT_Z] + motion[P]
-    change[VX], change[VZ], change[VY] = motion[X_RATE], motion[Z_RATE], motion[Z_RATE] + motion[P_RATE]

@@ -12,27 +12,14 @@ from ._clock import (
     time_until as time_until,
 )
 from ._compile import (
-    SOURCES as SOURCES,
     inlined as inlined,
     kernel as kernel,
     kernel_without_refcount as kernel_without_refcount,
-)
-from ._elimination import (
-    solve_in_place as solve_in_place,
 )
 from ._orthonormal import (
     dot as dot,
     orthonormal_rows as orthonormal_rows,
     orthonormalise as orthonormalise,
-)
-from ._phasor_sum import (
-    STEPS_AHEAD as STEPS_AHEAD,
-    fill_series as fill_series,
-    march as march,
-    propagate_by as propagate_by,
-    series_rows as series_rows,
-    steps_ahead as steps_ahead,
-    sum_now as sum_now,
 )
 from ._polynomials import (
     polynomials as polynomials,

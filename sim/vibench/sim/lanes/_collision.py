@@ -181,7 +181,6 @@ def contact_by_steps(
     state: Vector,
     force: Vector,
     work: Table,
-    log: Table,
     shapes: Complex,
     onto: Complex,
     base: complex,
@@ -207,7 +206,7 @@ def contact_by_steps(
         for k in range(FORCE_TERMS):
             force[k] = term.real
             term *= complex(0.0, omega / (k + 1.0))
-        code, length = advance_contact(state, 0.0, 2.0 * middle, force, middle, par, tolerance, work, log)
+        code, length = advance_contact(state, 0.0, 2.0 * middle, force, middle, par, tolerance, work)
         if code not in (LEAVES, HELD):
             return -1
         at[LEFT, lane] -= length

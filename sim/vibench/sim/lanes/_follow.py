@@ -1,5 +1,6 @@
 """Motions of one specimen under harmonic drives, followed side by side by their states alone. SI units."""
 
+import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,10 +10,10 @@ import llvmlite.binding
 import numpy as np
 
 from ..collision import LEAST_TOLERANCE, CollisionFit, fit_collisions, time_over_fifth_root
-from ..flight import GRID_TURN, FlightTables
+from ..flight import GRID_TURN
 from ..kernels import Complex, Floats, Table, Vector
-from ..model import VY, VZ, Hertz, Specimen, Y, Z, modal_form
-from ..slots import STATE_SIZE
+from ..model import VY, VZ, Harmonic, Hertz, Specimen, Y, Z, harmonic_motion, modal_form
+from ..slots import STATE_SIZE, parameters
 from ._rows import (
     COLUMN,
     CUBE,
@@ -122,7 +123,7 @@ def _box_of(fit: CollisionFit, unit: float) -> Vector:
 def follow_in_lanes(
     specimen: Specimen,
     tolerance: float,
-    drives: Sequence[FlightTables],
+    drives: Sequence[Harmonic],
     starts: Sequence[Floats],
     periods: Sequence[int],
 ) -> list[LaneRun | None]:
@@ -148,7 +149,7 @@ def follow_in_lanes(
     if numbers is None:
         msg = "This specimen cannot be followed in lanes: they serve Hertz's stops and three modes that turn."
         raise ValueError(msg)
-    motions = _motions_of(numbers, drives, np.array(starts))
+    motions = _motions_of(specimen, numbers, drives, np.array(starts))
     count, most = len(drives), max(periods)
     # The longest first, so that all lanes end at about the same time.
     order = np.argsort(-np.array(periods), kind="stable")
@@ -161,7 +162,7 @@ def follow_in_lanes(
         motions.bases[order],
         numbers.onto,
         wanted,
-        drives[0].par,
+        parameters(specimen),
         tolerance,
         numbers.box,
         numbers.fit.coefficients,
@@ -191,11 +192,17 @@ class _Motions:
     bases: Complex
 
 
-def _motions_of(numbers: _Numbers, drives: Sequence[FlightTables], starts: Floats) -> _Motions:
+def _motions_of(
+    specimen: Specimen, numbers: _Numbers, drives: Sequence[Harmonic], starts: Floats
+) -> _Motions:
     count = len(drives)
-    omegas = np.array([drive.omega for drive in drives])
-    phases = np.array([drive.phase for drive in drives])
-    steady = np.array([drive.shapes[DRIVE_TERM] for drive in drives])
+    omegas = np.array([2.0 * math.pi * drive.frequency_hz for drive in drives])
+    phases = np.array([cmath.exp(1j * drive.phase_rad) for drive in drives])
+    moved = [
+        harmonic_motion(specimen, omega, drive.amplitude_m)
+        for omega, drive in zip(omegas.tolist(), drives, strict=True)
+    ]
+    steady, forces = np.array([motion for motion, _ in moved]), np.array([force for _, force in moved])
     path = steady[:, Y] - steady[:, Z]
     rates = np.column_stack([np.tile(numbers.rates, (count, 1)), 1j * omegas])
     grid = GRID_TURN / np.max(np.abs(rates), axis=1)
@@ -221,10 +228,10 @@ def _motions_of(numbers: _Numbers, drives: Sequence[FlightTables], starts: Float
     columns[:, CUBE : CUBE + TERMS] = np.abs(rates) ** 3
     write(KICK, numbers.kick)
     write(DRIVE, terms[:, DRIVE_TERM:])
-    columns[:, FREQUENCY] = [drive.frequency for drive in drives]
+    columns[:, FREQUENCY] = [drive.frequency_hz for drive in drives]
     columns[:, GRID] = grid
     columns[:, LEFT] = columns[:, PERIOD] = 1.0 / columns[:, FREQUENCY]
-    bases = np.array([drive.force for drive in drives]) * phases
+    bases = forces * phases
     return _Motions(columns, shapes, bases)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..collision import POLYNOMIALS, VARIABLES
-from ..contact import LOG_COLUMNS, contact_workspace
+from ..contact import contact_workspace
 from ..flight import FORCE_TERMS, LARGEST_BOUND
 from ..kernels import Complex, Counts, Table, Vector, below, eight, eights, fma, kernel, store
 from ..slots import STATE_SIZE, Parameters
@@ -69,12 +69,7 @@ def run_lanes(  # noqa: C901, PLR0912, PLR0915 - the phases and their ends are o
     at, job_of, events = np.zeros((ROWS, LANES)), np.full(LANES, NOBODY), np.zeros(LANES, np.int64)
     series, one = np.zeros((ORDERS, LANES)), np.zeros(ORDERS)
     variables, values = np.zeros((VARIABLES, LANES)), np.zeros((POLYNOMIALS, LANES))
-    state, force, work, log = (
-        np.zeros(STATE_SIZE),
-        np.zeros(FORCE_TERMS),
-        contact_workspace(),
-        np.zeros((0, LOG_COLUMNS)),
-    )
+    state, force, work = np.zeros(STATE_SIZE), np.zeros(FORCE_TERMS), contact_workspace()
     lower, upper = par.lower, par.upper
     following, alive, moving, careful, over = 0, 0, 0, 0, ALL
     while True:
@@ -138,7 +133,6 @@ def run_lanes(  # noqa: C901, PLR0912, PLR0915 - the phases and their ends are o
                         state,
                         force,
                         work,
-                        log,
                         shapes[job],
                         onto,
                         bases[job],

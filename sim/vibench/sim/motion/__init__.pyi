@@ -1,20 +1,21 @@
 from ._base_motion import (
     sampled_motion as sampled_motion,
 )
+from ._cubic_run import (
+    integrate_cubics as integrate_cubics,
+)
 from ._flow_derivative import (
     flow_derivative as flow_derivative,
 )
 from ._integrate import (
     MAX_IMPACT_RATE_HZ as MAX_IMPACT_RATE_HZ,
     ROUNDING as ROUNDING,
-    SPARE_IMPACTS as SPARE_IMPACTS,
     Impacts as Impacts,
     Trajectory as Trajectory,
     check_impact_rate as check_impact_rate,
     check_times as check_times,
     check_within as check_within,
     integrate as integrate,
-    new_record as new_record,
     start_motion as start_motion,
 )
 from ._poincare import (

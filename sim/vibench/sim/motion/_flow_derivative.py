@@ -3,11 +3,10 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Floats, clock_at
+from ..engine import DIRECTIONS, NativeRun, RunRecord, most_impacts
+from ..kernels import Floats
 from ..model import Accuracy, Harmonic, Outcome, Specimen
-from ..slots import derivative_of, unit_tangent
-from ..stepping import advance_harmonic, harmonic_tables, new_state
-from ._integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
+from ._integrate import MAX_IMPACT_RATE_HZ, start_motion
 
 
 def flow_derivative(
@@ -38,11 +37,9 @@ def flow_derivative(
     lost.
 
     """
-    moving = new_state(specimen, start_motion(state), accuracy)
-    changes = unit_tangent()
-    record = new_record(0.0, duration_s, None, MAX_IMPACT_RATE_HZ)._replace(tangent=changes)
-    tables = harmonic_tables(specimen, drive)
-    code = advance_harmonic(moving, clock_at(0.0), duration_s, tables, accuracy.tolerance, record)
-    if code != Outcome.REACHED_END:
+    run = NativeRun(specimen, drive, start_motion(state), accuracy.tolerance)
+    run.carry(np.eye(DIRECTIONS))
+    outcome = run.advance(duration_s, RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, duration_s)))
+    if outcome is not Outcome.REACHED_END:
         return np.full(6, np.nan), np.full((6, 6), np.nan)
-    return moving[:6].copy(), derivative_of(changes)
+    return run.motion, (np.exp(run.growth)[:, None] * run.changes).T

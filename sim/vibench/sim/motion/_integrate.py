@@ -6,37 +6,26 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Floats, Vector, clock_at
+from .. import motion
+from ..engine import NativeRun, RunRecord, most_impacts
+from ..kernels import Floats, Vector
 from ..model import (
     Accuracy,
     AccuracyWord,
     Drive,
     Harmonic,
-    LinearSweep,
-    LogarithmicSweep,
     Outcome,
-    Sampled,
     Specimen,
-    Sweep,
     chosen,
 )
-from ..slots import IMPACTS, MOST_STEPS, NEXT_SAMPLE, OBSERVATIONS_SIZE, Record
-from ..stepping import advance_harmonic, advance_intervals, harmonic_tables, interval_tables, new_state
-from ._base_motion import BaseMotion, sampled_motion, sweep_interval_s, sweep_motion
 
 MAX_IMPACT_RATE_HZ = 200_000.0
 """Several times the busiest motions known of the paper's specimen: at 50 um 4300 impacts a second on Hertz's
 stops, 23000 in the chatter on rigid ones of restitution 0.8; chatter of 0.95 may need more."""
-MOST_IMPACTS = 1 << 26
-"""In one run: the memory of their times is half a gigabyte (none until they happen)."""
 LATEST_START_S = 1e8
 """Three years: the end of a run is one number, whose last digit there is 1e-8 s."""
 MOST_SAMPLES = 1e9
 """48 gigabytes."""
-SPARE_IMPACTS = 100
-"""Allowed on top of the rate, for short runs."""
-BATCH = 1 << 16
-"""Intervals of a sweep that are cut at a time: bounds the memory of a long sweep."""
 ROUNDING = 1e-9
 """A duration this close to a whole number of samples or intervals is taken for it."""
 
@@ -113,91 +102,32 @@ def integrate(
     """
     accuracy = chosen(Accuracy, accuracy)
     check_times(duration_s, start_time_s, sample_rate_hz)
-    state = new_state(specimen, start_motion(initial_state), accuracy)
-    clock = clock_at(float(start_time_s))
+    check_impact_rate(max_impact_rate_hz)
     end = float(start_time_s + duration_s)
-    record = new_record(start_time_s, duration_s, sample_rate_hz, max_impact_rate_hz)
-    match drive:
-        case Harmonic():
-            code = advance_harmonic(
-                state, clock, end, harmonic_tables(specimen, drive), accuracy.tolerance, record
-            )
-        case Sampled():
-            check_within(drive.duration_s, end)
-            code = _run_motion(state, clock, end, sampled_motion(drive), specimen, accuracy, record)
-        case LinearSweep() | LogarithmicSweep():
-            check_within(drive.duration_s, end)
-            code = _run_sweep(state, clock, end, drive, specimen, accuracy, record)
-    return _trajectory(state, clock, end, record, Outcome(code), accuracy)
-
-
-def _run_motion(
-    state: Vector,
-    clock: Vector,
-    end: float,
-    motion: BaseMotion,
-    specimen: Specimen,
-    accuracy: Accuracy,
-    record: Record,
-) -> int:
-    """Advance over intervals that are all cut already."""
-    tables = interval_tables(specimen, motion.interval, accuracy)
-    first, first_from = _place(float(clock[0]), motion.interval, len(motion.pieces))
-    last, last_to = _place_end(end, motion.interval, len(motion.pieces))
-    return advance_intervals(
-        state, clock, motion.pieces[first : last + 1], first_from, last_to, tables, record
-    )
-
-
-def _run_sweep(
-    state: Vector,
-    clock: Vector,
-    end: float,
-    drive: Sweep,
-    specimen: Specimen,
-    accuracy: Accuracy,
-    record: Record,
-) -> int:
-    """Advance over a sweep, a batch of intervals at a time."""
-    interval = sweep_interval_s(drive, accuracy)
-    tables = interval_tables(specimen, interval, accuracy)
-    intervals = round(drive.duration_s / interval)
-    first, first_from = _place(float(clock[0]), interval, intervals)
-    last, last_to = _place_end(end, interval, intervals)
-    for begin in range(first, last + 1, BATCH):
-        stop = min(begin + BATCH, last + 1)
-        code = advance_intervals(
-            state,
-            clock,
-            sweep_motion(drive, interval, begin, stop - begin).pieces,
-            first_from if begin == first else 0.0,
-            last_to if stop == last + 1 else interval,
-            tables,
-            record,
+    impacts = most_impacts(max_impact_rate_hz, duration_s)
+    samples = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
+    rate_hz = 1.0 if sample_rate_hz is None else float(sample_rate_hz)
+    start = start_motion(initial_state)
+    if not isinstance(drive, Harmonic):
+        # Compiled kernels, which are loaded with their first use.
+        return motion.integrate_cubics(
+            specimen, drive, float(start_time_s), end, accuracy, start, impacts, samples, rate_hz
         )
-        if code != Outcome.REACHED_END:
-            return code
-    return int(Outcome.REACHED_END)
-
-
-def _place(time_s: float, interval_s: float, intervals: int) -> tuple[int, float]:
-    """Find the interval that begins at or holds an instant, and how far into it that is."""
-    position = time_s / interval_s
-    nearest = round(position)
-    if abs(position - nearest) < ROUNDING * max(1.0, position) and nearest < intervals:
-        return nearest, 0.0
-    index = min(int(position), intervals - 1)
-    return index, time_s - index * interval_s
-
-
-def _place_end(time_s: float, interval_s: float, intervals: int) -> tuple[int, float]:
-    """Find the interval that ends at or holds an instant, and how far into it that is."""
-    position = time_s / interval_s
-    nearest = round(position)
-    if abs(position - nearest) < ROUNDING * max(1.0, position) and 0 < nearest <= intervals:
-        return nearest - 1, interval_s
-    index = min(int(position), intervals - 1)
-    return index, time_s - index * interval_s
+    run = NativeRun(specimen, drive, start, accuracy.tolerance, start_time_s=start_time_s)
+    record = RunRecord(impacts, start_s=start_time_s, sample_rate_hz=rate_hz, samples=samples)
+    outcome = run.advance(end, record)
+    is_whole = outcome is Outcome.REACHED_END
+    # A sample that rounding puts at, or a hair beyond, the very end.
+    states = record.all_samples(run.motion) if is_whole else record.samples
+    return Trajectory(
+        time_s=start_time_s + np.arange(len(states)) / rate_hz,
+        states=states,
+        final_state=run.motion,
+        end_time_s=end if is_whole else run.time_s,
+        impacts=Impacts(record.impact_times_s.copy()),
+        outcome=outcome,
+        accuracy=accuracy,
+    )
 
 
 def start_motion(initial_state: ArrayLike | None) -> Vector:
@@ -207,44 +137,6 @@ def start_motion(initial_state: ArrayLike | None) -> Vector:
         msg = f"Initial state {motion} is not allowed: give six finite numbers x, y, z, vx, vy, vz."
         raise ValueError(msg)
     return motion
-
-
-def new_record(
-    start_s: float, duration_s: float, sample_rate_hz: float | None, impact_rate_hz: float
-) -> Record:
-    """Make what a run fills: room for its samples and for the impacts that are allowed."""
-    check_impact_rate(impact_rate_hz)
-    count = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
-    return Record(
-        start=float(start_s),
-        sample_rate=1.0 if sample_rate_hz is None else float(sample_rate_hz),
-        samples=np.zeros((count, 6)),
-        impact_times=np.zeros(min(math.ceil(impact_rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)),
-        counts=np.array([0, 0, MOST_STEPS]),
-        observations=np.zeros(OBSERVATIONS_SIZE),
-        tangent=None,
-    )
-
-
-def _trajectory(
-    state: Vector, clock: Vector, end: float, record: Record, outcome: Outcome, accuracy: Accuracy
-) -> Trajectory:
-    motion = state[:6].copy()
-    reached = end if outcome is Outcome.REACHED_END else float(clock[0])
-    kept = int(record.counts[NEXT_SAMPLE])
-    if outcome is Outcome.REACHED_END and kept < len(record.samples):
-        # A sample that rounding puts at, or a hair beyond, the very end.
-        record.samples[kept:] = motion
-        kept = len(record.samples)
-    return Trajectory(
-        time_s=record.start + np.arange(kept) / record.sample_rate,
-        states=record.samples[:kept],
-        final_state=motion,
-        end_time_s=reached,
-        impacts=Impacts(record.impact_times[: record.counts[IMPACTS]].copy()),
-        outcome=outcome,
-        accuracy=accuracy,
-    )
 
 
 def check_impact_rate(max_impact_rate_hz: float) -> None:

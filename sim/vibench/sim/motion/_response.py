@@ -3,25 +3,12 @@
 import math
 from dataclasses import dataclass
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Floats, clock_at
+from ..engine import NativeRun, RunRecord, Watch, most_impacts
+from ..kernels import Floats
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
-from ..slots import (
-    IMPACTS,
-    LINE_P_IM,
-    LINE_P_RE,
-    LINE_X_IM,
-    LINE_X_RE,
-    MODE,
-    PEAK_P,
-    PEAK_X,
-    PEAKS,
-    PEAKS_AND_LINES,
-)
-from ..stepping import advance_harmonic, harmonic_tables, new_state
-from ._integrate import MAX_IMPACT_RATE_HZ, new_record, start_motion
+from ._integrate import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
 
 WHOLE = 1e-9
 """A window this close to a whole number of periods is taken for it."""
@@ -99,37 +86,35 @@ def steady_response(
     """
     accuracy = chosen(Accuracy, accuracy)
     periods = whole_periods(drive, duration_s, window_s)
-    state = new_state(specimen, start_motion(initial_state), accuracy)
-    clock = clock_at(0.0)
-    tables = harmonic_tables(specimen, drive)
-    record = new_record(0.0, duration_s, None, max_impact_rate_hz)
+    check_impact_rate(max_impact_rate_hz)
+    run = NativeRun(specimen, drive, start_motion(initial_state), accuracy.tolerance)
+    record = RunRecord(most_impacts(max_impact_rate_hz, duration_s))
     line_s = periods / drive.frequency_hz
-    code = advance_harmonic(state, clock, float(duration_s - window_s), tables, accuracy.tolerance, record)
-    before, line_start = int(record.counts[IMPACTS]), state[:6].copy()
-    for mode, until in ((PEAKS, duration_s - line_s), (PEAKS_AND_LINES, float(duration_s))):
-        if code == Outcome.REACHED_END:
-            record.observations[MODE], line_start = mode, state[:6].copy()
-            code = advance_harmonic(state, clock, until, tables, accuracy.tolerance, record)
-    observations = (
-        record.observations if code == Outcome.REACHED_END else np.full_like(record.observations, np.nan)
-    )
+    outcome = run.advance(float(duration_s - window_s), record)
+    before, line_start = record.impacts, run.motion
+    for watch, until in ((Watch.PEAKS, duration_s - line_s), (Watch.PEAKS_AND_LINES, float(duration_s))):
+        if outcome is Outcome.REACHED_END:
+            line_start = run.motion
+            record.watch(watch)
+            outcome = run.advance(until, record)
     # A line is the mean of twice the motion against the drive.
-    scale = 2.0 / line_s
+    scale = 2.0 / line_s if outcome is Outcome.REACHED_END else math.nan
+    peaks = (record.peak_x_m, record.peak_p_m) if outcome is Outcome.REACHED_END else (math.nan, math.nan)
     return Response(
         drive=drive,
         accuracy=accuracy,
         duration_s=duration_s,
         window_s=window_s,
         line_periods=periods,
-        largest_x_m=float(observations[PEAK_X]),
-        largest_p_m=float(observations[PEAK_P]),
-        line_x_m=scale * complex(observations[LINE_X_RE], observations[LINE_X_IM]),
-        line_p_m=scale * complex(observations[LINE_P_RE], observations[LINE_P_IM]),
-        impacts=int(record.counts[IMPACTS]) - before,
+        largest_x_m=peaks[0],
+        largest_p_m=peaks[1],
+        line_x_m=scale * record.area_x,
+        line_p_m=scale * record.area_p,
+        impacts=record.impacts - before,
         impacts_before=before,
         line_start_state=line_start,
-        final_state=state[:6].copy(),
-        outcome=Outcome(code),
+        final_state=run.motion,
+        outcome=outcome,
     )
 
 

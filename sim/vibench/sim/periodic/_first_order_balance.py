@@ -16,7 +16,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ..kernels import Complex, Floats
 from ._condensation import LinearStructure, condense
@@ -84,11 +84,11 @@ def _zeros(coefficients: Floats, exponents: Floats) -> list[float]:
     for k in range(len(ends) - 1):
         touching = any(t in found for t in ends[k : k + 2])
         if values[k] * values[k + 1] < 0.0 and not touching:
-            found.append(
-                float(
-                    brentq(_value, ends[k], ends[k + 1], args=(coefficients, exponents), xtol=ROOT_TOLERANCE)
-                )
+            low, high = ends[k], ends[k + 1]
+            root = scipy.optimize.brentq(
+                _value, low, high, args=(coefficients, exponents), xtol=ROOT_TOLERANCE
             )
+            found.append(float(root))
     return sorted(found)
 
 

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
-from scipy.optimize import brentq
 
 from ..kernels import Complex, Floats
 from ._condensation import Harmonics, LinearStructure
@@ -73,7 +72,7 @@ def transition(
         length = (stop - start) / (2.0 * math.pi) * period
         middle = np.array([0.5 * (start + stop)])
         if spring.kinks and not _acts(spring, motion, middle):
-            result = expm(system * length) @ result
+            result = scipy.linalg.expm(system * length) @ result
             continue
         marks = _marks(start, stop, fastest * length, spring, int(motion.harmonics[-1]))
         result = _crossed(system, spring_in, structure, spring, motion, marks) @ result
@@ -121,7 +120,7 @@ def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[f
 
             low, high = distance(float(grid[k])), distance(float(grid[k + 1]))
             if low * high < 0.0:
-                found.append(float(brentq(distance, grid[k], grid[k + 1], xtol=1e-14)))
+                found.append(float(scipy.optimize.brentq(distance, grid[k], grid[k + 1], xtol=1e-14)))
     return sorted(turn for turn in found if turn <= span_rad)
 
 

@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from ..kernels import Table, Vector
 from ..model import Harmonic, Specimen, base_transmissibility, chosen
@@ -193,7 +193,7 @@ def linear_phase_resonance_hz(
     values = [off(float(each)) for each in grid]
     # Falling: motion lags more as the frequency rises through a mode.
     found_hz = [
-        float(brentq(off, grid[k], grid[k + 1], xtol=1e-12))
+        float(scipy.optimize.brentq(off, grid[k], grid[k + 1], xtol=1e-12))
         for k in range(len(grid) - 1)
         if values[k] > 0.0 >= values[k + 1]
     ]

@@ -5,6 +5,3 @@ from ._stop import (
     place_between_rigid_stops as place_between_rigid_stops,
     rebound as rebound,
 )
-from ._variation import (
-    propagate_tangent_impact as propagate_tangent_impact,
-)

@@ -3,50 +3,20 @@
 import math
 from copy import copy
 from dataclasses import dataclass, replace
-from enum import Enum
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..engine import DIRECTIONS, MOST_STEPS, NativeRun, RunRecord, Watch, most_impacts
 from ..exponents import energy_metric
-from ..flight import FlightTables
-from ..kernels import Floats, advance_clock, clock_at
-from ..lanes import LaneRun
-from ..model import Accuracy, Harmonic, Outcome, Specimen
-from ..motion import MAX_IMPACT_RATE_HZ, new_record, start_motion, state_scales
-from ..slots import (
-    GROWTH,
-    IMPACTS,
-    LINE_P_IM,
-    LINE_P_RE,
-    LINE_X_IM,
-    LINE_X_RE,
-    MODE,
-    MOST_STEPS,
-    NEXT_SAMPLE,
-    NOTHING,
-    PEAK_P,
-    PEAK_X,
-    PEAKS,
-    PEAKS_AND_LINES,
-    SIDE,
-    STEPS_LEFT,
-    TANGENT_SIZE,
-    no_tangent,
-)
-from ..stepping import advance_harmonic, harmonic_tables, new_state
+from ..kernels import Floats
+from ..model import Harmonic, Outcome, Specimen
+from ..motion import MAX_IMPACT_RATE_HZ, start_motion, state_scales
 from ._nominal_cost import nominal_cost_s
 
-
-class ObservedQuantities(Enum):
-    """What is observed of a stretch."""
-
-    NOTHING = NOTHING
-    PEAKS = PEAKS
-    """Extremes of x and p."""
-    PEAKS_AND_LINES = PEAKS_AND_LINES
-    """Their components at the drive frequency as well."""
+if TYPE_CHECKING:
+    from ..lanes import LaneRun
 
 
 @dataclass(frozen=True)
@@ -105,20 +75,16 @@ class FollowedRun:
         self.drive = drive
         self.outcome = Outcome.REACHED_END
         """Of all stretches so far."""
-        self._tolerance = tolerance
-        self._state = new_state(specimen, start_motion(start), Accuracy.REFERENCE)
-        self._clock = clock_at(time_s)
-        self._tables = harmonic_tables(specimen, drive)
+        self._run = NativeRun(specimen, drive, start_motion(start), tolerance, start_time_s=time_s)
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)
-        self._tangent = no_tangent()
         self._cost_s = 0.0
         self._steps_left = MOST_STEPS
 
     @property
     def tolerance(self) -> float:
         """Relative error allowed in a step of a contact."""
-        return self._tolerance
+        return self._run.tolerance
 
     @property
     def cost_s(self) -> float:
@@ -128,27 +94,22 @@ class FollowedRun:
     @property
     def time_s(self) -> float:
         """Now."""
-        return float(self._clock[0])
+        return self._run.time_s
 
     @property
     def state(self) -> Floats:
         """X, y, z, vx, vy, vz now, shape (6,)."""
-        return self._state[: len(self._scales)].copy()
+        return self._run.motion
 
     def apart(self, tolerance: float | None = None) -> Self:
         """Give the same motion, to be followed apart from this one, at a tolerance of its own if need be."""
         twin = copy(self)
-        twin.__dict__.update(
-            _state=self._state.copy(),
-            _clock=self._clock.copy(),
-            _tangent=no_tangent() if tolerance is not None else self._tangent.copy(),
-            _tolerance=self._tolerance if tolerance is None else tolerance,
-        )
+        twin.__dict__.update(_run=self._run.apart(tolerance))
         return twin
 
     def pass_over(self, drive_periods: int) -> None:
         """Let so many drive periods pass in which the motion comes back to its state."""
-        advance_clock(self._clock, drive_periods / self.drive.frequency_hz)
+        self._run.pass_over(drive_periods / self.drive.frequency_hz)
 
     @property
     def periods(self) -> int | None:
@@ -159,21 +120,15 @@ class FollowedRun:
     @property
     def is_in_flight(self) -> bool:
         """No stop is touched now."""
-        return bool(self._state[SIDE] == 0.0)
+        return self._run.is_in_flight
 
-    @property
-    def flight(self) -> FlightTables:
-        """Specimen and drive, as `follow_in_lanes` asks for them."""
-        return self._tables.flight
-
-    def take(self, found: LaneRun) -> Stretch:
+    def take(self, found: "LaneRun") -> Stretch:
         """Be where a lane has come to that began here, at a whole drive period."""
         periods = len(found.states)
         start_s, frequency_hz = self.time_s, self.drive.frequency_hz
-        self._state = found.state
-        self._clock = clock_at((round(start_s * frequency_hz) + periods) / frequency_hz)
+        self._run.continue_from(found.state, (round(start_s * frequency_hz) + periods) / frequency_hz)
         length_s = self.time_s - start_s
-        self._cost_s += nominal_cost_s(self.specimen.contact, self._tolerance, length_s, found.impacts, 0, 0)
+        self._cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, found.impacts, 0, 0)
         samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, periods)
         return Stretch(
             start_s,
@@ -191,65 +146,60 @@ class FollowedRun:
 
     def follow_tangent(self) -> None:
         """Carry a small change along from now on, in no special direction."""
-        self._tangent = np.zeros((1, TANGENT_SIZE))
-        self._tangent[0, :GROWTH] = self._scales * np.linspace(1.0, 2.0, GROWTH)
+        self._run.carry((self._scales * np.linspace(1.0, 2.0, DIRECTIONS))[None])
 
     def drop_tangent(self) -> None:
         """Follow the states alone from now on."""
-        self._tangent = no_tangent()
+        self._run.carry(np.empty((0, DIRECTIONS)))
 
     def pushed(self, push: Floats) -> Self:
         """Give another motion, which begins now and a small change of the state, shape (6,), away."""
-        twin = self.apart()
-        state = new_state(self.specimen, start_motion(self.state + push), Accuracy.REFERENCE)
-        twin.__dict__.update(_state=state)
+        twin, run = self.apart(), self._run.apart()
+        run.place(start_motion(self.state + push))
+        twin.__dict__.update(_run=run)
         return twin
 
     def follow(
         self,
         until_s: float,
-        observe: ObservedQuantities = ObservedQuantities.NOTHING,
+        observe: Watch = Watch.NOTHING,
         samples: Samples | None = None,
     ) -> Stretch:
         """Advance to an instant; a run that has failed stays where it is."""
         start_s, before = self.time_s, self._size()
         kept = Samples(start_s, 1.0, 0) if samples is None else samples
-        record = new_record(start_s, until_s - start_s, None, MAX_IMPACT_RATE_HZ)._replace(
-            start=kept.first_s,
-            sample_rate=kept.rate_hz,
-            samples=np.zeros((kept.count, GROWTH)),
-            tangent=self._tangent,
+        record = RunRecord(
+            most_impacts(MAX_IMPACT_RATE_HZ, until_s - start_s),
+            start_s=kept.first_s,
+            sample_rate_hz=kept.rate_hz,
+            samples=kept.count,
+            steps=self._steps_left,
         )
-        record.counts[STEPS_LEFT] = self._steps_left
-        observations = record.observations
-        observations[MODE] = observe.value
+        record.watch(observe)
         if self.outcome is Outcome.REACHED_END:
-            code = advance_harmonic(self._state, self._clock, until_s, self._tables, self._tolerance, record)
-            self.outcome = Outcome(code)
-        if self.outcome is Outcome.REACHED_END:
-            # Samples that rounding puts a hair beyond the end.
-            record.samples[record.counts[NEXT_SAMPLE] :] = self._state[:GROWTH]
-        made = self._steps_left - int(record.counts[STEPS_LEFT])
+            self.outcome = self._run.advance(until_s, record)
+        made = self._steps_left - record.steps_left
         self._steps_left -= made
         self._cost_s += nominal_cost_s(
             self.specimen.contact,
-            self._tolerance,
+            self.tolerance,
             self.time_s - start_s,
-            int(record.counts[IMPACTS]),
-            len(self._tangent),
+            record.impacts,
+            len(self._run.growth),
             made,
         )
         return Stretch(
             start_s=start_s,
             end_s=self.time_s,
             outcome=self.outcome,
-            impacts=int(record.counts[IMPACTS]),
-            peak_x_m=float(observations[PEAK_X]),
-            peak_p_m=float(observations[PEAK_P]),
-            area_x=complex(observations[LINE_X_RE], observations[LINE_X_IM]),
-            area_p=complex(observations[LINE_P_RE], observations[LINE_P_IM]),
+            impacts=record.impacts,
+            peak_x_m=record.peak_x_m,
+            peak_p_m=record.peak_p_m,
+            area_x=record.area_x,
+            area_p=record.area_p,
             samples=kept,
-            states=record.samples,
+            # Samples that rounding puts a hair beyond the end.
+            states=record.all_samples(self.state if self.outcome is Outcome.REACHED_END else 0.0),
             growth=self._size() - before,
         )
 
@@ -259,7 +209,7 @@ class FollowedRun:
         Only a stop can add to it: however fast a mode is over the drive, a change that it turns from
         displacement to velocity has not grown.
         """
-        if len(self._tangent) == 0:
+        if len(self._run.growth) == 0:
             return math.nan
-        change = self._tangent[0, :GROWTH]
-        return 0.5 * math.log(change @ self._metric @ change) + float(self._tangent[0, GROWTH])
+        change = self._run.changes[0]
+        return 0.5 * math.log(change @ self._metric @ change) + float(self._run.growth[0])

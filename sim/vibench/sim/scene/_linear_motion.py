@@ -6,11 +6,12 @@ at most abs(S) + sum abs(m_j) for ever: a bound on p below the gap proves that n
 
 import math
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Complex, Floats, angle_at, clock_at
+from ..kernels import Complex, Floats
 from ..model import Harmonic, NoContact, PowerLaw, Specimen, X, Y, Z, harmonic_motion, modal_form
 
 
@@ -48,7 +49,9 @@ class LinearMotion:
 
     def state(self, time_s: float) -> Floats:
         """X, y, z, vx, vy, vz at an instant, shape (6,)."""
-        turn = angle_at(clock_at(time_s), 0.0, self.drive.frequency_hz) + self.drive.phase_rad
+        # Whole turns are dropped exactly: at late times their rounding would be a phase.
+        part = float(Fraction(time_s) * Fraction(self.drive.frequency_hz) % 1)
+        turn = 2.0 * math.pi * part + self.drive.phase_rad
         free = (self.modes * np.exp(self.rates * time_s)[:, None]).sum(axis=0)
         return np.asarray((self.steady * complex(math.cos(turn), math.sin(turn)) + free).real)
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..engine import Watch
 from ..kernels import Floats
 from ..motion import WHOLE
-from ._followed_run import FollowedRun, ObservedQuantities, Samples, Stretch
+from ._followed_run import FollowedRun, Samples, Stretch
 
 BLOCKS = 10
 """Parts of a window that are kept apart: what the scatter of the whole is found from."""
@@ -83,9 +84,7 @@ def samples_between(rate_hz: float, start_s: float, end_s: float) -> Samples:
     return Samples((first + 1) / rate_hz, rate_hz, max(0, last - first))
 
 
-def follow_strobed(
-    run: FollowedRun, until_s: float, observe: ObservedQuantities = ObservedQuantities.NOTHING
-) -> Stretch:
+def follow_strobed(run: FollowedRun, until_s: float, observe: Watch = Watch.NOTHING) -> Stretch:
     """Follow a motion to an instant, and keep its states once a drive period."""
     end_s = max(until_s, run.time_s)
     return run.follow(end_s, observe, samples_between(run.drive.frequency_hz, run.time_s, end_s))
@@ -110,7 +109,7 @@ def observe_window(
     line_s = max(end_s - periods / frequency, start_s)
     count = min(BLOCKS, periods)
     edges = [end_s - (periods * (count - k) // count) / frequency for k in range(1, count)] + [end_s]
-    head = [follow_strobed(run, line_s, ObservedQuantities.PEAKS)] if run.time_s < line_s else []
+    head = [follow_strobed(run, line_s, Watch.PEAKS)] if run.time_s < line_s else []
     parts: list[Stretch] = []
     for edge in edges:
         if is_chaos is not None and count == BLOCKS:
@@ -118,7 +117,7 @@ def observe_window(
                 run.drop_tangent()
             elif len(parts) == BLOCKS - LAST and math.isnan(parts[-1].growth):
                 run.follow_tangent()
-        parts.append(follow_strobed(run, edge, ObservedQuantities.PEAKS_AND_LINES))
+        parts.append(follow_strobed(run, edge, Watch.PEAKS_AND_LINES))
     return window_of(begins, parts, head)
 
 

@@ -9,9 +9,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from ..engine import Watch
 from ..model import Outcome
 from ._fixed_run import SceneRun, judged
-from ._followed_run import FollowedRun, ObservedQuantities, Stretch
+from ._followed_run import FollowedRun, Stretch
 from ._observed_window import follow_strobed, states_of, whole_periods, window_of
 from ._pace import Pace, growth_of
 from ._prediction import MotionKind
@@ -72,7 +73,7 @@ def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRu
         if not late:
             run.follow_tangent()
         starts.append(run.apart())
-        late.append(follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES))
+        late.append(follow_strobed(run, end_s, Watch.PEAKS_AND_LINES))
     before = late or early
     seen = _observed(run, before, starts, in_window, pace, f"it has not settled within {longest_s:g} s")
     return replace(seen, path=(*early, *late))
@@ -97,9 +98,7 @@ def _followed_on(
     run.follow_tangent()
     begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
     last = [
-        follow_strobed(
-            run, (made + number * slice_periods) / pace.frequency_hz, ObservedQuantities.PEAKS_AND_LINES
-        )
+        follow_strobed(run, (made + number * slice_periods) / pace.frequency_hz, Watch.PEAKS_AND_LINES)
         for number in range(1, in_window + 1)
     ]
     window = window_of(begins, last)
@@ -126,7 +125,7 @@ def _observe_period(run: FollowedRun, repeats: Repetition, path: Sequence[Stretc
     section = states_of(path)
     since = wandered_until(section, 2.0 * math.pi * pace.frequency_hz, repeats.period)
     end_s = settled_s + repeats.period / pace.frequency_hz
-    one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
+    one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
     window = window_of(begins, [one])
     seen = judged(run, window, [], pace, f"it repeats after {repeats.period} drive period(s)")
     if run.outcome is not Outcome.REACHED_END:

@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..engine import Watch
 from ..kernels import Floats
 from ..model import Outcome, Specimen, Y, Z
-from ._followed_run import FollowedRun, ObservedQuantities, Stretch
+from ._followed_run import FollowedRun, Stretch
 from ._observed_window import ObservedWindow, follow_strobed, observe_window, window_of
 from ._pace import Pace
 from ._prediction import MotionKind
@@ -258,7 +259,7 @@ class SeveralStarts:
         if other.repeats is not None:
             period, kind = other.repeats.period, MotionKind.PERIODIC
             begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
-            one = follow_strobed(run, end_s, ObservedQuantities.PEAKS_AND_LINES)
+            one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
             window = window_of(begins, [one])
             return reached_motion(run, kind, period, window, None, other.wandered_until_s, NOT_CARRIED)
         until_s = other.wandered_until_s

@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..engine import Watch
 from ..kernels import Floats
 from ..model import Accuracy, Outcome
 from ._fixed_run import SceneRun, leads
-from ._followed_run import FollowedRun, ObservedQuantities
+from ._followed_run import FollowedRun
 from ._observed_window import ObservedWindow, observe_window
 from ._pace import Pace
 from ._prediction import MotionKind, ScenePrediction
@@ -225,7 +226,7 @@ def _places_and_speeds(scene: Scene) -> Floats:
 
 def _responses(run: FollowedRun, length_s: float) -> Floats:
     """Responses over a stretch of whole drive periods, shape (4,); NaN if the run was lost."""
-    seen = run.follow(run.time_s + length_s, ObservedQuantities.PEAKS_AND_LINES)
+    seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
     if run.outcome is not Outcome.REACHED_END:
         return np.full(4, np.nan)
     scale = 2.0 / length_s

@@ -1,17 +1,3 @@
-from ._observed import (
-    LINE_P_IM as LINE_P_IM,
-    LINE_P_RE as LINE_P_RE,
-    LINE_X_IM as LINE_X_IM,
-    LINE_X_RE as LINE_X_RE,
-    MODE as MODE,
-    NOTHING as NOTHING,
-    OBSERVATIONS_SIZE as OBSERVATIONS_SIZE,
-    PEAK_P as PEAK_P,
-    PEAK_X as PEAK_X,
-    PEAKS as PEAKS,
-    PEAKS_AND_LINES as PEAKS_AND_LINES,
-    SECANTS as SECANTS,
-)
 from ._parameters import (
     CLOSED as CLOSED,
     LEVEL as LEVEL,
@@ -32,22 +18,10 @@ from ._parameters import (
 from ._record import (
     IMPACTS as IMPACTS,
     LOST as LOST,
-    MOST_STEPS as MOST_STEPS,
     NEXT_SAMPLE as NEXT_SAMPLE,
     REACHED_END as REACHED_END,
-    RESOLVED_STEP as RESOLVED_STEP,
-    STEPS_LEFT as STEPS_LEFT,
     STUCK as STUCK,
     TOO_LONG as TOO_LONG,
     TOO_MANY_IMPACTS as TOO_MANY_IMPACTS,
     Record as Record,
-)
-from ._variation import (
-    GROWTH as GROWTH,
-    TANGENT_SIZE as TANGENT_SIZE,
-    UNITS as UNITS,
-    derivative_of as derivative_of,
-    keep_in_range as keep_in_range,
-    no_tangent as no_tangent,
-    unit_tangent as unit_tangent,
 )

@@ -1,4 +1,4 @@
-"""What a run fills on its way, and how it ends. None of it changes a single step. SI units."""
+"""What a run under a drive of cubics fills on its way, and how it ends. None of it changes a step."""
 
 from typing import NamedTuple
 
@@ -14,13 +14,8 @@ LOST = int(Outcome.NOT_FINITE)
 STUCK = int(Outcome.STALLED)
 TOO_LONG = int(Outcome.TOO_LONG)
 
-NEXT_SAMPLE, IMPACTS, STEPS_LEFT = range(3)
+NEXT_SAMPLE, IMPACTS = range(2)
 """Places of `Record.counts`."""
-MOST_STEPS = 2_000_000_000
-"""Steps of flight in a run: seconds of work, and two days of the paper's specimen. One whose fastest mode is
-a million times faster than its drive would be followed for weeks."""
-RESOLVED_STEP = 50
-"""Steps of flight that a step through a force counts as: it takes as long."""
 
 
 class Record(NamedTuple):
@@ -34,8 +29,4 @@ class Record(NamedTuple):
     impact_times: Vector
     """Shape (most impacts,) [s]; a run ends when it is full."""
     counts: NDArray[np.int64]
-    """Samples and impacts so far, and steps that may still be made, shape (3,)."""
-    observations: Vector
-    tangent: Table | None
-    """Small changes of the state that are carried along, as `vibench.sim.slots` says, shape (m,
-    TANGENT_SIZE). m = 0 carries none; None carries none either, and tells a kernel so by its type."""
+    """Samples and impacts so far, shape (2,)."""

@@ -1,9 +1,3 @@
-from ._harmonic_run import (
-    HarmonicTables as HarmonicTables,
-    advance_by_law as advance_by_law,
-    advance_harmonic as advance_harmonic,
-    harmonic_tables as harmonic_tables,
-)
 from ._interval import (
     advance_interval as advance_interval,
     base_reaction as base_reaction,
@@ -17,8 +11,4 @@ from ._interval_run import (
 from ._substep import (
     FAILED as FAILED,
     IntervalTables as IntervalTables,
-)
-from ._workspace import (
-    Workspace as Workspace,
-    workspace_for as workspace_for,
 )

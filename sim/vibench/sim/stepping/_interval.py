@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
 from ..contact import begin_contact
+from ..engine import refuse_inside_a_stop
 from ..flight import LONGEST_TURN, base_force, shifted
 from ..kernels import Table, Vector, kernel, kernel_without_refcount
 from ..model import VX, VY, VZ, Accuracy, Specimen, X, Y, Z, state_matrix
@@ -27,8 +28,6 @@ from ..slots import SIDE, STATE_SIZE, Parameters, PowerTerms, parameters, power_
 from ._substep import FAILED, IntervalTables, advance_if_clear, advance_substep
 
 CUBIC_TERMS = 4
-INSIDE = 1e-9
-"""A start this part of the displacements beyond a rigid stop is taken to be on it: their rounding."""
 
 
 def interval_tables(
@@ -96,22 +95,9 @@ def new_state(
     state = np.zeros(STATE_SIZE)
     state[:6] = np.asarray(motion, dtype=np.float64)
     par = parameters(specimen)
-    if par.restitution is not None:
-        _refuse_inside_a_stop(state, specimen)
+    refuse_inside_a_stop(state, specimen)
     place_on_its_side(state, par, power_terms(specimen), par.restitution, accuracy.tolerance)
     return state
-
-
-def _refuse_inside_a_stop(state: Vector, specimen: Specimen) -> None:
-    lower, upper = specimen.gaps_m
-    p = float(state[Y] - state[Z])
-    beyond = max(p - upper, -p - lower)
-    if beyond > INSIDE * (min(lower, upper) + float(np.abs(state[:3]).sum())):
-        msg = (
-            f"A start at y - z = {p} m is not allowed: rigid stops stand at {-lower} and {upper} m; "
-            "start between them."
-        )
-        raise ValueError(msg)
 
 
 @kernel_without_refcount

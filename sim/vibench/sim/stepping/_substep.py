@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..contact import HELD, LEFT, LOG_COLUMNS, contact_workspace
+from ..contact import HELD, LEFT, contact_workspace
 from ..flight import (
     CLEAR,
     FORCE_TERMS,
@@ -147,10 +147,10 @@ def _stay_on_stop(
             return HELD, length
         state[SIDE] = 0.0
         return LEFT, tau + lets_go
-    pushing, no_log = np.zeros(FORCE_TERMS), np.zeros((0, LOG_COLUMNS))
+    pushing = np.zeros(FORCE_TERMS)
     pushing[0], pushing[1], pushing[2], pushing[3] = force.f0, force.f1, force.f2, force.f3
     return advance_touching(
-        state, tau, length, pushing, 0.0, tables.par, tables.power, tables.tolerance, work, no_log
+        state, tau, length, pushing, 0.0, tables.par, tables.power, tables.tolerance, work
     )
 
 

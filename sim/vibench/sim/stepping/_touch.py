@@ -30,9 +30,8 @@ def advance_touching(
     power: PowerTerms | None,
     tolerance: float,
     work: Table,
-    log: Table,
 ) -> tuple[int, float]:
     """Advance while a force acts that yields, to its end or ``limit``; see `vibench.sim.contact`."""
     if power is not None:
         return advance_smooth(state, tau, limit, force, middle, PowerSystem(par, power), tolerance, work)
-    return advance_contact(state, tau, limit, force, middle, par, tolerance, work, log)
+    return advance_contact(state, tau, limit, force, middle, par, tolerance, work)

@@ -11,9 +11,9 @@ crossed to the other stop.
 
 import math
 
-from ..flight import FlightTables, derivative_bound
-from ..kernels import Complex, Vector, fill_series, kernel_without_refcount
-from ..rigid import RESOLVED, closed_gap
+from ..flight import derivative_bound
+from ..kernels import Vector, kernel_without_refcount
+from ..rigid import RESOLVED
 from ..slots import Parameters
 
 SHORTEST_PART = 1e-3
@@ -53,21 +53,3 @@ def time_to_lift_off(series: Vector, length: float, closed: float, par: Paramete
     fastest = derivative_bound(series, length, 2)
     across = NEARLY * math.sqrt(2.0 * (par.lower + par.upper) / max(fastest, 1e-300))
     return min(length, across, max(sure, SHORTEST_PART * length))
-
-
-@kernel_without_refcount
-def closed_for(phasors: Complex, tables: FlightTables) -> float:
-    """How far from a stop m1 counts as touching it in a flight with these phasors [m]."""
-    reach = 0.0
-    for j in range(len(phasors)):
-        reach += abs(phasors[j] * tables.path[j])
-    return closed_gap(reach, tables.par)
-
-
-@kernel_without_refcount
-def lift_off(phasors: Complex, terms: Complex, series: Vector, tables: FlightTables) -> float:
-    """Find how long a flight from these phasors surely leaves a stop [s]; see `time_to_lift_off`."""
-    for j in range(len(phasors)):
-        terms[j] = phasors[j] * tables.path[j]
-    fill_series(series, terms, tables.series)
-    return time_to_lift_off(series, tables.grid, closed_for(phasors, tables), tables.par)

@@ -6,167 +6,30 @@ indentation, falls to zero: found like a touch, by the same proof, with it in th
 """
 
 import math
-from dataclasses import replace
-from typing import NamedTuple
-
-import numpy as np
 
 from ..contact import gap_of
 from ..flight import (
-    CLEAR,
-    GRID_TURN,
-    LARGEST_BOUND,
     NEVER,
-    OUT_OF_RANGE,
-    RUN_OF_STEPS,
     SERIES_TERMS,
-    TOUCHES,
     Cubic,
-    FlightTables,
     derivative_bound,
-    drive_phasor,
     first_contact,
-    flight_tables,
     place_on_series,
-    propagate_phasors,
 )
 from ..kernels import (
-    Complex,
     Table,
     Vector,
-    fill_series,
-    inlined,
     kernel_without_refcount,
-    march,
-    series_rows,
-    steps_ahead,
-    sum_now,
 )
 from ..model import (
-    PULL,
-    RATE,
-    ROW,
-    SHAPE,
     VX,
     VY,
     VZ,
-    Harmonic,
-    LinearGap,
-    NoContact,
-    Specimen,
     X,
     Y,
     Z,
 )
-from ..slots import LINE_P_IM, LINE_P_RE, MODE, PEAKS_AND_LINES, SIDE, Parameters
-
-LETS_GO = TOUCHES
-"""How a hold ends when it does not last: the place of a touch in a flight."""
-
-
-class HeldTables(NamedTuple):
-    """How the specimen moves while m1 is on a stop that holds it, or that is a spring."""
-
-    flight: FlightTables
-    """Modes of that motion in the place of the free ones; the part of p that is constant is left out."""
-    pulls: Complex
-    """What unit phasors add to what the stop at positive p must pull, for m1 to stay."""
-    let_go: float
-    """What it pushes at rest over the gap, in the same measure."""
-    rests: float
-    """The constant part of abs(p), over the gap."""
-
-
-def held_tables(tables: FlightTables, bound: Complex, specimen: Specimen) -> HeldTables:
-    """Make them for a rigid stop, from the free motion and `vibench.sim.model.bound_motion`."""
-    rates = bound[:, RATE].copy()
-    grid = GRID_TURN / float(np.abs(rates).max())
-    flight = tables._replace(
-        rates=rates,
-        squares=np.abs(rates) ** 2,
-        shapes=bound[:, SHAPE].copy(),
-        path=np.zeros_like(rates),
-        across=bound[:, SHAPE][:, X].copy(),
-        rows=bound[:-1, ROW].copy(),
-        grid=grid,
-        ahead=steps_ahead(rates, grid),
-        series=series_rows(rates),
-    )
-    pulls = bound[:, PULL] / specimen.masses[2]
-    return HeldTables(flight, pulls, specimen.stiffnesses[1] / tables.par.reduced_mass, 1.0)
-
-
-def pressed_tables(specimen: Specimen, drive: Harmonic) -> HeldTables | None:
-    """Make them for a stop that is a spring beside that of m1: exact too, with modes of its own.
-
-    None for other laws, and where two of these modes coincide.
-    """
-    match specimen.contact:
-        case LinearGap(stiffness=stop):
-            k0, k1, k2 = specimen.stiffnesses
-        case _:
-            return None
-    stiff = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
-    try:
-        flight = flight_tables(stiff, drive)
-    except ValueError:
-        return None
-    return HeldTables(flight, flight.path, k1 / (k1 + stop), stop / (k1 + stop))
-
-
-@inlined
-def hold(
-    side: float,
-    level: float,
-    phasors: Complex,
-    now: Complex,
-    terms: Complex,
-    series: Vector,
-    clock: Vector,
-    longest: float,
-    held: HeldTables,
-) -> tuple[int, float]:
-    """Find how long m1 stays on a stop: until it lets go, or ``longest`` [s]; see `flight.fly`.
-
-    ``level`` is what the stop pushes at rest, as `HeldTables.let_go` measures it.
-    """
-    flight, elapsed = held.flight, 0.0
-    grid = flight.grid
-    while elapsed < longest:
-        propagate_phasors(now, phasors, elapsed, clock, flight)
-        reach, bound = level, 0.0
-        for j in range(len(now)):
-            terms[j] = -side * now[j] * held.pulls[j]
-            reach += abs(terms[j])
-            bound += abs(terms[j]) * flight.squares[j]
-        if not bound < LARGEST_BOUND:
-            return OUT_OF_RANGE, elapsed
-        steps = min(RUN_OF_STEPS, int((longest - elapsed) / grid))
-        high = -level - bound * grid * grid / 8.0
-        if steps > 0 and sum_now(terms) < high:
-            made = march(terms, flight.ahead, steps, -math.inf, high)
-            elapsed += made * grid
-            if made == steps:
-                continue
-        length = min(grid, longest - elapsed)
-        fill_series(series, terms, flight.series)
-        series[0] += level
-        free = first_contact(series, length, math.inf, 0.0, bound, reach)
-        if free != NEVER:
-            return LETS_GO, elapsed + free
-        elapsed = longest if length < grid else elapsed + length
-    return CLEAR, longest
-
-
-@kernel_without_refcount
-def observe_rest(observations: Vector, p: float, clock: Vector, length: float, flight: FlightTables) -> None:
-    """Add what the constant part of p does to its line; `observe_flight` does the rest."""
-    if observations[MODE] == PEAKS_AND_LINES:
-        # The integral of exp(-i (omega t + phase)): its middle value times sin(q)/q, q half the turn.
-        half = 0.5 * flight.omega * length
-        line = p * length * math.sin(half) / half * drive_phasor(clock, 0.5 * length, flight).conjugate()
-        observations[LINE_P_RE] += line.real
-        observations[LINE_P_IM] += line.imag
+from ..slots import SIDE, Parameters
 
 
 @kernel_without_refcount

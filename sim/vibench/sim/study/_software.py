@@ -5,7 +5,7 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-from ..kernels import SOURCES
+from ..engine import physics_digest
 
 PACKAGES = ("vibench", "numpy", "scipy", "numba")
 
@@ -13,7 +13,7 @@ PACKAGES = ("vibench", "numpy", "scipy", "numba")
 @cache
 def software() -> str:
     """Versions, and the digest of the simulation's sources, as JSON text with sorted keys."""
-    found = {"python": platform.python_version(), "sim_sources": SOURCES}
+    found = {"python": platform.python_version(), "sim_sources": physics_digest()}
     for name in PACKAGES:
         try:
             found[name] = version(name)

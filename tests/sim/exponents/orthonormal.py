@@ -8,8 +8,7 @@ import math
 
 import numpy as np
 
-from ._arrays import Table, Vector
-from ._compile import kernel_without_refcount
+from vibench.sim.kernels import Table, Vector, kernel_without_refcount
 
 PASSES = 2
 LOST = 1e-11
