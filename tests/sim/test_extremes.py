@@ -307,7 +307,7 @@ def test_numbers_beyond_all_digits_end_with_an_outcome(contact, size):
 
 @pytest.mark.parametrize("contact", [*LAWS, "linear"])
 def test_a_run_ends_in_a_sentence_when_its_steps_are_used_up(contact, monkeypatch):
-    monkeypatch.setattr("vibench.sim.motion._integrate.MOST_STEPS", 1_000_000)
+    monkeypatch.setattr("vibench.sim.engine._run.MOST_STEPS", 1_000_000)
     specimen = paper(contact)
     assert integrate(specimen, DRIVE, 1.0).outcome is Outcome.REACHED_END
     run = integrate(specimen, DRIVE, 1000.0)

@@ -3,8 +3,9 @@
 Measured by their own depth and time, collisions differ only by how hard the other springs press: the
 shapes, and how they answer a misfit, are tabulated by that and then corrected
 (docs/decisions/0008-speed-of-contacts.md). Where a few corrections do not suffice (next to no speed,
-springs as fast as the collision, an instant to stop at in the midst of it) nothing is done here, and
-`contact` resolves it in steps. Peaks, lines and the variation follow from the sixteen points.
+springs as fast as the collision, an instant to stop at in the midst of it) nothing is done here, and the
+collision is resolved in steps. Used by chains; lanes take polynomials that are fitted to collisions. Motions
+of one specimen are followed by `vibench.sim.engine`.
 """
 
 import lazy_loader

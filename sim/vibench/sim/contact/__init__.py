@@ -2,8 +2,7 @@
 
 With |p| = gap + w^2 and dt = w ds every rate is a polynomial, so that Dormand and Prince's order 8(5,3)
 keeps its order at onset and exit (docs/decisions/0004-contact-integration.md, 0008-speed-of-contacts.md).
-Unknowns: w [m^0.5], r = d|p|/dt [m/s], x, z, vx, vz, t. What is observed is read from a log of the steps;
-the variation is advanced by the same twelve stages. Rigid stops and power laws are not here.
+Unknowns: w [m^0.5], r = d|p|/dt [m/s], x, z, vx, vz, t. Rigid stops and power laws are not here.
 """
 
 import lazy_loader

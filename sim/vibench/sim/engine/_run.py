@@ -61,7 +61,7 @@ class RunRecord:
         start_s: float = 0.0,
         sample_rate_hz: float = 1.0,
         samples: int = 0,
-        steps: int = MOST_STEPS,
+        steps: int | None = None,
         engine: Engine | None = None,
     ) -> None:
         """Make room for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
@@ -72,7 +72,7 @@ class RunRecord:
         record["start"], record["sample_rate"] = start_s, sample_rate_hz
         record["samples"], record["sample_room"] = self._samples.ctypes.data, samples
         record["impact_times"], record["impact_room"] = self._times.ctypes.data, most_impacts
-        record["steps_left"] = steps
+        record["steps_left"] = MOST_STEPS if steps is None else steps
 
     def watch(self, what: Watch) -> None:
         """Observe this from now on."""

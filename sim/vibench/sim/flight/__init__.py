@@ -1,9 +1,8 @@
 """Free motion between contacts: exact, with proof of the instant at which a stop is touched.
 
-Under a harmonic drive a flight is a sum of turning and decaying phasors; on an interval of a sampled or
-swept drive, one product with a matrix. A touch is excluded or found by a bound on the acceleration of p,
-never by sampling (docs/decisions/0004-contact-integration.md). Peaks, lines at the drive frequency and the
-variation of a flight are closed forms as well. Holds for every law but power laws, which act at every p.
+On an interval of a sampled or swept drive a flight is one product with a matrix. A touch is excluded or found
+by a bound on the acceleration of p, never by sampling (docs/decisions/0004-contact-integration.md). Holds for
+every law but power laws, which act at every p.
 """
 
 import lazy_loader

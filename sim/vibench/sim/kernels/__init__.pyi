@@ -16,11 +16,6 @@ from ._compile import (
     kernel as kernel,
     kernel_without_refcount as kernel_without_refcount,
 )
-from ._orthonormal import (
-    dot as dot,
-    orthonormal_rows as orthonormal_rows,
-    orthonormalise as orthonormalise,
-)
 from ._polynomials import (
     polynomials as polynomials,
 )

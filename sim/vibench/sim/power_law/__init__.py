@@ -1,9 +1,7 @@
-"""Motion under a power law, a sum of odd powers of p: a force that acts at every p, with no flight.
+"""Motion under a power law with a sampled or swept drive: a force that acts at every p, with no flight.
 
-Harmonic drive: long steps, the force at eight Gauss points found by substitution, the linear part as a
-Taylor series of the matrix exponential (docs/decisions/0026-power-laws.md). Sampled or swept drive: Dormand
-and Prince's order 8(5,3) in time (`smooth`). Peaks, lines, samples and the variation are those of the step
-itself.
+Dormand and Prince's order 8(5,3) in time. Harmonic drives take the long steps of `vibench.sim.engine`
+(docs/decisions/0026-power-laws.md).
 """
 
 import lazy_loader

@@ -1,9 +1,8 @@
-"""The memory of one run, slot by slot: the specimen's numbers, the state vector, the record, the observed.
+"""The memory of one run, slot by slot: the specimen's numbers, the state vector, the record.
 
 `_parameters` turns a `Specimen` into plain numbers and numbers the places of the state vector that every
 kernel advances in place; `_record` is what a run fills on its way (samples, impacts, counts) and its codes
-of ending; `_observed` numbers the array of peaks and lines; `_variation` is the table of small changes that
-are carried along. Filling a slot never changes a step of the motion.
+of ending. Filling a slot never changes a step of the motion.
 """
 
 import lazy_loader

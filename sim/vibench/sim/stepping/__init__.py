@@ -1,8 +1,7 @@
-"""Runs: flight, contact, impact and sticking joined, under a harmonic or a piecewise cubic drive.
+"""Runs: flight, contact, impact and sticking joined, under a piecewise cubic drive.
 
-A run advances one state vector in place; what is sampled or observed on the way never changes a step.
-Harmonic drives go from event to event (`advance_harmonic`); other drives are cut into intervals on which
-the base is a cubic, U(tau) = c0 + c1 tau + c2 tau^2 + c3 tau^3 [m]
+A run advances one state vector in place; what is sampled on the way never changes a step. Drives that are not
+harmonic are cut into intervals on which the base is a cubic, U(tau) = c0 + c1 tau + c2 tau^2 + c3 tau^3 [m]
 (docs/decisions/0004-contact-integration.md). `vibench.sim.shaker` steps a specimen inside a loop of its own:
 tables once, a state, then one call an interval, also from a compiled kernel (`kernel`). Tables may be shared
 by threads.

@@ -36,7 +36,7 @@ def advance_intervals(
     tables
         For the length of one interval.
     record
-        Filled on the way; its tally is left alone, for a drive without one frequency has no line.
+        Filled on the way.
 
     """
     whole = tables.length * tables.substeps

@@ -1,8 +1,7 @@
-"""Motion with m1 on a stop that holds it or is a spring: exact, until the stop would have to pull. SI.
+"""Motion with m1 on a rigid stop that holds it: exact, until the stop would have to pull. SI units.
 
-A rigid stop makes two bodies of three (`vibench.sim.model`), a spring a stiffer specimen about another place
-of rest. The stop lets go where the acceleration that presses m1 on it (`vibench.sim.rigid.press_on`), or the
-indentation, falls to zero: found like a touch, by the same proof, with it in the gap's place.
+A rigid stop makes two bodies of three (`vibench.sim.model`). It lets go where the acceleration that presses m1
+on it (`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof.
 """
 
 import math
