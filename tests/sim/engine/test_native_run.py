@@ -47,16 +47,11 @@ def test_random_scenes_end_where_strict_steps_do(law):
         drive = Harmonic(draws.uniform(20.0, 700.0), 10 ** draws.uniform(-6.5, -4.0), draws.uniform(0.0, 6.0))
         start = draws.uniform(-1.0, 1.0, 6) * np.repeat([5e-6, 5e-3], 3)
         words = {"start": start, "first_s": draws.uniform(0.0, 100.0)}
-        run, record, outcome = native(specimen, drive, 0.005, sample_rate_hz=20e3, samples=101, **words)
-        strict, exact, _ = native(
-            specimen, drive, 0.005, "reference", sample_rate_hz=20e3, samples=101, **words
-        )
+        run, record, outcome = native(specimen, drive, 0.005, **words)
+        strict, exact, _ = native(specimen, drive, 0.005, "reference", **words)
         assert outcome is Outcome.REACHED_END
         assert record.impacts == exact.impacts
         assert error_of(run.motion, strict.motion) < 1e-5
-        kept = min(len(record.samples), len(exact.samples))
-        assert kept >= 100
-        assert error_of(record.samples[:kept], exact.samples[:kept]) < 1e-5
 
 
 @pytest.mark.parametrize("law", LAWS)

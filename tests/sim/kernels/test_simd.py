@@ -21,7 +21,6 @@ from vibench.sim.kernels import (
     store,
     total,
 )
-from vibench.sim.kernels._simd import first_outside
 
 RANDOM = np.random.default_rng(7)
 
@@ -34,11 +33,6 @@ def reckoned(table, weights, out):
     value -= sixteen(table, 0) + sixteen(table, 1)
     store(out, 1, value)
     return total(value), largest(value)
-
-
-@kernel
-def outside(row, low, high):
-    return first_outside(sixteen(row, 0), low, high)
 
 
 @kernel
@@ -65,14 +59,6 @@ def test_sums_of_eight_take_the_rows_and_weights_that_they_say():
     np.testing.assert_allclose(out[0], weights[:8] @ table[:8], rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(out[1], weights @ table, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(out[2], 0.5 * weights[8:] @ table[4:12], rtol=1e-12, atol=1e-14)
-
-
-@pytest.mark.parametrize("place", [0, 1, 7, 15, 16])
-@pytest.mark.parametrize("stray", [-1.0, 1.0, np.nan, np.inf, 3.0])
-def test_the_first_number_that_strays_is_found(place, stray):
-    row = np.zeros(17)
-    row[place:] = stray
-    assert outside(row[:16].copy(), -1.0, 1.0) == place
 
 
 def test_what_is_not_a_number_shows_in_a_sum_and_in_the_largest():

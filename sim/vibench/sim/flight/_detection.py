@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from ..kernels import Vector, inlined, kernel_without_refcount
+from ..kernels import Vector, kernel_without_refcount
 
 LARGEST_BOUND = 1e150
 """Beyond it squares overflow, and nothing can be said about touches [m/s^2]."""
@@ -123,44 +123,6 @@ def first_contact(
 UNPROVED = -2.0
 NEWTON = 6
 """Corrections to a touch; two are the rule."""
-
-
-@inlined
-def _touch_without_turning(
-    series: Vector, length: float, lowest: float, highest: float, bound: float, scale: float
-) -> float:
-    """Find it where p surely does not turn before ``length``; UNPROVED where p may.
-
-    Then only the stop ahead can be touched, and only once, so that Newton's method may be trusted.
-    """
-    # No rate turns by more in this time, and d2p/dt2 changes by no more than that part of its bound.
-    change = bound * LONGEST_TURN
-    side = 1.0 if series[1] > 0.0 else -1.0
-    speed, bend, near = side * series[1], 2.0 * side * series[2], (highest if side > 0.0 else lowest)
-    if not min(speed, speed + bend * length) > change * length:
-        return UNPROVED
-    touch = TOUCH * min(lowest, highest) + ROUNDING * scale
-    gap = near - side * series[0]
-    if gap <= touch:
-        return 0.0
-    if gap > length * (speed + 0.5 * length * (max(bend, 0.0) + change)):
-        return NEVER
-    tau = 2.0 * gap / (speed + math.sqrt(max(speed * speed + 2.0 * bend * gap, 0.0)))
-    for _ in range(NEWTON):
-        tau = min(tau, length)
-        p, rate = polynomial_at(series, tau)
-        gap = near - side * p
-        if tau == length and gap > touch:
-            return NEVER
-        step = gap / (side * rate)
-        tau += step
-        # What this correction leaves of the gap is at most half of bound step^2.
-        if bound * step * step <= touch:
-            break
-    else:
-        return UNPROVED
-    touched: float = min(tau, length)
-    return touched
 
 
 @kernel_without_refcount

@@ -238,24 +238,6 @@ largest = cast("Callable[[SimdVector], float]", _largest)
 """The largest magnitude of all; NaN where one is not a number."""
 
 
-@intrinsic
-def _first_outside(_context: Any, simd: Any, low: Any, high: Any) -> Any:  # noqa: ARG001 - numba's names
-    def code(_context: Any, builder: Any, _signature: Any, given: Any) -> Any:
-        vector = simd.vector
-        above = builder.fcmp_ordered(">", given[0], spread_over(builder, given[1], vector))
-        below = builder.fcmp_ordered("<", given[0], spread_over(builder, given[2], vector))
-        outside = builder.bitcast(builder.not_(builder.and_(above, below)), ir.IntType(vector.count))
-        wide = builder.zext(outside, ir.IntType(64))
-        # A bit beyond the last lane stands for none.
-        return builder.cttz(builder.or_(wide, ir.Constant(wide.type, 1 << vector.count)), ir.IntType(1)(1))
-
-    return types.intp(simd, types.float64, types.float64), code
-
-
-first_outside = cast("Callable[[SimdVector, float, float], int]", _first_outside)
-"""The first lane that is not between two numbers; the count of lanes if all are."""
-
-
 def _mask_of(builder: Any, bits: Any) -> Any:
     """Give the bits of lanes as a number."""
     return builder.zext(builder.bitcast(bits, ir.IntType(bits.type.count)), ir.IntType(64))

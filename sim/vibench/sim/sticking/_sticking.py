@@ -1,7 +1,7 @@
 """Motion with m1 on a rigid stop that holds it: exact, until the stop would have to pull. SI units.
 
-A rigid stop makes two bodies of three (`vibench.sim.model`). It lets go where the acceleration that presses m1
-on it (`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof.
+A rigid stop makes two bodies of three (`vibench.sim.model`). It lets go where the acceleration that presses
+m1 on it (`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof.
 """
 
 import math
