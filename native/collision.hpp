@@ -93,8 +93,7 @@ template <class T> inline bool correct(Collision<T> &c, const T &begun, double c
     Wide<T, POINTS> free = series_at_points<T>(c.course, turn * Vector<POINTS>::load(t.shapes->heights));
     Wide<T, POINTS> there = begun + free + slow + pushed<T>(c.force, 1, 2, P, c.duration, t);
     Wide<T, POINTS> misfit = over * there - c.depths;
-    Wide<T, POINTS> change = end * Vector<POINTS>::load(shape[TO_DURATION]);
-    for (int k = 0; k < POINTS; k++) change = change + at(misfit, k) * Vector<POINTS>::load(shape[k]);
+    Wide<T, POINTS> change = end * Vector<POINTS>::load(shape[TO_DURATION]) + times(shape, misfit);
     T later = end_onto_duration * end + total(Vector<POINTS>::load(shape[ONTO_DURATION]) * misfit);
     if constexpr (is_dual<T>) change.value = Vector<POINTS>(0.0), later.value = 0.0;
     c.depths = c.depths - change;
@@ -145,16 +144,16 @@ template <class T> INLINE Collision<double> values_of(const Collision<T> &c) {
           value_of(c.moments), value_of(c.duration), c.unit,             c.pace,            c.press};
 }
 
-// Carries a motion that has just touched the stop on `side` to the end of its collision. Returns false, with
+// Carries a motion that has just touched the stop on `side` to the end of its collision; `pace` as in `Contact`. Returns false, with
 // nothing changed, where a few corrections do not suffice: next to no speed, springs as fast as the collision, an
 // instant to stop at in the midst of it, the reference level. Then the steps of contact.hpp resolve it.
 template <class T>
-inline bool collide(Collision<T> &c, T *motion, double side, const Complex<T> &drive, double longest,
+inline bool collide(Collision<T> &c, T *motion, double side, double pace, const Complex<T> &drive, double longest,
                     double tolerance, const Tables &tables) {
   const CollisionTables &t = tables.collision;
   double gap = gap_at(tables.specimen, side), speed = side * value_of(motion[VY] - motion[VZ]);
   if (tolerance < LEAST_TOLERANCE || !(speed > 0.0)) return false;
-  double w = fifth_root(speed * speed / (0.8 * tables.specimen.contact_stiffness / tables.pair));
+  double w = pace * speed;  // the largest
   double most = smaller(longest, LONGEST_COLLISION / t.fastest);
   if (!(LONGEST * w * w < speed * most)) return false;
   const T begins[WIDE] = {side * (motion[Y] - motion[Z]),   side * motion[X],  side * motion[Z],

@@ -268,7 +268,7 @@ struct Observer {
       again.take(part);
       double rate = again.trial[R];
       deepest = larger(deepest, again.trial[W]);
-      if (magnitude(rate) < 1e-7 * rate_scale) break;
+      if (magnitude(rate) < 1e-5 * rate_scale) break;  // w is flat there: it errs by the square
       if (rate > 0.0) low = part, before = rate;
       else high = part, after = rate;
     }

@@ -205,7 +205,7 @@ template <class T, class Stops> class Run {
       if (value_of(m.contact.w) == 0.0) {
         Collision<T> collision;
         Complex<T> now = drive_now();
-        if (collide(collision, m.at, m.contact.side, now, value_of(longest), tolerance, t)) {
+        if (collide(collision, m.at, m.contact.side, m.contact.pace, now, value_of(longest), tolerance, t)) {
           double length = value_of(collision.duration);
           if (observer.is_on())
             observer.see_collision(values_of(collision), m.contact.side, {value_of(now.re), value_of(now.im)});

@@ -65,8 +65,9 @@ class RunRecord:
         engine: Engine | None = None,
     ) -> None:
         """Make room for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
-        self._samples = np.zeros((samples, DIRECTIONS))
-        self._times = np.zeros(most_impacts)
+        # Only what has been filled is ever read: to clear it first takes as long as a short run.
+        self._samples = np.empty((samples, DIRECTIONS))
+        self._times = np.empty(most_impacts)
         self.structure = record = (native_engine() if engine is None else engine).new("Record")
         """As the engine takes it."""
         record["start"], record["sample_rate"] = start_s, sample_rate_hz
