@@ -1,5 +1,6 @@
 // The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
 // calls, so that threads may share tables. What is given is checked, and refused with a code.
+#include "signal.hpp"
 #include "tangent.hpp"
 
 #if defined(_WIN32)
@@ -170,15 +171,21 @@ Outcome advance(State &state, Tangent &tangent, const Tables &tables, double unt
 VIBENCH_API const char *vibench_structure(int64_t index) {
   constexpr const char *TEXTS[] = {Specimen_text, LinearMotion_text, HeldMotion_text, Drive_text, CollisionShapes_text,
                                    PowerTerms_text, PowerShapes_text,
-                                   Scene_text,    State_text,        Record_text,     Tangent_text, Readings_text};
-  return index >= 0 && index < 12 ? TEXTS[index] : nullptr;
+                                   Scene_text,    State_text,        Record_text,     Tangent_text, Readings_text,
+                                   Numbers_text,  Interpolation_text, Decimation_text, RecursiveFilter_text,
+                                   FilteredSignal_text};
+  constexpr int64_t COUNT = sizeof TEXTS / sizeof *TEXTS;
+  return index >= 0 && index < COUNT ? TEXTS[index] : nullptr;
 }
 VIBENCH_API int64_t vibench_size_of(int64_t index) {
   constexpr int64_t SIZES[] = {sizeof(Specimen),        sizeof(LinearMotion), sizeof(HeldMotion), sizeof(Drive),
                                sizeof(CollisionShapes), sizeof(PowerTerms),   sizeof(PowerShapes),
                                sizeof(Scene),           sizeof(State),        sizeof(Record),
-                               sizeof(Tangent),         sizeof(Readings)};
-  return index >= 0 && index < 12 ? SIZES[index] : 0;
+                               sizeof(Tangent),         sizeof(Readings),
+                               sizeof(Numbers), sizeof(Interpolation), sizeof(Decimation), sizeof(RecursiveFilter),
+                               sizeof(FilteredSignal)};
+  constexpr int64_t COUNT = sizeof SIZES / sizeof *SIZES;
+  return index >= 0 && index < COUNT ? SIZES[index] : 0;
 }
 // Bytes of the tables of a `Law`.
 VIBENCH_API int64_t vibench_size_of_tables(int64_t law) {
@@ -244,4 +251,54 @@ VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   Phasor phasors[PHASORS];
   start_flight(phasors, state->motion, drive_phasor(clock, 0.0, *tables), tables->flight);
   return PhasorSum<PHASORS>(phasors, tables->flight.path, tables->flight).reach;
+}
+
+// ---- Signals. Each call takes one structure; it returns REFUSED, or a number that its description explains.
+
+namespace {
+
+bool is_lent(const Numbers &numbers) { return numbers.size == 0 || (numbers.size > 0 && numbers.at != nullptr); }
+bool has_size(const Numbers &numbers, int64_t size) { return is_lent(numbers) && numbers.size == size; }
+// Of rows of `columns` numbers.
+bool has_columns(const Numbers &numbers, int64_t columns) {
+  return is_lent(numbers) && columns > 0 && numbers.size % columns == 0;
+}
+bool is_table(const Numbers &numbers, int64_t rows, int64_t columns) {
+  return has_columns(numbers, columns) && numbers.size / columns == rows;
+}
+
+bool is_usable(const Interpolation &of) {
+  return has_columns(of.samples, of.channels) && has_columns(of.table, INTERPOLATION_TAPS) &&
+         of.table.size >= 4 * INTERPOLATION_TAPS && is_lent(of.positions) &&
+         is_table(of.values, of.positions.size, of.channels);
+}
+
+bool is_usable(const Decimation &of) {
+  return is_lent(of.means) && of.reach % 8 == 0 && has_columns(of.table, of.reach) && of.table.size > 0 &&
+         is_lent(of.samples) && has_size(of.starts, of.samples.size) && has_size(of.fractions, of.samples.size);
+}
+
+bool is_usable(const RecursiveFilter &filter) {
+  int64_t order = filter.state.size;
+  return order > 0 && has_size(filter.state, order) && has_size(filter.numerator, order) &&
+         has_size(filter.denominator, order);
+}
+
+}  // namespace
+
+VIBENCH_API int64_t vibench_interpolate(const Interpolation *of) {
+  if (of == nullptr || !is_usable(*of)) return REFUSED;
+  interpolate(*of);
+  return 0;
+}
+
+VIBENCH_API int64_t vibench_decimate(const Decimation *of) {
+  return of != nullptr && is_usable(*of) && decimate(*of) ? 0 : REFUSED;
+}
+
+VIBENCH_API int64_t vibench_filter_signal(const FilteredSignal *of) {
+  if (of == nullptr || !is_usable(of->filter) || !is_lent(of->values)) return REFUSED;
+  if (!has_size(of->result, of->values.size)) return REFUSED;
+  run_filter(of->filter, of->values.at, of->result.at, of->values.size);
+  return 0;
 }

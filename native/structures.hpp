@@ -171,4 +171,44 @@ STRUCTURE(Readings,
   int64_t room, made;
 )
 
+// ---- Signals
+
+// An array lent for one call. Its size is checked against the others before anything is read or written.
+STRUCTURE(Numbers,
+  double *at;
+  int64_t size;
+)
+
+// Values of band-limited signals between their samples.
+STRUCTURE(Interpolation,
+  Numbers samples;             // [channels][samples of one]; zero outside
+  int64_t channels;
+  Numbers table;               // [phases + 3][INTERPOLATION_TAPS], from one phase before a sample to one behind the next
+  Numbers positions;           // in samples from the first
+  Numbers values;              // [channels][positions]: the result
+)
+
+// Samples at a lower rate from means over equal steps: each is a weighted sum of `reach` means.
+STRUCTURE(Decimation,
+  Numbers means;
+  int64_t reach;               // a multiple of eight
+  Numbers table;               // [rows][reach]: weights by the fraction of a step; one row serves whole fractions
+  Numbers starts;              // number of the oldest mean of each sample
+  Numbers fractions;           // of a step that each sample lies behind a mean, 0 to 1
+  Numbers samples;             // the result
+)
+
+// A ratio of polynomials in the delay by one step (direct form II, transposed); its state goes on from call to call.
+STRUCTURE(RecursiveFilter,
+  Numbers numerator;           // of the present value first
+  Numbers denominator;         // begins with 1
+  Numbers state;               // the last one stays zero
+)
+
+STRUCTURE(FilteredSignal,
+  RecursiveFilter filter;
+  Numbers values;
+  Numbers result;
+)
+
 }  // namespace vibench

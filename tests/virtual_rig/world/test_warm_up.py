@@ -13,16 +13,12 @@ from vibench.acquisition import open_bench
 from vibench.acquisition.instruments import LoopProgram
 from vibench.sim.shaker import _loaded_shaker as loaded_shaker
 from vibench.virtual_rig.world import (
-    _conversion as conversion,
-    _decimation as decimation,
-    _input_stage as input_stage,
     _loop_cables as loop_cables,
     _sensors as sensors,
 )
 
 kernels = (
-    loaded_shaker.move_shaker, decimation._weigh, input_stage._clipped, conversion._quantise,
-    sensors.show_steps, loop_cables._closed_loop
+    loaded_shaker.move_shaker, sensors.show_steps, loop_cables._closed_loop
 )
 with open_bench(Path("hardware_configs/virtual_rig_controller.toml")) as bench:
     before = [len(each.signatures) for each in kernels]

@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.special import i0
 
-from vibench.sim.kernels import kernel
+from vibench.sim.engine import native_engine
 
 from ._arrays import Reals
 
@@ -50,56 +50,15 @@ def interpolated(samples: Reals, positions: Reals) -> Reals:
 
     """
     channels = np.ascontiguousarray(np.atleast_2d(samples), dtype=np.float64)
-    result = np.empty((len(channels), positions.size))
-    _interpolate(channels, positions, _WEIGHTS, result)
-    return result.reshape(*samples.shape[:-1], positions.size)
-
-
-@kernel
-def _interpolate(channels: Reals, positions: Reals, table: Reals, result: Reals) -> None:
-    size = channels.shape[1]
-    weights = np.empty(_TAPS)
-    for i in range(positions.size):
-        whole = int(np.floor(positions[i]))
-        _weigh(positions[i] - whole, table, weights)
-        # The part of the taps that lies on the signal.
-        begin = whole + 1 - REACH
-        first = min(max(-begin, 0), _TAPS)
-        stop = max(first, min(size - begin, _TAPS))
-        used = weights[first:stop]
-        for channel in range(len(channels)):
-            result[channel, i] = _product(used, channels[channel, begin + first : begin + stop])
-
-
-@kernel
-def _weigh(fraction: float, table: Reals, weights: Reals) -> None:
-    """Give the weight of every tap: Lagrange's cubic through the phases around the fraction."""
-    place = fraction * _PHASES
-    row = min(int(place), _PHASES - 1)
-    t = place - row
-    a = -t * (t - 1) * (t - 2) / 6
-    b = (t + 1) * (t - 1) * (t - 2) / 2
-    c = -(t + 1) * t * (t - 2) / 2
-    d = (t + 1) * t * (t - 1) / 6
-    before, low, high, behind = table[row], table[row + 1], table[row + 2], table[row + 3]
-    for tap in range(_TAPS):
-        weights[tap] = (a * before[tap] + b * low[tap]) + (c * high[tap] + d * behind[tap])
-
-
-@kernel
-def _product(u: Reals, v: Reals) -> float:
-    # Eight sums that do not wait for each other: a processor makes them in one instruction.
-    a = b = c = d = e = f = g = h = 0.0
-    eights = len(u) - len(u) % 8
-    for k in range(0, eights, 8):
-        a += u[k] * v[k]
-        b += u[k + 1] * v[k + 1]
-        c += u[k + 2] * v[k + 2]
-        d += u[k + 3] * v[k + 3]
-        e += u[k + 4] * v[k + 4]
-        f += u[k + 5] * v[k + 5]
-        g += u[k + 6] * v[k + 6]
-        h += u[k + 7] * v[k + 7]
-    for k in range(eights, len(u)):
-        a += u[k] * v[k]
-    return ((a + b) + (c + d)) + ((e + f) + (g + h))
+    values = np.empty((len(channels), positions.size))
+    engine = native_engine()
+    work = engine.new(
+        "Interpolation",
+        samples=channels,
+        channels=len(channels),
+        table=_WEIGHTS,
+        positions=np.ascontiguousarray(positions, dtype=np.float64),
+        values=values,
+    )
+    engine.call("interpolate", work)
+    return values.reshape(*samples.shape[:-1], positions.size)

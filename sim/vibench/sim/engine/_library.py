@@ -20,6 +20,8 @@ BUILD = CHECKOUT / "native" / "build.py"
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
 """Of libraries of this system; wheels of others may have been built in the same checkout."""
 REBUILD = "python native/build.py"
+FUNCTIONS = ("interpolate", "decimate", "filter_signal")
+"""Of the library, each with one structure."""
 Tables = NDArray[np.float64]
 """What a run of one scene needs ready, as the engine lays it out."""
 _Pointer = ctypes.c_void_p
@@ -47,6 +49,9 @@ class Engine:
         filled = (_Pointer, _Pointer, _Pointer)
         self._declare("vibench_take_readings", count, _Pointer, _Pointer, number, *filled, count)
         self._declare("vibench_reach", number, _Pointer, _Pointer)
+        for name in FUNCTIONS:
+            self._declare(f"vibench_{name}", count, _Pointer)
+        self._functions = {name: getattr(self._library, f"vibench_{name}") for name in FUNCTIONS}
         self._types = self._read_structures()
 
     def _declare(self, name: str, result: type, *arguments: type) -> None:
@@ -72,9 +77,26 @@ class Engine:
         """Family of processors that the library was compiled for."""
         return self.path.name.split("-")[1]
 
-    def new(self, name: str) -> Structure:
-        """Make a structure of the interface, all zero; ``name`` as in native/structures.hpp."""
-        return np.zeros((), self._types[name])
+    def new(self, name: str, **fields: object) -> Structure:
+        """Make a structure of the interface, zero where nothing is given; names as in native/structures.hpp.
+
+        An array that is a field is lent, not copied: keep it as long as the structure is used.
+        """
+        structure = np.zeros((), self._types[name])
+        for field, value in fields.items():
+            structure[field] = _lent(value) if isinstance(value, np.ndarray) else value
+        return structure
+
+    def call(self, function: str, structure: Structure) -> int:
+        """Call a function of native/api.cpp that takes one structure; returns what is described there.
+
+        Raises ValueError when the engine refuses the structure.
+        """
+        code = int(self._functions[function](structure.ctypes.data))
+        if code < 0:
+            msg = f"The native engine refuses to {function}: array sizes must agree and numbers be finite."
+            raise ValueError(msg)
+        return code
 
     def prepare(self, scene: Structure) -> Tables:
         """Make the tables of a scene; its shapes of collisions and steps must outlive them.
@@ -131,6 +153,16 @@ class Engine:
     def reach(self, tables: Tables, state: Structure) -> float:
         """Return the largest abs(p) while no stop is touched [m]; infinite on a stop."""
         return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
+
+
+def _lent(numbers: NDArray[np.generic]) -> Structure | tuple[int, int]:
+    """Return what the engine knows an array of numbers by; a structure as it is."""
+    if numbers.dtype.names:
+        return numbers
+    if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
+        msg = f"An array of {numbers.dtype} was given: the native engine takes contiguous ones of float64."
+        raise TypeError(msg)
+    return numbers.ctypes.data, numbers.size
 
 
 def library_path() -> Path:

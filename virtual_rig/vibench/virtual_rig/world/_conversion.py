@@ -6,8 +6,6 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.kernels import kernel
-
 from ._decimation import Decimator, decimator
 from ._input_stage import InputStage
 from ._noise import NoiseStream
@@ -16,11 +14,12 @@ from ._wiring import Cable
 FloatArray = NDArray[np.float64]
 
 CONVERTER_BITS = 24
+_MOST_COUNTS = 2.0 ** (CONVERTER_BITS - 1)
 
 
 def volts_per_count(range_v: float) -> float:
     """Smallest step of an input [V]: its range, plus and minus, in 24 bits, as the driver reports it."""
-    return range_v / float(2 ** (CONVERTER_BITS - 1))
+    return range_v / _MOST_COUNTS
 
 
 class ConverterInput:
@@ -58,19 +57,10 @@ class ConverterInput:
         self._means = self._means[max(done, 0) :]
         self._means_first_step += max(done, 0)
         noise = self._noise.draw(sample, count)
-        self.has_clipped |= _quantise(samples, noise, self._noise_v, self._count_v)
-        return samples
-
-
-@kernel
-def _quantise(volts: FloatArray, noise: FloatArray, noise_v: float, count_v: float) -> bool:
-    """Add noise and round to whole counts, in place; tell whether one lay beyond the range."""
-    most, clips = 2.0 ** (CONVERTER_BITS - 1), False
-    for k in range(volts.size):
-        counts = np.rint((volts[k] + noise_v * noise[k]) / count_v)
-        clips |= counts > most - 1.0 or counts < -most
-        volts[k] = min(max(counts, -most), most - 1.0) * count_v
-    return clips
+        counts = np.rint((samples + self._noise_v * noise) / self._count_v)
+        clipped = np.clip(counts, -_MOST_COUNTS, _MOST_COUNTS - 1.0)
+        self.has_clipped |= bool(np.any(clipped != counts))
+        return clipped * self._count_v
 
 
 class Conversion:

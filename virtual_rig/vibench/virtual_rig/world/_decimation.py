@@ -12,7 +12,7 @@ from math import ceil, floor
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.kernels import kernel
+from vibench.sim.engine import native_engine
 
 FloatArray = NDArray[np.float64]
 
@@ -33,10 +33,8 @@ _DROOP_FIT_POINTS = 200
 
 _PHASES_PER_SAMPLE = 512
 """Rows of the table per output sample: linear interpolation between them is 110 dB below the signal."""
-_TOGETHER = 256
-"""Samples that go through the weights together: their sums stay in the nearest cache."""
 _LANES = 8
-"""Partial sums of the inner product, so that the processor need not wait for each addition."""
+"""The native engine takes weights in so many at a time."""
 
 EARLIEST_STEPS = -4.0
 """A channel may be this much early without the filter needing the future."""
@@ -75,26 +73,25 @@ class Decimator:
 
     def convert(self, means: FloatArray, means_first_step: int, sample: int, count: int) -> FloatArray:
         """Return ``count`` samples from number ``sample`` on, shape (count,); the means begin at a step."""
-        result = np.empty(count)
-        whole = len(self.table) == 1
-        if whole:
-            start = self.first_step(sample) - means_first_step
-            _weigh(self.table[0], self._by_phase(means[start:], count), result)
-        else:
-            # Counted from the first sample of the conversion: equal for every size of block.
-            origin = self.start_step - means_first_step + self._newest_offset - self.reach + 1
-            centres = np.asarray((np.arange(sample, sample + count) + 1.0) * self.ratio + self.centre(-1))
-            _weigh_between(self.table, means, origin, centres, result)
-        return result
-
-    def _by_phase(self, means: FloatArray, samples: int) -> FloatArray:
-        """Sort the steps of whole samples: shape (steps per sample, samples and the weights' reach)."""
-        stride = round(self.ratio)
-        rows = samples + ceil(self.reach / stride)
-        steps = np.zeros(rows * stride)
-        used = means[: rows * stride]
-        steps[: len(used)] = used
-        return np.ascontiguousarray(steps.reshape(rows, stride).T)
+        # Counted from the first sample of the conversion: equal for every size of block.
+        steps, begin = (np.arange(sample, sample + count) + 1.0) * self.ratio, self.centre(-1)
+        # Where one row of weights serves every sample, the fraction of a step is in them.
+        starts = steps + floor(begin) if len(self.table) == 1 else np.floor(steps + begin)
+        fractions = steps + begin - starts
+        starts += self.start_step - means_first_step + self._newest_offset - self.reach + 1
+        samples = np.empty(count)
+        engine = native_engine()
+        work = engine.new(
+            "Decimation",
+            means=means,
+            reach=self.reach,
+            table=self.table,
+            starts=starts,
+            fractions=fractions,
+            samples=samples,
+        )
+        engine.call("decimate", work)
+        return samples
 
 
 def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:
@@ -147,55 +144,3 @@ def _droop_correction() -> FloatArray:
     matrix = np.array(cosines).T
     half, *_ = np.linalg.lstsq(matrix * np.sinc(frequency)[:, np.newaxis], np.ones_like(frequency))
     return np.concatenate([half[:0:-1], half])
-
-
-@kernel
-def _weigh(weights: FloatArray, phases: FloatArray, result: FloatArray) -> None:
-    """Weigh for a whole number of steps per sample; ``phases[i, k]`` is the step i of the k-th sample.
-
-    Many samples advance together through the weights, two at a time: the inner loop runs over
-    neighbours in memory, and the sum of every sample keeps its order whatever the size of the block.
-    """
-    stride = phases.shape[0]
-    sums = np.empty(_TOGETHER)
-    for begin in range(0, result.size, _TOGETHER):
-        count = min(_TOGETHER, result.size - begin)
-        sums[:] = 0.0
-        for j in range(0, weights.size, 2):
-            first, second = weights[j], weights[j + 1]
-            at, behind = begin + j // stride, begin + (j + 1) // stride
-            one = phases[j % stride, at : at + count]
-            other = phases[(j + 1) % stride, behind : behind + count]
-            for k in range(count):
-                sums[k] += first * one[k] + second * other[k]
-        result[begin : begin + count] = sums[:count]
-
-
-@kernel
-def _weigh_between(
-    table: FloatArray, means: FloatArray, origin: int, centres: FloatArray, result: FloatArray
-) -> None:
-    rows = table.shape[0] - 1
-    for k in range(result.size):
-        step = int(np.floor(centres[k]))
-        place = (centres[k] - step) * rows
-        row = min(int(place), rows - 1)
-        part = place - row
-        below = _inner_product(table[row], means, origin + step)
-        above = _inner_product(table[row + 1], means, origin + step)
-        result[k] = below + part * (above - below)
-
-
-@kernel
-def _inner_product(weights: FloatArray, means: FloatArray, start: int) -> float:
-    a = b = c = d = e = f = g = h = 0.0
-    for j in range(0, weights.size, 8):
-        a += weights[j] * means[start + j]
-        b += weights[j + 1] * means[start + j + 1]
-        c += weights[j + 2] * means[start + j + 2]
-        d += weights[j + 3] * means[start + j + 3]
-        e += weights[j + 4] * means[start + j + 4]
-        f += weights[j + 5] * means[start + j + 5]
-        g += weights[j + 6] * means[start + j + 6]
-        h += weights[j + 7] * means[start + j + 7]
-    return ((a + b) + (c + d)) + ((e + f) + (g + h))

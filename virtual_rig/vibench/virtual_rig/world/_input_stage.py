@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.kernels import kernel
-
 from ..analogue import Coupling, Input
 from ._recursive_filter import RecursiveFilter
 from ._sensors import IEPE_BIAS_V
@@ -51,27 +49,15 @@ class InputStage:
 
     def pass_on(self, signals: FloatArray) -> tuple[FloatArray, bool]:
         """Volts at the converter and whether they clip, from the world's signals, shape (signals, steps)."""
-        volts = np.empty(signals.shape[1])
+        signal = signals[self.cable.signal]
         match self.configured.coupling:
             case Coupling.AC:
                 # The capacitor has long been charged to the constant part when a conversion begins.
-                passed = self._capacitor.run(signals[self.cable.signal] * self._gain)
-                clips = _clipped(passed, 1.0, 0.0, self._clip_v, volts)
+                volts = self._capacitor.run(signal * self._gain)
             case Coupling.DC:
-                signal = signals[self.cable.signal]
-                clips = _clipped(signal, self._gain, self._offset_v, self._clip_v, volts)
-        return volts, clips
-
-
-@kernel
-def _clipped(signal: FloatArray, gain: float, offset_v: float, clip_v: float, volts: FloatArray) -> bool:
-    """Turn a signal into volts and clip them; tell whether it was necessary."""
-    clips = False
-    for k in range(signal.size):
-        value = signal[k] * gain + offset_v
-        clips |= abs(value) > clip_v
-        volts[k] = min(max(value, -clip_v), clip_v)
-    return clips
+                volts = signal * self._gain + self._offset_v
+        clipped = np.clip(volts, -self._clip_v, self._clip_v)
+        return clipped, bool(np.any(clipped != volts))
 
 
 def _operating_point(configured: Input, cable: Cable) -> tuple[float, float]:

@@ -1,0 +1,81 @@
+// Weighted sums of samples: values between them, fewer of them, and filters that go on where their last block ended.
+#pragma once
+#include "structures.hpp"
+
+namespace vibench {
+
+constexpr int INTERPOLATION_TAPS = 64;
+constexpr int INTERPOLATION_REACH = INTERPOLATION_TAPS / 2;  // samples to either side
+
+// The sum depends on the order of the values alone, not on where a block begins. `count` is a multiple of eight.
+INLINE double inner_product(const double *weights, const double *values, int64_t count) {
+  Vector<8> sum = 0.0;
+  for (int64_t k = 0; k < count; k += 8) sum = sum + Vector<8>::load(weights + k) * Vector<8>::load(values + k);
+  return total(sum);
+}
+
+// Weights of the taps `fraction` of a sample behind a sample: Lagrange's cubic through the four phases around it.
+inline void interpolation_weights(double *weights, const Numbers &table, double fraction) {
+  int64_t phases = table.size / INTERPOLATION_TAPS - 3;
+  double place = fraction * double(phases);
+  int64_t row = smaller(int64_t(place), phases - 1);
+  double t = place - double(row);
+  double a = -t * (t - 1.0) * (t - 2.0) / 6.0, b = (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0;
+  double c = -(t + 1.0) * t * (t - 2.0) / 2.0, d = (t + 1.0) * t * (t - 1.0) / 6.0;
+  const double *rows = table.at + row * INTERPOLATION_TAPS;
+  for (int k = 0; k < INTERPOLATION_TAPS; k++) {
+    const double *tap = rows + k;
+    weights[k] = (a * tap[0] + b * tap[INTERPOLATION_TAPS]) +
+                 (c * tap[2 * INTERPOLATION_TAPS] + d * tap[3 * INTERPOLATION_TAPS]);
+  }
+}
+
+inline void interpolate(const Interpolation &of) {
+  int64_t size = of.samples.size / of.channels, count = of.positions.size;
+  double weights[INTERPOLATION_TAPS], around[INTERPOLATION_TAPS];
+  for (int64_t i = 0; i < count; i++) {
+    double position = of.positions.at[i], whole = whole_part(position);
+    bool reaches = whole >= -INTERPOLATION_REACH && whole < double(size + INTERPOLATION_REACH);
+    int64_t begin = reaches ? int64_t(whole) + 1 - INTERPOLATION_REACH : 0;
+    bool is_inside = reaches && begin >= 0 && begin + INTERPOLATION_TAPS <= size;
+    if (reaches) interpolation_weights(weights, of.table, position - whole);
+    for (int64_t channel = 0; channel < of.channels; channel++) {
+      const double *samples = of.samples.at + channel * size, *seen = around;
+      if (is_inside) seen = samples + begin;
+      else
+        for (int64_t k = 0; k < INTERPOLATION_TAPS; k++)
+          around[k] = begin + k >= 0 && begin + k < size ? samples[begin + k] : 0.0;
+      double outside = position == position ? 0.0 : position;
+      of.values.at[channel * count + i] = reaches ? inner_product(weights, seen, INTERPOLATION_TAPS) : outside;
+    }
+  }
+}
+
+// False when a sample needs means that are not there.
+inline bool decimate(const Decimation &of) {
+  int64_t rows = of.table.size / of.reach;
+  for (int64_t k = 0; k < of.samples.size; k++) {
+    double start = of.starts.at[k], place = of.fractions.at[k] * double(rows - 1);
+    if (!(start >= 0.0 && start <= double(of.means.size - of.reach))) return false;
+    if (!(place >= 0.0 && place <= double(rows - 1))) return false;
+    const double *means = of.means.at + int64_t(start);
+    int64_t row = smaller(int64_t(place), larger(rows - 2, int64_t(0)));
+    double part = place - double(row), sum = inner_product(of.table.at + row * of.reach, means, of.reach);
+    if (part > 0.0) sum += part * (inner_product(of.table.at + (row + 1) * of.reach, means, of.reach) - sum);
+    of.samples.at[k] = sum;
+  }
+  return true;
+}
+
+inline void run_filter(const RecursiveFilter &filter, const double *values, double *result, int64_t count) {
+  const double *numerator = filter.numerator.at, *denominator = filter.denominator.at;
+  double *state = filter.state.at;
+  for (int64_t n = 0; n < count; n++) {
+    double value = values[n], shown = state[0] + numerator[0] * value;
+    for (int64_t k = 1; k < filter.state.size; k++)
+      state[k - 1] = state[k] + numerator[k] * value - denominator[k] * shown;
+    result[n] = shown;
+  }
+}
+
+}  // namespace vibench
