@@ -1,7 +1,7 @@
 // The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
 // calls, so that threads may share tables. What is given is checked, and refused with a code.
-#include "signal.hpp"
 #include "tangent.hpp"
+#include "world.hpp"
 
 #if defined(_WIN32)
 #define VIBENCH_API extern "C" __declspec(dllexport)
@@ -173,7 +173,7 @@ VIBENCH_API const char *vibench_structure(int64_t index) {
                                    PowerTerms_text, PowerShapes_text,
                                    Scene_text,    State_text,        Record_text,     Tangent_text, Readings_text,
                                    Numbers_text,  Interpolation_text, Decimation_text, RecursiveFilter_text,
-                                   FilteredSignal_text};
+                                   FilteredSignal_text, Sensor_text, Controller_text, LoopCables_text};
   constexpr int64_t COUNT = sizeof TEXTS / sizeof *TEXTS;
   return index >= 0 && index < COUNT ? TEXTS[index] : nullptr;
 }
@@ -183,7 +183,7 @@ VIBENCH_API int64_t vibench_size_of(int64_t index) {
                                sizeof(Scene),           sizeof(State),        sizeof(Record),
                                sizeof(Tangent),         sizeof(Readings),
                                sizeof(Numbers), sizeof(Interpolation), sizeof(Decimation), sizeof(RecursiveFilter),
-                               sizeof(FilteredSignal)};
+                               sizeof(FilteredSignal), sizeof(Sensor), sizeof(Controller), sizeof(LoopCables)};
   constexpr int64_t COUNT = sizeof SIZES / sizeof *SIZES;
   return index >= 0 && index < COUNT ? SIZES[index] : 0;
 }
@@ -257,6 +257,8 @@ VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
 
 namespace {
 
+constexpr int64_t MOST_STEPS_OF_WORLD = int64_t(1) << 60;
+
 bool is_lent(const Numbers &numbers) { return numbers.size == 0 || (numbers.size > 0 && numbers.at != nullptr); }
 bool has_size(const Numbers &numbers, int64_t size) { return is_lent(numbers) && numbers.size == size; }
 // Of rows of `columns` numbers.
@@ -284,6 +286,21 @@ bool is_usable(const RecursiveFilter &filter) {
          has_size(filter.denominator, order);
 }
 
+bool is_usable(const Sensor &sensor) {
+  int64_t steps = sensor.motion.size;
+  return is_usable(sensor.filter) && is_lent(sensor.motion) && has_size(sensor.noise, steps) &&
+         has_size(sensor.volts, steps) && (sensor.instead.size == 0 || has_size(sensor.instead, steps));
+}
+
+bool is_usable(const LoopCables &loop) {
+  const Controller *c = loop.controller;
+  int64_t steps = loop.drive.size;
+  return c != nullptr && c->remembered >= 0 && c->remembered <= MOST_MEMORY && is_usable(loop.base) &&
+         is_usable(loop.m0) && is_lent(loop.drive) && loop.base.motion.size == steps &&
+         loop.m0.motion.size == steps && is_lent(loop.late) && loop.first >= 0 && loop.first < MOST_STEPS_OF_WORLD &&
+         loop.steps_per_sample > 0 && loop.steps_per_sample <= loop.late.size;
+}
+
 }  // namespace
 
 VIBENCH_API int64_t vibench_interpolate(const Interpolation *of) {
@@ -301,4 +318,25 @@ VIBENCH_API int64_t vibench_filter_signal(const FilteredSignal *of) {
   if (!has_size(of->result, of->values.size)) return REFUSED;
   run_filter(of->filter, of->values.at, of->result.at, of->values.size);
   return 0;
+}
+
+VIBENCH_API int64_t vibench_show(const Sensor *sensor) {
+  if (sensor == nullptr || !is_usable(*sensor)) return REFUSED;
+  show(*sensor, 0, sensor->motion.size);
+  return 0;
+}
+
+// Plays up to the controller's next sample; returns the step of the stretch behind the last one.
+VIBENCH_API int64_t vibench_play_loop(LoopCables *loop) {
+  if (loop == nullptr || !is_usable(*loop) || loop->begin < 0 || loop->begin >= loop->drive.size) return REFUSED;
+  play_loop(*loop);
+  return loop->stop;
+}
+
+// Shows the controller what the plant did; returns 1 when it wants attention before its next sample.
+VIBENCH_API int64_t vibench_hear_loop(LoopCables *loop) {
+  if (loop == nullptr || !is_usable(*loop)) return REFUSED;
+  if (loop->begin < 0 || loop->stop < loop->begin || loop->stop > loop->drive.size) return REFUSED;
+  hear_loop(*loop);
+  return wants_attention(*loop->controller);
 }

@@ -211,4 +211,58 @@ STRUCTURE(FilteredSignal,
   Numbers result;
 )
 
+// ---- The analogue world of the virtual rig
+
+// From a motion to volts: what a sensor shows over some steps.
+STRUCTURE(Sensor,
+  RecursiveFilter filter;
+  Numbers noise;               // [steps], in units of the motion
+  Numbers instead;             // [steps], likewise: shown where it is a number; or of no size
+  double full_scale;           // in units of the motion
+  double full_scale_voltage;   // [V]
+  Numbers motion;              // [steps]: means
+  Numbers volts;               // [steps]: the result
+)
+
+// A real-time controller: a Fourier series in its own phase, and the answer of a linear law to what it samples.
+// `vibench.acquisition.instruments` bounds the sizes.
+STRUCTURE(Controller,
+  double theta;                // phase of the sample [rad], within a turn
+  double omega;                // phase per sample [rad]
+  double omega_from, omega_to;  // before and after the glide
+  double glide, glide_step;    // from 0 to 1; and by sample
+  double fade, fade_step;      // factor on all that is played: 1 until it ends; and by sample
+  double limit;                // of the output [V]
+  double at_limit, most_at_limit;  // samples in a row with the output at its limit
+  double unheard, most_unheard;  // samples since its host said anything
+  double block;                // periods over which coefficients are taken
+  double turns;                // periods since the block began
+  double weight;               // sum of the weights in it
+  int64_t is_steady;           // whether nothing was changed in it
+  int64_t done;                // 1 when a block has been completed, 2 when nothing was changed in it
+  int64_t is_on;
+  int64_t remembered;          // numbers in the memory of the law
+  double step[64][64];         // of the law: memory onto memory
+  double inlet[64][2];         // inputs onto memory [1/V]
+  double output[64];           // memory onto volts [V]
+  double direct[2];            // inputs onto volts
+  double memory[64];
+  Phasor reference[2][20];     // coefficients before the glide and after it, from the first harmonic on [V]
+  Phasor sums[3][21];          // of the block: output, base and m0, from the mean on
+  Phasor coefficients[3][21];  // of the last block [V]
+)
+
+// Between the world and a controller: it samples means over its step, and its volts come late.
+STRUCTURE(LoopCables,
+  Controller *controller;
+  Sensor base, m0;
+  Numbers drive;               // [steps]: volts of everything else at the amplifier, then of all
+  Numbers late;                // volts of the next steps, from the one that is played next [latency + one sample]
+  int64_t first;               // number of the first step since the world began
+  int64_t begin, stop;         // steps of this stretch that are played now
+  int64_t steps_per_sample;
+  double base_sum, m0_sum;     // of volts since the last sample
+  double steps_heard;          // in these sums
+)
+
 }  // namespace vibench

@@ -16,9 +16,8 @@ from contextlib import contextmanager
 
 import numpy as np
 
+from vibench.sim.engine import native_engine
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.controller import LoopParts
-from vibench.virtual_rig.controller._answer import Now
 from vibench.virtual_rig.world import World, warm_up
 
 MAGIC = b"HL"
@@ -100,16 +99,20 @@ class HelicBoard:
         self._phase = self._epoch = 0
         self._stream, self._to, self._number = (), None, 0
         self._records = []
-        self._now = np.zeros(len(Now))
-        self._now[[Now.ON, Now.GLIDE, Now.OMEGA_FROM, Now.OMEGA_TO]] = 1.0
-        self._now[Now.LIMIT] = clamp_v
-        self._now[[Now.MOST_UNHEARD, Now.MOST_AT_LIMIT]] = math.inf
         # A block is over after each sample: its mean is what was sampled and played.
-        self._now[Now.BLOCK], self._now[Now.TURNS] = 1e-9, 0.5e-9
-        self._reference = np.zeros((2, HARMONICS), dtype=np.complex128)
-        self._law, self._memory = np.zeros((4, 5)), np.zeros(6)
-        self._sums, self._done = np.zeros((3, 1), dtype=np.complex128), np.zeros((3, 1), dtype=np.complex128)
-        self._parts = LoopParts(self._now, self._reference, self._law, self._memory, self._sums, self._done)
+        self._now = native_engine().new(
+            "Controller",
+            is_on=1,
+            glide=1.0,
+            omega_from=1.0,
+            omega_to=1.0,
+            limit=clamp_v,
+            most_unheard=math.inf,
+            most_at_limit=math.inf,
+            block=1e-9,
+            turns=0.5e-9,
+            remembered=3,
+        )
         self._closing = threading.Event()
         self._client = None
         self.is_left = threading.Event()
@@ -145,13 +148,13 @@ class HelicBoard:
     @contextmanager
     def answering(self):
         with self._turn:
-            yield self._parts
+            yield self._now
 
     def attend(self, time_s):
         with self._turn:
-            if self._now[Now.DONE]:
-                self._now[Now.DONE] = 0.0
-                self._tick(*self._done[:, 0].real.tolist())
+            if self._now["done"]:
+                self._now["done"] = 0
+                self._tick(*self._now["coefficients"][:, 0].real.tolist())
 
     def _tick(self, out, base, m0):
         """Keep the record of a sample, and get the next one ready."""
@@ -175,29 +178,28 @@ class HelicBoard:
             self._take(name)
         enabled = (self._armed and not self.trips) or not self.is_gated
         if enabled and not self._was_enabled:
-            self._memory[:] = 0.0
-            self._memory[2] = -m0
+            self._now["memory"][:3] = 0.0, 0.0, -m0
         self._was_enabled = enabled
-        self._now[Now.FADE] = float(enabled)
+        self._now["fade"] = float(enabled)
         self._phase = (self._phase + round(self._values["freq"][0] / self.rate_hz * TURN)) % TURN
-        self._now[Now.THETA] = 2 * math.pi * self._phase / TURN
-        self._now[Now.TURNS] = 0.5e-9
+        self._now["theta"] = 2 * math.pi * self._phase / TURN
+        self._now["turns"] = 0.5e-9
 
     def _take(self, name):
         if name == "forcing_coeffs":
             _, *both = self._values[name]
-            self._reference[:] = np.array(both[:HARMONICS]) - 1j * np.array(both[HARMONICS:])
+            self._now["reference"][:, :HARMONICS] = np.array(both[:HARMONICS]) - 1j * np.array(
+                both[HARMONICS:]
+            )
         elif name.startswith("ctrl"):
             kp, ki, kd, tau = (self._values[f"ctrl_{each}"][0] for each in ("kp", "ki", "kd", "tau_d"))
             step = 1 / self.rate_hz
             share = step / (tau + step)
             # Integral, filtered rate, and error of before; the error is the target, zero, less adc1.
-            self._law[:] = (
-                (1, 0, 0, 0, -ki * step),
-                (0, 1 - share, -share / step, 0, -share / step),
-                (0, 0, 0, 0, -1),
-                (1, kd * (1 - share), -kd * share / step, 0, -kp - kd * share / step),
-            )
+            self._now["step"][:3, :3] = (1, 0, 0), (0, 1 - share, -share / step), (0, 0, 0)
+            self._now["inlet"][:3, 1] = -ki * step, -share / step, -1
+            self._now["output"][:3] = 1, kd * (1 - share), -kd * share / step
+            self._now["direct"] = 0, -kp - kd * share / step
 
     def _send(self, first):
         records, self._records = self._records, []

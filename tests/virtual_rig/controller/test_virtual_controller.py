@@ -13,10 +13,36 @@ from vibench.acquisition.instruments import (
     LoopRequest,
     LoopState,
 )
-from vibench.virtual_rig.controller import VirtualController, answer, wants_attention
+from vibench.sim.engine import native_engine
+from vibench.virtual_rig.controller import VirtualController
 
 RATE_HZ = 10_240.0
 FACTS = LoopFacts(name="simulated", serial="1", rate_hz=RATE_HZ, latency_s=3e-4, limit_v=2.0, watchdog_s=0.5)
+
+
+FULL_SCALE = 1e3
+
+
+class Wire:
+    """A sensor that shows what it is given, one step at a time."""
+
+    def __init__(self):
+        self.shown = np.zeros(1)
+        self._arrays = {name: np.ones(1) for name in ("numerator", "denominator", "state", "noise", "volts")}
+        self._arrays["state"][:] = self._arrays["noise"][:] = 0.0
+
+    @property
+    def parts(self):
+        arrays = dict(self._arrays)
+        filtered = {name: arrays.pop(name) for name in ("numerator", "denominator", "state")}
+        return native_engine().new(
+            "Sensor",
+            filter=native_engine().new("RecursiveFilter", **filtered),
+            motion=self.shown,
+            full_scale=FULL_SCALE,
+            full_scale_voltage=FULL_SCALE,
+            **arrays,
+        )
 
 
 class Wired:
@@ -27,6 +53,16 @@ class Wired:
         self.controller = VirtualController(FACTS, lambda: self.samples / RATE_HZ, 10 * RATE_HZ)
         self.played = [0.0, 0.0, 0.0]
         self.gain = gain
+        self.base, self.m0, self.drive, self.late = Wire(), Wire(), np.zeros(1), np.zeros(1)
+        self.m0.shown[:] = 0.25
+        self.cables = native_engine().new(
+            "LoopCables",
+            base=self.base.parts,
+            m0=self.m0.parts,
+            drive=self.drive,
+            late=self.late,
+            steps_per_sample=1,
+        )
 
     def tell(self, ask, **more):
         line = LoopRequest(ask=ask, **more).model_dump_json().encode()
@@ -37,10 +73,16 @@ class Wired:
 
     def run(self, seconds):
         for _ in range(round(seconds * RATE_HZ)):
-            with self.controller.answering() as parts:
-                self.played.append(answer(self.gain * self.played[-3], 0.25, parts))
-                if wants_attention(parts.now):
+            self.base.shown[:], self.drive[:] = self.gain * self.played[-3], 0.0
+            with self.controller.answering() as controller:
+                self.cables["controller"] = controller.ctypes.data
+                self.cables["begin"], self.cables["stop"] = 0, 1
+                if native_engine().call("hear_loop", self.cables):
                     self.controller.attend(self.samples / RATE_HZ)
+            with self.controller.answering() as controller:
+                self.cables["controller"], self.cables["begin"] = controller.ctypes.data, 0
+                native_engine().call("play_loop", self.cables)
+            self.played.append(float(self.drive[0]))
             self.samples += 1
 
 

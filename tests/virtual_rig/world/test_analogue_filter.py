@@ -11,7 +11,7 @@ STEP_S = 1 / 102_400
 def response(running, frequency_hz):
     """Complex gain of a filter as it runs."""
     z = np.exp(-2j * np.pi * frequency_hz * STEP_S)
-    return np.polyval(running.parts.numerator[::-1], z) / np.polyval(running.parts.denominator[::-1], z)
+    return np.polyval(running.numerator[::-1], z) / np.polyval(running.denominator[::-1], z)
 
 
 @pytest.mark.parametrize(

@@ -55,7 +55,7 @@ def test_a_resonance_beyond_the_grid_is_left_out_and_not_folded_into_the_band():
     analogue, band_hz = resonant(30e3, 0.02), np.linspace(50.0, 2500.0, 200)
     running = running_filter(analogue, COARSE.step_s)
     z = np.exp(-2j * np.pi * band_hz * COARSE.step_s)
-    gain = np.polyval(running.parts.numerator[::-1], z) / np.polyval(running.parts.denominator[::-1], z)
+    gain = np.polyval(running.numerator[::-1], z) / np.polyval(running.denominator[::-1], z)
     error = gain / analogue.response(band_hz) - 1
     assert np.max(np.abs(error)) < 5e-3
     assert np.max(np.abs(error[band_hz < WATCHED_HZ])) < 5e-4

@@ -12,14 +12,9 @@ from pathlib import Path
 from vibench.acquisition import open_bench
 from vibench.acquisition.instruments import LoopProgram
 from vibench.sim.shaker import _loaded_shaker as loaded_shaker
-from vibench.virtual_rig.world import (
-    _loop_cables as loop_cables,
-    _sensors as sensors,
-)
+from vibench.virtual_rig.world import _loop_cables as loop_cables
 
-kernels = (
-    loaded_shaker.move_shaker, sensors.show_steps, loop_cables._closed_loop
-)
+kernels = (loaded_shaker.move_shaker, loop_cables._closed_loop)
 with open_bench(Path("hardware_configs/virtual_rig_controller.toml")) as bench:
     before = [len(each.signatures) for each in kernels]
     bench.controller.play(LoopProgram(frequency_hz=100, reference_v=((0.1, 0.0),)))

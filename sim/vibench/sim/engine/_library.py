@@ -20,7 +20,7 @@ BUILD = CHECKOUT / "native" / "build.py"
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
 """Of libraries of this system; wheels of others may have been built in the same checkout."""
 REBUILD = "python native/build.py"
-FUNCTIONS = ("interpolate", "decimate", "filter_signal")
+FUNCTIONS = ("interpolate", "decimate", "filter_signal", "show", "play_loop", "hear_loop")
 """Of the library, each with one structure."""
 Tables = NDArray[np.float64]
 """What a run of one scene needs ready, as the engine lays it out."""

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from vibench.acquisition.instruments import (
@@ -19,9 +20,9 @@ from vibench.acquisition.instruments import (
     LoopState,
 )
 from vibench.acquisition.rig import Rig
+from vibench.sim.engine import Structure, native_engine
 
 from ..generator import Reply
-from ._answer import ComplexArray, FloatArray, LoopParts, Now
 
 RAMP_S = 0.05
 """How fast it ramps down by itself [s]."""
@@ -54,13 +55,8 @@ class VirtualController:
         self._state = LoopState.SILENT
         self._reason = ""
         self._blocks: list[LoopBlock] = []
-        self._now: FloatArray = np.zeros(len(Now))
-        self._limit()
         self._program: LoopProgram | None = None
-        self._reference: ComplexArray = np.zeros((2, 1), dtype=np.complex128)
-        self._law: FloatArray = np.zeros((1, 2))
-        self._memory: FloatArray = np.zeros(0)
-        self._sums = self._done = np.zeros((3, 1), dtype=np.complex128)
+        self._now = self._new()
 
     @property
     def is_on(self) -> bool:
@@ -68,15 +64,18 @@ class VirtualController:
         return self._state is not LoopState.SILENT
 
     @contextmanager
-    def answering(self) -> Iterator[LoopParts]:
-        """Hand out what samples are answered with; nothing is changed by its host meanwhile."""
+    def answering(self) -> Iterator[Structure]:
+        """Hand out what samples are answered with; nothing is changed by its host meanwhile.
+
+        A `Controller` of native/structures.hpp.
+        """
         with self._turn:
-            yield LoopParts(self._now, self._reference, self._law, self._memory, self._sums, self._done)
+            yield self._now
 
     def attend(self, time_s: float) -> None:
-        """See to what `wants_attention` asked for at a rig time: keep a block, end, be silent."""
+        """Keep a block, end, or be silent, as the samples up to a rig time ask for."""
         with self._turn:
-            if self._now[Now.DONE]:
+            if self._now["done"]:
                 self._keep_block(time_s)
             self._watch()
 
@@ -89,7 +88,7 @@ class VirtualController:
             place = ".".join(map(str, first["loc"]))
             return _line(_refusal(f"{place}: {first['msg']}; what it plays goes on"))
         with self._turn:
-            self._now[Now.UNHEARD] = 0.0
+            self._now["unheard"] = 0.0
             return _line(self._answered(request))
 
     def _answered(self, request: LoopRequest) -> str:
@@ -107,61 +106,61 @@ class VirtualController:
         return report.model_dump_json()
 
     def _play(self, program: LoopProgram) -> None:
-        now, before = self._now, self._program
+        before = self._program
         began = not self.is_on or before is None
-        gone_from = np.zeros(0, dtype=np.complex128) if began else self._wanted()
-        size = max(len(program.reference_v), len(gone_from))
-        self._reference = np.zeros((2, size), dtype=np.complex128)
-        self._reference[0, : len(gone_from)] = gone_from
-        self._reference[1, : len(program.reference_v)] = [complex(*each) for each in program.reference_v]
         omega = 2 * np.pi * program.frequency_hz / self.facts.rate_hz
         if began:
-            now[:] = 0.0
-            self._limit()
-            now[Now.OMEGA] = omega
-        now[Now.OMEGA_FROM], now[Now.OMEGA_TO] = now[Now.OMEGA], omega
-        glide_samples = max(program.glide_s * self.facts.rate_hz, 1.0)
-        now[Now.GLIDE], now[Now.GLIDE_STEP] = 0.0, 1.0 / glide_samples
-        now[Now.FADE], now[Now.FADE_STEP] = 1.0, 0.0
-        now[Now.BLOCK] = program.block_periods
-        now[[Now.TURNS, Now.WEIGHT, Now.STEADY]] = 0.0
-        self._sums = np.zeros((3, program.harmonics + 1), dtype=np.complex128)
-        self._done = np.zeros_like(self._sums)
+            self._now = self._new()
+            self._now["omega"] = omega
+        now = self._now
+        now["reference"][0] = 0.0 if began else self._wanted()
+        now["reference"][1] = 0.0
+        now["reference"][1, : len(program.reference_v)] = [complex(*each) for each in program.reference_v]
+        now["omega_from"], now["omega_to"] = now["omega"], omega
+        now["glide"], now["glide_step"] = 0.0, 1.0 / max(program.glide_s * self.facts.rate_hz, 1.0)
+        now["fade"], now["fade_step"] = 1.0, 0.0
+        now["block"] = program.block_periods
+        now["turns"] = now["weight"] = now["is_steady"] = now["sums"] = 0
         if began or before is None or program.feedback != before.feedback:
-            self._law = _law_of(program.feedback)
-            self._memory = np.zeros(2 * (len(self._law) - 1))
+            _fill_law(now, program.feedback)
         self._program, self._state, self._reason = program, LoopState.PLAYING, ""
-        now[Now.ON] = 1.0
+        now["is_on"] = 1
 
-    def _limit(self) -> None:
+    def _new(self) -> Structure:
         rate_hz = self.facts.rate_hz
-        self._now[Now.LIMIT] = self.facts.limit_v
-        self._now[Now.MOST_UNHEARD] = self.facts.watchdog_s * rate_hz
-        self._now[Now.MOST_AT_LIMIT] = LONGEST_AT_LIMIT_S * rate_hz
+        return native_engine().new(
+            "Controller",
+            limit=self.facts.limit_v,
+            most_unheard=self.facts.watchdog_s * rate_hz,
+            most_at_limit=LONGEST_AT_LIMIT_S * rate_hz,
+        )
 
-    def _wanted(self) -> ComplexArray:
-        share = 0.5 - 0.5 * np.cos(np.pi * self._now[Now.GLIDE])
-        return np.asarray(self._reference[0] + share * (self._reference[1] - self._reference[0]))
+    def _wanted(self) -> NDArray[np.complex128]:
+        before, after = self._now["reference"]
+        share = 0.5 - 0.5 * np.cos(np.pi * self._now["glide"])
+        return np.asarray(before + share * (after - before))
 
     def _end(self, reason: str, ramp_s: float) -> None:
         if self.is_on and self._state is not LoopState.ENDING:
             self._state, self._reason = LoopState.ENDING, reason
-            self._now[Now.FADE_STEP] = 1.0 / max(ramp_s * self.facts.rate_hz, 1.0)
+            self._now["fade_step"] = 1.0 / max(ramp_s * self.facts.rate_hz, 1.0)
 
     def _watch(self) -> None:
         now = self._now
-        if now[Now.UNHEARD] > now[Now.MOST_UNHEARD]:
+        if now["unheard"] > now["most_unheard"]:
             self._end(f"its host said nothing for {self.facts.watchdog_s:g} s", RAMP_S)
-        elif now[Now.AT_LIMIT] > now[Now.MOST_AT_LIMIT]:
+        elif now["at_limit"] > now["most_at_limit"]:
             self._end(f"its output stayed at its limit of {self.facts.limit_v:g} V", RAMP_S)
-        if self._state is LoopState.ENDING and now[Now.FADE] <= 0.0:
+        if self._state is LoopState.ENDING and now["fade"] <= 0.0:
             self._state = LoopState.SILENT
-            now[[Now.ON, Now.UNHEARD, Now.AT_LIMIT]] = 0.0
+            now["is_on"] = now["unheard"] = now["at_limit"] = 0
 
     def _keep_block(self, end_s: float) -> None:
-        output, base, m0 = (tuple((float(c.real), float(c.imag)) for c in row) for row in self._done)
-        steady = bool(self._now[Now.DONE] > 1.0)
-        self._now[Now.DONE] = 0.0
+        count = 0 if self._program is None else self._program.harmonics + 1
+        found = self._now["coefficients"][:, :count]
+        output, base, m0 = (tuple((float(c.real), float(c.imag)) for c in row) for row in found)
+        steady = bool(self._now["done"] > 1)
+        self._now["done"] = 0
         if len(self._blocks) < MOST_BLOCKS:
             self._blocks.append(LoopBlock(end_s=end_s, steady=steady, output=output, base=base, m0=m0))
 
@@ -183,16 +182,14 @@ def controller_of(rig: Rig, clock: Callable[[], float]) -> VirtualController | N
     return VirtualController(facts, clock, virtual.grid_rate_hz)
 
 
-def _law_of(feedback: LoopFeedback | None) -> FloatArray:
-    """One table: memory and output below each other, memory and inputs beside each other."""
-    if feedback is None:
-        return np.zeros((1, 2))
-    size = len(feedback.output)
-    law = np.zeros((size + 1, size + 2))
-    law[:size, :size] = np.reshape(feedback.step, (size, size))
-    law[:size, size:] = np.reshape(feedback.inlet, (size, 2))
-    law[size] = [*feedback.output, *feedback.direct]
-    return law
+def _fill_law(now: Structure, feedback: LoopFeedback | None) -> None:
+    now["remembered"] = now["memory"] = now["direct"] = 0
+    if feedback is not None:
+        size = len(feedback.output)
+        now["remembered"] = size
+        now["step"][:size, :size] = np.reshape(feedback.step, (size, size))
+        now["inlet"][:size] = np.reshape(feedback.inlet, (size, 2))
+        now["output"][:size], now["direct"] = feedback.output, feedback.direct
 
 
 def _refusal(sentence: str) -> str:

@@ -3,18 +3,23 @@
 from typing import NamedTuple
 
 import numpy as np
+from llvmlite import binding
+from numba import types
 from numpy.typing import NDArray
 
+from vibench.sim.engine import native_engine
 from vibench.sim.kernels import kernel
 from vibench.sim.shaker import ShakenMotion, ShakerParts, move_shaker
 
-from ..controller import LoopParts, VirtualController, answer, wants_attention
-from ._sensors import SensorParts, show_steps
+from ..controller import VirtualController
+from ._sensors import SensorParts
 from ._wiring import Signal
 
 FloatArray = NDArray[np.float64]
-_DRIVE, _AMPLIFIER = int(Signal.DRIVE), int(Signal.AMPLIFIER)
-_BASE, _M0 = int(Signal.BASE_ACCELERATION), int(Signal.M0_VELOCITY)
+# The shaker is moved by a kernel as yet, so that a kernel goes from sample to sample.
+_play_loop, _hear_loop = (
+    types.ExternalFunction(f"vibench_{name}", types.int64(types.intp)) for name in ("play_loop", "hear_loop")
+)
 
 
 class PlantParts(NamedTuple):
@@ -27,17 +32,6 @@ class PlantParts(NamedTuple):
     m0: SensorParts
 
 
-class CableParts(NamedTuple):
-    """What is on its way."""
-
-    late: FloatArray
-    """Volts of the next steps, from the one that is played next, shape (latency + sample,)."""
-    heard: FloatArray
-    """Sums over the sample so far of base and m0, and how many steps they have."""
-    steps: int
-    """From sample to sample."""
-
-
 class LoopCables:
     """Hands a controller its samples, on a grid since the world began, and plays its volts.
 
@@ -46,13 +40,15 @@ class LoopCables:
 
     def __init__(self, loop: VirtualController) -> None:
         self._loop = loop
-        steps = loop.steps_per_sample
-        self._parts = CableParts(np.zeros(loop.latency_steps + steps), np.zeros(3), steps)
+        engine, steps = native_engine(), loop.steps_per_sample
+        binding.load_library_permanently(str(engine.path))
+        self._late = np.zeros(loop.latency_steps + steps)
+        self._cables = engine.new("LoopCables", late=self._late, steps_per_sample=steps)
 
     @property
     def is_on(self) -> bool:
         """Whether the controller plays, or volts are still on their way."""
-        return self._loop.is_on or bool(self._parts.late.any())
+        return self._loop.is_on or bool(self._late.any())
 
     def move(
         self, first: int, step_s: float, plant: PlantParts, motion: ShakenMotion, signals: FloatArray
@@ -61,75 +57,58 @@ class LoopCables:
 
         ``signals`` holds at first what else drives the amplifier, and at last all that there was.
         """
-        done, steps = 0, signals.shape[1]
-        while done < steps:
+        cables, drive = self._cables, signals[Signal.DRIVE]
+        cables["first"], cables["begin"] = first, 0
+        cables["drive"] = drive.ctypes.data, drive.size
+        cables["base"] = plant.base.showing(motion.base_acceleration, signals[Signal.BASE_ACCELERATION])
+        cables["m0"] = plant.m0.showing(motion.m0_velocity, signals[Signal.M0_VELOCITY])
+        done, good = 0, True
+        while good and done < drive.size:
             with self._loop.answering() as loop:
-                stop, good = _closed_loop(
+                cables["controller"] = loop.ctypes.data
+                done, good = _closed_loop(
                     done,
-                    first,
-                    plant,
-                    self._parts,
-                    loop,
+                    cables.ctypes.data,
+                    plant.shaker,
+                    drive,
+                    plant.noise,
                     motion.amplifier_voltage,
                     motion.base_acceleration,
                     motion.m0_velocity,
                     motion.ends,
-                    signals,
                 )
-                self._loop.attend((first + stop) * step_s)
-            done = stop
-            if not good:
-                break
+                self._loop.attend((first + done) * step_s)
+        signals[Signal.AMPLIFIER, :done] = motion.amplifier_voltage[:done]
         return done
 
 
 @kernel
 def _closed_loop(
     begin: int,
-    first: int,
-    plant: PlantParts,
-    cables: CableParts,
-    loop: LoopParts,
+    cables: int,
+    shaker: ShakerParts,
+    drive: FloatArray,
+    noise: FloatArray,
     amplifier_voltage: FloatArray,
     base_acceleration: FloatArray,
     m0_velocity: FloatArray,
     ends: FloatArray,
-    signals: FloatArray,
 ) -> tuple[int, bool]:
     """Go from sample to sample until the stretch ends, or the controller asks for attention."""
-    late, heard, each = cables
-    drive = signals[_DRIVE]
     while begin < drive.size:
-        if (first + begin) % each == 0:
-            count = max(heard[2], 1.0)
-            volts = answer(heard[0] / count, heard[1] / count, loop)
-            heard[:] = 0.0
-            late[-each:] = volts
-        stop = min(begin + each - (first + begin) % each, drive.size)
-        count = stop - begin
-        drive[begin:stop] += late[:count]
-        late[:-count] = late[count:]
-        late[-count:] = 0.0
-        rows = ends[begin:stop] if ends.shape[0] else ends
+        stop = _play_loop(cables)
         good = move_shaker(
             drive[begin:stop],
-            plant.noise[begin:stop],
-            plant.shaker,
+            noise[begin:stop],
+            shaker,
             amplifier_voltage[begin:stop],
             base_acceleration[begin:stop],
             m0_velocity[begin:stop],
-            rows,
+            ends[begin:stop] if ends.shape[0] else ends,
         )
-        if good < count:
+        if good < stop - begin:
             return begin + good, False
-        show_steps(base_acceleration[begin:stop], begin, plant.base, signals[_BASE, begin:stop])
-        show_steps(m0_velocity[begin:stop], begin, plant.m0, signals[_M0, begin:stop])
-        for n in range(begin, stop):
-            heard[0] += signals[_BASE, n]
-            heard[1] += signals[_M0, n]
-        heard[2] += count
         begin = stop
-        if wants_attention(loop.now):
+        if _hear_loop(cables):
             break
-    signals[_AMPLIFIER, :begin] = amplifier_voltage[:begin]
     return begin, True

@@ -1,18 +1,18 @@
 """From motion to volts: the laser vibrometer that watches m0 and the accelerometer on the base."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import AccelerometerConfig, VibrometerConfig
-from vibench.sim.kernels import kernel
+from vibench.sim.engine import Structure, native_engine
 
 from ._disturbance import Disturbance, RandomDropouts, overwrite
 from ._noise import NoiseStream
-from ._recursive_filter import FilterParts, RecursiveFilter, run_filter
+from ._recursive_filter import RecursiveFilter
 from ._time_grid import USUAL_GRID, TimeGrid
 
 _FIT_BAND = 0.2
@@ -94,10 +94,11 @@ LONGEST_DELAY_S = 5e-3
 """Of a sensor: what the converter keeps for the beginning of a conversion at its lowest rate."""
 
 
-class SensorParts(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class SensorParts:
     """What a stretch of motion is shown with."""
 
-    filter: FilterParts
+    filter: RecursiveFilter
     noise: FloatArray
     """In units of the motion, shape (steps,)."""
     instead: FloatArray
@@ -106,17 +107,18 @@ class SensorParts(NamedTuple):
     """In units of the motion."""
     full_scale_v: float
 
-
-@kernel
-def show_steps(values: FloatArray, first: int, parts: SensorParts, volts: FloatArray) -> None:
-    """Show the means of a motion over some steps, from a first one of the stretch on."""
-    run_filter(parts.filter, values, volts)
-    scale = parts.full_scale_v / parts.full_scale
-    for n in range(values.size):
-        seen = volts[n] + parts.noise[first + n]
-        if parts.instead.size and not np.isnan(parts.instead[first + n]):
-            seen = parts.instead[first + n]
-        volts[n] = min(max(seen * scale, -parts.full_scale_v), parts.full_scale_v)
+    def showing(self, motion: FloatArray, volts: FloatArray) -> Structure:
+        """Describe to the native engine that the means of a motion are shown as these volts."""
+        return native_engine().new(
+            "Sensor",
+            filter=self.filter.parts,
+            noise=self.noise,
+            instead=self.instead,
+            full_scale=self.full_scale,
+            full_scale_voltage=self.full_scale_v,
+            motion=motion,
+            volts=volts,
+        )
 
 
 class Sensor(Protocol):
@@ -129,7 +131,8 @@ class Sensor(Protocol):
 def shown(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
     """Output volts for the means of a motion over the next steps, shape (steps,)."""
     volts = np.empty(len(values))
-    show_steps(values, 0, sensor.parts(first_step, len(values)), volts)
+    parts = sensor.parts(first_step, len(values))
+    native_engine().call("show", parts.showing(values, volts))
     return volts
 
 
@@ -177,7 +180,7 @@ class Vibrometer:
         overwrite(instead, first_step, self._full_scale_m_per_s, disturbed)
         noise = self._noise_rms * self._noise.draw(first_step, count)
         scale = self._full_scale_m_per_s, self._full_scale_v
-        return SensorParts(self._filter.parts, noise, instead, *scale)
+        return SensorParts(self._filter, noise, instead, *scale)
 
 
 class Accelerometer:
@@ -202,4 +205,4 @@ class Accelerometer:
         """Give what the acceleration [m/s2] is shown with in the next steps, without bias."""
         noise = self._noise_rms * self._noise.draw(first_step, count)
         scale = self._full_scale_v / self._sensitivity, self._full_scale_v
-        return SensorParts(self._filter.parts, noise, np.empty(0), *scale)
+        return SensorParts(self._filter, noise, np.empty(0), *scale)

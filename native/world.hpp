@@ -1,0 +1,48 @@
+// The analogue world of the virtual rig: what sensors show of a motion, and the cables of a fast control loop.
+#pragma once
+#include "controller.hpp"
+#include "signal.hpp"
+
+namespace vibench {
+
+// Volts of the steps from `begin` to before `stop`.
+inline void show(const Sensor &sensor, int64_t begin, int64_t stop) {
+  double *volts = sensor.volts.at, most = sensor.full_scale_voltage, scale = most / sensor.full_scale;
+  run_filter(sensor.filter, sensor.motion.at + begin, volts + begin, stop - begin);
+  for (int64_t n = begin; n < stop; n++) {
+    double seen = volts[n] + sensor.noise.at[n];
+    if (sensor.instead.size > 0 && sensor.instead.at[n] == sensor.instead.at[n]) seen = sensor.instead.at[n];
+    volts[n] = smaller(larger(seen * scale, -most), most);
+  }
+}
+
+// Plays from `begin` up to the controller's next sample: adds its late volts to the drive, and finds `stop`.
+inline void play_loop(LoopCables &loop) {
+  int64_t each = loop.steps_per_sample, into = (loop.first + loop.begin) % each;
+  double *late = loop.late.at, *drive = loop.drive.at + loop.begin;
+  if (into == 0) {
+    double count = larger(loop.steps_heard, 1.0);
+    double volts = answer(*loop.controller, loop.base_sum / count, loop.m0_sum / count);
+    loop.base_sum = loop.m0_sum = loop.steps_heard = 0.0;
+    for (int64_t k = loop.late.size - each; k < loop.late.size; k++) late[k] = volts;
+  }
+  loop.stop = smaller(loop.begin + each - into, loop.drive.size);
+  int64_t count = loop.stop - loop.begin;
+  for (int64_t k = 0; k < count; k++) drive[k] += late[k];
+  for (int64_t k = count; k < loop.late.size; k++) late[k - count] = late[k];
+  for (int64_t k = loop.late.size - count; k < loop.late.size; k++) late[k] = 0.0;
+}
+
+// Shows the controller what the plant did in the steps that were played; the next ones begin behind them.
+inline void hear_loop(LoopCables &loop) {
+  show(loop.base, loop.begin, loop.stop);
+  show(loop.m0, loop.begin, loop.stop);
+  for (int64_t n = loop.begin; n < loop.stop; n++) {
+    loop.base_sum += loop.base.volts.at[n];
+    loop.m0_sum += loop.m0.volts.at[n];
+  }
+  loop.steps_heard += double(loop.stop - loop.begin);
+  loop.begin = loop.stop;
+}
+
+}  // namespace vibench
