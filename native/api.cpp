@@ -295,7 +295,7 @@ bool is_usable(const Sensor &sensor) {
 bool is_usable(const LoopCables &loop) {
   const Controller *c = loop.controller;
   int64_t steps = loop.drive.size;
-  return c != nullptr && c->remembered >= 0 && c->remembered <= MOST_MEMORY && is_usable(loop.base) &&
+  return c != nullptr && c->harmonics >= 0 && c->harmonics <= MOST_HARMONICS && c->remembered >= 0 && c->remembered <= MOST_MEMORY && is_usable(loop.base) &&
          is_usable(loop.m0) && is_lent(loop.drive) && loop.base.motion.size == steps &&
          loop.m0.motion.size == steps && is_lent(loop.late) && loop.first >= 0 && loop.first < MOST_STEPS_OF_WORLD &&
          loop.steps_per_sample > 0 && loop.steps_per_sample <= loop.late.size;

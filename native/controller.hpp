@@ -26,7 +26,7 @@ inline double answer_of_law(Controller &c, double base_volts, double m0_volts) {
 inline void add_to_block(Controller &c, const double (&sampled)[3], const Phasor &turn) {
   double weight = 1.0 - cosine_sine(2.0 * PI * c.turns / c.block).cosine;
   Phasor back{weight, 0.0};
-  for (int k = 0; k <= MOST_HARMONICS; k++) {
+  for (int k = 0; k <= c.harmonics; k++) {
     for (int row = 0; row < 3; row++) c.sums[row][k] = c.sums[row][k] + sampled[row] * back;
     back = back * conjugate(turn);
   }
@@ -34,7 +34,7 @@ inline void add_to_block(Controller &c, const double (&sampled)[3], const Phasor
   c.turns += c.omega / (2.0 * PI);
   if (!(c.turns >= c.block)) return;
   for (int row = 0; row < 3; row++)
-    for (int k = 0; k <= MOST_HARMONICS; k++) {
+    for (int k = 0; k <= c.harmonics; k++) {
       c.coefficients[row][k] = ((k == 0 ? 1.0 : 2.0) / c.weight) * c.sums[row][k];
       c.sums[row][k] = {0.0, 0.0};
     }
@@ -54,7 +54,7 @@ inline double answer(Controller &c, double base_volts, double m0_volts) {
   double share = eased(c.glide), volts = 0.0;
   c.omega = c.omega_from + share * (c.omega_to - c.omega_from);
   Phasor turn = turned_by(c.theta), turned = turn;
-  for (int k = 0; k < MOST_HARMONICS; k++) {
+  for (int k = 0; k < c.harmonics; k++) {
     volts += real_of_product(c.reference[0][k] + share * (c.reference[1][k] - c.reference[0][k]), turned);
     turned = turned * turn;
   }

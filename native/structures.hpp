@@ -241,6 +241,7 @@ STRUCTURE(Controller,
   int64_t is_steady;           // whether nothing was changed in it
   int64_t done;                // 1 when a block has been completed, 2 when nothing was changed in it
   int64_t is_on;
+  int64_t harmonics;           // that are played, and that come back
   int64_t remembered;          // numbers in the memory of the law
   double step[64][64];         // of the law: memory onto memory
   double inlet[64][2];         // inputs onto memory [1/V]

@@ -111,6 +111,7 @@ class HelicBoard:
             most_at_limit=math.inf,
             block=1e-9,
             turns=0.5e-9,
+            harmonics=HARMONICS,
             remembered=3,
         )
         self._closing = threading.Event()

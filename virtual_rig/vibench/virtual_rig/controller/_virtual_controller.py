@@ -116,6 +116,7 @@ class VirtualController:
         now["reference"][0] = 0.0 if began else self._wanted()
         now["reference"][1] = 0.0
         now["reference"][1, : len(program.reference_v)] = [complex(*each) for each in program.reference_v]
+        now["harmonics"] = max(now["harmonics"], len(program.reference_v), program.harmonics)
         now["omega_from"], now["omega_to"] = now["omega"], omega
         now["glide"], now["glide_step"] = 0.0, 1.0 / max(program.glide_s * self.facts.rate_hz, 1.0)
         now["fade"], now["fade_step"] = 1.0, 0.0
