@@ -1,5 +1,6 @@
 // The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
 // calls, so that threads may share tables. What is given is checked, and refused with a code.
+#include "filters.hpp"
 #include "tangent.hpp"
 #include "world.hpp"
 
@@ -173,7 +174,9 @@ VIBENCH_API const char *vibench_structure(int64_t index) {
                                    PowerTerms_text, PowerShapes_text,
                                    Scene_text,    State_text,        Record_text,     Tangent_text, Readings_text,
                                    Numbers_text,  Interpolation_text, Decimation_text, RecursiveFilter_text,
-                                   FilteredSignal_text, Sensor_text, Controller_text, LoopCables_text};
+                                   FilteredSignal_text, Sensor_text, Controller_text, LoopCables_text,
+                                   TrackedStop_text, TrackRecord_text, MotionFilter_text, MotionSmoother_text,
+                                   ContactSearch_text};
   constexpr int64_t COUNT = sizeof TEXTS / sizeof *TEXTS;
   return index >= 0 && index < COUNT ? TEXTS[index] : nullptr;
 }
@@ -183,7 +186,9 @@ VIBENCH_API int64_t vibench_size_of(int64_t index) {
                                sizeof(Scene),           sizeof(State),        sizeof(Record),
                                sizeof(Tangent),         sizeof(Readings),
                                sizeof(Numbers), sizeof(Interpolation), sizeof(Decimation), sizeof(RecursiveFilter),
-                               sizeof(FilteredSignal), sizeof(Sensor), sizeof(Controller), sizeof(LoopCables)};
+                               sizeof(FilteredSignal), sizeof(Sensor), sizeof(Controller), sizeof(LoopCables),
+                               sizeof(TrackedStop), sizeof(TrackRecord), sizeof(MotionFilter), sizeof(MotionSmoother),
+                               sizeof(ContactSearch)};
   constexpr int64_t COUNT = sizeof SIZES / sizeof *SIZES;
   return index >= 0 && index < COUNT ? SIZES[index] : 0;
 }
@@ -310,7 +315,8 @@ VIBENCH_API int64_t vibench_interpolate(const Interpolation *of) {
 }
 
 VIBENCH_API int64_t vibench_decimate(const Decimation *of) {
-  return of != nullptr && is_usable(*of) && decimate(*of) ? 0 : REFUSED;
+  if (of == nullptr || !is_usable(*of) || !decimate(*of)) return REFUSED;
+  return 0;
 }
 
 VIBENCH_API int64_t vibench_filter_signal(const FilteredSignal *of) {
@@ -339,4 +345,67 @@ VIBENCH_API int64_t vibench_hear_loop(LoopCables *loop) {
   if (loop->begin < 0 || loop->stop < loop->begin || loop->stop > loop->drive.size) return REFUSED;
   hear_loop(*loop);
   return wants_attention(*loop->controller);
+}
+
+// ---- Hidden motion
+
+namespace {
+
+constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
+constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
+constexpr int64_t MOST_SMALL_STEPS = 100000;
+
+bool is_stepped(double step, int64_t small_steps) {
+  return is_positive(step) && small_steps > 0 && small_steps <= MOST_SMALL_STEPS;
+}
+
+bool has_samples(const TrackRecord &record, int64_t samples) {
+  return is_table(record.states, samples, TRACKED) && is_table(record.covariances, samples, TRACKED * TRACKED) &&
+         is_table(record.innovations, samples, 2) && has_size(record.kinds, samples) &&
+         is_table(record.jacobians, samples, TRACKED * TRACKED) && has_size(record.impulses, samples);
+}
+
+bool is_usable(const MotionFilter &f) {
+  int64_t samples = f.velocity.size, states = f.state.size, parameters = states - TRACKED;
+  if (parameters < 0 || parameters > MOST_PARAMETERS || !is_lent(f.velocity) || !is_lent(f.state)) return false;
+  bool is_kept = f.record.states.size > 0;
+  return has_size(f.acceleration, samples + 1) && is_table(f.flows, 1 + parameters, FLOW_SIZE) &&
+         is_table(f.small_flows, 1 + parameters, FLOW_SIZE) && is_table(f.stops, 1 + parameters, STOP_SIZE) &&
+         has_size(f.deviations, parameters) && is_stepped(f.step, f.small_steps) &&
+         is_table(f.noise, states, states) && has_size(f.force_variance, samples) &&
+         has_size(f.force_input, TRACKED) && is_table(f.covariance, states, states) &&
+         has_samples(f.record, is_kept ? samples : 0) && !(is_kept && parameters > 0);
+}
+
+bool is_usable(const MotionSmoother &s) {
+  int64_t samples = s.record.kinds.size, forces = s.force_variance.size;
+  return has_samples(s.record, samples) && has_size(s.flow, FLOW_SIZE) && has_size(s.force_input, TRACKED) &&
+         is_lent(s.force_variance) && (forces == 0 || forces == samples) && is_table(s.states, samples, TRACKED) &&
+         is_table(s.variances, samples, 2) && is_table(s.forces, forces, 2) && has_size(s.matrix, TRACKED * TRACKED);
+}
+
+bool is_usable(const ContactSearch &of) {
+  return is_lent(of.touched) && is_table(of.states, of.touched.size, TRACKED) && is_lent(of.acceleration) &&
+         has_size(of.small_flow, FLOW_SIZE) && has_size(of.stop, STOP_SIZE) && is_stepped(of.step, of.small_steps) &&
+         of.longest > 0 && has_columns(of.contacts, CONTACT_COLUMNS);
+}
+
+}  // namespace
+
+// Returns the samples that were filtered before the motion was lost.
+VIBENCH_API int64_t vibench_filter_motion(MotionFilter *filter) {
+  if (filter == nullptr || !is_usable(*filter)) return REFUSED;
+  return filter_motion(*filter);
+}
+
+VIBENCH_API int64_t vibench_smooth_motion(const MotionSmoother *smoother) {
+  if (smoother == nullptr || !is_usable(*smoother)) return REFUSED;
+  smooth_motion(*smoother);
+  return 0;
+}
+
+// Returns the contacts that were found.
+VIBENCH_API int64_t vibench_follow_contacts(const ContactSearch *search) {
+  if (search == nullptr || !is_usable(*search)) return REFUSED;
+  return follow_contacts(*search);
 }

@@ -23,19 +23,6 @@ inline double exponential(double x) {
   return (1.0 + sum) * power;
 }
 
-// Natural logarithm of a positive number: of its power of two, and 2 artanh((f - 1) / (f + 1)) of the rest as a series.
-inline double logarithm(double x) {
-  if (!(x > 0.0) || !is_finite(x)) return x == 0.0 ? -INFINITE : x > 0.0 ? x : x - x;
-  double scale = 0.0;
-  if (x < 1e-290) x *= 0x1p300, scale = -300.0;
-  int64_t bits = __builtin_bit_cast(int64_t, x), exponent = (bits >> 52) - 1023;
-  double f = __builtin_bit_cast(double, bits - (exponent << 52));
-  if (f > 1.4142135623730951) f *= 0.5, exponent++;
-  double s = (f - 1.0) / (f + 1.0), square = s * s, sum = 0.0;  // |s| < 0.172
-  for (int k = 23; k >= 3; k -= 2) sum = (sum + 1.0 / k) * square;
-  return (double(exponent) + scale) * 6.93147180559945309417e-01 + 2.0 * (s + s * sum);
-}
-
 struct CosineSine {
   double cosine, sine;
 };
@@ -77,6 +64,27 @@ inline CosineSine cosine_sine(double angle) {
     case 2: return {-of.cosine, -of.sine};
     default: return {of.sine, -of.cosine};
   }
+}
+
+// ln x for x > 0, right to one unit in the last place; -infinity at zero, NaN below. Coefficients of Sun's fdlibm.
+inline double logarithm(double x) {
+  constexpr double LN2_HIGH = 6.93147180369123816490e-01, LN2_LOW = 1.90821492927058770002e-10;
+  constexpr int64_t ROOT_HALF = 0x3fe6a09e667f3bcd;
+  if (!(x > 0.0)) return x == 0.0 ? -INFINITE : NOT_A_NUMBER;
+  if (!is_finite(x)) return x;
+  double exponent = 0.0;
+  if (x < 0x1p-1022) x *= 0x1p54, exponent = -54.0;  // subnormal
+  int64_t bits = __builtin_bit_cast(int64_t, x), whole = (bits - ROOT_HALF) >> 52;
+  exponent += double(whole);
+  double f = __builtin_bit_cast(double, bits - whole * (int64_t(1) << 52)) - 1.0;  // x = 2^whole (1 + f)
+  double s = f / (2.0 + f), z = s * s, half = 0.5 * f * f;
+  double r = z * (6.666666666666735130e-01 +
+                  z * (3.999999999940941908e-01 +
+                       z * (2.857142874366239149e-01 +
+                            z * (2.222219843214978396e-01 +
+                                 z * (1.818357216161805012e-01 +
+                                      z * (1.531383769920937332e-01 + z * 1.479819860511658591e-01))))));
+  return exponent * LN2_HIGH - ((half - (s * (half + r) + exponent * LN2_LOW)) - f);
 }
 
 }  // namespace vibench

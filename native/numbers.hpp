@@ -10,6 +10,7 @@ namespace vibench {
 
 constexpr double PI = 3.14159265358979323846;
 constexpr double INFINITE = __builtin_inf();
+constexpr double NOT_A_NUMBER = __builtin_nan("");
 constexpr double EPSILON = 2.220446049250313e-16;  // distance from 1 to the next double
 
 template <class A> constexpr A smaller(A a, A b) { return b < a ? b : a; }

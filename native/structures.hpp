@@ -266,4 +266,74 @@ STRUCTURE(LoopCables,
   double steps_heard;          // in these sums
 )
 
+// ---- Hidden motion (docs/hidden-motion.md): X, Y, Z and their rates relative to the base, the base's velocity W and
+// the error B of the recorded acceleration; behind these eight, deviations of parameters that are looked for.
+
+// A stop that is pressed in by d pushes with (K d^n + k d)(1 + loss dd/dt).
+STRUCTURE(TrackedStop,
+  double lower_gap, upper_gap;  // at negative and positive p [m]
+  double steepness;            // K [N/m^n]
+  double exponent;             // n
+  double spring;               // k [N/m]
+  double loss;                 // [s/m]
+  double inverse_m1, inverse_m2;  // [1/kg]
+)
+
+// What a filter keeps of every sample, before it is used.
+STRUCTURE(TrackRecord,
+  Numbers states;              // [samples][8]
+  Numbers covariances;         // [samples][8][8]
+  Numbers innovations;         // [samples][2]: the innovation [m/s] and its variance, 0 where it was not used
+  Numbers kinds;               // [samples]: `StepKind`
+  Numbers jacobians;           // [samples][8][8], of steps that met a stop
+  Numbers impulses;            // [samples]: on m1 [N s]
+)
+
+// A Kalman filter over the samples of two channels.
+STRUCTURE(MotionFilter,
+  Numbers acceleration;        // of the base [samples + 1] [m/s^2]
+  Numbers velocity;            // of m0 [samples] [m/s]; NaN where it was not measured
+  Numbers flows, small_flows;  // [1 + parameters][8][10]: state, acceleration and its rise onto the state one step later
+  Numbers stops;               // [1 + parameters] of `TrackedStop`
+  Numbers deviations;          // [parameters]: by which the later flows and stops differ from the first
+  double step;                 // [s]
+  int64_t small_steps;         // in a step that meets a stop
+  Numbers noise;               // Q of a step [states][states]
+  double velocity_variance;    // [m^2/s^2]
+  double impulse_share;        // error of a collision's impulse, as a part of it
+  Numbers force_variance;      // of an unknown contact force held over each sample [samples] [N^2]
+  Numbers force_input;         // 1 N on m1 against m2, held over a step, onto the state [8]
+  double level;                // running mean of the squared normalised innovation
+  double level_share;          // that one sample makes up
+  double limit;                // of the level: beyond it the motion is lost
+  Numbers state;               // [states]
+  Numbers covariance;          // [states][states]
+  TrackRecord record;          // of no size, or without parameters
+)
+
+// The smoother, back over what a filter kept.
+STRUCTURE(MotionSmoother,
+  TrackRecord record;
+  Numbers flow;                // [8][10], of the filter
+  Numbers force_variance;      // [samples] [N^2], or of no size
+  Numbers force_input;         // [8]
+  Numbers states;              // [samples][8]: this and the rest are results
+  Numbers variances;           // [samples][2]: of p and of its rate
+  Numbers forces;              // [samples][2]: the unknown force on m1 and its variance; or of no size
+  Numbers matrix;              // [8][8]: M of the first sample, whose smoothed covariance is P - P M P
+)
+
+// Contacts of a smoothed motion, followed between its samples.
+STRUCTURE(ContactSearch,
+  Numbers states;              // [samples][8]
+  Numbers touched;             // [samples]: 0 where a step was a flight
+  Numbers acceleration;        // of the base, as far beyond the states as a contact may last [m/s^2]
+  Numbers small_flow;          // [8][10]
+  Numbers stop;                // one `TrackedStop`
+  double step;                 // [s]
+  int64_t small_steps;
+  int64_t longest;             // samples: what lasts longer is no collision, m1 has come to rest on the stop
+  Numbers contacts;            // [contacts][7]: the results, as `TrackedContact` orders them
+)
+
 }  // namespace vibench

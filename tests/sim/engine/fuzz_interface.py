@@ -7,20 +7,22 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from native_calls import calls
 
 from vibench.sim import Harmonic, gong2025
 from vibench.sim.engine import Engine, EngineError, collision_structure, power_structure, scene_of
 
 STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
 STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
-POINTERS = {"collisions", "power_shapes", "samples", "impact_times"}
+POINTERS = {"collisions", "power_shapes", "samples", "impact_times", "controller", "at"}
 LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "power:5", "power:3+5+7")
 CODES = {-1, 0, 1, 2, 3, 4}
 
 
 def spoil(structure, draws):
     """Overwrite one number of a structure, or of one inside it."""
-    name = draws.choice([name for name in structure.dtype.names if name not in POINTERS])
+    names = [name for name in structure.dtype.names if name not in POINTERS]
+    name = draws.choice(names)
     kind = structure.dtype[name]
     if kind.names:
         spoil(structure[name], draws)
@@ -66,6 +68,31 @@ def call(engine, draws):
     return engine.run(tables, state, until, tolerance, record)
 
 
+def lent_sizes(structure):
+    """Views of the sizes of all arrays that a structure lends."""
+    for name in structure.dtype.names:
+        if structure.dtype[name].names == ("at", "size"):
+            yield structure[name]["size"]
+        elif structure.dtype[name].names:
+            yield from lent_sizes(structure[name])
+
+
+def call_spoilt(engine, draws):
+    """Call every function with one structure, of which something may be broken; yields their codes."""
+    for function, structure, _ in calls(engine, draws):
+        sizes = [(view, int(view)) for view in lent_sizes(structure)]
+        for _ in range(draws.integers(3)):
+            spoil(structure, draws)
+        if function.endswith("_loop") and draws.random() < 0.3:
+            spoil(structure.lent["controller"], draws)
+        for view, true in sizes:
+            view[...] = min(int(view), true)
+        try:
+            yield min(engine.call(function, structure), 0)
+        except ValueError:
+            yield -1
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("library", type=Path)
@@ -74,6 +101,7 @@ def main():
     given = options.parse_args()
     engine, draws = Engine(given.library), np.random.default_rng(given.seed)
     codes = [call(engine, draws) for _ in range(given.count)]
+    codes += [code for _ in range(given.count // 20) for code in call_spoilt(engine, draws)]
     if not set(codes) <= CODES:
         raise EngineError(f"Codes that no outcome has: {set(codes) - CODES}")
     print({code: codes.count(code) for code in sorted(set(codes))})  # noqa: T201 - what its caller reads

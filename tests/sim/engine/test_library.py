@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.sim.engine.native_calls import calls
 from vibench.sim import Harmonic, gong2025
 from vibench.sim.engine import (
     Engine,
@@ -52,6 +53,14 @@ def test_every_family_that_runs_here_gives_the_same_digits(build):
     answers = [np.array(list(final_motions(engine))) for engine in engines]
     for answer in answers[1:]:
         assert np.array_equal(answer, answers[0])
+    for seed in range(5):
+        draws = [np.random.default_rng(seed) for _ in engines]
+        for same in zip(*(calls(*each) for each in zip(engines, draws, strict=True)), strict=True):
+            codes = [each.call(name, given) for each, (name, given, _) in zip(engines, same, strict=True)]
+            assert codes == codes[:1] * len(codes)
+            for filled in zip(*(arrays for _, _, arrays in same), strict=True):
+                assert all(np.array_equal(each, filled[0], equal_nan=True) for each in filled)
+                assert np.any(filled[0])
 
 
 def test_the_loaded_engine_is_built_from_the_sources_of_this_checkout(build):

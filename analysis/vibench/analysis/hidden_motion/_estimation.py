@@ -11,12 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..signals import Reals
-from ._filter_kernels import STATES, forward
-from ._filtering import IMPULSE_SHARE, LOSS_LIMIT, SMOOTHING_S, FilterState, MotionModel, motion_model
+from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, move_filter
 from ._parameters import Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
 from ._tracking import acquire
-from ._tracking_model import StepTables, TrackedSpecimen, step_tables
+from ._tracking_model import STATES, StepTables, TrackedSpecimen, step_tables
 
 _DEVIATION = {
     Hidden.LOWER_GAP: 1e-5,
@@ -176,40 +175,23 @@ class _Search:
 
     def _block(self, model: MotionModel, at: FilterState, count: int) -> bool:
         """Filter some samples; says whether the track held."""
-        tables = self._variants()
         size = STATES + len(self._wanted)
         noise = np.zeros((size, size))
         noise[:STATES, :STATES] = model.step_noise
         at.covariance[STATES:, STATES:] += _WANDER**2 * np.eye(len(self._wanted))
         inflation = self._inflation()
-        level = np.array([1.0, tables[0].step_s / SMOOTHING_S])
-        done = forward(
-            self._motion.accelerations(at.sample, at.sample + count + 1),
-            self._motion.velocities(at.sample + 1, at.sample + count + 1),
-            np.stack([each.flow for each in tables]),
-            np.stack([each.small_flow for each in tables]),
-            np.stack([each.stop for each in tables]),
-            self._deviation / self._prior_sd,
-            tables[0].step_s,
-            tables[0].small_steps,
-            noise,
-            inflation * model.velocity_variance,
-            IMPULSE_SHARE,
-            np.zeros(count),
-            tables[0].force_input,
-            LOSS_LIMIT,
-            level,
-            at.state,
-            at.covariance,
-            np.empty((0, STATES)),
-            np.empty((0, STATES, STATES)),
-            np.empty((0, 2)),
-            np.empty(0),
-            np.empty((0, STATES, STATES)),
-            np.empty(0),
+        at.innovation_level = 1.0
+        done = move_filter(
+            self._variants(),
+            self._motion,
+            at,
+            count,
+            noise=noise,
+            velocity_variance=inflation * model.velocity_variance,
+            loss_limit=LOSS_LIMIT,
+            deviations=self._deviation / self._prior_sd,
         )
-        at.sample += done
-        self._level = float(level[0]) if inflation == 1.0 else self._level
+        self._level = at.innovation_level if inflation == 1.0 else self._level
         return bool(done == count)
 
     def _ran_away(self) -> str:

@@ -1,16 +1,16 @@
 """Runs of the filter and of the smoother over stretches of a prepared motion, as values."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from vibench.sim import Specimen
+from vibench.sim.engine import Structure, native_engine
 
 from ..signals import Flags, Reals
-from ._filter_kernels import FLIGHT, STATES, VX, X, forward
 from ._prepared_motion import ChannelNoise, PreparedMotion
-from ._smoother_kernels import backward
-from ._tracking_model import StepTables, TrackedSpecimen, step_tables
+from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_tables
 
 _DIFFUSION_OF_GAP = 7e-6
 """What the model leaves out moves each mass by this part of the gap in the root of a millisecond."""
@@ -20,13 +20,15 @@ _DRIFT_M_PER_S2 = 1e-3
 """Of the accelerometer's slow error in the root of a second."""
 _ACCELERATION_EXCESS = 1.5
 """Variance of an acceleration between samples over that of one: what linear interpolation adds."""
-IMPULSE_SHARE = 0.003
+_IMPULSE_SHARE = 0.003
 """Error of a collision's impulse that the model's own equations may make."""
-SMOOTHING_S = 8e-3
+_SMOOTHING_S = 8e-3
 """Over which squared innovations are averaged to notice a loss."""
 LOSS_LIMIT = 8.0
 """Mean squared normalised innovation, 1 for a track, beyond which the motion is no longer followed."""
 _NOTHING = np.empty(0)
+_FLIGHT = 0.0
+"""Kind of a step without a stop."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,17 +112,25 @@ class Filtered:
         value, variance = self.innovations.T
         return np.asarray(np.where(variance > 0, value**2 / np.where(variance > 0, variance, 1.0), np.nan))
 
-    def cut(self, count: int) -> "Filtered":
-        """Keep the first ``count`` samples."""
-        return Filtered(
-            self.first,
-            self.states[:count],
-            self.covariances[:count],
-            self.innovations[:count],
-            self.kinds[:count],
-            self.jacobians[:count],
-            self.impulses[:count],
-        )
+    @classmethod
+    def room(cls, first: int, count: int) -> "Filtered":
+        """Make room for so many samples."""
+        shapes = (STATES,), (STATES, STATES), (2,), (), (STATES, STATES), ()
+        return cls(first, *(np.empty((count, *shape)) for shape in shapes))
+
+    @property
+    def arrays(self) -> dict[str, Reals]:
+        """By name, in the order of the fields; `TrackRecord` of native/structures.hpp has the same names."""
+        return {each.name: getattr(self, each.name) for each in fields(self)[1:]}
+
+    def samples(self, begin: int, end: int | None = None) -> "Filtered":
+        """Return some of the samples."""
+        return Filtered(self.first + begin, *(each[begin:end] for each in self.arrays.values()))
+
+    @property
+    def record(self) -> Structure:
+        """What the native engine fills and smooths."""
+        return native_engine().new("TrackRecord", **self.arrays)
 
 
 def run_filter(
@@ -136,46 +146,65 @@ def run_filter(
 
     ``force_variance`` is that of a contact force held over each sample [N^2], where no law tells it.
     """
-    a = motion.accelerations(at.sample, at.sample + count + 1)
-    v = motion.velocities(at.sample + 1, at.sample + count + 1)
-    kept = _room(v.size)
-    latent = force_variance if force_variance.size else np.zeros(v.size)
-    level = np.array([at.innovation_level, min(1.0, model.tables.step_s / SMOOTHING_S)])
-    done = forward(
-        a,
-        v,
-        model.tables.flow[np.newaxis],
-        model.tables.small_flow[np.newaxis],
-        model.tables.stop[np.newaxis],
-        _NOTHING,
-        model.tables.step_s,
-        model.tables.small_steps,
-        model.step_noise,
-        model.velocity_variance,
-        IMPULSE_SHARE,
-        latent,
-        model.tables.force_input,
-        loss_limit,
-        level,
-        at.state,
-        at.covariance,
-        *kept,
+    kept = Filtered.room(at.sample + 1, min(count, motion.samples - 1 - at.sample))
+    done = move_filter(
+        [model.tables],
+        motion,
+        at,
+        kept.kinds.size,
+        noise=model.step_noise,
+        velocity_variance=model.velocity_variance,
+        loss_limit=loss_limit,
+        force_variance=force_variance,
+        record=kept.record,
     )
-    found = Filtered(at.sample + 1, *kept)
+    return kept.samples(0, done)
+
+
+def move_filter(
+    tables: Sequence[StepTables],
+    motion: PreparedMotion,
+    at: FilterState,
+    count: int,
+    *,
+    noise: Reals,
+    velocity_variance: float,
+    loss_limit: float,
+    deviations: Reals = _NOTHING,
+    force_variance: Reals = _NOTHING,
+    record: Structure | None = None,
+) -> int:
+    """Move ``at`` on by up to ``count`` samples; returns how many were done before a loss.
+
+    Tables behind the first are the model with one parameter raised by its deviation.
+    """
+    engine, first = native_engine(), tables[0]
+    work = engine.new(
+        "MotionFilter",
+        acceleration=motion.accelerations(at.sample, at.sample + count + 1),
+        velocity=motion.velocities(at.sample + 1, at.sample + count + 1),
+        flows=np.stack([each.flow for each in tables]),
+        small_flows=np.stack([each.small_flow for each in tables]),
+        stops=np.stack([each.stop for each in tables]),
+        deviations=deviations,
+        step=first.step_s,
+        small_steps=first.small_steps,
+        noise=noise,
+        velocity_variance=velocity_variance,
+        impulse_share=_IMPULSE_SHARE,
+        force_variance=force_variance if force_variance.size else np.zeros(count),
+        force_input=first.force_input,
+        level=at.innovation_level,
+        level_share=min(1.0, first.step_s / _SMOOTHING_S),
+        limit=loss_limit,
+        state=at.state,
+        covariance=at.covariance,
+        **({} if record is None else {"record": record}),
+    )
+    done = engine.call("filter_motion", work)
     at.sample += done
-    at.innovation_level = float(level[0])
-    return found if done == v.size else found.cut(done)
-
-
-def _room(count: int) -> tuple[Reals, ...]:
-    return (
-        np.empty((count, STATES)),
-        np.empty((count, STATES, STATES)),
-        np.empty((count, 2)),
-        np.empty(count),
-        np.empty((count, STATES, STATES)),
-        np.empty(count),
-    )
+    at.innovation_level = float(work["level"])
+    return done
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,21 +238,20 @@ def smooth(model: MotionModel, run: Filtered, force_variance: Reals = _NOTHING) 
     """Run back over what the filter kept."""
     count = run.states.shape[0]
     states, variances = np.empty((count, STATES)), np.empty((count, 2))
-    forces, matrix = np.empty((force_variance.size, 2)), np.zeros((STATES, STATES))
-    backward(
-        np.ascontiguousarray(model.tables.flow[:, :STATES]),
-        run.states,
-        run.covariances,
-        run.innovations,
-        run.kinds,
-        run.jacobians,
-        force_variance,
-        model.tables.force_input,
-        states,
-        variances,
-        forces,
-        matrix,
+    forces, matrix = np.empty((force_variance.size, 2)), np.empty((STATES, STATES))
+    engine = native_engine()
+    work = engine.new(
+        "MotionSmoother",
+        record=run.record,
+        flow=model.tables.flow,
+        force_variance=force_variance,
+        force_input=model.tables.force_input,
+        states=states,
+        variances=variances,
+        forces=forces,
+        matrix=matrix,
     )
+    engine.call("smooth_motion", work)
     covariance = run.covariances[0] if count else np.empty((STATES, STATES))
     return Smoothed(
         run.first,
@@ -231,5 +259,5 @@ def smooth(model: MotionModel, run: Filtered, force_variance: Reals = _NOTHING) 
         variances,
         forces,
         covariance - covariance @ matrix @ covariance,
-        run.kinds != FLIGHT,
+        run.kinds != _FLIGHT,
     )

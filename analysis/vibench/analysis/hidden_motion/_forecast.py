@@ -8,10 +8,9 @@ import numpy as np
 
 from ..signals import Reals
 from ..tables import Labelled
-from ._filter_kernels import STATES, VX, W, X, Y, Z
 from ._filtering import FilterState, MotionModel, run_filter
 from ._prepared_motion import PreparedMotion
-from ._tracking_model import equations, exact_flow
+from ._tracking_model import STATES, VX, W, X, Y, Z, equations, exact_flow
 
 AHEAD_S = 0.04
 LEARNT_S = 0.15

@@ -13,9 +13,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from ..signals import Flags, Reals
-from ._filter_kernels import STATES
 from ._filtering import Filtered, FilterState, MotionModel, Smoothed, run_filter, smooth
 from ._prepared_motion import PreparedMotion
+from ._tracking_model import STATES
 
 _PEAK_BAND_HZ = 4500.0
 """The force is looked at in this band: wide enough for a collision, narrow enough for its noise."""

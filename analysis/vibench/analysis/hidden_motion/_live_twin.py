@@ -17,7 +17,6 @@ from vibench.sim import Specimen
 from ..recordings import BASE, RESPONSE
 from ..signals import Reals
 from ._change_watch import BLOCK_S, ChangeWatch, KnownNumber, Level
-from ._filter_kernels import STATES
 from ._filtering import LOSS_LIMIT, Filtered, FilterState, MotionModel, motion_model, run_filter
 from ._forecast import LEARNT_S, Forecast, Forecaster
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
@@ -26,7 +25,7 @@ from ._parameters import Hidden, with_values
 from ._prepared_motion import ChannelNoise, PreparedMotion, dark_samples, require_channels, white_noise
 from ._sensor_correction import HALF_LENGTH, sensor_correction
 from ._tracking import ACQUISITION_S, acquire, believed
-from ._tracking_model import TrackedSpecimen, tracked_specimen
+from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
 
 HELD_S = 3.0
 """Of motion that is held for finding numbers in."""

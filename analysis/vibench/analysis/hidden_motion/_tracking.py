@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..signals import Flags, Reals
+from ..signals import Flags
 from ._filtering import (
     LOSS_LIMIT,
     Filtered,
@@ -82,16 +82,7 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
     begin = _calmest(model, found.smoothed, found.is_open, motion.sample_rate_hz)
     if begin is None:
         return "no flight between two impacts was told well enough to begin a track"
-    rest = replace(
-        found.run,
-        first=found.run.first + begin,
-        states=found.run.states[begin:],
-        covariances=found.run.covariances[begin:],
-        innovations=found.run.innovations[begin:],
-        kinds=found.run.kinds[begin:],
-        jacobians=found.run.jacobians[begin:],
-    )
-    ahead = smooth(model.without_stops, rest, found.force_variance[begin:])
+    ahead = smooth(model.without_stops, found.run.samples(begin), found.force_variance[begin:])
     return FilterState(ahead.first, ahead.states[0].copy(), _ACQUIRED_EXCESS * ahead.first_covariance)
 
 
@@ -175,7 +166,7 @@ def _pieces(model: MotionModel, motion: PreparedMotion, at: FilterState) -> Iter
             beyond = run_filter(model, motion, at.copy(), ahead)
             whole = _joined(run, beyond)
         if kept:
-            seen = whole.cut(kept) if is_lost else whole
+            seen = whole.samples(0, kept) if is_lost else whole
             yield _piece(smooth(model, seen), run, kept)
         if is_lost:
             return
@@ -189,23 +180,13 @@ def _piece(smoothed: Smoothed, run: Filtered, kept: int) -> TrackedPiece:
             variances=smoothed.variances[:kept],
             touched=smoothed.touched[:kept],
         ),
-        run.cut(kept),
+        run.samples(0, kept),
     )
 
 
 def _joined(one: Filtered, other: Filtered) -> Filtered:
-    def both(name: str) -> Reals:
-        return np.concatenate([getattr(one, name), getattr(other, name)])
-
-    return Filtered(
-        one.first,
-        both("states"),
-        both("covariances"),
-        both("innovations"),
-        both("kinds"),
-        both("jacobians"),
-        both("impulses"),
-    )
+    pairs = zip(one.arrays.values(), other.arrays.values(), strict=True)
+    return Filtered(one.first, *(np.concatenate(pair) for pair in pairs))
 
 
 def believed(run: Filtered, sample_rate_hz: float) -> int:

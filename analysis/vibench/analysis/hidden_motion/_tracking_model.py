@@ -10,8 +10,13 @@ from vibench.sim import PowerLaw, RigidStops, Specimen
 
 from ..errors import InvalidRequest
 from ..signals import Reals
-from ._filter_kernels import STATES, VX, VY, VZ, B, W, X, Y, Z
 
+STATES = 8
+"""X, Y, Z and their rates relative to the base, the base's velocity W, the error B of its acceleration, SI.
+
+Behind them the filter has deviations of the parameters that are estimated. Equations: docs/hidden-motion.md.
+"""
+X, Y, Z, VX, VY, VZ, W, B = range(STATES)
 _SMALL_STEPS_A_CONTACT = 36
 """Kick and flow alternate so often during the shortest collision; a force at 1 um then errs by under 1e-3."""
 _FASTEST_APPROACH_M_PER_S = 0.5
@@ -54,7 +59,7 @@ def tracked_specimen(specimen: Specimen) -> TrackedSpecimen:
 
 @dataclass(frozen=True, eq=False)
 class StepTables:
-    """What `_filter_kernels.forward` needs of a specimen."""
+    """What the filter needs of a specimen."""
 
     flow: Reals
     """Shape (8, 10): state, acceleration and its rise -> state one sample later, without stops."""
@@ -62,7 +67,7 @@ class StepTables:
     """The same for a small step."""
     small_steps: int
     stop: Reals
-    """Shape (8,)."""
+    """A `TrackedStop` of native/structures.hpp, shape (8,)."""
     force_input: Reals
     """Shape (8,): state after a force of 1 N on m1 against m2, held over a sample."""
     acceleration_input: Reals

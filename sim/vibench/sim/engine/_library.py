@@ -20,7 +20,10 @@ BUILD = CHECKOUT / "native" / "build.py"
 _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
 """Of libraries of this system; wheels of others may have been built in the same checkout."""
 REBUILD = "python native/build.py"
-FUNCTIONS = ("interpolate", "decimate", "filter_signal", "show", "play_loop", "hear_loop")
+FUNCTIONS = (
+    *("interpolate", "decimate", "filter_signal", "show", "play_loop", "hear_loop"),
+    *("filter_motion", "smooth_motion", "follow_contacts"),
+)
 """Of the library, each with one structure."""
 Tables = NDArray[np.float64]
 """What a run of one scene needs ready, as the engine lays it out."""
@@ -29,6 +32,12 @@ _Pointer = ctypes.c_void_p
 
 class EngineError(RuntimeError):
     """The native engine cannot be used here; the text says what to do."""
+
+
+class _Lending(np.ndarray[tuple[int, ...], np.dtype[np.void]]):
+    """A structure that keeps what it points to."""
+
+    lent: dict[str, object]
 
 
 class Engine:
@@ -80,9 +89,10 @@ class Engine:
     def new(self, name: str, **fields: object) -> Structure:
         """Make a structure of the interface, zero where nothing is given; names as in native/structures.hpp.
 
-        An array that is a field is lent, not copied: keep it as long as the structure is used.
+        An array that is a field is lent, not copied; it lives as long as the structure.
         """
-        structure = np.zeros((), self._types[name])
+        structure = np.zeros((), self._types[name]).view(_Lending)
+        structure.lent = fields
         for field, value in fields.items():
             structure[field] = _lent(value) if isinstance(value, np.ndarray) else value
         return structure

@@ -1,0 +1,133 @@
+"""A call of every function of the native engine that takes one structure, with random numbers."""
+
+import numpy as np
+
+STATES, STEPS, PARAMETERS = 8, 40, 2
+
+
+def calls(engine, draws):
+    """Yield for each function its name, its structure, and the arrays that it fills."""
+
+    def normal(*shape, scale=1.0):
+        return scale * draws.standard_normal(shape)
+
+    def low_pass():
+        pole = draws.uniform(0.1, 0.9)
+        weights = {"numerator": np.array([1.0 - pole, 0.0]), "denominator": np.array([1.0, -pole])}
+        return engine.new("RecursiveFilter", state=np.zeros(2), **weights)
+
+    def sensor(steps):
+        volts, instead = np.zeros(steps), np.full(steps, np.nan)
+        instead[::7] = 0.5
+        motion, noise = normal(steps), normal(steps, scale=0.01)
+        arrays = {"motion": motion, "noise": noise, "instead": instead, "volts": volts}
+        return engine.new(
+            "Sensor", filter=low_pass(), full_scale=2.0, full_scale_voltage=5.0, **arrays
+        ), volts
+
+    values = np.zeros((2, 30))
+    positions, table = draws.uniform(-40.0, 140.0, 30), normal(19, 64)
+    arrays = {"samples": normal(2, 100), "positions": positions, "table": table, "values": values}
+    yield "interpolate", engine.new("Interpolation", channels=2, **arrays), [values]
+
+    samples = np.zeros(12)
+    starts, fractions = np.floor(draws.uniform(0.0, 60.0, 12)), draws.uniform(0.0, 1.0, 12)
+    arrays = {"means": normal(100), "starts": starts, "fractions": fractions, "samples": samples}
+    yield "decimate", engine.new("Decimation", table=normal(5, 24), reach=24, **arrays), [samples]
+
+    result = np.zeros(50)
+    arrays = {"values": normal(50), "result": result}
+    yield "filter_signal", engine.new("FilteredSignal", filter=low_pass(), **arrays), [result]
+
+    structure, volts = sensor(STEPS)
+    yield "show", structure, [volts]
+
+    controller = engine.new("Controller", is_on=1, harmonics=3, remembered=2, fade=1.0, limit=1.0)
+    controller["omega_to"], controller["glide_step"] = 0.3, 0.4
+    controller["block"], controller["turns"] = 10.0, 1.5
+    controller["reference"][:, :3] = normal(2, 3) + 1j * normal(2, 3)
+    controller["step"][:2, :2], controller["inlet"][:2] = normal(2, 2, scale=0.3), normal(2, 2)
+    (base, _), (m0, volts) = sensor(STEPS), sensor(STEPS)
+    drive, late = normal(STEPS), normal(7)
+    loop = engine.new(
+        "LoopCables", controller=controller.ctypes.data, base=base, m0=m0, drive=drive, late=late
+    )
+    loop.lent["controller"] = controller
+    loop["steps_per_sample"], loop["first"] = 4, 8
+    filled = [drive, late, controller["sums"].real]
+    yield "play_loop", loop, filled
+    yield "hear_loop", loop, [*filled, volts]
+    yield "play_loop", loop, filled
+
+    yield from motion_calls(engine, draws, normal)
+
+
+def motion_calls(engine, draws, normal):
+    """Filter, smooth and follow the contacts of a motion that has them in most steps."""
+    stop = np.array([1e-5, 2e-5, 4.9e9, 1.5, 0.0, 0.3, 476.0, 500.0])
+    if draws.random() < 0.5:
+        stop[2:5] = 1e8, 1.3, 1e4
+    noise = normal(STATES, STATES, scale=1e-6)
+
+    def varied(*shape):
+        flows = np.zeros((*shape, STATES, STATES + 2))
+        flows[..., :STATES] = np.eye(STATES)
+        return flows + normal(*flows.shape, scale=1e-6)
+
+    for parameters in (0, PARAMETERS):
+        states = STATES + parameters
+        state, covariance, grown = (
+            normal(states, scale=1e-5),
+            np.eye(states) * 1e-6,
+            np.zeros((states, states)),
+        )
+        state[3:6] = normal(3, scale=0.3)
+        grown[:STATES, :STATES] = noise @ noise.T
+        # Samples are kept only where there are no parameters.
+        shapes = {"states": (8,), "covariances": (8, 8), "jacobians": (8, 8), "innovations": (2,)}
+        shapes = {} if parameters else shapes | {"kinds": (), "impulses": ()}
+        kept = {name: np.zeros((STEPS, *shape)) for name, shape in shapes.items()}
+        record = engine.new("TrackRecord", **kept)
+        numbers = {"step": 2e-5, "small_steps": 7, "velocity_variance": 1e-6, "impulse_share": 0.01}
+        level = {"level": 1.0, "level_share": 0.01, "limit": 1e9}
+        arrays = {
+            "acceleration": normal(STEPS + 1, scale=20.0),
+            "velocity": np.where(draws.random(STEPS) < 0.1, np.nan, normal(STEPS, scale=0.05)),
+            "flows": varied(1 + parameters),
+            "small_flows": varied(1 + parameters),
+            "stops": np.tile(stop, (1 + parameters, 1)) * draws.uniform(0.999, 1.001, (1 + parameters, 8)),
+            "deviations": np.full(parameters, 1e-3),
+            "noise": grown,
+            "force_variance": draws.uniform(0.0, 1.0, STEPS),
+            "force_input": normal(STATES, scale=1e-3),
+            "state": state,
+            "covariance": covariance,
+        }
+        work = engine.new("MotionFilter", record=record, **numbers, **level, **arrays)
+        yield "filter_motion", work, [state, covariance, *kept.values()]
+        if parameters:
+            return
+
+        kept["kinds"][:] = draws.integers(0, 3, STEPS)
+        kept["covariances"][:], kept["jacobians"][:] = grown, normal(STEPS, 8, 8, scale=0.3)
+        kept["states"][:], kept["innovations"][:] = normal(STEPS, 8), np.abs(normal(STEPS, 2))
+        filled = {"states": np.zeros((STEPS, 8)), "variances": np.zeros((STEPS, 2))}
+        filled |= {"forces": np.zeros((STEPS, 2)), "matrix": np.zeros((8, 8))}
+        given = {name: arrays[name] for name in ("force_variance", "force_input")}
+        work = engine.new("MotionSmoother", record=record, flow=varied(), **given, **filled)
+        yield "smooth_motion", work, list(filled.values())
+
+        states, contacts = normal(STEPS, 8, scale=5e-6), np.zeros((STEPS, 7))
+        states[:, 3:6] = normal(STEPS, 3, scale=0.3)
+        arrays = {"states": states, "touched": np.ones(STEPS), "acceleration": normal(STEPS + 20, scale=20.0)}
+        arrays |= {"small_flow": flying(2e-5 / 7), "stop": stop, "contacts": contacts}
+        work = engine.new("ContactSearch", step=2e-5, small_steps=7, longest=50, **arrays)
+        yield "follow_contacts", work, [contacts]
+
+
+def flying(step):
+    """Masses that feel nothing but the base, over a step."""
+    flow = np.eye(STATES, STATES + 2)
+    flow[[0, 1, 2], [3, 4, 5]] = step
+    flow[3:6, STATES] = -step
+    return flow
