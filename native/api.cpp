@@ -166,31 +166,30 @@ Outcome advance(State &state, Tangent &tangent, const Tables &tables, double unt
   return advance<6>(state, tangent, tables, until, tolerance, record);
 }
 
+#define DESCRIBED(Name) {Name##_text, sizeof(Name)}
+constexpr struct {
+  const char *text;
+  int64_t size;
+} STRUCTURES[] = {
+    DESCRIBED(Specimen), DESCRIBED(LinearMotion), DESCRIBED(HeldMotion), DESCRIBED(Drive),
+    DESCRIBED(CollisionShapes), DESCRIBED(PowerTerms), DESCRIBED(PowerShapes), DESCRIBED(Scene),
+    DESCRIBED(State), DESCRIBED(Record), DESCRIBED(Tangent), DESCRIBED(Readings),
+    // Signals, world, hidden motion
+    DESCRIBED(Numbers), DESCRIBED(Interpolation), DESCRIBED(Decimation), DESCRIBED(RecursiveFilter),
+    DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoopCables),
+    DESCRIBED(TrackedStop), DESCRIBED(TrackRecord), DESCRIBED(MotionFilter), DESCRIBED(MotionSmoother),
+    DESCRIBED(ContactSearch),
+};
+constexpr int64_t STRUCTURE_COUNT = sizeof STRUCTURES / sizeof *STRUCTURES;
+
 }  // namespace
 
-// The text of all structures, in the order of `vibench_size_of`.
+// Text and size of all structures, those that others hold first.
 VIBENCH_API const char *vibench_structure(int64_t index) {
-  constexpr const char *TEXTS[] = {Specimen_text, LinearMotion_text, HeldMotion_text, Drive_text, CollisionShapes_text,
-                                   PowerTerms_text, PowerShapes_text,
-                                   Scene_text,    State_text,        Record_text,     Tangent_text, Readings_text,
-                                   Numbers_text,  Interpolation_text, Decimation_text, RecursiveFilter_text,
-                                   FilteredSignal_text, Sensor_text, Controller_text, LoopCables_text,
-                                   TrackedStop_text, TrackRecord_text, MotionFilter_text, MotionSmoother_text,
-                                   ContactSearch_text};
-  constexpr int64_t COUNT = sizeof TEXTS / sizeof *TEXTS;
-  return index >= 0 && index < COUNT ? TEXTS[index] : nullptr;
+  return index >= 0 && index < STRUCTURE_COUNT ? STRUCTURES[index].text : nullptr;
 }
 VIBENCH_API int64_t vibench_size_of(int64_t index) {
-  constexpr int64_t SIZES[] = {sizeof(Specimen),        sizeof(LinearMotion), sizeof(HeldMotion), sizeof(Drive),
-                               sizeof(CollisionShapes), sizeof(PowerTerms),   sizeof(PowerShapes),
-                               sizeof(Scene),           sizeof(State),        sizeof(Record),
-                               sizeof(Tangent),         sizeof(Readings),
-                               sizeof(Numbers), sizeof(Interpolation), sizeof(Decimation), sizeof(RecursiveFilter),
-                               sizeof(FilteredSignal), sizeof(Sensor), sizeof(Controller), sizeof(LoopCables),
-                               sizeof(TrackedStop), sizeof(TrackRecord), sizeof(MotionFilter), sizeof(MotionSmoother),
-                               sizeof(ContactSearch)};
-  constexpr int64_t COUNT = sizeof SIZES / sizeof *SIZES;
-  return index >= 0 && index < COUNT ? SIZES[index] : 0;
+  return index >= 0 && index < STRUCTURE_COUNT ? STRUCTURES[index].size : 0;
 }
 // Bytes of the tables of a `Law`.
 VIBENCH_API int64_t vibench_size_of_tables(int64_t law) {
@@ -258,21 +257,24 @@ VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   return PhasorSum<PHASORS>(phasors, tables->flight.path, tables->flight).reach;
 }
 
-// ---- Signals. Each call takes one structure; it returns REFUSED, or a number that its description explains.
+// ---- Signals, the world of the virtual rig, and hidden motion: functions of one structure
 
 namespace {
 
-constexpr int64_t MOST_STEPS_OF_WORLD = int64_t(1) << 60;
+constexpr int64_t LAST_STEP = int64_t(1) << 60;  // of a world
+constexpr int64_t MOST_SMALL_STEPS = 100000;
+constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
+constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
 
 bool is_lent(const Numbers &numbers) { return numbers.size == 0 || (numbers.size > 0 && numbers.at != nullptr); }
 bool has_size(const Numbers &numbers, int64_t size) { return is_lent(numbers) && numbers.size == size; }
-// Of rows of `columns` numbers.
 bool has_columns(const Numbers &numbers, int64_t columns) {
   return is_lent(numbers) && columns > 0 && numbers.size % columns == 0;
 }
 bool is_table(const Numbers &numbers, int64_t rows, int64_t columns) {
   return has_columns(numbers, columns) && numbers.size / columns == rows;
 }
+bool is_count(int64_t count, int64_t most) { return count >= 0 && count <= most; }
 
 bool is_usable(const Interpolation &of) {
   return has_columns(of.samples, of.channels) && has_columns(of.table, INTERPOLATION_TAPS) &&
@@ -287,8 +289,11 @@ bool is_usable(const Decimation &of) {
 
 bool is_usable(const RecursiveFilter &filter) {
   int64_t order = filter.state.size;
-  return order > 0 && has_size(filter.state, order) && has_size(filter.numerator, order) &&
-         has_size(filter.denominator, order);
+  return order > 0 && is_lent(filter.state) && has_size(filter.numerator, order) && has_size(filter.denominator, order);
+}
+
+bool is_usable(const FilteredSignal &of) {
+  return is_usable(of.filter) && is_lent(of.values) && has_size(of.result, of.values.size);
 }
 
 bool is_usable(const Sensor &sensor) {
@@ -299,61 +304,12 @@ bool is_usable(const Sensor &sensor) {
 
 bool is_usable(const LoopCables &loop) {
   const Controller *c = loop.controller;
+  if (c == nullptr || !is_count(c->harmonics, MOST_HARMONICS) || !is_count(c->remembered, MOST_MEMORY)) return false;
   int64_t steps = loop.drive.size;
-  return c != nullptr && c->harmonics >= 0 && c->harmonics <= MOST_HARMONICS && c->remembered >= 0 && c->remembered <= MOST_MEMORY && is_usable(loop.base) &&
-         is_usable(loop.m0) && is_lent(loop.drive) && loop.base.motion.size == steps &&
-         loop.m0.motion.size == steps && is_lent(loop.late) && loop.first >= 0 && loop.first < MOST_STEPS_OF_WORLD &&
-         loop.steps_per_sample > 0 && loop.steps_per_sample <= loop.late.size;
+  return is_usable(loop.base) && is_usable(loop.m0) && is_lent(loop.drive) && loop.base.motion.size == steps &&
+         loop.m0.motion.size == steps && is_count(loop.first, LAST_STEP) && is_count(loop.begin, steps) &&
+         is_lent(loop.late) && loop.steps_per_sample > 0 && loop.steps_per_sample <= loop.late.size;
 }
-
-}  // namespace
-
-VIBENCH_API int64_t vibench_interpolate(const Interpolation *of) {
-  if (of == nullptr || !is_usable(*of)) return REFUSED;
-  interpolate(*of);
-  return 0;
-}
-
-VIBENCH_API int64_t vibench_decimate(const Decimation *of) {
-  if (of == nullptr || !is_usable(*of) || !decimate(*of)) return REFUSED;
-  return 0;
-}
-
-VIBENCH_API int64_t vibench_filter_signal(const FilteredSignal *of) {
-  if (of == nullptr || !is_usable(of->filter) || !is_lent(of->values)) return REFUSED;
-  if (!has_size(of->result, of->values.size)) return REFUSED;
-  run_filter(of->filter, of->values.at, of->result.at, of->values.size);
-  return 0;
-}
-
-VIBENCH_API int64_t vibench_show(const Sensor *sensor) {
-  if (sensor == nullptr || !is_usable(*sensor)) return REFUSED;
-  show(*sensor, 0, sensor->motion.size);
-  return 0;
-}
-
-// Plays up to the controller's next sample; returns the step of the stretch behind the last one.
-VIBENCH_API int64_t vibench_play_loop(LoopCables *loop) {
-  if (loop == nullptr || !is_usable(*loop) || loop->begin < 0 || loop->begin >= loop->drive.size) return REFUSED;
-  play_loop(*loop);
-  return loop->stop;
-}
-
-// Shows the controller what the plant did; returns 1 when it wants attention before its next sample.
-VIBENCH_API int64_t vibench_hear_loop(LoopCables *loop) {
-  if (loop == nullptr || !is_usable(*loop)) return REFUSED;
-  if (loop->begin < 0 || loop->stop < loop->begin || loop->stop > loop->drive.size) return REFUSED;
-  hear_loop(*loop);
-  return wants_attention(*loop->controller);
-}
-
-// ---- Hidden motion
-
-namespace {
-
-constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
-constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
-constexpr int64_t MOST_SMALL_STEPS = 100000;
 
 bool is_stepped(double step, int64_t small_steps) {
   return is_positive(step) && small_steps > 0 && small_steps <= MOST_SMALL_STEPS;
@@ -367,7 +323,7 @@ bool has_samples(const TrackRecord &record, int64_t samples) {
 
 bool is_usable(const MotionFilter &f) {
   int64_t samples = f.velocity.size, states = f.state.size, parameters = states - TRACKED;
-  if (parameters < 0 || parameters > MOST_PARAMETERS || !is_lent(f.velocity) || !is_lent(f.state)) return false;
+  if (!is_count(parameters, MOST_PARAMETERS) || !is_lent(f.velocity) || !is_lent(f.state)) return false;
   bool is_kept = f.record.states.size > 0;
   return has_size(f.acceleration, samples + 1) && is_table(f.flows, 1 + parameters, FLOW_SIZE) &&
          is_table(f.small_flows, 1 + parameters, FLOW_SIZE) && is_table(f.stops, 1 + parameters, STOP_SIZE) &&
@@ -392,20 +348,17 @@ bool is_usable(const ContactSearch &of) {
 
 }  // namespace
 
-// Returns the samples that were filtered before the motion was lost.
-VIBENCH_API int64_t vibench_filter_motion(MotionFilter *filter) {
-  if (filter == nullptr || !is_usable(*filter)) return REFUSED;
-  return filter_motion(*filter);
-}
-
-VIBENCH_API int64_t vibench_smooth_motion(const MotionSmoother *smoother) {
-  if (smoother == nullptr || !is_usable(*smoother)) return REFUSED;
-  smooth_motion(*smoother);
-  return 0;
-}
-
-// Returns the contacts that were found.
-VIBENCH_API int64_t vibench_follow_contacts(const ContactSearch *search) {
-  if (search == nullptr || !is_usable(*search)) return REFUSED;
-  return follow_contacts(*search);
-}
+// Each returns what its function does, or REFUSED.
+#define OF_ONE_STRUCTURE(function, Structure)                                 \
+  VIBENCH_API int64_t vibench_##function(Structure *of) {                     \
+    return of != nullptr && is_usable(*of) ? function(*of) : int64_t(REFUSED); \
+  }
+OF_ONE_STRUCTURE(interpolate, Interpolation)
+OF_ONE_STRUCTURE(decimate, Decimation)
+OF_ONE_STRUCTURE(filter_signal, FilteredSignal)
+OF_ONE_STRUCTURE(show, Sensor)
+OF_ONE_STRUCTURE(play_loop, LoopCables)
+OF_ONE_STRUCTURE(hear_loop, LoopCables)
+OF_ONE_STRUCTURE(filter_motion, MotionFilter)
+OF_ONE_STRUCTURE(smooth_motion, MotionSmoother)
+OF_ONE_STRUCTURE(follow_contacts, ContactSearch)

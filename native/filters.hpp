@@ -161,7 +161,7 @@ INLINE void use_back(StateRow &adjoint, StateMatrix &matrix, const StateMatrix &
     for (int j : seen) matrix.add(i, j, added);
 }
 
-inline void smooth_motion(const MotionSmoother &s) {
+inline int64_t smooth_motion(const MotionSmoother &s) {
   StateMatrix flow = StateMatrix::load(s.flow.at, TRACKED + 2), matrix;
   StateRow adjoint = 0.0, force_input = StateRow::load(s.force_input.at);
   for (StateRow &row : matrix.rows) row = 0.0;
@@ -190,6 +190,7 @@ inline void smooth_motion(const MotionSmoother &s) {
     }
   }
   for (int i = 0; i < TRACKED; i++) matrix.rows[i].store(s.matrix.at + i * TRACKED);
+  return 0;
 }
 
 }  // namespace vibench

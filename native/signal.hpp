@@ -30,7 +30,7 @@ inline void interpolation_weights(double *weights, const Numbers &table, double 
   }
 }
 
-inline void interpolate(const Interpolation &of) {
+inline int64_t interpolate(const Interpolation &of) {
   int64_t size = of.samples.size / of.channels, count = of.positions.size;
   double weights[INTERPOLATION_TAPS], around[INTERPOLATION_TAPS];
   for (int64_t i = 0; i < count; i++) {
@@ -49,22 +49,23 @@ inline void interpolate(const Interpolation &of) {
       of.values.at[channel * count + i] = reaches ? inner_product(weights, seen, INTERPOLATION_TAPS) : outside;
     }
   }
+  return 0;
 }
 
-// False when a sample needs means that are not there.
-inline bool decimate(const Decimation &of) {
+// Refused when a sample needs means that are not there.
+inline int64_t decimate(const Decimation &of) {
   int64_t rows = of.table.size / of.reach;
   for (int64_t k = 0; k < of.samples.size; k++) {
     double start = of.starts.at[k], place = of.fractions.at[k] * double(rows - 1);
-    if (!(start >= 0.0 && start <= double(of.means.size - of.reach))) return false;
-    if (!(place >= 0.0 && place <= double(rows - 1))) return false;
+    if (!(start >= 0.0 && start <= double(of.means.size - of.reach))) return REFUSED;
+    if (!(place >= 0.0 && place <= double(rows - 1))) return REFUSED;
     const double *means = of.means.at + int64_t(start);
     int64_t row = smaller(int64_t(place), larger(rows - 2, int64_t(0)));
     double part = place - double(row), sum = inner_product(of.table.at + row * of.reach, means, of.reach);
     if (part > 0.0) sum += part * (inner_product(of.table.at + (row + 1) * of.reach, means, of.reach) - sum);
     of.samples.at[k] = sum;
   }
-  return true;
+  return 0;
 }
 
 inline void run_filter(const RecursiveFilter &filter, const double *values, double *result, int64_t count) {
@@ -76,6 +77,11 @@ inline void run_filter(const RecursiveFilter &filter, const double *values, doub
       state[k - 1] = state[k] + numerator[k] * value - denominator[k] * shown;
     result[n] = shown;
   }
+}
+
+inline int64_t filter_signal(const FilteredSignal &of) {
+  run_filter(of.filter, of.values.at, of.result.at, of.values.size);
+  return 0;
 }
 
 }  // namespace vibench

@@ -183,7 +183,7 @@ STRUCTURE(Numbers,
 STRUCTURE(Interpolation,
   Numbers samples;             // [channels][samples of one]; zero outside
   int64_t channels;
-  Numbers table;               // [phases + 3][INTERPOLATION_TAPS], from one phase before a sample to one behind the next
+  Numbers table;               // [phases + 3][64]: taps, from one phase before a sample to one behind the next
   Numbers positions;           // in samples from the first
   Numbers values;              // [channels][positions]: the result
 )
@@ -293,7 +293,7 @@ STRUCTURE(TrackRecord,
 STRUCTURE(MotionFilter,
   Numbers acceleration;        // of the base [samples + 1] [m/s^2]
   Numbers velocity;            // of m0 [samples] [m/s]; NaN where it was not measured
-  Numbers flows, small_flows;  // [1 + parameters][8][10]: state, acceleration and its rise onto the state one step later
+  Numbers flows, small_flows;  // [1 + parameters][8][10]: state, acceleration and its rise -> state a step later
   Numbers stops;               // [1 + parameters] of `TrackedStop`
   Numbers deviations;          // [parameters]: by which the later flows and stops differ from the first
   double step;                 // [s]

@@ -16,8 +16,13 @@ inline void show(const Sensor &sensor, int64_t begin, int64_t stop) {
   }
 }
 
-// Plays from `begin` up to the controller's next sample: adds its late volts to the drive, and finds `stop`.
-inline void play_loop(LoopCables &loop) {
+inline int64_t show(const Sensor &sensor) {
+  show(sensor, 0, sensor.motion.size);
+  return 0;
+}
+
+// Plays from `begin` up to the controller's next sample: adds its late volts to the drive. Returns `stop`.
+inline int64_t play_loop(LoopCables &loop) {
   int64_t each = loop.steps_per_sample, into = (loop.first + loop.begin) % each;
   double *late = loop.late.at, *drive = loop.drive.at + loop.begin;
   if (into == 0) {
@@ -31,10 +36,13 @@ inline void play_loop(LoopCables &loop) {
   for (int64_t k = 0; k < count; k++) drive[k] += late[k];
   for (int64_t k = count; k < loop.late.size; k++) late[k - count] = late[k];
   for (int64_t k = loop.late.size - count; k < loop.late.size; k++) late[k] = 0.0;
+  return loop.stop;
 }
 
-// Shows the controller what the plant did in the steps that were played; the next ones begin behind them.
-inline void hear_loop(LoopCables &loop) {
+// Shows the controller what the plant did in the steps that were played; the next ones begin behind them. Returns 1
+// when the controller wants attention before its next sample.
+inline int64_t hear_loop(LoopCables &loop) {
+  if (loop.stop < loop.begin || loop.stop > loop.drive.size) return REFUSED;
   show(loop.base, loop.begin, loop.stop);
   show(loop.m0, loop.begin, loop.stop);
   for (int64_t n = loop.begin; n < loop.stop; n++) {
@@ -43,6 +51,7 @@ inline void hear_loop(LoopCables &loop) {
   }
   loop.steps_heard += double(loop.stop - loop.begin);
   loop.begin = loop.stop;
+  return wants_attention(*loop.controller);
 }
 
 }  // namespace vibench

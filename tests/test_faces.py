@@ -35,6 +35,7 @@ FOR_PEOPLE = (
 FOR_OUR_PROGRAMS = (
     "vibench.acquisition.control",
     "vibench.acquisition.first_day",
+    "vibench.sim.engine",
     "vibench.sim.feedback",
     "vibench.sim.kernels",
     "vibench.sim.shaker",
