@@ -284,7 +284,8 @@ bool is_usable(const Interpolation &of) {
 
 bool is_usable(const Decimation &of) {
   return is_lent(of.means) && of.reach % 8 == 0 && has_columns(of.table, of.reach) && of.table.size > 0 &&
-         is_lent(of.samples) && has_size(of.starts, of.samples.size) && has_size(of.fractions, of.samples.size);
+         is_lent(of.samples) && is_count(of.first, LAST_STEP) &&
+         is_positive(of.ratio) && is_finite(of.begin) && magnitude(double(of.origin)) < double(LAST_STEP);
 }
 
 bool is_usable(const RecursiveFilter &filter) {

@@ -7,11 +7,23 @@ namespace vibench {
 constexpr int INTERPOLATION_TAPS = 64;
 constexpr int INTERPOLATION_REACH = INTERPOLATION_TAPS / 2;  // samples to either side
 
-// The sum depends on the order of the values alone, not on where a block begins. `count` is a multiple of eight.
+// Sums of weighted values of N stretches that begin `stride` apart: each weight is loaded once for all. A sum depends
+// on the order of its values alone, not on N. `count` is a multiple of eight.
+template <int N>
+INLINE void inner_products(double (&sums)[N], const double *weights, const double *values, int64_t stride,
+                           int64_t count) {
+  Vector<8> all[N];
+  for (Vector<8> &each : all) each = 0.0;
+  for (int64_t k = 0; k < count; k += 8) {
+    Vector<8> weight = Vector<8>::load(weights + k);
+    for (int n = 0; n < N; n++) all[n] = all[n] + weight * Vector<8>::load(values + n * stride + k);
+  }
+  for (int n = 0; n < N; n++) sums[n] = total(all[n]);
+}
 INLINE double inner_product(const double *weights, const double *values, int64_t count) {
-  Vector<8> sum = 0.0;
-  for (int64_t k = 0; k < count; k += 8) sum = sum + Vector<8>::load(weights + k) * Vector<8>::load(values + k);
-  return total(sum);
+  double sums[1];
+  inner_products(sums, weights, values, 0, count);
+  return sums[0];
 }
 
 // Weights of the taps `fraction` of a sample behind a sample: Lagrange's cubic through the four phases around it.
@@ -54,12 +66,23 @@ inline int64_t interpolate(const Interpolation &of) {
 
 // Refused when a sample needs means that are not there.
 inline int64_t decimate(const Decimation &of) {
-  int64_t rows = of.table.size / of.reach;
-  for (int64_t k = 0; k < of.samples.size; k++) {
-    double start = of.starts.at[k], place = of.fractions.at[k] * double(rows - 1);
-    if (!(start >= 0.0 && start <= double(of.means.size - of.reach))) return REFUSED;
-    if (!(place >= 0.0 && place <= double(rows - 1))) return REFUSED;
+  constexpr int TOGETHER = 4;
+  int64_t rows = of.table.size / of.reach, count = of.samples.size, last = of.means.size - of.reach;
+  for (int64_t k = 0; k < count; k++) {
+    // Counted from sample 0: equal for every size of block.
+    double steps = (double(of.first + k) + 1.0) * of.ratio, at = steps + of.begin;
+    // Where one row of weights serves every sample, the fraction of a step is in them.
+    double whole = rows == 1 ? steps + whole_part(of.begin) : whole_part(at);
+    double start = whole + double(of.origin), place = (at - whole) * double(rows - 1);
+    if (!(start >= 0.0 && start <= double(last))) return REFUSED;
     const double *means = of.means.at + int64_t(start);
+    if (double(last) - start >= (TOGETHER - 1) * of.ratio && rows == 1 && k + TOGETHER <= count) {
+      double sums[TOGETHER];
+      inner_products(sums, of.table.at, means, int64_t(of.ratio), of.reach);
+      for (int n = 0; n < TOGETHER; n++) of.samples.at[k + n] = sums[n];
+      k += TOGETHER - 1;
+      continue;
+    }
     int64_t row = smaller(int64_t(place), larger(rows - 2, int64_t(0)));
     double part = place - double(row), sum = inner_product(of.table.at + row * of.reach, means, of.reach);
     if (part > 0.0) sum += part * (inner_product(of.table.at + (row + 1) * of.reach, means, of.reach) - sum);

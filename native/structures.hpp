@@ -193,8 +193,10 @@ STRUCTURE(Decimation,
   Numbers means;
   int64_t reach;               // a multiple of eight
   Numbers table;               // [rows][reach]: weights by the fraction of a step; one row serves whole fractions
-  Numbers starts;              // number of the oldest mean of each sample
-  Numbers fractions;           // of a step that each sample lies behind a mean, 0 to 1
+  double ratio;                // steps from sample to sample
+  double begin;                // place of the last sample before number 0 [steps]
+  int64_t origin;              // number of the oldest mean of a sample, less the whole steps of its place
+  int64_t first;               // number of the first sample
   Numbers samples;             // the result
 )
 

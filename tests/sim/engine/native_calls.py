@@ -31,9 +31,15 @@ def calls(engine, draws):
     yield "interpolate", engine.new("Interpolation", channels=2, **arrays), [values]
 
     samples = np.zeros(12)
-    starts, fractions = np.floor(draws.uniform(0.0, 60.0, 12)), draws.uniform(0.0, 1.0, 12)
-    arrays = {"means": normal(100), "starts": starts, "fractions": fractions, "samples": samples}
-    yield "decimate", engine.new("Decimation", table=normal(5, 24), reach=24, **arrays), [samples]
+    for rows, ratio in ((1, 3.0), (5, draws.uniform(0.3, 5.0))):
+        arrays = {"means": normal(100), "table": normal(rows, 24), "samples": samples}
+        place = {
+            "ratio": ratio,
+            "begin": draws.uniform(0.0, 5.0),
+            "first": 1000,
+            "origin": -int(1001 * ratio),
+        }
+        yield "decimate", engine.new("Decimation", reach=24, **place, **arrays), [samples]
 
     result = np.zeros(50)
     arrays = {"values": normal(50), "result": result}

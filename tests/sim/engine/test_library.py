@@ -87,6 +87,22 @@ def test_structures_are_read_from_what_the_compiler_read():
         parse_structures(["Inner { double a-b; }"])
 
 
+def test_arrays_whose_sizes_disagree_are_refused_and_none_is_needed():
+    engine = native_engine()
+    arrays = {"samples": np.ones(9), "positions": np.ones(5), "table": np.ones((4, 64)), "values": np.ones(5)}
+    for name, found in (("positions", np.ones(4)), ("table", np.ones(256 + 1)), ("samples", np.ones(9))):
+        channels = 2 if name == "samples" else 1
+        with pytest.raises(ValueError, match="refuses to interpolate: array sizes must agree"):
+            engine.call(
+                "interpolate", engine.new("Interpolation", channels=channels, **arrays | {name: found})
+            )
+    nothing = arrays | {"positions": np.empty(0), "values": np.empty(0)}
+    assert engine.call("interpolate", engine.new("Interpolation", channels=1, **nothing)) == 0
+    for wrong in (np.ones(9, np.float32), np.ones(18)[::2]):
+        with pytest.raises(TypeError, match="the native engine takes contiguous ones of float64"):
+            engine.new("Interpolation", **arrays | {"samples": wrong})
+
+
 def test_threads_share_tables_and_give_the_same_motion():
     engine, specimen, drive = native_engine(), gong2025(), Harmonic(130.0, 20e-6)
 

@@ -5,6 +5,7 @@ import importlib.util
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,10 +93,16 @@ class Engine:
         An array that is a field is lent, not copied; it lives as long as the structure.
         """
         structure = np.zeros((), self._types[name]).view(_Lending)
-        structure.lent = fields
+        structure.lent = {}
+        self.fill(structure, **fields)
+        return structure
+
+    def fill(self, structure: Structure, **fields: object) -> None:
+        """Change fields of a structure that `new` made."""
+        assert isinstance(structure, _Lending)
+        structure.lent |= fields
         for field, value in fields.items():
             structure[field] = _lent(value) if isinstance(value, np.ndarray) else value
-        return structure
 
     def call(self, function: str, structure: Structure) -> int:
         """Call a function of native/api.cpp that takes one structure; returns what is described there.
@@ -165,14 +172,14 @@ class Engine:
         return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
 
 
-def _lent(numbers: NDArray[np.generic]) -> Structure | tuple[int, int]:
+def _lent(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
     """Return what the engine knows an array of numbers by; a structure as it is."""
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
         msg = f"An array of {numbers.dtype} was given: the native engine takes contiguous ones of float64."
         raise TypeError(msg)
-    return numbers.ctypes.data, numbers.size
+    return numbers.__array_interface__["data"][0], numbers.size
 
 
 def library_path() -> Path:

@@ -57,10 +57,14 @@ class ConverterInput:
         self._means = self._means[max(done, 0) :]
         self._means_first_step += max(done, 0)
         noise = self._noise.draw(sample, count)
-        counts = np.rint((samples + self._noise_v * noise) / self._count_v)
-        clipped = np.clip(counts, -_MOST_COUNTS, _MOST_COUNTS - 1.0)
-        self.has_clipped |= bool(np.any(clipped != counts))
-        return clipped * self._count_v
+        samples += self._noise_v * noise
+        samples /= self._count_v
+        counts = np.rint(samples, out=samples)
+        if np.abs(counts).max(initial=0.0) >= _MOST_COUNTS:
+            self.has_clipped |= bool(np.any((counts >= _MOST_COUNTS) | (counts < -_MOST_COUNTS)))
+            counts = np.clip(counts, -_MOST_COUNTS, _MOST_COUNTS - 1.0)
+        counts *= self._count_v
+        return counts
 
 
 class Conversion:

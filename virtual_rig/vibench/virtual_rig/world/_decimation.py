@@ -7,12 +7,13 @@ interpolated. A sensor's delay moves the place of evaluation and so is exact bet
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil, floor
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.engine import native_engine
+from vibench.sim.engine import Structure, native_engine
 
 FloatArray = NDArray[np.float64]
 
@@ -73,25 +74,18 @@ class Decimator:
 
     def convert(self, means: FloatArray, means_first_step: int, sample: int, count: int) -> FloatArray:
         """Return ``count`` samples from number ``sample`` on, shape (count,); the means begin at a step."""
-        # Counted from the first sample of the conversion: equal for every size of block.
-        steps, begin = (np.arange(sample, sample + count) + 1.0) * self.ratio, self.centre(-1)
-        # Where one row of weights serves every sample, the fraction of a step is in them.
-        starts = steps + floor(begin) if len(self.table) == 1 else np.floor(steps + begin)
-        fractions = steps + begin - starts
-        starts += self.start_step - means_first_step + self._newest_offset - self.reach + 1
-        samples = np.empty(count)
-        engine = native_engine()
-        work = engine.new(
-            "Decimation",
-            means=means,
-            reach=self.reach,
-            table=self.table,
-            starts=starts,
-            fractions=fractions,
-            samples=samples,
-        )
-        engine.call("decimate", work)
+        engine, samples = native_engine(), np.empty(count)
+        origin = self.start_step - means_first_step + self._newest_offset - self.reach + 1
+        engine.fill(self._work, means=means, origin=origin, first=sample, samples=samples)
+        engine.call("decimate", self._work)
         return samples
+
+    @cached_property
+    def _work(self) -> Structure:
+        """What is the same for every block."""
+        return native_engine().new(
+            "Decimation", table=self.table, reach=self.reach, ratio=self.ratio, begin=self.centre(-1)
+        )
 
 
 def decimator(ratio: float, start_step: int, delay_steps: float) -> Decimator:

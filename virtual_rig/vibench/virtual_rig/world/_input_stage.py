@@ -55,9 +55,10 @@ class InputStage:
                 # The capacitor has long been charged to the constant part when a conversion begins.
                 volts = self._capacitor.run(signal * self._gain)
             case Coupling.DC:
-                volts = signal * self._gain + self._offset_v
-        clipped = np.clip(volts, -self._clip_v, self._clip_v)
-        return clipped, bool(np.any(clipped != volts))
+                volts = signal * self._gain
+                volts += self._offset_v
+        clips = bool(np.abs(volts).max(initial=0.0) > self._clip_v)
+        return np.clip(volts, -self._clip_v, self._clip_v) if clips else volts, clips
 
 
 def _operating_point(configured: Input, cable: Cable) -> tuple[float, float]:

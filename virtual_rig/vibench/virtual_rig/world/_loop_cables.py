@@ -59,9 +59,9 @@ class LoopCables:
         """
         cables, drive = self._cables, signals[Signal.DRIVE]
         cables["first"], cables["begin"] = first, 0
-        cables["drive"] = drive.ctypes.data, drive.size
-        cables["base"] = plant.base.showing(motion.base_acceleration, signals[Signal.BASE_ACCELERATION])
-        cables["m0"] = plant.m0.showing(motion.m0_velocity, signals[Signal.M0_VELOCITY])
+        base = plant.base.showing(motion.base_acceleration, signals[Signal.BASE_ACCELERATION])
+        m0 = plant.m0.showing(motion.m0_velocity, signals[Signal.M0_VELOCITY])
+        native_engine().fill(cables, drive=drive, base=base, m0=m0)
         done, good = 0, True
         while good and done < drive.size:
             with self._loop.answering() as loop:

@@ -16,14 +16,13 @@ class RecursiveFilter:
         weights = [np.asarray(each, dtype=np.float64) for each in (numerator, denominator)]
         order = max(len(each) for each in weights)
         self.numerator, self.denominator = (np.pad(each, (0, order - len(each))) for each in weights)
-        self._state = np.zeros(order)
-
-    @property
-    def parts(self) -> Structure:
-        """What the native engine runs."""
-        return native_engine().new(
-            "RecursiveFilter", numerator=self.numerator, denominator=self.denominator, state=self._state
+        self.parts: Structure = native_engine().new(
+            "RecursiveFilter",
+            numerator=self.numerator,
+            denominator=self.denominator,
+            state=np.zeros(order),
         )
+        """What the native engine runs."""
 
     def run(self, values: FloatArray) -> FloatArray:
         """Return the next output values, one for each input value."""
