@@ -1,6 +1,7 @@
 """Between the world and a real-time controller: its samples are means over its step, its volts come late."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, cast
 
 import numpy as np
 from llvmlite import binding
@@ -18,7 +19,8 @@ from ._wiring import Signal
 FloatArray = NDArray[np.float64]
 # The shaker is moved by a kernel as yet, so that a kernel goes from sample to sample.
 _play_loop, _hear_loop = (
-    types.ExternalFunction(f"vibench_{name}", types.int64(types.intp)) for name in ("play_loop", "hear_loop")
+    cast("Callable[[int], int]", types.ExternalFunction(f"vibench_{name}", types.int64(types.intp)))
+    for name in ("play_loop", "hear_loop")
 )
 
 
