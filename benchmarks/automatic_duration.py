@@ -4,6 +4,8 @@ Scenes are drawn at random, and near an edge of chaos. The long run is another d
 at other instants, it rounds otherwise. An answer agrees when kind, period and responses do;
 where the start is forgotten, when the long run came to one of the motions that it names. "chaotic so far" and
 "undecided" are counted apart.
+
+Of scenes that neither repeat nor are chaotic, the stated errors are counted that hold for the long run.
 """
 
 import argparse
@@ -13,7 +15,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
-from random_scenes import described, edge_scene, random_scene
+from random_scenes import described, edge_scene, quasi_periodic_scene, random_scene
 
 from vibench.sim import FixedDuration, MotionKind, Outcome, Scene, ScenePrediction, solve_scene
 
@@ -39,16 +41,21 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--random", type=int, default=40, help="scenes drawn at random")
     parser.add_argument("--edge", type=int, default=15, help="scenes near an edge of chaos")
+    parser.add_argument(
+        "--quasi-periodic", type=int, default=25, help="scenes that neither repeat nor are chaotic"
+    )
     asked = parser.parse_args()
     random = np.random.default_rng(asked.seed)
     compared = [_compared(random_scene(random)) for _ in range(asked.random)]
     compared += [_compared(edge_scene(random)) for _ in range(asked.edge)]
+    covered = [_covered(quasi_periodic_scene(random)) for _ in range(asked.quasi_periodic)]
     counts = Counter(each.verdict for each in compared)
     decided = counts["agrees"] + counts["is named"] + counts["DIFFERS"]
     print(f"\nseed {asked.seed}: {dict(counts)} of {len(compared)}; long runs that were lost are not counted")
     print(
         f"agree or named: {(decided - counts['DIFFERS']) / max(decided, 1):.1%} of {decided} that are decided"
     )
+    print(f"stated errors of quasi-periodic motions that hold: {sum(covered)} of {4 * len(covered)}")
     print(f"cost over that without a budget, median: {np.median([each.cost for each in compared]):.2f}")
 
 
@@ -65,6 +72,16 @@ def _compared(scene: Scene) -> Compared:
     )
     sys.stdout.flush()
     return Compared(verdict, taken_s / alone_s)
+
+
+def _covered(scene: Scene) -> int:
+    """Count the responses of a scene that lie within their stated errors of those of a long run."""
+    found, truth = solve_scene(scene), solve_scene(replace(scene, duration=LONG, budget_s=0.0))
+    off = [abs(getattr(found, name) / getattr(truth, name) - 1.0) for name in RESPONSES]
+    stated = [getattr(found, f"{name}_error") for name in RESPONSES]
+    print(f"{described(scene)}: {found.ended}; off {max(off):.1e}, stated {max(stated):.1e}")
+    sys.stdout.flush()
+    return sum(one <= error for one, error in zip(off, stated, strict=True))
 
 
 def _timed(scene: Scene) -> tuple[ScenePrediction, float]:

@@ -42,6 +42,17 @@ def edge_scene(random: np.random.Generator) -> Scene:
         return at(scene, inner_hz)
 
 
+def quasi_periodic_scene(random: np.random.Generator) -> Scene:
+    """Draw a scene of the paper's specimen that neither repeats nor is chaotic: a torus, or a drift."""
+    while True:
+        drive = Harmonic(float(random.uniform(100.0, 140.0)), float(random.uniform(8e-6, 40e-6)))
+        specimen = gong2025(float(random.uniform(2e-5, 5e-5)))
+        scene = Scene(specimen, drive, duration=AutomaticDuration())
+        found = solve_scene(replace(scene, budget_s=0.0))
+        if found.motion in {MotionKind.QUASI_PERIODIC, MotionKind.UNDECIDED}:
+            return scene
+
+
 def at(scene: Scene, frequency_hz: float) -> Scene:
     """Drive a scene at another frequency."""
     return replace(scene, drive=Harmonic(frequency_hz, scene.drive.amplitude_m))

@@ -282,6 +282,36 @@ def test_a_motion_that_still_fades_is_undecided(contact, damping_time_s, frequen
     assert answer.motion is MotionKind.UNDECIDED
 
 
+@pytest.mark.parametrize(
+    ("frequency_hz", "amplitude_m", "damping_time_s"),
+    [
+        (119.88743, 20e-6, 3e-5),  # spirals into a torus for minutes
+        (111.9871, 22.993e-6, 3.882e-5),  # peaks repeat in each part of the window, lines do not
+        (118.43285, 30.028e-6, 4.588e-5),
+    ],
+)
+def test_errors_of_a_chosen_window_cover_a_later_window(frequency_hz, amplitude_m, damping_time_s):
+    asked = Scene(
+        gong2025(damping_time_s=damping_time_s),
+        Harmonic(frequency_hz, amplitude_m),
+        duration=AutomaticDuration(),
+    )
+    answer = solve_scene(asked)
+    later = solve_scene(replace(asked, duration=FixedDuration(300.0, 5.0), budget_s=0.0))
+    for name in ("response_i", "response_ii", "relative_i", "relative_ii"):
+        stated = getattr(answer, f"{name}_error")
+        assert abs(getattr(answer, name) / getattr(later, name) - 1.0) < stated < 0.2
+
+
+def test_a_slow_drift_is_followed_and_undecided_while_it_lasts():
+    drift = Scene(
+        gong2025(damping_time_s=3e-5), Harmonic(119.88743, 20e-6), duration=AutomaticDuration(longest_s=20.0)
+    )
+    answer = solve_scene(drift)
+    assert answer.motion is MotionKind.UNDECIDED
+    assert answer.ended.endswith("still drifts")
+
+
 def test_a_motion_of_undamped_modes_and_the_drive_is_quasi_periodic():
     specimen = gong2025(contact="linear", damping_time_s=0.0)
     length = AutomaticDuration(window_s=0.5, longest_s=10.0)

@@ -15,6 +15,7 @@ from ._repetition import (
     Growth,
     Repetition,
     Sharpness,
+    is_drifting,
     kind_of,
     repetition,
     section_needed,
@@ -73,6 +74,10 @@ class Pace:
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
         """Say whether the motion of these stretches, one after the other, repeats at their end."""
         return self.repeats_in(states_of(stretches))
+
+    def drifts(self, stretches: Sequence[Stretch]) -> bool:
+        """Return whether the motion of these stretches still approaches or leaves another motion."""
+        return is_drifting(states_of(stretches), 2.0 * np.pi * self.frequency_hz)
 
     def cycle(self, stretches: Sequence[Stretch]) -> int:
         """Give the drive periods over which lines are taken: the motion's own, if it has nearly settled.

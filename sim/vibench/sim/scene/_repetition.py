@@ -29,6 +29,8 @@ CERTAIN_GROWTH = 12.0
 """A small change has grown by e^12 = 160 000: more than shear makes of it."""
 NEUTRAL = 0.1
 """Growth per forgetting time that counts as none: the specimen's own damping has -1."""
+DRIFT_PARTS = 6
+"""A motion drifts whose changes grow or shrink over so many parts in turn: by chance in 2 cases of 720."""
 FEWEST_NEUTRAL = 8.0
 """Forgetting times that a motion must neither grow nor die to be called quasi-periodic."""
 
@@ -129,6 +131,30 @@ def wandered_until(section: Floats, omega: float, period: int) -> int:
     changes = np.abs(points[period:] - points[:-period]).max(axis=1)
     wandering = np.flatnonzero(changes > NEARLY)
     return int(wandering[-1]) + period + 1 if len(wandering) else 0
+
+
+def is_drifting(section: Floats, omega: float) -> bool:
+    """Return whether the changes of a motion from period to period shrink or grow steadily.
+
+    Near a bifurcation a motion settles so slowly that a small change neither grows nor fades in the time
+    that was watched, as on a torus. On a torus the changes keep their size.
+
+    Parameters
+    ----------
+    section
+        States once a drive period, shape (n, 6).
+    omega
+        Angular frequency of the drive [rad/s].
+
+    """
+    points = section / np.repeat([1.0, omega], 3)
+    periods = range(1, min(MOST_PERIODS, len(points) // (2 * DRIFT_PARTS)) + 1)
+    changes = [np.square(points[period:] - points[:-period]).sum(axis=1) for period in periods]
+    if not changes:
+        return False
+    smallest = min(changes, key=lambda squares: float(squares.mean()))
+    trend = np.diff([float(part.mean()) for part in np.array_split(smallest, DRIFT_PARTS)])
+    return bool(np.all(trend < 0.0) or np.all(trend > 0.0))
 
 
 def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:

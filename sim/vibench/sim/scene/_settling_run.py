@@ -23,6 +23,8 @@ SLICE_S, SLICE_PERIODS = 0.25, 4
 """Between two looks pass this long and this many drive periods, if the window is not shorter."""
 WINDOWS = 2
 """A motion that does not repeat is watched for so many windows; the last of them is the one observed."""
+DRIFT_SHARE = 0.25
+"""Share of the budget that a slow drift may use: finding its error repeats its path three times."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,9 @@ def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRu
         if kind is MotionKind.CHAOTIC and len(late) >= in_window and patience.alone_s > 0.0:
             return (yield from _followed_on(run, [*early, *late], len(late), patience, pace))
         if len(late) >= WINDOWS * in_window and kind is not MotionKind.UNDECIDED:
+            if pace.drifts(late):
+                less = replace(patience, alone_s=DRIFT_SHARE * patience.alone_s)
+                return (yield from _followed_on(run, [*early, *late], len(late), less, pace))
             seen = _observed(run, late, starts, in_window, pace, f"it is {kind}")
             return replace(seen, settled_s=late[0].start_s, path=(*early, *late))
         made += slice_periods
@@ -82,7 +87,7 @@ def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRu
 def _followed_on(
     run: FollowedRun, path: Sequence[Stretch], watched: int, patience: Patience, pace: Pace
 ) -> Asking[SceneRun]:
-    """Follow chaos on by its states alone, until it dies out or the budget is used up, and observe it.
+    """Follow chaos or a slow drift by its states until it ends or the budget is used up; then observe.
 
     The last ``watched`` stretches of the path were observed.
     """
@@ -93,7 +98,7 @@ def _followed_on(
     yield [Following(states, until_s, run.cost_s + patience.alone_s)]
     if states.repeats is not None:
         seen = _observe_period(run, states.repeats, path, pace)
-        return replace(seen, grew=True, wandered_until_s=states.wandered_until_s)
+        return replace(seen, wandered_until_s=states.wandered_until_s)
     # Chaos may have settled on a torus, which does not repeat either: only growth tells the two apart.
     run.follow_tangent()
     begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
@@ -104,8 +109,16 @@ def _followed_on(
     window = window_of(begins, last)
     kind = kind_of(None, growth_of(last), pace.fading_s)
     if kind is not MotionKind.CHAOTIC:
-        seen = judged(run, window, (), pace, f"after {run.time_s:.3g} s it is {kind}")
-        return replace(seen, grew=True, wandered_until_s=last[0].start_s)
+        is_drifting = pace.drifts(last)
+        found = "still drifts" if is_drifting else f"is {kind}"
+        before = () if growth_of(path).is_certain else path[-watched:]
+        seen = judged(run, window, before, pace, f"after {run.time_s:.3g} s it {found}")
+        return replace(
+            seen,
+            motion=MotionKind.UNDECIDED if is_drifting else seen.motion,
+            grew=growth_of(path).is_certain,
+            wandered_until_s=last[0].start_s,
+        )
     seen = judged(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
     if run.outcome is not Outcome.REACHED_END:
         return seen

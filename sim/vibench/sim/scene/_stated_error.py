@@ -22,7 +22,7 @@ from ._observed_window import ObservedWindow, observe_window
 from ._pace import Pace
 from ._prediction import MotionKind, ScenePrediction
 from ._scatter import draws_apart, draws_of_starts
-from ._scene import Scene
+from ._scene import AutomaticDuration, Scene
 from ._several_starts import SEED, pushes
 from ._states_alone import Asking
 
@@ -30,6 +30,8 @@ STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE:
 """Tolerance of the comparison. A hundredth of quick's would not do: a collision in one is better."""
 FORGETTING = 4.0
 """Forgetting times that a motion which repeats is followed before it is compared."""
+SHORTER = 4
+"""Shorter windows that are compared with one. Other lines leak into theirs this many times as much."""
 LOOKS = 8
 """Periods of it, or drive periods of a motion that does not repeat, that are compared."""
 SAFETY = 2.0
@@ -87,6 +89,8 @@ def stated_errors(
     answer = seen.window.responses_m
     # Who looks more closely may find that it does not repeat yet, and take the lines over another length.
     sure = _rounding(answer) + seen.leaked
+    if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
+        sure += _by_window(seen)
     if seen.repeats is not None and seen.was_settled:
         off = off_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
         return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
@@ -98,6 +102,23 @@ def stated_errors(
     added = error_per_period(run, scene.accuracy)
     drawn = yield from _drawn(begin, seen, strict, pace, slowest_rate)
     return StatedErrors(drawn + SAFETY * added + seen.leaked, added)
+
+
+def _by_window(seen: SceneRun) -> Floats:
+    """Estimate the relative errors made by where a window begins and ends, shape (4,).
+
+    They are the largest differences from shorter windows that begin elsewhere. A motion that settled slowly
+    is compared with what it was long before, because it may go on to settle.
+    """
+    answer = seen.window.responses_m
+    lines = np.array([[block.line_x_m, block.line_p_m] for block in seen.blocks])
+    peaks = np.array([[block.peak_x_m, block.peak_p_m] for block in seen.blocks])
+    length = max(1, len(seen.window.blocks) // SHORTER)
+    short = [slice(first, first + length) for first in range(len(seen.blocks) - length + 1)]
+    off_peaks = np.max([np.abs(peaks[each].max(axis=0) - answer[::2]) for each in short], axis=0)
+    whole = np.array([seen.window.line_x_m, seen.window.line_p_m])
+    off_lines = np.max([np.abs(lines[each].mean(axis=0) - whole) for each in short], axis=0) / SHORTER
+    return np.asarray(SAFETY * np.array([off_peaks, off_lines]).T.ravel() / answer)
 
 
 def _rounding(answer: Floats) -> Floats:
