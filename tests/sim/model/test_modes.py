@@ -66,7 +66,7 @@ def test_modes_that_coincide_are_refused_with_a_remedy():
     critical = dataclasses.replace(
         gong2025(),
         masses=(m0, 1e-3, 1e-3),
-        stiffnesses=(k0, 1.0, 1e-20),
+        stiffnesses=(k0, 1.0, 1e-12),
         dampings=(2.0 * np.sqrt(k0 * m0), 0.0, 0.0),
     )
     with pytest.raises(ValueError, match="coincide"):
@@ -89,3 +89,30 @@ def test_a_light_mass_on_a_heavy_frame_moves_as_its_closed_form_says(heavier):
     )
     moved = base_transmissibility(specimen, omega / (2.0 * np.pi))[0]
     assert moved[3] / moved[2] == pytest.approx(omega**2 / (1.0 - omega**2 + 1j * damping * omega), rel=1e-12)
+
+
+@pytest.mark.parametrize("damping_time_s", [0.3, 30.0])
+def test_modes_far_above_critical_damping_are_told_apart(damping_time_s):
+    """Proportional damping: the rates s of each mode solve s^2 + omega^2 (1 + damping_time s) = 0."""
+    specimen = gong2025(damping_time_s=damping_time_s)
+    root = np.sqrt(np.asarray(specimen.masses))
+    squares = np.linalg.eigvalsh(specimen.stiffness_matrix / np.outer(root, root))
+    fast = 0.5 * damping_time_s * squares * (1.0 + np.sqrt(1.0 - 4.0 / (damping_time_s**2 * squares)))
+    np.testing.assert_allclose(
+        np.sort(modal_form(specimen).rates.real), np.sort(-np.concatenate([squares / fast, fast])), rtol=1e-9
+    )
+
+
+def test_a_slow_mode_beside_fast_dampings_is_told_apart():
+    specimen = dataclasses.replace(gong2025(), dampings=(1e4, 0.3, 3e6))
+    rates = modal_form(specimen).rates
+    system, _ = state_matrix(specimen)
+    for rate in rates:
+        residual = np.linalg.svd(system - rate * np.eye(6), compute_uv=False)
+        assert residual[-1] < 1e-12 * residual[0]
+
+
+def test_frequencies_that_double_precision_cannot_hold_together_are_refused():
+    specimen = dataclasses.replace(gong2025(), masses=(5.8e-3, 1e-300, 2e-3))
+    with pytest.raises(ValueError, match="further apart than double precision resolves"):
+        modal_form(specimen)

@@ -43,9 +43,9 @@ from ._linear_gap import (
     LinearGap as LinearGap,
 )
 from ._modes import (
-    COINCIDENT as COINCIDENT,
     ModalForm as ModalForm,
     base_transmissibility as base_transmissibility,
+    diagonal_form as diagonal_form,
     harmonic_motion as harmonic_motion,
     modal_form as modal_form,
     state_matrix as state_matrix,

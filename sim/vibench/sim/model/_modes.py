@@ -5,7 +5,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..kernels import Complex, Table, Vector
 from ._specimen import Specimen
@@ -85,37 +85,110 @@ class ModalForm(NamedTuple):
 
 COINCIDENT = 1e7
 """Condition of the eigenvectors beyond which two modes count as one (critical damping to 14 digits)."""
+PROPORTIONAL = 1e-12
+"""Modal damping off the diagonal below this part of the largest is rounding: the undamped modes are modes."""
+CRITICAL = 1e-12
+"""abs(1 - damping ratio^2) below which a mode has no pair of distinct rates."""
+WIDEST = 1e10
+"""Ratio of natural frequencies beyond which double precision does not resolve the slowest mode."""
+REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per cent."
 
 
 @lru_cache(maxsize=64)
 def modal_form(specimen: Specimen) -> ModalForm:
     """Diagonalise the specimen without contact, for any damping; its arrays are not to be written to.
 
-    Raises ValueError when two modes coincide (critical damping): then no full set of modes exists.
+    Raises ValueError as `diagonal_form`.
     """
     return diagonal_form(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
 
 
 def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
-    """Diagonalise M s'' + C s' + K s = 0 with a diagonal M; as `modal_form`."""
-    system = _first_order(mass, stiffness, damping)
-    # Mass-normalised and in units of the fastest mode: a balanced matrix, so that every digit counts.
+    """Diagonalise M s'' + C s' + K s = 0 with a diagonal M.
+
+    The undamped modes come from a symmetric problem, whose vectors are orthogonal however near two
+    frequencies are. They stay modes where damping is proportional to the springs, or none.
+
+    Raises ValueError when two modes coincide (critical damping), for then no full set of modes exists, and
+    when natural frequencies lie too far apart.
+    """
     root = np.sqrt(np.diag(mass))
-    speed = math.sqrt(float(np.linalg.eigvalsh(stiffness / np.outer(root, root))[-1]))
-    units = np.concatenate([1.0 / root, speed / root])
-    values, vectors = np.linalg.eig(system / units[:, None] * units[None, :] / speed)
-    if np.linalg.cond(vectors) > COINCIDENT:
-        msg = "Two modes of this specimen coincide (critical damping): change a damping by 0.1 per cent."
+    try:
+        factor = np.linalg.cholesky(stiffness / np.outer(root, root))
+    except np.linalg.LinAlgError:
+        factor = np.zeros_like(stiffness)
+    # Singular values of the factor are frequencies: their squares would lose twice the digits of a slow mode.
+    modes, omega, _ = np.linalg.svd(factor)
+    modes, omega = modes[:, ::-1], omega[::-1]
+    if not WIDEST * omega[0] > omega[-1]:
+        msg = (
+            f"Natural frequencies from {omega[0]:.3g} to {omega[-1]:.3g} rad/s lie further apart than double "
+            "precision resolves: give masses and stiffnesses that are more alike."
+        )
         raise ValueError(msg)
-    left = np.linalg.inv(vectors) / units[None, :]
+    losses = modes.T @ (damping / np.outer(root, root)) @ modes
+    shapes, rows = modes / root[:, None], (modes * root[:, None]).T
+    diagonal = np.diag(losses)
+    if np.max(np.abs(losses - np.diag(diagonal))) <= PROPORTIONAL * np.max(diagonal):
+        return _undamped_shapes(omega, diagonal, shapes, rows)
+    return _coupled_shapes(omega, losses, shapes, rows)
+
+
+def _undamped_shapes(omega: Vector, damping: Vector, shapes: Table, rows: Table) -> ModalForm:
+    """Rates, shapes and rows of q'' + damping q' + omega^2 q = 0 in every mode."""
+    parts = [part for mode in zip(omega, 0.5 * damping, shapes.T, rows, strict=True) for part in _mode(*mode)]
+    rates, moved, read = zip(*parts, strict=True)
+    return ModalForm(np.asarray(rates, np.complex128), np.array(moved), np.array(read))
+
+
+def _mode(omega: float, decay: float, shape: Vector, row: Vector) -> list[tuple[complex, Complex, Complex]]:
+    """Split one mode q = row.displacement into its terms: one of a pair, or two that do not oscillate."""
+    turn = (omega - decay) * (omega + decay)
+    if abs(turn) <= CRITICAL * omega**2:
+        raise ValueError(REFUSAL)
+    if turn > 0.0:
+        damped = math.sqrt(turn)
+        rate = complex(-decay, damped)
+        # q = Re(e exp(rate t)) with e = q0 - i (q0' + decay q0) / damped.
+        read = _state((1.0 - 1j * decay / damped) * row, -1j / damped * row)
+        return [(rate, _state(shape, rate * shape), read)]
+    fast = -decay - math.sqrt(-turn)
+    slow = omega**2 / fast
+    return [
+        (rate, _state(shape, rate * shape), _state(-other * row, row) / (rate - other))
+        for rate, other in ((slow, fast), (fast, slow))
+    ]
+
+
+def _state(displacement: NDArray[np.generic], velocity: NDArray[np.generic]) -> Complex:
+    return np.concatenate([displacement, velocity]).astype(np.complex128)
+
+
+def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) -> ModalForm:
+    """Do as `_undamped_shapes` where damping couples the undamped modes."""
+    # In the coordinates q and q' / omega, fast modes beside slow ones do not make the condition large.
+    values, vectors = np.linalg.eig(
+        np.block(
+            [
+                [np.zeros_like(losses), np.diag(omega)],
+                [-np.diag(omega), -losses * omega[None, :] / omega[:, None]],
+            ]
+        )
+    )
+    if np.linalg.cond(vectors) > COINCIDENT:
+        raise ValueError(REFUSAL)
+    left = np.linalg.inv(vectors)
     kept = values.imag >= 0.0
-    weights = np.where(values.imag[kept] > 0.0, 2.0, 1.0)
+    weights = np.where(values.imag[kept] > 0.0, 2.0, 1.0)[:, None]
+    size = len(omega)
+    moved = np.hstack([vectors.T[:, :size] @ shapes.T, vectors.T[:, size:] @ (shapes * omega).T])
+    read = np.hstack([left[:, :size] @ rows, left[:, size:] @ (rows / omega[:, None])])
     # A passive structure does not grow: a positive real part is rounding.
-    rates = (np.minimum(values.real[kept], 0.0) + 1j * values.imag[kept]) * speed
+    rates = np.minimum(values.real[kept], 0.0) + 1j * values.imag[kept]
     return ModalForm(
         rates=rates.astype(np.complex128),
-        shapes=np.ascontiguousarray((vectors * units[:, None]).T[kept], dtype=np.complex128),
-        rows=np.ascontiguousarray(left[kept] * weights[:, None], dtype=np.complex128),
+        shapes=np.ascontiguousarray(moved[kept], dtype=np.complex128),
+        rows=np.ascontiguousarray(read[kept] * weights, dtype=np.complex128),
     )
 
 
