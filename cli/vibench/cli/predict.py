@@ -254,7 +254,8 @@ def _tell(results: StudyResults) -> None:
             share_text(each),
             *([_number(each.lyapunov_per_s)] if has_exponents else []),
         )
-    print_table(rows)
+    if points:
+        print_table(rows)
     if step > 1:
         console.print(f"every {step}th of {len(points)} points; --json or --out gives all")
     motions = motions_table(points)

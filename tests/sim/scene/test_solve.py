@@ -303,6 +303,20 @@ def test_errors_of_a_chosen_window_cover_a_later_window(frequency_hz, amplitude_
         assert abs(getattr(answer, name) / getattr(later, name) - 1.0) < stated < 0.2
 
 
+def test_a_window_of_too_many_drive_periods_is_refused():
+    fast = Scene(gong2025(contact="power:5"), Harmonic(1e6, 1e-6), duration=FixedDuration(1e4, 5.0))
+    with pytest.raises(ValueError, match=r"give 2 s or less"):
+        solve_scene(fast)
+
+
+def test_a_small_change_may_vanish():
+    """It shrinks below the smallest number in a gap of 1e-300 m: "math domain error" was the answer."""
+    tiny = Scene(
+        gong2025(gap_m=1e-300, contact="power:5"), Harmonic(260.0, 5e-6), duration=FixedDuration(0.5, 0.2)
+    )
+    assert solve_scene(tiny).ended
+
+
 def test_a_slow_drift_is_followed_and_undecided_while_it_lasts():
     drift = Scene(
         gong2025(damping_time_s=3e-5), Harmonic(119.88743, 20e-6), duration=AutomaticDuration(longest_s=20.0)

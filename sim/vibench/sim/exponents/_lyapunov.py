@@ -185,7 +185,7 @@ def intervals_to_skip(interval: Interval, duration_s: float, settle_s: float) ->
     left = interval.count_in(settle_s + duration_s) - skipped
     if left < FEWEST_INTERVALS:
         msg = (
-            f"Duration {duration_s} s holds {left} intervals of {interval.length_s} s: "
+            f"Duration {duration_s} s holds {max(left, 0)} intervals of {interval.length_s} s: "
             f"ask for {FEWEST_INTERVALS} or more, by a longer duration or a shorter interval."
         )
         raise ValueError(msg)

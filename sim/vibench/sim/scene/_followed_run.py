@@ -1,6 +1,7 @@
 """A motion under a harmonic drive, followed stretch by stretch, each watched in its own way. SI units."""
 
 import math
+import sys
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
@@ -212,4 +213,6 @@ class FollowedRun:
         if len(self._run.growth) == 0:
             return math.nan
         change = self._run.changes[0]
-        return 0.5 * math.log(change @ self._metric @ change) + float(self._run.growth[0])
+        # Strong damping may shrink it below the smallest number.
+        energy = max(change @ self._metric @ change, sys.float_info.min)
+        return 0.5 * math.log(energy) + float(self._run.growth[0])

@@ -25,6 +25,8 @@ FORGETTING = 8.0
 """Forgetting times after which a motion that does not repeat is taken to be on its attractor."""
 FEWEST_TIMES = 40.0
 """The longest run holds this many forgetting times; slower modes, and undamped ones, count as so slow."""
+MOST_STATES = 2_000_000
+"""A window holds no more drive periods. Their states, two windows of them and a copy, take 300 MB."""
 FEWEST_PERIODS = 32
 """Drive periods after which a motion that does not repeat is taken to be on its attractor, at least."""
 SETTLED = {Accuracy.QUICK: 1e-5, Accuracy.STANDARD: 1e-6, Accuracy.REFERENCE: 1e-8}
@@ -103,7 +105,7 @@ def pace_of(
     specimen: Specimen, frequency_hz: float, accuracy: Accuracy, slowest_rate: float, longest_s: float
 ) -> Pace:
     """Choose the pace for a specimen whose slowest mode has ``slowest_rate`` [1/s], zero or negative."""
-    slowest_s = longest_s / FEWEST_TIMES
+    slowest_s = min(longest_s / FEWEST_TIMES, MOST_STATES / FEWEST_TIMES / frequency_hz)
     fading_s = -1.0 / slowest_rate if slowest_rate < 0.0 else slowest_s
     own, nearly = (_sharpness(specimen.contact, each) for each in (accuracy, Accuracy.QUICK))
     return Pace(frequency_hz, min(slowest_s, fading_s), fading_s, own, nearly)

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from ..costs import Expected, cost_ledger
 from ..model import PowerLaw, Specimen
 from ._linear_motion import LinearMotion, linear_motion, never_touches
+from ._observed_window import whole_periods
+from ._pace import MOST_STATES
 from ._prediction import Method
 from ._scene import AutomaticDuration, FixedDuration, Observable, Scene
 from ._several_starts import CLEAR, FEWEST, MOST
@@ -78,6 +80,13 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
     if method is Method.CLOSED_FORM:
         why = _why_closed(scene.specimen, motion)
         return ScenePlan(method, (why,), CLOSED_FORM_S, CLOSED_FORM_S, method.value, motion.largest_p_m)
+    if whole_periods(scene.duration.window_s, scene.drive.frequency_hz) > MOST_STATES:
+        frequency_hz = scene.drive.frequency_hz
+        msg = (
+            f"Window {scene.duration.window_s:g} s is not allowed at {frequency_hz:g} Hz: "
+            f"a state is kept in each drive period; give {MOST_STATES / frequency_hz:.3g} s or less."
+        )
+        raise ValueError(msg)
     sentences = (
         _why_followed(scene.specimen, motion, method),
         *_carried(scene.observe),
@@ -175,7 +184,8 @@ def _length(duration: FixedDuration | AutomaticDuration) -> str:
         case AutomaticDuration(longest_s=longest_s):
             return (
                 "The motion is followed until it repeats, and observed over one of its periods; "
-                f"if it never does, over {window}; for {longest_s:g} s at most."
+                f"if it never does, over {window}; "
+                f"for {longest_s:g} s or {MOST_STATES} drive periods at most."
             )
 
 

@@ -15,7 +15,7 @@ from ._line_spectrum import spectrum_of
 from ._linear_motion import LinearMotion, linear_motion
 from ._observed_window import states_of, whole_periods
 from ._other_starts import ALONE, ensemble_beside, memory_of
-from ._pace import Pace, growth_of, pace_of
+from ._pace import MOST_STATES, Pace, growth_of, pace_of
 from ._plan import plan_of, transient_decay_s
 from ._prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
 from ._scatter import WindowScatter, window_scatter
@@ -279,7 +279,7 @@ def _watching(
         case FixedDuration(duration_s=duration_s, window_s=window_s):
             return (yield from run_for(run, duration_s, window_s, pace)), pace
         case AutomaticDuration(window_s=window_s):
-            patience = Patience(window_s, longest_s, alone_s, is_exact)
+            patience = Patience(window_s, min(longest_s, MOST_STATES / drive.frequency_hz), alone_s, is_exact)
             return (yield from settling(run, patience, pace)), pace
 
 
