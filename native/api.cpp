@@ -323,8 +323,9 @@ bool has_samples(const TrackRecord &record, int64_t samples) {
 }
 
 bool is_usable(const MotionFilter &f) {
+  if (!is_lent(f.velocity) || !is_lent(f.state) || !is_count(f.state.size, MOST_STATES)) return false;
   int64_t samples = f.velocity.size, states = f.state.size, parameters = states - TRACKED;
-  if (!is_count(parameters, MOST_PARAMETERS) || !is_lent(f.velocity) || !is_lent(f.state)) return false;
+  if (parameters < 0) return false;
   bool is_kept = f.record.states.size > 0;
   return has_size(f.acceleration, samples + 1) && is_table(f.flows, 1 + parameters, FLOW_SIZE) &&
          is_table(f.small_flows, 1 + parameters, FLOW_SIZE) && is_table(f.stops, 1 + parameters, STOP_SIZE) &&
