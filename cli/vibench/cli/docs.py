@@ -27,16 +27,16 @@ def docs(
         typer.Option("--out", metavar="DIR", help="Build it there; the user's own folder if absent."),
     ] = None,
     rebuild: Annotated[bool, typer.Option("--rebuild", help="Build it although it is there.")] = False,
-    notebooks: Annotated[
-        bool, typer.Option("--notebooks", help="Run the tutorials for their figures.")
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Leave out the tutorials' results, which take some five minutes.")
     ] = False,
     show: Annotated[bool, typer.Option("--open", help="Open its first page in the browser.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Build the documentation site from what is installed, if it is not there, and say where it lies."""
+    """Build the documentation site of this version unless it exists; print the path of its first page."""
     target = built_site() if out is None else out
-    if rebuild or notebooks or not (target / "index.html").is_file():
-        build(target, "notebooks" if notebooks else "pages")
+    if rebuild or not (target / "index.html").is_file():
+        build(target, "pages" if quick else "tutorials")
     first = documentation_page() if out is None else target / "index.html"
     if as_json:
         print_json({"page": str(first)})
@@ -69,9 +69,10 @@ def build(target: Path, extent: str) -> None:
             shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)
         command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-b", "html"]
         ended = subprocess.run(  # noqa: S603 - this interpreter, and Sphinx
-            [*command, str(root / "docs"), str(target)],
+            [*command, str(root / "docs"), str(root / "site")],
             env={**os.environ, "VIBENCH_DOCS": extent},
             check=False,
         )
-    if ended.returncode != 0:
-        raise typer.Exit(ExitCode.FAILED)
+        if ended.returncode != 0:
+            raise typer.Exit(ExitCode.FAILED)
+        shutil.copytree(root / "site", target, ignore=shutil.ignore_patterns(".doctrees"), dirs_exist_ok=True)
