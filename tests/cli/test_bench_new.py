@@ -99,6 +99,23 @@ def test_a_number_as_people_write_it_is_one(tmp_path, answer, gain_db):
     assert (rig.amplifier.gain_db, wrong) == (gain_db, [])
 
 
+SENSITIVITY = "accelerometer.sensitivity_v_per_m_per_s2"
+
+
+def test_a_sensitivity_is_taken_with_the_unit_of_its_certificate(tmp_path):
+    rig, wrong = asked_of_a_person(tmp_path, {SENSITIVITY: ["10 pC/g", "10 mV/m/s2", "much", "100 mV/g"]})
+    assert rig.accelerometer.sensitivity_v_per_m_per_s2 == pytest.approx(0.1 / 9.80665)
+    assert [part in told for part, told in zip(("charge", "two ways", "no number"), wrong, strict=True)] == [
+        True
+    ] * 3
+
+
+def test_a_number_takes_the_place_of_a_sensitivity_with_its_unit(tmp_path):
+    text = with_answer(LAB.read_text(encoding="utf-8"), SENSITIVITY, "100 mV/g", "note")
+    assert value_in(text, SENSITIVITY) == '"100 mV/g"'
+    assert value_in(with_answer(text, SENSITIVITY, "0.0102", "note"), SENSITIVITY) == "0.0102"
+
+
 @pytest.mark.parametrize("name", ["B\udce9nch", "a\x7fb", "two\nlines"])
 def test_a_letter_that_cannot_be_written_is_asked_again(tmp_path, name):
     rig, wrong = asked_of_a_person(tmp_path, {"name": [name, "Bénch"]})

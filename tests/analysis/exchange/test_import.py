@@ -95,6 +95,25 @@ def test_scales_of_file_and_mapping_multiply_and_integers_stay_exact(tmp_path):
         np.testing.assert_array_equal(again.read_counts("base_acceleration"), counts)
 
 
+def test_a_file_in_volts_is_scaled_by_the_sensitivity_of_the_sensor(tmp_path):
+    volts = signals()
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["acc"], file["vib"] = volts
+        file["vib"].attrs["units"] = "V"
+        file["other"] = volts[0]
+        file["other"].attrs["units"] = "m s-2"
+    channels = [
+        ("acc", "base_acceleration", 'scale = "100 mV/g"'),
+        ("vib", "m0_velocity", 'scale = "250 mm/s/V"'),
+        ("acc", "force", 'quantity = "force"\nunit = "N"\nscale = "50 mV/N"'),
+    ]
+    _, values = imported(tmp_path / "a.h5", mapping(tmp_path, *channels))
+    assert_same(values, [98.0665 * volts[0], 0.25 * volts[1], 20.0 * volts[0]])
+    scaled = mapping(tmp_path, ("other", "base_acceleration", 'scale = "100 mV/g"'))
+    with pytest.raises(InvalidRequest, match=r"other is in 'm s-2'.* for a file in volts"):
+        import_recording(tmp_path / "a.h5", scaled, tmp_path / "second.h5")
+
+
 def test_values_that_are_no_numbers_are_lost_samples(tmp_path):
     wanted = signals()
     wanted[0, 55_000:55_003] = np.nan
@@ -332,6 +351,10 @@ def test_a_recording_says_where_it_came_from(tmp_path):
         ('role = "m0_velocity"', 'role = "m0_velocity"\nunit = "mm s-1"', "convert it by scale"),
         ('role = "m0_velocity"', 'role = "other"', "needs a quantity and a unit"),
         ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = 0', "leaves nothing"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = "100 mV/g"', "such as '250 mm/s/V'"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = "4 V/m/s"', "two ways"),
+        ('role = "m0_velocity"', 'role = "m0_velocity"\nscale = true', "number"),
+        ('role = "m0_velocity"', 'role = "drive_voltage"\nscale = "10 V/V"', "a voltage; give a number"),
     ],
 )
 def test_a_wrong_mapping_names_its_key(tmp_path, old, new, said):

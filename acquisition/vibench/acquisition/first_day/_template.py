@@ -106,6 +106,8 @@ def _literal(held: str, answer: str, key: str, note: str) -> str:
     """Write an answer in the kind of what it takes the place of."""
     value: Any = tomllib.loads(f"value = {held}")["value"]
     match value:
+        case str() if "/" in value:  # a sensitivity with its unit
+            return _guessed(answer)
         case str():
             return json.dumps(answer, ensure_ascii=False)
         case dict():
@@ -123,4 +125,6 @@ def _number(answer: str, key: str) -> str:
     try:
         return _as_toml(answer)
     except ValueError as error:
+        if "/" in answer:  # a sensitivity with its unit
+            return json.dumps(answer, ensure_ascii=False)
         raise ConfigurationError(f"{key}: {answer!r} is no number; give one, such as 0.1 or 2e-3") from error

@@ -53,6 +53,9 @@ from ._output import (
     OutputConfig as OutputConfig,
     OutputUse as OutputUse,
 )
+from ._sensitivity import (
+    volts_per_unit as volts_per_unit,
+)
 from ._sensors import (
     accelerometer as accelerometer,
     sensor_name as sensor_name,

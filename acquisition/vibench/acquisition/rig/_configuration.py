@@ -3,15 +3,16 @@
 from datetime import date
 from enum import StrEnum
 from math import inf
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from vibench.sim import SpecimenTable
 
 from ..host import FrozenModel
 from ..instruments import Knob, LoopInput
 from ._output import OutputConfig
+from ._sensitivity import volts_per_unit
 from ._virtual import VirtualConfig, fastest_sample_rate_hz
 
 _LARGEST = 1e250
@@ -146,14 +147,24 @@ class ShakerConfig(FrozenModel):
         return self
 
 
+def _acceleration_sensitivity(given: object) -> object:
+    return volts_per_unit(given, "m s-2") if isinstance(given, str) else given
+
+
+def _velocity_range(given: object) -> object:
+    return 1e3 / volts_per_unit(given, "m s-1") if isinstance(given, str) else given
+
+
 class VibrometerConfig(FrozenModel):
     """The laser vibrometer. Range and filters are set by hand: the operator confirms them."""
 
     model: str
     serial: str = ""
     decoder: str
-    range_mm_per_s_per_v: PositiveFloat
-    """Decoder range [mm/s per volt]."""
+    range_mm_per_s_per_v: Annotated[
+        PositiveFloat, BeforeValidator(_velocity_range, json_schema_input_type=PositiveFloat | str)
+    ]
+    """Decoder range [mm/s per volt], or text with another unit: ``"4 V/(m/s)"``."""
     full_scale_v: PositiveFloat
     """Largest output, peak [V]."""
     bandwidth_hz: PositiveFloat
@@ -179,7 +190,10 @@ class AccelerometerConfig(FrozenModel):
 
     model: str
     serial: str = ""
-    sensitivity_v_per_m_per_s2: PositiveFloat
+    sensitivity_v_per_m_per_s2: Annotated[
+        PositiveFloat, BeforeValidator(_acceleration_sensitivity, json_schema_input_type=PositiveFloat | str)
+    ]
+    """Sensitivity [V per m/s2], or text with the unit of the data sheet: ``"100 mV/g"``."""
     full_scale_v: PositiveFloat
     resonance_hz: PositiveFloat
     iepe: Literal["yes", "no"]

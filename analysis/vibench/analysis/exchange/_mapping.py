@@ -7,6 +7,7 @@ from pydantic import AwareDatetime, Field, NonNegativeFloat, PositiveFloat, Posi
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import ROLE_PATTERN, Origin
+from vibench.acquisition.rig import volts_per_unit
 from vibench.sim import FrozenModel, SpecimenTable
 
 from ..recordings import BASE, DRIVE, RESPONSE
@@ -21,7 +22,7 @@ KNOWN_ROLES = {
 
 
 class ChannelMapping(FrozenModel):
-    """One channel: ``value = scale * number in the file + offset``, in ``unit``."""
+    """One channel: ``value = factor * number in the file + offset``, in ``unit``."""
 
     source: str = Field(min_length=1)
     """Its name in the file, as `vibench import FILE` lists it."""
@@ -30,7 +31,8 @@ class ChannelMapping(FrozenModel):
     quantity: str = ""
     unit: str = ""
     """UDUNITS text of the value; known for the three channels that an analysis needs."""
-    scale: float = 1.0
+    scale: float | str = 1.0
+    """Unit per number in the file; of a file in volts, or the sensor's sensitivity: ``"100 mV/g"``."""
     offset: float = 0.0
     full_scale: PositiveFloat | None = None
     """What the input could bear, as a number in the file; values near it are marked as overloads."""
@@ -42,14 +44,6 @@ class ChannelMapping(FrozenModel):
     delay_s: float = 0.0
     """How late the channel shows what happened [s]."""
     long_name: str = ""
-
-    @model_validator(mode="after")
-    def _has_a_scale(self) -> Self:
-        if self.scale == 0:
-            raise ValueError(
-                f"the scale of {self.role} is 0, which leaves nothing of it; give unit per number"
-            )
-        return self
 
     @model_validator(mode="after")
     def _has_the_unit_of_its_role(self) -> Self:
@@ -65,6 +59,24 @@ class ChannelMapping(FrozenModel):
                     f"{self.role} is in {needed!r}, and {given!r} was given; convert it by scale"
                 )
         return self
+
+    @model_validator(mode="after")
+    def _has_a_scale(self) -> Self:
+        if self.factor == 0:
+            raise ValueError(
+                f"the scale of {self.role} is 0, which leaves nothing of it; give unit per number"
+            )
+        return self
+
+    @property
+    def factor(self) -> float:
+        """Unit per number in the file."""
+        if not isinstance(self.scale, str):
+            return self.scale
+        unit = self.kind[1]
+        if unit == "V":
+            raise ValueError(f"scale = {self.scale!r} was given for {self.role}, a voltage; give a number")
+        return 1.0 / volts_per_unit(self.scale, unit)
 
     @property
     def kind(self) -> tuple[str, str]:

@@ -1,0 +1,142 @@
+"""Sensitivities in the units of data sheets: one meaning, or a refusal that says what to write."""
+
+import tomllib
+
+import pytest
+
+from vibench.acquisition import shipped
+from vibench.acquisition.errors import ConfigurationError
+from vibench.acquisition.host import from_toml
+from vibench.acquisition.rig import Rig, volts_per_unit
+
+ACCELERATION, VELOCITY = "m s-2", "m s-1"
+G = 9.80665
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "expected"),
+    [
+        ("100 mV/g", ACCELERATION, 0.1 / G),
+        ("100mV/g", ACCELERATION, 0.1 / G),
+        ("  100.  mV / g ", ACCELERATION, 0.1 / G),
+        ("0.1 V/g", ACCELERATION, 0.1 / G),
+        (".1 V/gn", ACCELERATION, 0.1 / G),
+        ("1e5 uV/g", ACCELERATION, 0.1 / G),
+        ("1E+5 µV/g", ACCELERATION, 0.1 / G),
+        ("100000 μV/g", ACCELERATION, 0.1 / G),
+        ("100\u00a0mV/g", ACCELERATION, 0.1 / G),
+        ("10 g/V", ACCELERATION, 0.1 / G),
+        ("10.2 mV/(m/s2)", ACCELERATION, 0.0102),
+        ("10.2 mV/(m/s²)", ACCELERATION, 0.0102),
+        ("10.2 mV/(m/s^2)", ACCELERATION, 0.0102),
+        ("10.2 mV/(m/s**2)", ACCELERATION, 0.0102),
+        ("10.2 mV/(m s-2)", ACCELERATION, 0.0102),
+        ("10.2 mV/(m·s⁻²)", ACCELERATION, 0.0102),
+        ("10.2 mV/(m*s^-2)", ACCELERATION, 0.0102),
+        ("10.2 mV/ms⁻²", ACCELERATION, 0.0102),
+        ("10.2 mV / ms^-2", ACCELERATION, 0.0102),
+        ("98 m/s²/V", ACCELERATION, 1 / 98),
+        ("98 (m/s2)/V", ACCELERATION, 1 / 98),
+        ("250 mm/s/V", VELOCITY, 4.0),
+        ("250 (mm/s)/V", VELOCITY, 4.0),
+        ("0.25 m/s/V", VELOCITY, 4.0),
+        ("250e3 µm/s/V", VELOCITY, 4.0),
+        ("4 V/(m/s)", VELOCITY, 4.0),
+        ("4 mV/(mm/s)", VELOCITY, 4.0),
+        ("4 mV/(mm s⁻¹)", VELOCITY, 4.0),
+        ("100 mV/(in/s)", VELOCITY, 0.1 / 0.0254),
+        ("11.2 mV/N", "N", 0.0112),
+        ("50 mV/lbf", "N", 0.05 / (0.45359237 * G)),
+        ("80 µm/V", "m", 12500.0),
+        ("12.5 mV/um", "m", 12500.0),
+        ("50 mV/Pa", "Pa", 0.05),
+    ],
+)
+def test_a_spelling_of_a_data_sheet_has_its_value(text, unit, expected):
+    assert volts_per_unit(text, unit) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "said"),
+    [
+        ("10 mV/m/s2", ACCELERATION, "two ways; write '10 mV/(m/s2)'"),
+        ("10 mV/m/s²", ACCELERATION, "two ways; write '10 mV/(m/s2)'"),
+        ("10 mV/m s-2", ACCELERATION, "two ways; write '10 mV/(m s-2)'"),
+        ("4 V/m/s", VELOCITY, "two ways; write '4 V/(m/s)'"),
+        ("10 pC/g", ACCELERATION, "is a charge"),
+        ("1.02 pC/(m/s2)", ACCELERATION, "is a charge"),
+        ("4 pC/N", "N", "is a charge"),
+        ("100", ACCELERATION, "such as '100 mV/g'"),
+        ("100 mV", ACCELERATION, "such as"),
+        ("mV/g", ACCELERATION, "such as"),
+        ("", ACCELERATION, "such as"),
+        ("100 mv/g", ACCELERATION, "such as"),
+        ("100 MV/g", ACCELERATION, "such as"),
+        ("100 mV/G", ACCELERATION, "such as"),
+        ("100 mV/kg", ACCELERATION, "such as"),
+        ("100 mV/g rms", ACCELERATION, "such as"),
+        ("100 mV/gpk", ACCELERATION, "such as"),
+        ("100 mV/g2", ACCELERATION, "such as"),
+        ("100 mV/g/V", ACCELERATION, "such as"),
+        ("100,5 mV/g", ACCELERATION, "such as"),
+        ("1,000 mV/g", ACCELERATION, "such as"),
+        ("1 000 mV/g", ACCELERATION, "such as"),
+        ("1_000 mV/g", ACCELERATION, "such as"),
+        ("10^2 mV/g", ACCELERATION, "such as"),
+        ("10² mV/g", ACCELERATION, "such as"),
+        ("１００ mV/g", ACCELERATION, "such as"),
+        ("-100 mV/g", ACCELERATION, "number above 0"),
+        ("0 mV/g", ACCELERATION, "number above 0"),
+        ("0 g/V", ACCELERATION, "number above 0"),
+        ("nan mV/g", ACCELERATION, "number above 0"),
+        ("1e400 mV/g", ACCELERATION, "number above 0"),
+        ("1e-310 g/V", ACCELERATION, "number above 0"),
+        ("100 mV/g ± 10 %", ACCELERATION, "such as"),
+        ("250 mm/s/V", ACCELERATION, "such as '100 mV/g'"),
+        ("100 mV/g", VELOCITY, "such as '250 mm/s/V'"),
+        ("100 mV/g", "N", "such as '11.2 mV/N'"),
+    ],
+)
+def test_a_spelling_without_one_meaning_is_refused(text, unit, said):
+    with pytest.raises(
+        ValueError, match="^" + repr(text)[:3].replace("+", r"\+").replace(".", r"\.")
+    ) as refused:
+        volts_per_unit(text, unit)
+    assert said in str(refused.value)
+
+
+def rig_with(**texts):
+    """Read the shipped configuration with other sensitivities."""
+    path = shipped("hardware_configs/virtual_rig.toml")
+    content = tomllib.loads(path.read_text(encoding="utf-8"))
+    for place, value in texts.items():
+        table, _, key = place.partition("__")
+        content[table][key] = value
+    return from_toml(content, Rig, path)
+
+
+def test_a_hardware_configuration_takes_the_units_of_data_sheets():
+    rig = rig_with(
+        accelerometer__sensitivity_v_per_m_per_s2="100 mV/g", vibrometer__range_mm_per_s_per_v="4 V/(m/s)"
+    )
+    assert rig.accelerometer.sensitivity_v_per_m_per_s2 == pytest.approx(0.1 / G)
+    assert rig.vibrometer.range_mm_per_s_per_v == pytest.approx(250.0)
+    assert rig == Rig.model_validate_json(rig.model_dump_json())
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"accelerometer__sensitivity_v_per_m_per_s2": "10 pC/g"}, "is a charge"),
+        ({"accelerometer__sensitivity_v_per_m_per_s2": "0.01"}, "such as '100 mV/g'"),
+        ({"accelerometer__sensitivity_v_per_m_per_s2": True}, "give a number"),
+        ({"vibrometer__range_mm_per_s_per_v": "100 mV/g"}, "such as '250 mm/s/V'"),
+        ({"accelerometer__full_scale_v": "5 V"}, "give a number"),
+    ],
+)
+def test_a_hardware_configuration_names_the_key_of_a_wrong_unit(given, said):
+    with pytest.raises(ConfigurationError) as refused:
+        rig_with(**given)
+    (place,) = given
+    assert place.replace("__", ".") in str(refused.value)
+    assert said in str(refused.value)
