@@ -137,6 +137,7 @@ def test_the_instruments_of_the_virtual_rig_are_listed_by_name(vibench_here, tmp
     assert result.returncode == 0, result.stderr
     found = json.loads(result.stdout)
     assert any("1689::851" in name for name in found["visa"])
+    assert any(line.startswith("vibench.generators: afg1022x, ") for line in found["plug-ins"])
     assert any(device.startswith("cDAQ1Mod1: NI 9234") for device in found["daq"])
 
 

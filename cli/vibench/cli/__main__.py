@@ -8,6 +8,7 @@ import importlib
 import logging
 import os
 import sys
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -458,7 +459,8 @@ def vibench(
 
 
 def main() -> None:
-    """Run the command line. An error that a user can mend is one sentence and a non-zero exit."""
+    """Run the command line. An error that a user can fix is one sentence and a non-zero exit."""
+    warnings.formatwarning = _sentence
     try:
         app()
     except CheckStopped as error:
@@ -479,6 +481,10 @@ def main() -> None:
             raise
         complain(OSError(sentence))
         sys.exit(ExitCode.FAILED)
+
+
+def _sentence(message: Warning | str, *_place: object, **_named: object) -> str:
+    return f"warning: {message}\n"
 
 
 def _disk_trouble(error: Exception) -> str:

@@ -19,6 +19,7 @@ from vibench.acquisition import (
     open_bench,
     stop_on_signal,
 )
+from vibench.acquisition.instruments import PlugInKind, plug_in_names
 from vibench.acquisition.rig import Rig, load_rig, save_knob_sheet
 
 from .bench_new import new_bench
@@ -39,13 +40,15 @@ def list_bench(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """List every instrument that can be seen, by name."""
+    """List every instrument that can be seen, and the installed plug-ins, by name."""
     found = list_instruments() if bench is None else list_rig_instruments(load_rig(bench))
     devices = [f"{device.name}: {device.product}, serial {device.serial}" for device in found.daq_devices]
+    plug_ins = [f"{kind.value}: {', '.join(plug_in_names(kind))}" for kind in PlugInKind]
+    titles = {"VISA": found.visa_resources, "DAQ": devices, "Plug-ins": plug_ins, "Remarks": found.remarks}
     if as_json:
-        print_json({"visa": list(found.visa_resources), "daq": devices, "remarks": list(found.remarks)})
+        print_json({title.lower(): list(lines) for title, lines in titles.items()})
         return
-    for title, lines in (("VISA", found.visa_resources), ("DAQ", devices), ("Remarks", found.remarks)):
+    for title, lines in titles.items():
         console.print(bold(title))
         for line in lines or ("none",):
             console.print(f"  {line}")

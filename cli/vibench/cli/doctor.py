@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
+from vibench.acquisition.instruments import PlugInKind, plug_in_names
 from vibench.acquisition.recording import KEY_VARIABLE
 from vibench.acquisition.rig import TOKEN_VARIABLE
 from vibench.sim.kernels import advance_clock
@@ -47,6 +48,7 @@ def doctor(as_json: AsJson = False) -> None:
         "libraries": dict(libraries()),
         "folders": dict(folders()),
         "instruments": dict(instruments()),
+        "plug-ins": {kind.value: ", ".join(plug_in_names(kind)) for kind in PlugInKind},
         "environment": {
             name: "(set, secret)" if name in SECRET else os.environ[name]
             for name in VARIABLES

@@ -31,6 +31,7 @@ from .model import (
     Specimen as Specimen,
     SpecimenDescription as SpecimenDescription,
     SpecimenTable as SpecimenTable,
+    SpecimenWarning as SpecimenWarning,
     UnknownSpecimenError as UnknownSpecimenError,
     UnreadableTomlError as UnreadableTomlError,
     base_response as base_response,

@@ -8,6 +8,7 @@ from vibench.sim.maps import Map, Range, solve_map
 OWN = {"name": "mine", "masses_kg": (5.8e-3, 2.1e-3, 2.2e-3)}
 
 
+@pytest.mark.filterwarnings("ignore::vibench.sim.SpecimenWarning")
 @pytest.mark.parametrize(
     ("said", "words"),
     [

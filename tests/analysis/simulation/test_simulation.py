@@ -64,7 +64,11 @@ def test_the_answer_grows_to_the_linear_transmission():
 def test_the_answer_is_that_of_the_specimen_that_is_named(tmp_path):
     """A shipped one by its name, one of one's own by its file."""
     file = tmp_path / "own.toml"
-    file.write_text('model = "gong2025"\nmasses_kg = [0.0061, 0.0019, 0.0025]\n', encoding="utf-8")
+    file.write_text(
+        'model = "gong2025"\nmasses_kg = [0.0061, 0.0019, 0.0025]\n'
+        "single_frequencies_hz = [322.0, 100.0, 390.6]\ndamping_time_s = 2e-5\n",
+        encoding="utf-8",
+    )
     answers = []
     for named in ("gong2025", str(file)):
         request = SimulationRequest(specimen=named, **LINEAR)

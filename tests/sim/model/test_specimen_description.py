@@ -11,6 +11,7 @@ from vibench.sim import (
     Harmonic,
     SpecimenDescription,
     SpecimenTable,
+    SpecimenWarning,
     UnknownSpecimenError,
     base_transmissibility,
     gong2025,
@@ -216,3 +217,49 @@ def test_a_truth_value_or_a_text_is_no_number_in_a_file_or_in_one_that_it_starts
 def test_an_infinite_gap_is_read_back_from_json(tmp_path):
     one_sided = load_specimen(written(tmp_path, WHOLE))
     assert SpecimenDescription.model_validate_json(one_sided.model_dump_json()) == one_sided
+
+
+SPRINGS = "stiffnesses_n_per_m = [23741, 829.047, 12046.3]"
+FREQUENCIES = "single_frequencies_hz = [322.0, 100.0, 390.6]"
+DAMPERS = "dampings_ns_per_m = [0.474821, 0.0165809, 0.240926]"
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_a_mass_that_changes_its_spring_is_warned_of(tmp_path, index):
+    masses = [5.8e-3, 2.1e-3, 2.0e-3]
+    masses[index] *= 1.5
+    own = f'name = "mine"\nmodel = "gong2025"\nmasses_kg = {masses}\n'
+    with pytest.warns(SpecimenWarning) as warned:
+        made = load_specimen(written(tmp_path, own)).specimen()
+    (springs, dampers) = (str(each.message) for each in warned)
+    assert "single_frequencies_hz was kept" in springs
+    assert f"give {SPRINGS} to keep them" in springs
+    assert "damping_time_s was kept" in dampers
+    assert f"give {DAMPERS} to keep them" in dampers
+    assert made.stiffnesses[index] == pytest.approx(1.5 * gong2025().stiffnesses[index])
+    kept = load_specimen(written(tmp_path, own + SPRINGS)).specimen()
+    assert kept.stiffnesses == pytest.approx(gong2025().stiffnesses, rel=1e-5)
+    assert kept.dampings == pytest.approx(gong2025().dampings, rel=1e-5)
+
+
+def test_springs_that_change_their_damping_are_warned_of(tmp_path):
+    own = 'name = "mine"\nmodel = "gong2025"\nsingle_frequencies_hz = [322.0, 120.0, 390.6]\n'
+    with pytest.warns(SpecimenWarning, match=r"dampings changed .* damping_time_s = 2e-05 to confirm"):
+        load_specimen(written(tmp_path, own))
+    with pytest.warns(SpecimenWarning, match="dampings changed"):
+        SpecimenTable.model_validate({"stiffnesses_n_per_m": [2e4, 800.0, 1.2e4]})
+    load_specimen(written(tmp_path, own + "damping_time_s = 2e-5"))
+
+
+def test_a_change_that_is_confirmed_or_follows_from_nothing_is_not_warned_of(tmp_path):
+    head = 'name = "mine"\nmodel = "gong2025"\n'
+    for own in (
+        "gap_m = 30e-6",
+        "masses_kg = [5.8e-3, 2.1e-3, 2.0e-3]",
+        f"masses_kg = [5.8e-3, 3e-3, 2e-3]\n{SPRINGS}\n{DAMPERS}",
+        f"masses_kg = [5.8e-3, 3e-3, 2e-3]\n{FREQUENCIES}\ndamping_time_s = 2e-5",
+    ):
+        load_specimen(written(tmp_path, head + own))
+    assert SpecimenTable.model_validate(
+        load_specimen("two_masses").model_dump()
+    ) == SpecimenTable.model_validate("two_masses")

@@ -76,6 +76,7 @@ from ._specimen_description import (
     DampingTime as DampingTime,
     SpecimenDescription as SpecimenDescription,
     SpecimenTable as SpecimenTable,
+    SpecimenWarning as SpecimenWarning,
     UnknownSpecimenError as UnknownSpecimenError,
     load_specimen as load_specimen,
     shipped_specimens as shipped_specimens,

@@ -7,6 +7,7 @@ A description says everything of a specimen; nothing in it is assumed. It may st
 import math
 import reprlib
 import tomllib
+import warnings
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -59,6 +60,10 @@ NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
 
 class UnknownSpecimenError(ValueError):
     """A specimen that is not shipped, or a file that describes none."""
+
+
+class SpecimenWarning(UserWarning):
+    """Springs or dampings that change because other numbers of a specimen were replaced."""
 
 
 class _Described(FrozenModel):
@@ -360,10 +365,34 @@ def _laid_over(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, An
     """Replace what is said anew; the other of two keys that say the same goes, and so do its sources."""
     replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
     kept = {key: value for key, value in base.items() if key not in replaced}
+    _warn_of_changes(base, {**kept, **said}, said)
     old, new = base.get(SOURCES, {}), said.get(SOURCES, {})
     if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
         return {**kept, **said}
     return {**kept, **said, SOURCES: {**{key: old[key] for key in old if key not in replaced}, **new}}
+
+
+def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], said: Mapping[str, Any]) -> None:
+    """Warn of springs and dampings that are not given, and follow from what is."""
+    changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
+    try:
+        before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))
+    except ValidationError:  # the specimen is refused elsewhere
+        return
+    for name, (kept, direct) in zip(("stiffnesses", "dampings"), ALTERNATIVES, strict=True):
+        old, new = getattr(before, name), getattr(now, name)
+        if not (said.keys() & {kept, direct} or np.allclose(old, new, rtol=1e-4, atol=0.0)):
+            warnings.warn(
+                f"{made['name']}: {name} changed from {_listed(old)} to {_listed(new)}, because {kept} was "
+                f"kept; give {direct} = {_listed(old)} to keep them, or {kept} = {made[kept]} to confirm "
+                "the change",
+                SpecimenWarning,
+                stacklevel=2,
+            )
+
+
+def _listed(numbers: Triple) -> str:
+    return f"[{', '.join(f'{each:.6g}' for each in numbers)}]"
 
 
 def _complaint(specimen: str, error: ValidationError) -> str:
