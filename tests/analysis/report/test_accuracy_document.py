@@ -22,6 +22,12 @@ def benchmark():
     )
 
 
+def test_the_page_begins_with_its_answer(benchmark):
+    for page in (PAGE.read_text(encoding="utf-8"), accuracy_document(benchmark, "x.png")):
+        assert page.index("`standard` is the default") < page.index("| level | promised |") < 500
+        assert page.index("## How it was measured") < page.index("Made by `vibench tradeoff")
+
+
 def headings(text):
     return [line for line in text.splitlines() if line.startswith(("#", "| level", "| motion"))]
 

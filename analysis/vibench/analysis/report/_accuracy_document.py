@@ -43,6 +43,14 @@ def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
     yield from (
         "# Speed and accuracy, measured",
         "",
+        "`standard` is the default. Use `quick` to look around, and `reference` to check a result. In chaos,",
+        "no level gives digits of a single motion; only averages mean something.",
+    )
+    yield from _promises(benchmark)
+    yield from (
+        "",
+        "## How it was measured",
+        "",
         "Made by `vibench tradeoff --markdown docs/accuracy.md`; not edited by hand.",
         f"Machine: {benchmark.machine}. {benchmark.software}.",
         "",
@@ -57,7 +65,6 @@ def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
         yield from _motion(each)
     yield from _lotteries(benchmark.lotteries)
     yield from _transients(benchmark.transients)
-    yield from _promises(benchmark)
 
 
 def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
@@ -159,7 +166,7 @@ def _number(value: float | None) -> str:
 
 
 def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
-    yield from ("", "## Promises", "", "| level | promised | worst above | kept |", "|---|---|---|---|")
+    yield from ("", "## Promises", "", "| level | promised | worst found | kept |", "|---|---|---|---|")
     for accuracy in Accuracy:
         worst = worst_error(benchmark, accuracy)
         kept = "yes" if worst <= accuracy.promise else "**no**"
