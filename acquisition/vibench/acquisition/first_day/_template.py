@@ -39,16 +39,7 @@ def with_answer(text: str, key: str, answer: str, note: str) -> str:
 
 
 def place_of(content: Mapping[str, Any], key: str) -> tuple[str | int, ...]:
-    """Give the way to a key through what was read of a configuration.
-
-    Parameters
-    ----------
-    content
-        As TOML was read.
-    key
-        As a question names it; an input by the role of its channel.
-
-    """
+    """Return the path of a question's key in the content of a configuration."""
     if not key.startswith(_CHANNEL):
         return tuple(key.split("."))
     role, _, name = key.removeprefix(_CHANNEL).partition(".")
