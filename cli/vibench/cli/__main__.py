@@ -460,7 +460,7 @@ def vibench(
 
 def main() -> None:
     """Run the command line. An error that a user can fix is one sentence and a non-zero exit."""
-    warnings.formatwarning = _sentence
+    warnings.formatwarning = lambda message, *_place, **_named: f"warning: {message}\n"
     try:
         app()
     except CheckStopped as error:
@@ -481,10 +481,6 @@ def main() -> None:
             raise
         complain(OSError(sentence))
         sys.exit(ExitCode.FAILED)
-
-
-def _sentence(message: Warning | str, *_place: object, **_named: object) -> str:
-    return f"warning: {message}\n"
 
 
 def _disk_trouble(error: Exception) -> str:

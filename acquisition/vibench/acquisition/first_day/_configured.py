@@ -52,28 +52,11 @@ def configured(
 ) -> Rig:
     """Ask everything, write the configuration, and read it back.
 
-    Parameters
-    ----------
-    template
-        A hardware configuration whose comments say CONFIRM where nobody has looked yet.
-    target
-        Where the new one goes; it must not be there.
-    seen
-        What can be seen from here.
-    ask
-        Asks one question.
-    note
-        Who answers, and when; it stands behind each answer.
-    questions
-        What to ask, where it is more than usual.
-    refuse
-        Hears what is wrong with an answer, or with all together; when it returns, they are asked again.
+    Comments of ``template`` say CONFIRM where nobody has looked yet. ``note`` says who answers, and when; it
+    stands behind each answer. ``refuse`` receives what is wrong with an answer, or with all together; when it
+    returns, they are asked again.
 
-    Raises
-    ------
-    ConfigurationError
-        When ``target`` is there, or ``refuse`` raises it; nothing is written then.
-
+    Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
     """
     if target.exists():
         raise ConfigurationError(f"{target} is there already, and nothing is overwritten; give another name")

@@ -18,21 +18,10 @@ def built_site() -> Path:
 def documentation_page(page: str = "index") -> Path:
     """Path of a page of the documentation on this computer, without the network.
 
-    Parameters
-    ----------
-    page
-        Name of the page, as it stands in ``docs`` without ``.md``: ``"gui"``, ``"campaigns"``.
+    ``page`` is its name in ``docs`` without ``.md``: ``"gui"``, ``"campaigns"``. The page is HTML where the
+    site has been built (``vibench docs``), else the Markdown behind it.
 
-    Returns
-    -------
-    Path
-        The HTML page where the site has been built (``vibench docs``), else the Markdown behind it.
-
-    Raises
-    ------
-    ConfigurationError
-        When there is no such page.
-
+    Raises ConfigurationError when there is no such page.
     """
     sources = shipped_folder("docs")
     built, written = built_site() / f"{page}.html", sources / f"{page}.md"

@@ -21,16 +21,7 @@ EXTRAS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 def need_extra(extra: str) -> None:
     """Make sure that the libraries of an extra can be imported; imports none of them.
 
-    Parameters
-    ----------
-    extra
-        Its word in `pyproject.toml`.
-
-    Raises
-    ------
-    MissingLibrary
-        When one is not installed.
-
+    Raises MissingLibrary when one is not installed. ``extra`` is its word in `pyproject.toml`.
     """
     for library in EXTRAS[extra]:
         # The parent first: finding a submodule of what is missing raises.
@@ -58,18 +49,8 @@ def need_space(megabytes: int, advice: str = "") -> None:
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
     """Wrap the ``__getattr__`` of a face whose names need an extra: what is missing is told with its extra.
 
-    Parameters
-    ----------
-    found
-        The ``__getattr__`` that lazy_loader made.
-    extra
-        Its word in `pyproject.toml`.
-
-    Raises
-    ------
-    MissingLibrary
-        By what is returned, when a library of the extra is not installed.
-
+    ``found`` is the ``__getattr__`` that lazy_loader made, ``extra`` the word in `pyproject.toml`. What is
+    returned raises MissingLibrary when a library of the extra is not installed.
     """
 
     def told(name: str) -> object:

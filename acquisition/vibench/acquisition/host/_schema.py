@@ -109,18 +109,10 @@ SCHEMAS: Mapping[str, _Kind] = MappingProxyType(
 
 
 def json_schema(kind: str) -> Json:
-    """Give the JSON Schema (draft 4) of a kind of TOML file.
+    """Return the JSON Schema (draft 4) of a ``kind`` of TOML file.
 
-    Parameters
-    ----------
-    kind
-        ``campaign``, ``rig``, ``study``, ``map``, ``mapping`` or ``specimen``.
-
-    Raises
-    ------
-    ConfigurationError
-        For any other word.
-
+    Kinds are ``campaign``, ``rig``, ``study``, ``map``, ``mapping`` and ``specimen``; any other word raises
+    ConfigurationError.
     """
     if kind not in SCHEMAS:
         raise ConfigurationError(f"there is no schema of {kind!r}; there are {', '.join(SCHEMAS)}")
@@ -136,15 +128,9 @@ def schema_name(kind: str) -> str:
 
 
 def schema_line(model: BaseModel, schemas: Path) -> str:
-    """Give the line that tells an editor the schema of a file, or nothing where there is none.
+    """Return the line that tells an editor the schema of a file that holds ``model``, empty if there is none.
 
-    Parameters
-    ----------
-    model
-        What the file holds.
-    schemas
-        Folder of the schemas, as ``shipped_folder("schemas")`` gives it.
-
+    ``schemas`` is the folder of the schemas, as ``shipped_folder("schemas")`` gives it.
     """
     names = {each.__name__ for each in type(model).__mro__}
     kind = next((kind for kind, each in SCHEMAS.items() if each.model in names), None)

@@ -12,18 +12,9 @@ SUFFIX = ".toml"
 
 
 def shipped(name: str) -> Path:
-    """Path of a file that comes with vibench, ``"hardware_configs/virtual_rig.toml"`` for example.
+    """Path of a file that comes with vibench, by its ``name``: ``"hardware_configs/virtual_rig.toml"``.
 
-    Parameters
-    ----------
-    name
-        Its folder and its name.
-
-    Raises
-    ------
-    ConfigurationError
-        When this installation has no such file.
-
+    Raises ConfigurationError when this installation has no such file.
     """
     for folder in FOLDERS:
         path = folder / name
@@ -33,18 +24,9 @@ def shipped(name: str) -> Path:
 
 
 def shipped_folder(folder: str) -> Path:
-    """Path of a folder that comes with vibench: campaigns, hardware_configs, studies, examples.
+    """Path of a ``folder`` that comes with vibench: campaigns, hardware_configs, studies, examples.
 
-    Parameters
-    ----------
-    folder
-        Its name.
-
-    Raises
-    ------
-    ConfigurationError
-        When this installation has no such folder.
-
+    Raises ConfigurationError when this installation has no such folder.
     """
     found = next((place / folder for place in FOLDERS if (place / folder).is_dir()), None)
     if found is None:
@@ -53,14 +35,7 @@ def shipped_folder(folder: str) -> Path:
 
 
 def all_shipped(folder: str) -> tuple[Path, ...]:
-    """Every TOML file that comes with vibench in a folder, ``"campaigns"`` for example, by name.
-
-    Parameters
-    ----------
-    folder
-        Its name.
-
-    """
+    """Every TOML file that comes with vibench in a ``folder`` such as ``"campaigns"``, by name."""
     return tuple(sorted(shipped_folder(folder).glob(f"*{SUFFIX}")))
 
 

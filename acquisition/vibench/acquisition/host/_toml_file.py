@@ -70,24 +70,9 @@ def migrated(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]
 
 
 def validated(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
-    """Validate ``content`` as ``model``; errors name ``origin`` and the key.
+    """Validate the content of TOML or JSON, whose paths are relative to ``folder``.
 
-    Parameters
-    ----------
-    content
-        As TOML or JSON was read.
-    model
-        What it must be.
-    origin
-        How errors call it.
-    folder
-        What paths in it are relative to.
-
-    Raises
-    ------
-    ConfigurationError
-        When the model does not allow it.
-
+    Raises ConfigurationError, which names ``origin`` and the key, when the model does not allow it.
     """
     try:
         return model.model_validate(content, context={"folder": folder})
@@ -113,13 +98,7 @@ def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
     >>> shortened("0123456789", 7)
     '01...89'
 
-    Parameters
-    ----------
-    text
-        Of any length.
-    longest
-        Letters that are kept, three dots among them.
-
+    ``text`` has any length; ``longest`` is the number of letters that are kept, three dots among them.
     """
     if len(text) <= longest:
         return text
