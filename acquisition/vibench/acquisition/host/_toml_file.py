@@ -70,7 +70,7 @@ def migrated(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]
 
 
 def validated(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
-    """Validate the content of TOML or JSON, whose paths are relative to ``folder``.
+    """Validate ``content`` of TOML or JSON as ``model``; paths in it are relative to ``folder``.
 
     Raises ConfigurationError, which names ``origin`` and the key, when the model does not allow it.
     """
