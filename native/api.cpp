@@ -15,6 +15,7 @@ using namespace vibench;
 namespace {
 
 constexpr double LATEST = 1e12;  // [s]
+constexpr int64_t MOST_PARTS = 1000000;  // of an interval between readings
 
 bool is_positive(double x) { return x > 0.0 && is_finite(x); }
 bool is_not_negative(double x) { return x >= 0.0 && is_finite(x); }
@@ -87,7 +88,7 @@ bool is_usable(const Readings &readings) {
   for (int i = 0; i < 6; i++)
     if (!is_positive(readings.metric[i][i])) return false;
   return has_room && readings.made >= 0 && readings.made <= readings.room && readings.parts > 0 &&
-         is_positive(readings.interval) && readings.interval * double(readings.room) < 1e12;
+         readings.parts <= MOST_PARTS && is_positive(readings.interval) && readings.interval * double(readings.room) < LATEST;
 }
 
 bool is_tolerance(double tolerance) { return tolerance > 0.0 && tolerance < 1.0; }

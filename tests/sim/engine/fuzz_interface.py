@@ -14,7 +14,19 @@ from vibench.sim.engine import Engine, EngineError, collision_structure, power_s
 
 STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
 STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
-POINTERS = {"collisions", "power_shapes", "samples", "impact_times", "controller", "at"}
+POINTERS = {
+    *(
+        "collisions",
+        "power_shapes",
+        "samples",
+        "impact_times",
+        "growth",
+        "impacts",
+        "motions",
+        "controller",
+        "at",
+    )
+}
 LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "power:5", "power:3+5+7")
 CODES = {-1, 0, 1, 2, 3, 4}
 
@@ -65,7 +77,22 @@ def call(engine, draws):
         return -1
     if draws.random() < 0.5:
         engine.start(tables, state, tolerance)
-    return engine.run(tables, state, until, tolerance, record)
+    kind = draws.integers(3)
+    if kind == 0:
+        return engine.run(tables, state, until, tolerance, record)
+    tangent, readings = engine.new("Tangent"), engine.new("Readings")
+    tangent["changes"], tangent["rows"] = draws.integers(1, 7), np.eye(6)
+    growth, impacts, motions = np.zeros(6 * 8), np.zeros(8, np.int64), np.zeros((8, 6))
+    readings["interval"], readings["parts"], readings["room"] = 0.002, 2, 8
+    readings["metric"], readings["growth"] = np.eye(6), growth.ctypes.data
+    readings["impacts"], readings["motions"] = impacts.ctypes.data, motions.ctypes.data
+    if draws.random() < 0.5:
+        spoil((tangent, readings)[draws.integers(2)], draws)
+    readings["room"] = min(int(readings["room"]), 8)
+    if kind == 1:
+        return engine.run(tables, state, until, tolerance, record, tangent)
+    last = int(draws.choice([-1, 0, 3, 8, 9]))
+    return engine.take_readings(tables, state, tolerance, record, tangent, readings, last)
 
 
 def lent_sizes(structure):

@@ -13,7 +13,6 @@ from ._detection import (
     TOUCH as TOUCH,
     derivative_bound as derivative_bound,
     first_contact as first_contact,
-    first_touch as first_touch,
     polynomial_at as polynomial_at,
     touched_side as touched_side,
 )
