@@ -15,17 +15,8 @@ from vibench.sim.engine import Engine, EngineError, collision_structure, power_s
 STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
 STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
 POINTERS = {
-    *(
-        "collisions",
-        "power_shapes",
-        "samples",
-        "impact_times",
-        "growth",
-        "impacts",
-        "motions",
-        "controller",
-        "at",
-    )
+    *("collisions", "power_shapes", "samples", "impact_times"),
+    *("growth", "impacts", "motions", "controller", "at"),
 }
 LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "power:5", "power:3+5+7")
 CODES = {-1, 0, 1, 2, 3, 4}
