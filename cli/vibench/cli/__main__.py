@@ -354,7 +354,7 @@ COMMANDS = {
     "docs": Place(
         "docs",
         "docs",
-        "Build the documentation site from what is installed, if it is not there, and say where it lies.",
+        "Build the documentation site of this version unless it exists; print the path of its first page.",
         Panel.INSTALLATION,
     ),
     "schema": Place(

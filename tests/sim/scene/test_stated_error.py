@@ -106,16 +106,14 @@ def test_roundings_that_grow_are_in_the_error_of_a_law_that_is_flown_exactly(
 ):
     """All lengths times a number: the same scene. Exact laws, compared with themselves, said 1e-11."""
     found = []
-    for scale in np.linspace(0.7, 1.4, 12):
+    for scale in np.linspace(0.7, 1.4, 24):
         drive = Harmonic(frequency_hz, scale * amplitude_m)
         specimen = gong2025(contact=contact, gap_m=scale * 45e-6)
         length = FixedDuration(duration_s, 0.5 * duration_s)
         answer = solve_scene(Scene(specimen, drive, duration=length, budget_s=0.0))
         found.append((answer.response_i, answer.response_i * answer.response_i_error))
     answers, stated = np.transpose(found)
-    outside = np.abs(answers[:, None] - answers) > stated[:, None] + stated
-    # Roundings are drawn anew: 19 of 20 pairs.
-    assert np.count_nonzero(outside) <= outside.size / 20
+    assert np.all(np.abs(answers[:, None] - answers) <= stated[:, None] + stated)
 
 
 def test_what_steps_change_before_starts_come_apart_is_stated_too():

@@ -34,7 +34,7 @@ def density_at(spectrum: Spectrum, frequency_hz: NDArray[np.floating]) -> Sample
 
 
 class HeldNoise(PeriodicNoise, AbstractFeedback):
-    """Noise as it was asked for at the base: a spectrum in (m/s2)2/Hz, white or shaped.
+    """Noise with a given acceleration spectrum at the base, white or shaped.
 
     Every realisation has phases of its own, as that of `WhiteNoise`, and a drive that follows from the
     gains measured before. The first ``equalisations`` of them, at levels that rise from ``start_db``, are not

@@ -30,11 +30,12 @@ def need_extra(extra: str) -> None:
 
 
 def need_space(megabytes: int, advice: str = "") -> None:
-    """Require address space for the libraries and their threads [MB]: they hang or abort where it runs out.
+    """Require address space for the libraries and their threads: they hang or abort where it runs out.
 
-    Raises ConfigurationError where the limit is lower; ``advice`` is its last sentence.
+    ``megabytes`` is the space [MB]. Raises ConfigurationError where the limit is lower; its last sentence is
+    ``advice``.
     """
-    if sys.platform == "win32":
+    if sys.platform == "win32" or find_spec("resource") is None:
         return
     import resource  # noqa: PLC0415 - POSIX only
 

@@ -38,7 +38,7 @@ SAFETY = 2.0
 """Error that is stated over the error that was measured."""
 ROUNDING = 1e-11
 """Relative error of an exact answer."""
-ROUNDED = 3e-14
+ROUNDED = 1e-13
 """How far away a compared run starts, over the drive's amplitude: some times what roundings come to over a
 run, since the difference that it makes is one draw of many."""
 _SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
