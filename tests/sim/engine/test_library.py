@@ -1,6 +1,7 @@
 """The library of the native engine: found, checked, rebuilt, and the same on every family of processors."""
 
 import importlib.util
+import threading
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,9 +17,11 @@ from vibench.sim.engine import (
     RunRecord,
     Watch,
     check_known_answer,
+    collision_structure,
     library_path,
     native_engine,
     parse_structures,
+    power_structure,
     scene_of,
     usable_families,
 )
@@ -155,3 +158,16 @@ def test_without_its_sources_an_installed_engine_is_taken_as_it_is(tmp_path, mon
     installed.unlink()
     with pytest.raises(EngineError, match="install vibench again"):
         library_path()
+
+
+def test_threads_that_ask_first_at_once_share_one_table_of_collisions():
+    """Runs point into it: a second one was dropped while it was used, and numbers were wrong."""
+    engine, threads = Engine(library_path()), 8
+    start = threading.Barrier(threads)
+
+    def places(_):
+        start.wait()
+        return collision_structure(engine).ctypes.data, power_structure(engine).ctypes.data
+
+    with ThreadPoolExecutor(threads) as pool:
+        assert len(set(pool.map(places, range(threads)))) == 1

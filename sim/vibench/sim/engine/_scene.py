@@ -4,6 +4,7 @@ import cmath
 import math
 from dataclasses import replace
 from functools import cache
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,10 +84,25 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
     return scene
 
 
-# The tables of a run point into these, so that they live as long as the process.
-@cache
 def power_structure(engine: Engine) -> Structure:
     """Return the `PowerShapes` of native/structures.hpp."""
+    with _ONE_THREAD:
+        return _power_structure(engine)
+
+
+def collision_structure(engine: Engine) -> Structure:
+    """Return the `CollisionShapes` of native/structures.hpp."""
+    with _ONE_THREAD:
+        return _collision_structure(engine)
+
+
+# The tables of a run point into these, so that they live as long as the process. Without the lock two threads
+# would make one each at the first call, and the cache would drop one of them.
+_ONE_THREAD = Lock()
+
+
+@cache
+def _power_structure(engine: Engine) -> Structure:
     shapes = engine.new("PowerShapes")
     shapes["points"], shapes["weights"] = POINTS_AT, GAUSS_WEIGHTS
     shapes["shares"] = POWER_SHARES[:, :, :GAUSS_POINTS]
@@ -98,8 +114,7 @@ def power_structure(engine: Engine) -> Structure:
 
 
 @cache
-def collision_structure(engine: Engine) -> Structure:
-    """Return the `CollisionShapes` of native/structures.hpp."""
+def _collision_structure(engine: Engine) -> Structure:
     solved = engine.new("CollisionShapes")
     solved["shares"] = SHARES[:, :, :POINTS]
     solved["ends"] = SHARES[:, :, POINTS].T
