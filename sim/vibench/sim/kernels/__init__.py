@@ -1,4 +1,4 @@
-"""What compiled code is made of: compilation, vectors in registers, a clock, polynomials.
+"""Building blocks of compiled code: compilation, vectors in registers, a clock, polynomials.
 
 `kernel`, `kernel_without_refcount` and `inlined` are the three ways to compile a function with numba
 (docs/decisions: 0018-first-use.md, 0027-numbers-in-registers.md); the cache on disk is keyed by all sources

@@ -1,4 +1,4 @@
-"""What is simulated, as values: specimen, contact law, drive, accuracy, and the specimen without contact.
+"""Definition of a simulation: specimen, contact law, drive, accuracy, and the specimen without contact.
 
 `Specimen` and the contact laws are frozen and validated; a law also has a name in one word, `power:3+5` or
 `hertz`. `Harmonic`, sweeps and `Sampled` say how the base moves, `Accuracy` how exactly to integrate,

@@ -1,4 +1,4 @@
-"""m1 on a rigid stop that holds it: exact motion until the stop would have to pull; lift-off.
+"""m1 resting on a rigid stop: exact motion until the contact force reaches zero; lift-off.
 
 Release is found like a touch, by the proof of `flight`, from the acceleration that presses m1 on the stop.
 After lift-off the gap grows from nothing, so that the first moment of the flight is bounded instead of

@@ -1,4 +1,4 @@
-"""Motion with m1 on a rigid stop that holds it: exact, until the stop would have to pull. SI units.
+"""Motion with m1 resting on a rigid stop: exact until the contact force reaches zero. SI units.
 
 A rigid stop makes two bodies of three (`vibench.sim.model`). It lets go where the acceleration that presses
 m1 on it (`vibench.sim.rigid.press_on`) falls to zero: found like a touch, by the same proof.
