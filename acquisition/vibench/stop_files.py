@@ -1,4 +1,4 @@
-"""Stops that are put down as files for a program that drives, and how their sender sees what became of them.
+"""Stop requests written as files for a program that drives, and how their sender learns the result.
 
 A file ``PID.START.stop-LEVEL`` in the folder of engines is a stop for the process of that number that began
 then. The program renames it to ``.taken-LEVEL`` when it obeys, touches it while it ramps down, and removes it
@@ -13,35 +13,35 @@ from enum import Enum, auto
 
 LONGEST_REASON = 500
 TAKEN_S = 1.0
-"""How long a program may take to take a stop; it looks twenty times a second [s]."""
+"""Longest time for a program to accept a stop; it checks twenty times a second [s]."""
 HEEDED_S = 5.0
-"""How long it may then do nothing before its output is off; a block and a setting are some tenths [s]."""
+"""Longest time without progress until its output is off; a block and a setting take some tenths [s]."""
 LOOK_S = 0.01
 SWITCH_OFF = "The generator may still be driving: switch the amplifier off, then open the bench again"
 
 
 class Fate(Enum):
-    """What became of a stop."""
+    """Result of a stop."""
 
     SILENT = auto()
-    """The program took it, and confirmed that its output is off."""
+    """The program accepted it and confirmed that its output is off."""
     UNCONFIRMED = auto()
-    """The program took it, and did not confirm that its output is off."""
+    """The program accepted it but did not confirm that its output is off."""
     NOT_TAKEN = auto()
 
 
 def stop_path(folder: str, pid: int | str, start: str, level: str) -> str:
-    """Return where a stop is put down."""
+    """Return the path of a stop file."""
     return os.path.join(folder, f"{pid}.{start}.stop-{level}")  # noqa: PTH118 - pathlib takes 8 ms to load
 
 
 def taken_path(stop: str) -> str:
-    """Return the name of a stop from the moment at which it is obeyed."""
+    """Return the path of a stop file once the stop is obeyed."""
     return ".taken-".join(stop.rsplit(".stop-", 1))
 
 
 def put_down(stop: str, reason: str) -> None:
-    """Leave a stop, whole or not at all; raises OSError when there is no room for a name."""
+    """Write a stop file, completely or not at all; raises OSError when the folder has no room for it."""
     coming = f"{stop}-{os.getpid()}-{time.monotonic_ns()}"
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
     try:
@@ -54,7 +54,7 @@ def put_down(stop: str, reason: str) -> None:
 
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:
-    """Wait until a program has obeyed a stop that was put down, or does not."""
+    """Wait until a program has obeyed a stop, or fails to."""
     give_up_s = time.monotonic() + TAKEN_S
     while _changed_ns(stop) is not None:
         if time.monotonic() > give_up_s:

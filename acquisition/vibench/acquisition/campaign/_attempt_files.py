@@ -26,7 +26,7 @@ def complete_attempt(
 ) -> KeptRecording | None:
     """Find a complete recording of a point; the last damaged one where there is no sound one, or None.
 
-    Raises RecordingError when one is complete, but was made by another plan.
+    Raises RecordingError when one is complete but was measured with another plan.
     """
     damaged: KeptRecording | None = None
     for path in attempts_in(folder, name):

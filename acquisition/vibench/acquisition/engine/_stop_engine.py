@@ -25,13 +25,13 @@ class StopDelivery(StrEnum):
     """How a stop has reached a program."""
 
     TOLD = "told"
-    """An engine has taken it, and nothing drives there: the output was read back as off."""
+    """An engine accepted it, and nothing drives: the output was read back as off."""
     TAKEN = "taken"
-    """The same of a program that is no engine."""
+    """The same for a program that is not an engine."""
     UNHEEDED = "unheeded"
-    """It has taken it, and has not confirmed that its output is off."""
+    """The engine accepted it but has not confirmed that its output is off."""
     KEPT = "kept"
-    """It has not taken it: its process lives, and obeys as soon as it comes back."""
+    """The engine has not accepted it: its process is alive and obeys when it resumes."""
 
 
 def stop_engine(

@@ -63,7 +63,7 @@ class ExcitationKind:
 
     @property
     def about(self) -> str:
-        """What is played, in a line."""
+        """One-line description of the signal."""
         return getdoc(self.plan).splitlines()[0]  # type: ignore[union-attr] # each has a docstring
 
     @property

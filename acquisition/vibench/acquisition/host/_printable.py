@@ -1,4 +1,4 @@
-"""Text of a file, a folder or an instrument on its way to a reader."""
+"""Printable form of text from a file, a folder or an instrument."""
 
 from unicodedata import category
 

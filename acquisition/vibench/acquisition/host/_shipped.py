@@ -12,7 +12,7 @@ SUFFIX = ".toml"
 
 
 def shipped(name: str) -> Path:
-    """Path of a file that comes with vibench, by its ``name``: ``"hardware_configs/virtual_rig.toml"``.
+    """Path of a file shipped with vibench, by ``name``: ``"hardware_configs/virtual_rig.toml"``.
 
     Raises ConfigurationError when this installation has no such file.
     """

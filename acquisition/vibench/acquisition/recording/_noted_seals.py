@@ -1,4 +1,4 @@
-"""The seals that campaigns have noted in their journals: they show another recording under the same name.
+"""Seals listed in the journals of campaigns: they reveal another recording under the same name.
 
 The check of a seal asks for them, so that every command identifies recordings by this one rule.
 """

@@ -107,7 +107,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
 
 
 def _require_whole(made: Path, header: RecordingHeader) -> None:
-    """Read back what was written: h5py does not report a disk that fails while it closes an object.
+    """Read back the written data: h5py does not report a disk that fails while it closes an object.
 
     Raises OSError where something is missing.
     """

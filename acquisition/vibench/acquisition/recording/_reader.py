@@ -198,7 +198,7 @@ class Recording(RecordingDescription):
         return digest.hexdigest() == read_attributes(self._open.file[role])["sha256"]
 
     def check_seal(self, depth: SealDepth | str, key: SealKey | None = None) -> SealCheck:
-        """Hold the recording against the seal that it got at its end, and the one that a campaign noted.
+        """Check the recording against its own seal, and against the one in a campaign's journal.
 
         Parameters
         ----------

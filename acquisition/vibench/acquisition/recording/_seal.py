@@ -66,7 +66,7 @@ class SealState(StrEnum):
     UNSEALED = "unsealed"
     """Made before recordings had seals: nothing shows whether scales, tables and plan were changed."""
     SEAL_GONE = "seal_gone"
-    """Written by a version that seals every recording, and without its seal."""
+    """Written by a version that seals every recording, but the seal is missing."""
     UNFINISHED = "unfinished"
     """Still being recorded, or cut off: it is sealed when it is finished or recovered."""
     OTHER_KEY = "other_key"

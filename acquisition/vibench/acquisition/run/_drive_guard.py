@@ -1,4 +1,4 @@
-"""Watches a run, and silences its drive when the run reads no more blocks."""
+"""Watches a run and silences its drive when the run reads no more blocks."""
 
 from collections.abc import Callable
 from time import monotonic
@@ -13,11 +13,11 @@ STANDSTILL_BLOCKS = 50
 STOPPED_BLOCKS = 15
 """The same after a stop was requested."""
 _LONGEST_ROUND_S = 0.1
-"""Longest time between two looks that counts [s]: in a longer one the whole process was halted."""
+"""Longest interval between two checks that counts [s]: in a longer one the whole process was suspended."""
 
 
 class DriveGuard(ClosedOnLeaving):
-    """Holds what silencing needs before the drive begins: a thread, memory, and the request to end.
+    """Reserves what silencing needs before the drive begins: a thread, memory, and the request to end.
 
     The run calls it when its drive begins and after every block. From then on a stop of this process counts
     the drive as on, until its output was read back as off.
@@ -63,7 +63,7 @@ class DriveGuard(ClosedOnLeaving):
         self._confirm()
 
     def close(self) -> None:
-        """End the watch. Legal at any time; a drive whose silence is not confirmed still counts as on."""
+        """Stop watching. Legal at any time; a drive that is not confirmed as off still counts as on."""
         self._watchdog.close()
 
     def _look(self) -> None:

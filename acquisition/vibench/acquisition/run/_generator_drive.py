@@ -21,7 +21,7 @@ GUARD_S = 0.02
 """A burst is triggered so long after the last one must have ended: what a trigger does to one that still
 plays is not documented for every firmware, and the times of reading vary by some milliseconds [s]."""
 CHECK_MARGIN_S = 0.5
-"""A check's burst outlasts the check by this: commands and the reading of samples take their time [s]."""
+"""Extra length of a check's burst, for commands and the reading of samples [s]."""
 LITTLE = 0.98
 """A level is not lowered before the frequency changes where it is lowered by less than this."""
 MOST_CYCLES = 50_000

@@ -38,7 +38,7 @@ class SilenceWatch:
         self._residue_v = inf
         self._loudest_v = 0.0
         self.is_heard = False
-        """Whether the drive was still there when it had been listened to for long enough."""
+        """Whether the drive was still present at the end of the listening time."""
 
     def learn_hum(self, quiet: Samples) -> None:
         """Take volts (channels, samples) of a time at which nothing played."""

@@ -1,15 +1,15 @@
-"""Which drives of this process may be on: a stop is confirmed when there is none."""
+"""Drives of this process that may be on: a stop is confirmed when there are none."""
 
 
 class DrivesOn:
-    """The drives that have begun and whose silence nobody has confirmed."""
+    """Drives that have started and are not yet confirmed as off."""
 
     def __init__(self) -> None:
         self._drives: set[object] = set()
         self._has_advanced = False
 
     def __bool__(self) -> bool:
-        """Whether any may be on."""
+        """Whether any drive may be on."""
         return bool(self._drives)
 
     def begin(self, drive: object) -> None:

@@ -69,7 +69,7 @@ class KeptStops:
         self.confirm()
 
     def confirm(self) -> None:
-        """Take away what was obeyed once nothing drives any more; until then, show signs of life."""
+        """Remove obeyed stops once nothing drives; until then, show that the program is alive."""
         is_advancing = DRIVES_ON.take_advance()
         for taken in tuple(self._taken):
             with suppress(OSError):  # somebody has emptied the folder

@@ -1,4 +1,4 @@
-"""Memory held back for silencing: it is given back when there is no other."""
+"""Memory reserved for silencing the drive: it is released when memory is exhausted."""
 
 import mmap
 from collections.abc import Iterator
@@ -12,14 +12,14 @@ RESERVE_BYTES = 16_000_000
 
 
 class MemoryReserve:
-    """Address space of no use but to be given back."""
+    """Reserved address space."""
 
     def __init__(self) -> None:
         self._held: mmap.mmap | None = None
         self._changing = Lock()
 
     def hold(self) -> None:
-        """Hold it, before anything drives. Raises AcquisitionError when there is no such memory."""
+        """Reserve it before anything drives. Raises AcquisitionError when memory is too short."""
         with self._changing:
             if self._held is None:
                 try:
@@ -32,14 +32,14 @@ class MemoryReserve:
                     ) from error
 
     def release(self) -> None:
-        """Give it back. Legal at any time."""
+        """Release the reserve. Legal at any time."""
         held, self._held = self._held, None
         if held is not None:
             held.close()
 
     @contextmanager
     def released_when_short(self) -> Iterator[None]:
-        """Give it back at a MemoryError inside, which goes on."""
+        """Release the reserve at a MemoryError inside, and re-raise it."""
         try:
             yield
         except MemoryError:

@@ -16,7 +16,7 @@ _HARMLESS = ("SIGCHLD", "SIGCLD", "SIGURG", "SIGWINCH", "SIGCONT", "SIGINFO")
 _PAUSES = ("SIGTSTP", "SIGTTIN", "SIGTTOU")
 """Stop a process, as Ctrl-Z does; a terminal sends the last two again and again."""
 _ALWAYS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK", "SIGXCPU")
-"""Heeded whatever a program does about them otherwise; the others only where it does nothing."""
+"""Always heeded; other signals are heeded only if the program does not handle them."""
 
 
 @contextmanager
@@ -75,7 +75,7 @@ def _signals(switch: StopSwitch) -> Iterator[None]:
 
 
 def signal_name(number: int) -> str:
-    """Return the name of a signal; real-time signals have none but their number."""
+    """Return the name of a signal; real-time signals have only a number."""
     known = {each.value: each.name for each in signal.Signals}
     return known.get(number, f"signal {number}")
 

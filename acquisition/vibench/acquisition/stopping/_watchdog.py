@@ -13,7 +13,7 @@ LEFT_ALONE_S = 1.0
 
 
 class Watchdog:
-    """Lets something be done at every `INTERVAL_S`, in a thread of its own, until closed.
+    """Calls a function at every `INTERVAL_S`, in a separate thread, until closed.
 
     Raises AcquisitionError when the system gives no thread.
     """

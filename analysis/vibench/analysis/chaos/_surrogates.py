@@ -27,7 +27,7 @@ class SurrogateTest:
     spectrum_error: float
     """Largest relative error of a surrogate's spectrum."""
     least_margin: float = 0.0
-    """Margin below which the statistic is chance."""
+    """Margin below which the statistic is due to chance."""
 
     @property
     def margin(self) -> float:
@@ -117,7 +117,7 @@ def surrogate_test(series: Reals, *, seed: int = 0) -> SurrogateTest:
 def gaussianised(series: Reals) -> Reals:
     """Replace values by normal ones of the same rank: this undoes a static, monotone nonlinearity of noise.
 
-    Surrogates with the bent values themselves have a spectrum that only iterations approach.
+    Surrogates with the distorted values themselves match the spectrum only after iterations.
     """
     rank = np.argsort(np.argsort(series))
     return np.asarray(ndtri((rank + 0.5) / series.size))

@@ -12,7 +12,7 @@ _EXPLAINED = 0.02
 """Part of the spread that the harmonics of one rotation may leave unexplained on a smooth closed curve."""
 _NOISE_MARGIN = 1.5
 _CLEAR = 0.8
-"""Left over, at most, where one rotation stands out of noise that could explain all the rest."""
+"""Largest residual beside one rotation that stands out of noise."""
 _MAINS_HZ = (50.0, 60.0)
 _MAINS_HARMONICS = 3
 _MAINS_WITHIN = 1e-3
@@ -59,7 +59,7 @@ def is_torus(found: Rotation, noise_over_spread: float) -> bool:
 
 
 def mains_hz(found: Rotation, drive_hz: float, periods: int) -> float | None:
-    """Return the frequency of the mains, or of its harmonic, that makes points turn so fast; else None."""
+    """Return the mains frequency, or its harmonic, that explains this rotation of the points; else None."""
     for mains in _MAINS_HZ:
         for hum_hz in mains * np.arange(1, _MAINS_HARMONICS + 1):
             turns = hum_hz / drive_hz

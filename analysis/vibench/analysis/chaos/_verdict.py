@@ -49,7 +49,7 @@ def begin_of_last_motion(points: Points) -> int:
 
 
 MOST_POINTS = 3000
-"""The shape of the last so many points is judged: more would only cost time."""
+"""Number of last points whose shape is tested: more would only cost time."""
 ABOVE_NOISE = 5.0
 """Scatter of the points over their noise below which its shape says nothing."""
 LARGEST_NOISE = 0.1
@@ -59,7 +59,7 @@ SMALL = 0.05
 SLOW = 0.5
 """Part of the points' variance between tenths of the record, beyond which slow change explains it."""
 _FEWEST_TURNS = 3.0
-"""Of a closed curve in a record, below which it is no more than a slow change."""
+"""Turns of a closed curve in a record below which it counts as a slow change."""
 _LARGEST_HUM = 0.1
 """Part of the orbit that mains hum may reach; more may be a motion at its frequency."""
 _LOW_PERIOD = 4

@@ -1,4 +1,4 @@
-"""Channels of a file on one time axis: aligned by what the file says of time, or refused."""
+"""Channels of a file on one time axis: aligned by the times in the file, or refused."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -12,7 +12,7 @@ from ._source_channel import SECONDS, SourceChannel
 from ._time_axis import Piece, agrees, pieces
 
 _APART = 0.1
-"""Part of a sample interval by which channels that are analysed together may be apart unnoticed."""
+"""Largest offset, in sample intervals, that channels analysed together may have."""
 _IGNORE = 'give time = "even" and sample_rate_hz in the mapping to ignore it'
 _UNITS = ("s", "ms", "us")
 
@@ -29,7 +29,7 @@ class Alignment:
     late_s: tuple[float, ...]
     """How much later than its place each channel was sampled, less than half an interval."""
     remarks: tuple[str, ...]
-    """What the file says of time beyond a rate, and what the mapping put in its place."""
+    """Time information in the file beyond a rate, and its replacement by the mapping."""
 
 
 def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> Alignment:
@@ -91,7 +91,7 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
 
 
 def _with_unit(channel: SourceChannel, mapping: ImportMapping) -> SourceChannel:
-    """Return a channel with times in the unit of the mapping, or in the one that its sample rate demands."""
+    """Return a channel with times in the unit of the mapping, or in one that agrees with its sample rate."""
     if mapping.time == "even":
         return SourceChannel(channel.name, channel.samples, channel.label)
     if channel.time_unit is None:

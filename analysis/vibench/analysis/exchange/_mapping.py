@@ -109,7 +109,7 @@ class ImportMapping(FrozenModel):
     time: Literal["file", "even"] = "file"
     """``"even"``: samples are even, simultaneous, at ``sample_rate_hz``, whatever the file says of time."""
     time_unit: Literal["s", "ms", "us"] | None = None
-    """Of the file's times, where the file states none or a wrong one."""
+    """Unit of the file's times, if missing or wrong there."""
     origin: Origin | None = None
     """``"real"`` or ``"simulated"``; as the file says where it is left out, and real if that is silent."""
     measurement: Measurement

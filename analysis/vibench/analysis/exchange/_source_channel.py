@@ -64,7 +64,7 @@ class SourceChannel:
     time_unit: str | None = None
     """Unit of its times, empty where the file states none; None where it has no times."""
     time_trouble: str = ""
-    """What the file says of its time that cannot be."""
+    """Contradiction in the file's time information; empty if there is none."""
 
     @property
     def rates_hz(self) -> tuple[float, float]:

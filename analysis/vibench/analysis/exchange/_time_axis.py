@@ -1,4 +1,4 @@
-"""What a file says of time, whatever its format: a rate or an interval by name, or a channel of times."""
+"""Time information in a file of any format: a named rate or interval, or a channel of times."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -31,7 +31,7 @@ EVEN = 1e-3
 _PLACED = 0.1
 """How far it may lie from a place on any even axis, beside the rounding of the times."""
 _OFF, _MANY_OFF = 0.25, 0.05
-"""Where more than so large a share of the intervals is so far off the median, times have too few digits."""
+"""Share of intervals, and their relative deviation from the median, above which times have too few digits."""
 _COARSE_SPREAD = 1.25
 """Of coarse times about a straight line, in their last digit; more shows that samples are missing."""
 _RISING = 0.9
@@ -119,7 +119,7 @@ class TimeAxis:
 
 
 def agrees(rate_hz: float, bounds_hz: tuple[float, float]) -> bool:
-    """Tell whether a rate lies within bounds, or as near to them as two clocks."""
+    """Return whether a rate lies within bounds, widened by the difference of two clocks."""
     low, high = bounds_hz
     return low * (1 - SAME_RATE) <= rate_hz <= high * (1 + SAME_RATE)
 
@@ -194,7 +194,7 @@ class _Scan:
         self._samples += block.size
 
     def axis(self) -> TimeAxis:
-        """Judge what was seen."""
+        """Evaluate the times seen."""
         places, distance = np.concatenate(self._kept, axis=1) if self._kept else np.zeros((2, 1))
         span = max(float(places.max()), 1.0)
         slope, offset = np.polyfit(places / span, distance, 1) if np.ptp(places) else (0.0, 0.0)

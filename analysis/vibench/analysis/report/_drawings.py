@@ -60,7 +60,7 @@ class Drawing(Generic[A, L]):
     findings: Callable[[Result[A, L]], Iterator[str]]
     """The first sentence is the result, the others are its statistics."""
     numbers: Callable[[Result[A, L]], Iterator[tuple[str, str]]]
-    """What a reader takes away, each with its bounds, the most important first."""
+    """The main numbers, each with its bounds, the most important first."""
     tables: tuple[Callable[[Sequence[Result[A, L]]], ReportTable], ...] = ()
     together: Callable[[Sequence[Result[A, L]]], Iterator[DrawnFigure]] = lambda _: iter(())
 
