@@ -11,7 +11,7 @@ from vibench.acquisition import printable
 
 def plain_lines(text: str) -> str:
     """Write every line of a text without control characters."""
-    return "\n".join(map(printable, text.split("\n")))
+    return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
 
 
 def plain_tip(text: str) -> str:
