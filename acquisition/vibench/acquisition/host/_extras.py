@@ -35,18 +35,15 @@ def need_space(megabytes: int, advice: str = "") -> None:
     ``megabytes`` is the space [MB]. Raises ConfigurationError where the limit is lower; its last sentence is
     ``advice``.
     """
-    if sys.platform == "win32":
-        return
-    if find_spec("resource") is None:  # tests take it away
-        return
-    import resource  # noqa: PLC0415 - POSIX only
+    if sys.platform != "win32" and find_spec("resource") is not None:
+        import resource  # noqa: PLC0415 - POSIX only
 
-    most, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if most not in (resource.RLIM_INFINITY, -1) and most < 1_000_000 * megabytes:
-        raise ConfigurationError(
-            f"this process may have {most / 1e6:.0f} MB of address space, and needs {megabytes} MB. Nothing "
-            f"was done; raise the limit (ulimit -v {1000 * megabytes}) and try again. {advice}".rstrip()
-        )
+        most, _ = resource.getrlimit(resource.RLIMIT_AS)
+        if most not in (resource.RLIM_INFINITY, -1) and most < 1_000_000 * megabytes:
+            raise ConfigurationError(
+                f"this process may have {most / 1e6:.0f} MB of address space, and needs {megabytes} MB. "
+                f"Nothing was done; raise the limit (ulimit -v {1000 * megabytes}) and try again. {advice}".rstrip()
+            )
 
 
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
