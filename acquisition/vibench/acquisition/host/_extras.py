@@ -42,7 +42,8 @@ def need_space(megabytes: int, advice: str = "") -> None:
         if most not in (resource.RLIM_INFINITY, -1) and most < 1_000_000 * megabytes:
             raise ConfigurationError(
                 f"this process may have {most / 1e6:.0f} MB of address space, and needs {megabytes} MB. "
-                f"Nothing was done; raise the limit (ulimit -v {1000 * megabytes}) and try again. {advice}".rstrip()
+                "Nothing was done; "
+                f"raise the limit (ulimit -v {1000 * megabytes}) and try again. {advice}".rstrip()
             )
 
 
