@@ -90,21 +90,29 @@ def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
     places, found = scipy.signal.find_peaks(height, prominence=_CROWD_RISE * least)
     rise = found["prominences"] / np.maximum(least, _LEAST_RISE_SD * spread[places])
     others_hz = frequency_hz[places[rise > _CROWD_RISE]]
-    peaks = []
-    for place in places[rise > 1.0]:
+    clear = places[rise > 1.0]
+    peaks: list[CurvePeak] = []
+    for place in clear[np.argsort(-height[clear])]:
+        if len(peaks) == most:
+            break
         peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
         away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
         # It is itself one of them.
         if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
             peaks.append(peak)
-    highest = sorted(peaks, key=lambda each: -each.magnitude)[:most]
-    return tuple(sorted(highest, key=lambda each: each.frequency_hz))
+    return tuple(sorted(peaks, key=lambda each: each.frequency_hz))
 
 
 def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> tuple[CurvePeak, float]:
     """Measure a peak; gives it, and the larger of its two half widths [Hz]."""
     x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
-    bend, slope, top = np.polyfit(x - x[1], y, 2)
+    # The parabola by divided differences: a chaotic curve has thousands of peaks to be looked at.
+    (left, right), (before, after) = np.diff(y) / np.diff(x), np.diff(x)
+    bend, slope, top = (
+        (right - left) / (before + after),
+        (left * after + right * before) / (before + after),
+        y[1],
+    )
     offset = float(np.clip(-slope / (2 * bend), x[0] - x[1], x[2] - x[1])) if bend < 0 else 0.0
     peak = float(top + slope * offset + bend * offset**2)
     at_hz = float(np.exp(x[1] + offset))
