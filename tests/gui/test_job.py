@@ -4,6 +4,7 @@ import os
 import signal
 import time
 from functools import partial
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
@@ -12,6 +13,8 @@ from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QLineEdit, QMe
 from vibench.acquisition import open_recording
 from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import REJECTED
+from vibench.analysis import analyse
 from vibench.gui.page import AppContext, Settings
 from vibench.gui.page._user_actions import ABORT_KEY, OPERATOR_STOP
 from vibench.gui.pages.rig._rig_choice import PACES
@@ -147,6 +150,12 @@ def type_into_dialog(qtbot, text):
     return timer
 
 
+def give_focus(qtbot, window):
+    """Make the window active: no window manager here does so when a dialog has closed."""
+    window.activateWindow()
+    qtbot.waitUntil(lambda: QApplication.activeWindow() is window, timeout=PATIENCE_MS)
+
+
 def read_and_start(qtbot, window):
     """Read what will happen to its end, and start it."""
     while window.context.bridge.state is EngineState.ARMED:
@@ -155,10 +164,17 @@ def read_and_start(qtbot, window):
         qtbot.waitUntil(lambda: not window.context.bridge.is_ordering, timeout=PATIENCE_MS)
 
 
-def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
+@pytest.mark.parametrize(("width", "height", "points"), [(1280, 720, 10), (1024, 700, 14)])
+def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path, qapp, width, height, points):
     """Another measurement is made, looked at, compared with those before it, and exported."""
     key = partial(press, qtbot, bench)
     files, compare = bench.pages[FILES], bench.pages[COMPARE]
+    font = qapp.font()
+    font.setPointSize(points)
+    qapp.setFont(font)
+    qtbot.waitUntil(lambda: bench.is_themed, timeout=PATIENCE_MS)
+    bench.resize(width, height)
+    give_focus(qtbot, bench)
     before = len(list(bench.context.folder.rglob("*.h5")))
     reach(qtbot, bench, EngineState.READY)
     key(Qt.Key.Key_2, CONTROL)
@@ -186,6 +202,9 @@ def test_the_whole_job_is_done_by_keyboard_alone(bench, qtbot, tmp_path):
     qtbot.waitUntil((tmp_path / "overlay.svg").exists, timeout=PATIENCE_MS)
     assert not timer.isActive()
     qtbot.waitUntil(lambda: bench.strip.notices[-1].what.startswith("Written"), timeout=PATIENCE_MS)
+    assert (bench.width(), bench.height()) == (width, height)
+    font.setPointSize(10)
+    qapp.setFont(font)
 
 
 def test_the_whole_job_is_done_by_mouse_alone(bench, qtbot, tmp_path):
@@ -337,6 +356,25 @@ def test_the_live_pictures_show_the_run(bench, qtbot):
     reach(qtbot, bench, EngineState.READY)
     with open_recording(recorded(bench).file) as recording:
         assert any("tapped the table" in event.text for event in recording.events)
+
+
+def test_an_average_of_noise_is_rejected_while_it_is_played(bench, qtbot):
+    noise = {"kind": "white_noise", "amplitude_vpp": 0.2, "band_start_hz": 40, "band_stop_hz": 600}
+    noise |= {"realisations": 12, "settle_s": 1.0}
+    plan = {"name": "noise", "ramp_s": 0.3, "ramp_step_s": 0.03, "excitation": noise}
+    bench.pages[TEST].form.show_value(Measurement.model_validate(plan))
+    reach(qtbot, bench, EngineState.READY)
+    give_focus(qtbot, bench)
+    bench.user_actions.arm_test()
+    reach(qtbot, bench, EngineState.ARMED)
+    read_and_start(qtbot, bench)
+    card = bench.pages[RUN].watch_card
+    qtbot.waitUntil(lambda: card.averages.text().endswith(" of 12"), timeout=PATIENCE_MS)
+    card.reject_button.click()
+    reach(qtbot, bench, EngineState.READY)
+    with open_recording(recorded(bench).file) as recording:
+        assert [each.text for each in recording.events if each.kind == "mark"] == [REJECTED]
+    assert analyse(Path(recorded(bench).file)).response.periodic.realisations == 11
 
 
 def test_what_is_complained_of_goes_when_it_has_come_about(bench, qtbot):
