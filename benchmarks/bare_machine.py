@@ -1,6 +1,6 @@
 """The README's two commands on a bare Debian: no compiler, no git, none of Qt's libraries, no vibench before.
 
-    sudo python benchmarks/bare_machine.py /var/tmp/bare
+    sudo python benchmarks/bare_machine.py FOLDER
 
 debootstrap makes the system in the given folder, which takes some 3 GB in the end, and chroot runs in it. The
 commands are those of README.md. Each ends with its exit code, its seconds and the last lines that it printed.

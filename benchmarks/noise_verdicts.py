@@ -4,7 +4,7 @@
     python benchmarks/noise_verdicts.py --count 100 --seed 1 --shard 1/4 --save verdicts.json
 
 The points are narrow-band noise, one value a drive period, through a cubic, a saturation, a soft dead zone
-or a square; the chaos is that of maps and of the specimen among its stops.
+or a square. Chaos comes from maps and from the specimen with stops.
 """
 
 import argparse

@@ -7,9 +7,9 @@
 
 This process is the laboratory: the virtual rig on the wall's clock, and a witness at the generator's
 terminal. What drives is another process, which reaches the rig as it reaches real instruments: `vibench
-measure` on a terminal of its own, the window (offscreen), or another process that attends an engine. A cell
-is one run of its own process: it is brought into a state, the condition is made, the cause happens, and the
-witness waits for silence. Counted is from Enter: `vibench stop` is the installed command. Cells are drawn by
+measure` on a separate terminal, the window (offscreen), or another process that attends an engine. Each cell
+runs one process: it reaches the state, the condition is created, the cause happens, and the witness waits for
+silence. Time counts from Enter: `vibench stop` is the installed command. Cells are drawn by
 the seed and written to ``--save`` one by one; those that stand there are not measured again. Linux only; two
 conditions need a C compiler.
 """

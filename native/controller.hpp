@@ -10,7 +10,7 @@ constexpr int MOST_MEMORY = 64;
 // Rises from 0 to 1 along half a cosine.
 INLINE double eased(double share) { return 0.5 - 0.5 * cosine_sine(PI * share).cosine; }
 
-// The answer of the law [V]. The memory is that of the next sample afterwards.
+// Returns the output of the control law [V], and prepares its memory for the next sample.
 inline double answer_of_law(Controller &c, double base_volts, double m0_volts) {
   double next[MOST_MEMORY], volts = c.direct[0] * base_volts + c.direct[1] * m0_volts;
   for (int k = 0; k < c.remembered; k++) volts += c.output[k] * c.memory[k];

@@ -64,7 +64,7 @@ void test_products_keep_what_they_round_off() {
   }
 }
 
-// Newton's method, which is trusted where p surely does not turn, against the careful search.
+// Newton's method is used where p provably does not turn. It must agree with the full search.
 void test_a_touch_is_the_one_that_the_careful_search_finds() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
   const double lowest_gaps[] = {GAP, 0.3 * GAP, INFINITE};

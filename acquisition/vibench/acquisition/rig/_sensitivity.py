@@ -28,7 +28,7 @@ _SIGNS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "¹": "1", "⁻": "-", 
 def volts_per_unit(text: str, unit: str) -> float:
     """Read a sensitivity with its unit, as data sheets print it [V per ``unit``].
 
-    ``text`` is ``"100 mV/g"`` or ``"250 mm/s/V"``; ``unit`` is that of the recorded quantity: ``"m s-2"``.
+    ``text`` is ``"100 mV/g"`` or ``"250 mm/s/V"``; ``unit`` is the recorded unit, such as ``"m s-2"``.
 
     Raises ValueError when the text has no number above 0 or another unit, or can be read in two ways.
     """

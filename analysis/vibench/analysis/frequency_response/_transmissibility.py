@@ -226,9 +226,9 @@ def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexe
 def _slope(products: Complexes, value: Complexes, settings: FrequencyResponseSettings) -> Complexes:
     """Give the relative change from line to line of the density P that value = (H P) / P is averaged with.
 
-    It is that of the drive and of the estimator's instrument: the reference, x for h1, y for h2, and for hv
-    r x + H* y with the noise ratio r.
-    It is compared with the reference, else with x, which are taken as level.
+    The estimator weights lines by the drive and by its instrument: the reference, x for h1, y for h2, and
+    r x + H* y for hv with the noise ratio r. The instrument is compared with the reference, or with x where
+    there is none; both are assumed level.
     """
     s_xx, s_yx = products[_DRIVE, _DRIVE], products[_RESPONSE, _DRIVE]
     level = products[-1, -1].real if len(products) > _REFERENCE else s_xx.real

@@ -121,8 +121,8 @@ def methods_table(evidence: Evidence, case: Case) -> ReportTable:
         "Methods of integration",
         ("method", f"energy kept at {speeds} m/s", "exponent [1/s]"),
         tuple(rows),
-        "Steps fall on a contact wherever they happen to. Energy is that of m1 and m2 in a free impact, over "
-        f"that before it, mean over when in a step it begins; exponents at {SHOWN_HZ:g} Hz, 5 µm, from rest.",
+        "The first step in a contact begins at any moment. Energy of m1 and m2 after a free impact over that "
+        f"before it, averaged over that moment; exponents at {SHOWN_HZ:g} Hz, 5 µm, from rest.",
     )
 
 

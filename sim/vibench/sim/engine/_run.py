@@ -171,7 +171,7 @@ class NativeRun:
             self._state[name] = value
 
     def apart(self, tolerance: float | None = None) -> Self:
-        """Return the same motion, to be followed apart; with a tolerance of its own, without changes."""
+        """Return a copy of the motion; one with another tolerance carries no small changes."""
         twin = copy(self)
         twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
         if tolerance is not None:
