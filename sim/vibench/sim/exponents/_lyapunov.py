@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from ..kernels import Floats
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen, modal_form
 from ..motion import MAX_IMPACT_RATE_HZ, flow_derivative, state_scales
-from ..periodic import multipliers
 from ._blocking import BlockedMean, blocked_mean
 from ._settling import ALIGNING, SURE, FinalMotion, Settling, settling
 from ._tangent_run import ALMOST, Interval, TangentRun, interval_for, run_with_tangent
@@ -226,6 +225,8 @@ def _from_multipliers(
     specimen: Specimen, drive: Harmonic, run: TangentRun, cycle: int
 ) -> tuple[float, float]:
     """Largest exponent of a periodic motion over two cycles, and half of how far they differ [1/s]."""
+    from ..periodic import multipliers  # noqa: PLC0415 - it imports scipy; few scenes ask for an exponent
+
     length, state, found = cycle * run.interval.length_s, run.section[-1], []
     for _ in range(2):
         state, derivative = flow_derivative(specimen, drive, state, length)

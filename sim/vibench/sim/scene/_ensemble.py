@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import scipy
 
 from ._prediction import Ensemble, FoundMotion, MotionKind
+from ._quantiles import student_quantile
 from ._scatter import COVERED
 from ._several_starts import LASTING_S, ReachedMotion, SeveralStarts, kind_among, motions_among
 from ._shares import Count, EscapeRate, shares_of, wilson_share
@@ -104,7 +104,7 @@ def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
         # A calm start of chaos in bursts knows nothing of the bursts.
         known = [each for each in map(error_of, group) if each is not None]
         return max(known, default=None)
-    widened = math.sqrt(1.0 + 1.0 / len(group)) * float(scipy.special.stdtrit(len(group) - 1, COVERED))
+    widened = math.sqrt(1.0 + 1.0 / len(group)) * student_quantile(len(group) - 1, COVERED)
     return widened * (_deviation([each.responses_m[0] for each in group]) or 0.0)
 
 

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from ..kernels import Complex, Floats
 from ._observed_window import Block
+from ._quantiles import student_quantile
 
 COVERED = 0.975
 """Share of one tail and the middle: 19 cases of 20 with both tails."""
@@ -37,7 +37,7 @@ class WindowScatter:
         Student's t for so many blocks. Measured in seven chaotic regimes of five laws at three durations, 40
         runs each: 85 to 99.7 % of the pairs.
         """
-        return math.sqrt(2.0) * float(scipy.special.stdtrit(self.blocks - 1, COVERED)) * self.relative
+        return math.sqrt(2.0) * student_quantile(self.blocks - 1, COVERED) * self.relative
 
 
 def window_scatter(block_peaks: ArrayLike, blocks_in_window: int) -> WindowScatter | None:
@@ -97,7 +97,7 @@ def _lines_apart(parts: Complex) -> float:
     for each in (parts, 0.5 * (parts[0 : len(parts) // 2 * 2 : 2] + parts[1::2])):
         if len(each) < FEWEST_BLOCKS:
             continue
-        times = math.sqrt(2.0) * float(scipy.special.stdtrit(len(each) - 1, COVERED)) / math.sqrt(len(each))
+        times = math.sqrt(2.0) * student_quantile(len(each) - 1, COVERED) / math.sqrt(len(each))
         turned = each * (line.conjugate() / abs(line)) if line != 0.0 else each
         deviations = times * np.array([turned.real.std(ddof=1), turned.imag.std(ddof=1)])
         across = min(float(deviations[1] ** 2) / (2.0 * abs(line)), float(deviations[1]))
@@ -111,5 +111,5 @@ def draws_of_starts(answer: Floats, others: Sequence[Floats]) -> Floats:
     ``answer`` is one of them, ``others`` are more, each of shape (4,). NaN where one was lost.
     """
     found = np.array([answer, *others])
-    times = math.sqrt(2.0) * float(scipy.special.stdtrit(len(found) - 1, COVERED))
+    times = math.sqrt(2.0) * student_quantile(len(found) - 1, COVERED)
     return np.asarray(times * found.std(axis=0, ddof=1) / np.abs(answer))

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import scipy
+from ._quantiles import normal_quantile, poisson_mean
 
 UNSURE = 0.05
 """An interval misses what it is of once in twenty times."""
@@ -44,7 +44,7 @@ def wilson_share(count: float, trials: float, unsure: float = UNSURE) -> Share:
             "give one trial or more, at most as many counted, and a probability between 0 and 1."
         )
         raise ValueError(msg)
-    deviations = float(scipy.special.ndtri(1.0 - 0.5 * unsure))
+    deviations = normal_quantile(0.5 * unsure)
     share, weight = count / trials, deviations**2 / trials
     middle = (share + 0.5 * weight) / (1.0 + weight)
     half = math.sqrt(weight * (share * (1.0 - share) + 0.25 * weight)) / (1.0 + weight)
@@ -119,6 +119,6 @@ def escape_rate(escapes: int, chaotic_s: float) -> EscapeRate:
     a Poisson process (Garwood, Biometrika 28 (1936) 437).
     """
     tail = UNSURE if escapes == 0 else 0.5 * UNSURE
-    low = 0.0 if escapes == 0 else 0.5 * float(scipy.special.chdtri(2 * escapes, 1.0 - tail)) / chaotic_s
-    high = 0.5 * float(scipy.special.chdtri(2 * escapes + 2, tail)) / chaotic_s
+    low = 0.0 if escapes == 0 else poisson_mean(escapes, 1.0 - tail) / chaotic_s
+    high = poisson_mean(escapes + 1, tail) / chaotic_s
     return EscapeRate(escapes / chaotic_s, low, high, escapes, chaotic_s)
