@@ -5,8 +5,6 @@ from typing import Annotated
 
 import typer
 
-from vibench.sim.hdf5_files import external_data_allowed
-
 AllowExternal = Annotated[
     bool,
     typer.Option(
@@ -18,4 +16,8 @@ AllowExternal = Annotated[
 
 def external_data(allowed: bool) -> AbstractContextManager[None]:
     """Allow it while inside, if the user said so."""
-    return external_data_allowed() if allowed else nullcontext()
+    if not allowed:
+        return nullcontext()
+    from vibench.sim.hdf5_files import external_data_allowed
+
+    return external_data_allowed()

@@ -25,10 +25,10 @@ from vibench.sim.study import (
 )
 from vibench.sim.study._columns import SESSION
 from vibench.sim.study._errors import ClusterLost
+from vibench.sim.study._file_store import FileStore
 from vibench.sim.study._layout import STATE
 from vibench.sim.study._results import results_of
 from vibench.sim.study._run import StudyEnd
-from vibench.sim.study._store import FileStore
 
 pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
 

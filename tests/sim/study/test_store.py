@@ -24,10 +24,10 @@ from vibench.sim.study import (
 from vibench.sim.study._columns import COLUMNS, IDENTITY, NUMBERS, SESSION
 from vibench.sim.study._disk import sole_writer
 from vibench.sim.study._expansion import scene_identity
+from vibench.sim.study._file_store import FileStore, make_file
 from vibench.sim.study._layout import STATE
 from vibench.sim.study._results import results_of
 from vibench.sim.study._run import StudyEnd
-from vibench.sim.study._store import FileStore, make_file
 
 
 @pytest.fixture(scope="module")

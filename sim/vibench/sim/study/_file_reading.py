@@ -4,18 +4,19 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
-import h5py
 import numpy as np
 from pydantic import ValidationError
 
-from ..hdf5_files import UnsafeHdf5, open_hdf5
 from . import _layout as layout
 from ._arrays import Arrays
 from ._errors import StudyError
 from ._grid_plan import GridPlan
 from ._layout import PointState
+
+if TYPE_CHECKING:
+    import h5py
 
 Plan = TypeVar("Plan", bound=GridPlan)
 
@@ -80,7 +81,7 @@ def places_of(path: Path, plan: GridPlan) -> Places:
         )
 
 
-def _arrays(file: h5py.File, plan: GridPlan) -> Arrays:
+def _arrays(file: "h5py.File", plan: GridPlan) -> Arrays:
     # States first: an answer that comes while this reads is left for the next time.
     state = file[layout.STATE][...].reshape(-1)
     is_missing = state == PointState.MISSING
@@ -94,12 +95,14 @@ def _arrays(file: h5py.File, plan: GridPlan) -> Arrays:
     return arrays
 
 
-def _offset(dataset: h5py.Dataset) -> int:
+def _offset(dataset: "h5py.Dataset") -> int:
     return int(dataset.id.get_offset())
 
 
 @contextmanager
-def _opened(path: Path, kind: type[GridPlan]) -> Iterator[h5py.File]:
+def _opened(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
+    from ..hdf5_files import UnsafeHdf5, open_hdf5  # noqa: PLC0415 - h5py, which answers in memory do without
+
     if not path.is_file():
         raise StudyError(f"{path} does not exist, or is no file; give the path of a {kind.called}'s file.")
     try:
@@ -117,7 +120,7 @@ def _opened(path: Path, kind: type[GridPlan]) -> Iterator[h5py.File]:
         yield file
 
 
-def _require_ours(path: Path, file: h5py.File, kind: type[GridPlan]) -> None:
+def _require_ours(path: Path, file: "h5py.File", kind: type[GridPlan]) -> None:
     found = file.attrs.get("format")
     if not (isinstance(found, bytes) and found.decode() == kind.format):
         raise StudyError(
@@ -131,7 +134,7 @@ def _require_ours(path: Path, file: h5py.File, kind: type[GridPlan]) -> None:
         )
 
 
-def _plan(path: Path, file: h5py.File, kind: type[Plan]) -> Plan:
+def _plan(path: Path, file: "h5py.File", kind: type[Plan]) -> Plan:
     text = np.asarray(file[layout.STUDY][()]).item()
     try:
         return kind.model_validate_json(text)

@@ -15,7 +15,7 @@ from ._grid_plan import GridPlan
 from ._progress import Cancelled, StudyObserver
 from ._results import StudyResults, open_study, results_of
 from ._run import run_study
-from ._store import FileStore, MemoryStore, Store
+from ._store import MemoryStore, Store
 from ._study import Study
 from ._threads import ThreadExecutor
 
@@ -82,6 +82,8 @@ def store_of(plan: GridPlan, out: Path | None, existing: ExistingStudy | Existin
     if out is None:
         yield MemoryStore(plan)
         return
+    from ._file_store import FileStore  # noqa: PLC0415 - h5py takes longer than a short answer
+
     is_there = existing is ExistingStudy.RESUME and out.exists()
     with FileStore(out, plan) if is_there else FileStore.created(out, plan) as store:
         yield store

@@ -1,0 +1,332 @@
+"""Where answers are kept while a study runs: a file that survives a kill.
+
+Order of a commit: cells -> sync -> states -> sync. Whatever moment the process or the power ends, a point
+whose state says that it is done has all its cells. States, like everything else, are written once.
+
+The file before its first point: everything known is written, and every place for an answer is there.
+
+After this nothing but bytes at known places is written: HDF5 itself has closed the file, so that no crash
+can catch it between two steps.
+"""
+
+import os
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..operating_system import sync_file, sync_folder
+from . import _layout as layout
+from ._arrays import Arrays, PointAnswer, put
+from ._axes import StudyAxis
+from ._columns import (
+    COORDINATE,
+    COORDINATES,
+    FOUND_MOTION,
+    MOST_FOUND,
+    SESSION,
+    Column,
+)
+from ._disk import Disk, sole_writer
+from ._errors import StudyError
+from ._file_reading import places_of, read_arrays, read_plan
+from ._grid_plan import GridPlan
+from ._software import software
+
+MAKING_SUFFIX = ".making"
+_COMPONENTS = {
+    axis.name: axis
+    for axis in (
+        StudyAxis(COORDINATE, COORDINATES, "", "x, y, z and their velocities"),
+        StudyAxis(
+            FOUND_MOTION,
+            tuple(float(k) for k in range(MOST_FOUND)),
+            "1",
+            "motions of an ensemble, by their share",
+        ),
+    )
+}
+"""What the components of a column are, where that is more than their number."""
+HEAD_BYTES = 2_000_000
+"""More than sessions, axes and attributes take together."""
+
+
+def make_file(path: Path, plan: GridPlan) -> None:
+    """Create a plan's file, all points missing, or leave nothing.
+
+    Raises StudyError when the name is taken, the folder does not exist, or the disk is too full.
+    """
+    _claim_name(path)
+    making = path.with_name(path.name + MAKING_SUFFIX)
+    try:
+        _require_room(path, plan)
+        with h5py.File(making, "w", libver=layout.LIBVER, locking=False) as file:
+            _fill(file, plan)
+        sync_file(making)
+        os.replace(making, path)  # noqa: PTH105 - the pair of os.fsync
+        sync_folder(path.parent)
+    except OSError as error:
+        _discard(making, path)
+        raise StudyError(f"{path} cannot be created: {error}. Nothing was computed.") from error
+    except BaseException:
+        _discard(making, path)
+        raise
+
+
+def _discard(*paths: Path) -> None:
+    for path in paths:
+        path.unlink(missing_ok=True)
+
+
+def _claim_name(path: Path) -> None:
+    """Take the name with an empty file, so that two runs cannot both have it."""
+    try:
+        path.open("xb").close()
+    except FileExistsError:
+        raise StudyError(
+            f"{path} exists, and nothing is ever overwritten; resume it, or choose another name."
+        ) from None
+    except OSError as error:
+        raise StudyError(f"{path} cannot be created: {error.strerror}; choose another folder.") from error
+
+
+def _require_room(path: Path, plan: GridPlan) -> None:
+    needed_bytes = HEAD_BYTES + plan.grid.size * sum(
+        np.dtype(column.dtype).itemsize * column.components for column in plan.columns
+    )
+    free_bytes = shutil.disk_usage(path.parent).free
+    if free_bytes < needed_bytes:
+        raise StudyError(
+            f"{path} needs {needed_bytes / 1e6:.0f} MB for {plan.grid.size} points; the disk has"
+            f" {free_bytes / 1e6:.0f} MB. Make room, or choose another folder or a smaller {plan.called}."
+        )
+
+
+def _fill(file: h5py.File, plan: GridPlan) -> None:
+    _attach(
+        file,
+        {
+            "Conventions": layout.CONVENTIONS,
+            "format": plan.format,
+            "format_version": layout.FORMAT_VERSION,
+            "title": "predictions of vibro-impact responses",
+        },
+    )
+    text = plan.model_dump_json().encode()
+    file.create_dataset(layout.STUDY, data=np.array(text, dtype=h5py.string_dtype("utf-8", len(text))))
+    scales = [_scale(file, axis) for axis in plan.axes]
+    last: dict[str, h5py.Dataset] = {}
+    for column in plan.columns:
+        dataset = _column(file, column, plan.grid.shape)
+        if column.components > 1 and column.along not in last:
+            last[column.along] = _scale(file, _COMPONENTS.get(column.along) or _numbered(column))
+        along = [last[column.along]] if column.components > 1 else []
+        for index, scale in enumerate([*scales, *along]):
+            dataset.dims[index].attach_scale(scale)
+    _sessions(file)
+
+
+def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
+    match axis.values[0]:
+        case str():
+            raw = [str(value).encode() for value in axis.values]
+            kind = h5py.string_dtype("utf-8", max(len(each) for each in raw))
+            dataset = file.create_dataset(axis.name, data=np.array(raw, dtype=kind))
+        case _:
+            dataset = file.create_dataset(axis.name, data=np.array(axis.values, dtype="<f8"))
+            _attach(dataset, {"units": axis.units})
+    _attach(dataset, {"long_name": axis.long_name})
+    dataset.make_scale(axis.name)
+    return dataset
+
+
+def _numbered(column: Column) -> StudyAxis:
+    """Give the axis of a column whose components are told by their number."""
+    return StudyAxis(column.along, tuple(float(k) for k in range(column.components)), "1", column.along)
+
+
+def _column(file: h5py.File, column: Column, shape: tuple[int, ...]) -> h5py.Dataset:
+    """Create a contiguous dataset in its place, filled with what stands for missing."""
+    whole = shape if column.components == 1 else (*shape, column.components)
+    kind = np.dtype(column.dtype)
+    stored = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind
+    dataset = file.create_dataset(column.name, data=np.full(whole, column.missing, dtype=stored))
+    _attach(dataset, {"long_name": column.long_name})
+    match kind.kind:
+        case "f":
+            _attach(dataset, {"units": column.units})
+        case "i":
+            dataset.attrs["_FillValue"] = kind.type(column.missing)
+    if column.meanings:
+        dataset.attrs["flag_values"] = np.arange(len(column.meanings), dtype=kind)
+        _attach(dataset, {"flag_meanings": " ".join(column.meanings)})
+    return dataset
+
+
+def _sessions(file: h5py.File) -> None:
+    group = file.create_group(layout.SESSIONS)
+    for column in layout.SESSION_COLUMNS:
+        kind = h5py.string_dtype("utf-8", column.width)
+        group.create_dataset(column.name, data=np.zeros(layout.MOST_SESSIONS, dtype=kind), dtype=kind)
+    group.create_dataset(layout.N_SESSIONS, data=np.zeros(1, dtype=layout.COUNTER_DTYPE))
+
+
+def _attach(target: h5py.HLObject, values: Mapping[str, str | int | float]) -> None:
+    """Attach scalars, text as UTF-8 of fixed length, which old readers understand."""
+    for name, value in values.items():
+        match value:
+            case str():
+                raw = value.encode()
+                kind = h5py.string_dtype("utf-8", max(len(raw), 1))
+                target.attrs.create(name, np.array(raw, dtype=kind), dtype=kind)
+            case _:
+                target.attrs[name] = value
+
+
+class FileStore:
+    """Keeps answers in a study's file; a context that releases it.
+
+    Raises
+    ------
+    StudyError
+        When the file is another study's, is being written by another run, or is no study's file.
+
+    """
+
+    def __init__(self, path: Path, plan: GridPlan, opened: Callable[[Path], Disk] = sole_writer) -> None:
+        self._path = path
+        self._columns = plan.columns
+        self._disk = opened(path)
+        try:
+            _require_same(path, read_plan(path, type(plan)), plan)
+            self._places = places_of(path, plan)
+            self._arrays = read_arrays(path, plan)
+        except BaseException:
+            self._disk.close()
+            raise
+        self._session = 0
+
+    @classmethod
+    def created(cls, path: Path, plan: GridPlan) -> Self:
+        """Create the file first; refuses a name that is taken."""
+        make_file(path, plan)
+        return cls(path, plan)
+
+    @property
+    def arrays(self) -> Arrays:
+        """Everything kept so far."""
+        return self._arrays
+
+    def begin(self, executor: str) -> None:
+        """Note moment, software and executor in the next row of sessions."""
+        self._session = min(self._places.sessions, layout.MOST_SESSIONS - 1)
+        texts = (datetime.now(UTC).isoformat(timespec="milliseconds"), software(), executor)
+        for column, text in zip(layout.SESSION_COLUMNS, texts, strict=True):
+            raw = text.encode()[: column.width].ljust(column.width, b"\0")
+            self._write(self._places.session_columns[column.name] + self._session * column.width, raw)
+        self._sync()
+        counter = np.asarray(self._session + 1, dtype=layout.COUNTER_DTYPE)
+        self._write(self._places.n_sessions, counter.tobytes())
+        self._sync()
+
+    def keep(self, answers: Sequence[PointAnswer]) -> None:
+        """Commit answers in an order that cannot lie.
+
+        Raises StudyError when the disk refuses; what was committed before is kept.
+        """
+        for answer in answers:
+            cells = {**answer.cells, SESSION: self._session}
+            kept = PointAnswer(answer.number, answer.state, cells)
+            for column, raw in put(self._arrays, self._columns, kept):
+                self._write(self._places.columns[column.name] + answer.number * len(raw), raw)
+        self._sync()
+        for answer in answers:
+            self._write(self._places.columns[layout.STATE] + answer.number, bytes([answer.state]))
+            self._arrays[layout.STATE][answer.number] = answer.state
+        self._sync()
+
+    def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
+        """Fill in many points that are not computed: whole columns, in an order that cannot lie."""
+        for name, values in cells.items():
+            self._arrays[name][numbers] = values
+            self._write(self._places.columns[name], self._arrays[name].tobytes())
+        self._sync()
+        self._arrays[layout.STATE][numbers] = layout.PointState.FILLED
+        self._write(self._places.columns[layout.STATE], self._arrays[layout.STATE].tobytes())
+        self._sync()
+
+    def close(self) -> None:
+        """Release the file."""
+        self._disk.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _write(self, offset: int, raw: bytes) -> None:
+        try:
+            self._disk.write(offset, raw)
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def _sync(self) -> None:
+        try:
+            self._disk.sync()
+        except OSError as error:
+            raise self._refused(error) from error
+
+    def _refused(self, error: OSError) -> StudyError:
+        return StudyError(
+            f"The disk refused {self._path}: {error.strerror}. What was kept before is safe;"
+            " make room or mend the disk, and resume."
+        )
+
+
+def _require_same(path: Path, kept: GridPlan, asked: GridPlan) -> None:
+    differing = asked.differences(kept)
+    if differing:
+        raise StudyError(
+            f"{path} holds another {asked.called}: "
+            f"{', '.join(_difference(name, kept, asked) for name in differing)}."
+            f" Nothing was changed; ask for the same {asked.called}, or choose another file."
+        )
+
+
+SHOWN = 60
+"""Characters of a value that a message shows."""
+
+
+def _difference(name: str, kept: GridPlan, asked: GridPlan) -> str:
+    """Say how one field of two plans differs; of long lists, where they begin to."""
+    there, here = (plan.model_dump(mode="json")[name] for plan in (kept, asked))
+    match there, here:
+        case [*some], [*others]:
+            index = next(
+                (i for i, pair in enumerate(zip(some, others, strict=False)) if pair[0] != pair[1]),
+                min(len(some), len(others)),
+            )
+            there, here = (_item(values, index) for values in (some, others))
+        case _:
+            pass
+    return f"{name} is {_short(there)} there and {_short(here)} here"
+
+
+def _item(values: list[object], index: int) -> str:
+    if len(values) == 1:
+        return str(values[0])
+    return f"{values[index]} at place {index + 1}" if index < len(values) else f"{len(values)} values"
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= SHOWN else text[:SHOWN] + "…"
