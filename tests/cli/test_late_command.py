@@ -9,7 +9,7 @@ import typer
 
 from vibench.cli.__main__ import COMMANDS
 
-HEAVY = {"numpy", "scipy", "numba", "matplotlib", "h5py", "pyvisa", "nidaqmx", "grpc", "PySide6"}
+HEAVY = {"numpy", "scipy", "numba", "matplotlib", "h5py", "pydantic", "pyvisa", "nidaqmx", "grpc", "PySide6"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -37,6 +37,21 @@ def test_the_list_of_commands_needs_none_of_the_large_libraries():
     loaded = "import vibench.cli.__main__, sys; print(*sys.modules)"
     process = subprocess.run([sys.executable, "-c", loaded], capture_output=True, text=True, check=True)
     assert HEAVY.isdisjoint(process.stdout.split())
+
+
+@pytest.mark.parametrize("point", [("20e-6", "130"), ("5e-6", "260")], ids=["periodic", "chaotic"])
+def test_a_prediction_without_a_file_needs_neither_scipy_nor_h5py(point):
+    program = (
+        "import atexit, sys; from vibench.command import main\n"
+        "atexit.register(lambda: print('loaded', *sys.modules, file=sys.stderr)); main()"
+    )
+    words = ["predict", "--amplitude", point[0], "--frequency", point[1]]
+    process = subprocess.run(
+        [sys.executable, "-c", program, *words], capture_output=True, text=True, check=True
+    )
+    loaded = process.stderr.partition("loaded ")[2].split()
+    assert "vibench.sim.scene" in loaded
+    assert {"scipy", "h5py", "numba", "matplotlib"}.isdisjoint(loaded)
 
 
 def test_a_group_reads_its_own_commands(vibench_here, tmp_path):

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.metadata import version
 from itertools import pairwise
 from typing import Annotated, Any, TextIO
 
@@ -391,6 +390,8 @@ app = typer.Typer(
 def tell_version(*, asked: bool) -> None:
     """Print the version, as ``--version`` alone asks for it."""
     if asked:
+        from importlib.metadata import version
+
         typer.echo(f"vibench {version('vibench')}")
         raise typer.Exit
 

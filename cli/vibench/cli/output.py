@@ -4,15 +4,17 @@ import json
 import sys
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
-from rich.progress import TextColumn
 from rich.segment import Segment
-from rich.table import Table
 from rich.text import Text
 
 from vibench.acquisition import printable
+
+if TYPE_CHECKING:
+    from rich.progress import TextColumn
+    from rich.table import Table
 
 
 class PrintableConsole(Console):
@@ -34,8 +36,10 @@ console = PrintableConsole(highlight=False, soft_wrap=True, markup=False, emoji=
 errors = PrintableConsole(stderr=True, highlight=False, soft_wrap=True, markup=False, emoji=False)
 
 
-def words(text_format: str) -> TextColumn:
+def words(text_format: str) -> "TextColumn":
     """Make a column of progress bars that shows names as they are."""
+    from rich.progress import TextColumn
+
     return TextColumn(text_format, markup=False)
 
 
@@ -49,7 +53,7 @@ def paragraph(text: str) -> Text:
     return Text(text)
 
 
-def print_table(rows: Table) -> None:
+def print_table(rows: "Table") -> None:
     """Print a table that no terminal and no file is too narrow for: words wrap, a number is never cut."""
     for column in rows.columns:
         words_of = [word for text in (column.header, *column.cells) for word in str(text).split()]

@@ -2,12 +2,14 @@
 
 import tempfile
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vibench.acquisition import ConfigurationError, named
-from vibench.acquisition.rig import Rig, load_rig, with_faults
+
+if TYPE_CHECKING:
+    from vibench.acquisition.rig import Rig
 
 BenchPath = Annotated[
     Path | None,
@@ -33,8 +35,10 @@ def bench_path(given: Path | None) -> Path:
     return named("virtual_rig" if given is None else given, "hardware_configs")
 
 
-def rig_at(bench: Path | None, faults: Path | None) -> Rig:
+def rig_at(bench: Path | None, faults: Path | None) -> "Rig":
     """Read the hardware configuration that was given, or the virtual rig's, with faults if any are given."""
+    from vibench.acquisition.rig import load_rig, with_faults
+
     rig = load_rig(bench_path(bench))
     return rig if faults is None else with_faults(rig, faults)
 

@@ -25,6 +25,7 @@ from ._log import (
 )
 from ._printable import (
     printable as printable,
+    shortened as shortened,
 )
 from ._schema import (
     json_schema as json_schema,
@@ -42,7 +43,6 @@ from ._toml_file import (
     from_toml as from_toml,
     load_toml as load_toml,
     save_toml as save_toml,
-    shortened as shortened,
     toml_text as toml_text,
     validated as validated,
 )

@@ -2,6 +2,9 @@
 
 from unicodedata import category
 
+LONGEST_CLAUSE = 400
+"""Letters; a value that stands in a fault may be as long as its file."""
+
 
 def printable(text: str) -> str:
     r"""Write what would move a cursor, reorder text or be invisible as an escape: one line comes of it.
@@ -23,3 +26,17 @@ def printable(text: str) -> str:
         each if each.isprintable() or category(each) == "Zs" else each.encode("unicode_escape").decode()
         for each in text
     )
+
+
+def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
+    """Cut the middle out of a text that is too long to be read.
+
+    >>> shortened("0123456789", 7)
+    '01...89'
+
+    ``text`` has any length; ``longest`` is the number of letters that are kept, three dots among them.
+    """
+    if len(text) <= longest:
+        return text
+    kept = (longest - 3) // 2
+    return f"{text[:kept]}...{text[len(text) - kept :]}"

@@ -18,6 +18,7 @@ from vibench.sim import (
 )
 
 from ..errors import ConfigurationError
+from ._printable import shortened
 from ._schema import FORMAT, VERSION, schema_line
 from ._shipped import shipped_folder
 
@@ -87,23 +88,7 @@ def validated(content: dict[str, Any], model: type[Model], origin: str, folder: 
 MOST_CLAUSES = 5
 """Faults that one sentence names; further ones are counted."""
 MOST_KEYS = 12
-LONGEST_CLAUSE = 400
-"""Letters; a value that stands in a fault may be as long as its file."""
 LONGEST_SENTENCE = 1600
-
-
-def shortened(text: str, longest: int = LONGEST_CLAUSE) -> str:
-    """Cut the middle out of a text that is too long to be read.
-
-    >>> shortened("0123456789", 7)
-    '01...89'
-
-    ``text`` has any length; ``longest`` is the number of letters that are kept, three dots among them.
-    """
-    if len(text) <= longest:
-        return text
-    kept = (longest - 3) // 2
-    return f"{text[:kept]}...{text[len(text) - kept :]}"
 
 
 Place = tuple[str | int, ...]
