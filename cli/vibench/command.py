@@ -42,6 +42,8 @@ def main() -> None:
         code = None if asked is None else stopped(*asked)
         if code is not None:
             sys.exit(code)
+    # To look for plug-ins, pydantic reads the metadata of every installed package; none is used here.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     gc.set_threshold(10_000)  # imports leave little garbage: looking for it took a fifth of the start
     from vibench.cli import main as run_command
 
