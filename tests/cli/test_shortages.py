@@ -89,12 +89,12 @@ def test_every_command_is_refused_without_address_space(vibench_here, tmp_path, 
 @pytest.mark.parametrize(
     ("wrapped", "said"),
     [
-        (MemoryError(), "no memory left"),
-        (RuntimeError("can't start new thread"), "no memory left"),
-        (ImportError("libllvmlite.so: failed to map segment from shared object"), "no memory left"),
-        (SystemError("<built-in> returned NULL without setting an exception"), "no memory left"),
-        (OSError(24, "Too many open files"), "open no more files"),
-        (ImportError("x.so: cannot open shared object file: Too many open files"), "open no more files"),
+        (MemoryError(), "out of memory"),
+        (RuntimeError("can't start new thread"), "out of memory"),
+        (ImportError("libllvmlite.so: failed to map segment from shared object"), "out of memory"),
+        (SystemError("<built-in> returned NULL without setting an exception"), "out of memory"),
+        (OSError(24, "Too many open files"), "cannot open more files"),
+        (ImportError("x.so: cannot open shared object file: Too many open files"), "cannot open more files"),
     ],
 )
 def test_a_shortage_is_told_however_it_is_wrapped(vibench_here, tmp_path, monkeypatch, wrapped, said):

@@ -127,7 +127,7 @@ def test_without_its_seal_a_recording_is_refused_or_warned_of(vibench_here, fold
     for word in ("analyse", "analyse folder", "export", "spectra"):
         code, text = told[word]
         assert code == 1 or "seal is gone" in text, (word, text)
-        assert change != "samples" or (code == 1 and "do not have their checksum" in text), (word, text)
+        assert change != "samples" or (code == 1 and "do not match their checksum" in text), (word, text)
     (row,) = (line for line in told["catalogue"][1].splitlines() if line.startswith("dwell.h5"))
     assert not row.endswith("good"), row
     report = folder.parent / "one" / "report.html"
@@ -150,7 +150,7 @@ def test_another_recording_under_the_name_is_refused_by_every_command(vibench_he
             _seal.write_seal(file, {}, None)
     for word, (code, text) in said_by_all(vibench_here, folder).items():
         assert code == 1, (word, text)
-        assert "the campaign noted for dwell: another recording" in text, (word, text)
+        assert "the campaign's journal for dwell: another recording" in text, (word, text)
 
 
 def test_export_warns_of_a_recording_without_its_seal(vibench_here, folder):

@@ -198,7 +198,7 @@ COMMANDS = {
     "release": Place(
         "watch",
         "release",
-        "Let a run go on that was held with vibench stop --level hold, or in the window.",
+        "Continue a run that was held with vibench stop --level hold, or in the window.",
         Panel.MEASURE,
     ),
     "gui": Place(
@@ -279,7 +279,7 @@ COMMANDS = {
     "study": Place(
         "study",
         "study",
-        "Predict responses over every combination of what a file lists, longest first.",
+        "Predict responses for every combination listed in a file, longest first.",
         Panel.PREDICT,
         space_mb=SIMULATION_MB,
     ),
@@ -302,7 +302,7 @@ COMMANDS = {
     "bench": Place(
         "bench",
         "bench",
-        "Look at the instruments.",
+        "Check and list instruments.",
         Panel.BENCH,
         space_mb=BENCH_MB,
     ),
@@ -323,7 +323,7 @@ COMMANDS = {
     "import": Place(
         "import_recording",
         "import_file",
-        "Make a recording of another program's file, or say what is in it.",
+        "Convert another program's file to a recording, or list its contents.",
         Panel.FILES,
     ),
     "pack": Place(
@@ -497,12 +497,12 @@ def _shortage(error: BaseException | None) -> str:
     text = str(error)
     if isinstance(error, MemoryError) or any(said in text for said in _NO_MEMORY):
         return (
-            "there is no memory left for this process; what was written before is kept. Close other "
+            "this process is out of memory; data written so far are kept. Close other "
             "programs, or raise its limit (ulimit -v)"
         )
     if isinstance(error, OSError | ImportError) and os.strerror(errno.EMFILE) in text:
         return (
-            "this process may open no more files; what was written before is kept. Raise its limit (ulimit "
+            "this process cannot open more files; data written so far are kept. Raise its limit (ulimit "
             "-n), or close other programs"
         )
     return _shortage(error.__cause__ or error.__context__)

@@ -28,7 +28,7 @@ def docs(
     ] = None,
     rebuild: Annotated[bool, typer.Option("--rebuild", help="Build it although it is there.")] = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Leave out the tutorials' results, which take some five minutes.")
+        bool, typer.Option("--quick", help="Leave out the tutorials' results, which take about five minutes.")
     ] = False,
     show: Annotated[bool, typer.Option("--open", help="Open its first page in the browser.")] = False,
     as_json: AsJson = False,

@@ -62,7 +62,7 @@ def serve_rig(
                 console.print(f"  {line}")
         if rig.token is not None:
             console.print()
-            console.print("Other computers can reach it; it lets in whoever has the token:")
+            console.print("Other computers can reach it; access requires the token:")
             console.print(
                 f"  export {TOKEN_VARIABLE}={rig.token}  # our own programs; others send it as metadata"
             )

@@ -157,7 +157,7 @@ class KeptStudies:
         self._failed += say_failures(results)
         if not results.is_complete:
             errors.print(
-                f"stopped after {results.kept} of {study.grid.size} points; the same command goes on"
+                f"stopped after {results.kept} of {study.grid.size} points; the same command continues"
             )
             raise typer.Exit(ExitCode.STOPPED)
         return results

@@ -243,7 +243,7 @@ def test_another_recording_under_its_name_is_found_by_whoever_checks_a_seal(fold
         for depth in SealDepth:
             found = recording.check_seal(depth)
             assert found.state is SealState.DAMAGED
-            assert found.sentence.endswith("the campaign noted for two: another recording")
+            assert found.sentence.endswith("the campaign's journal for two: another recording")
         assert not recording.is_checked
     assert [(each.path, each.verdict) for each in verify_recordings(folder) if each.is_bad] == [
         ("two.h5", "damaged")

@@ -196,7 +196,7 @@ def test_without_a_seal_samples_are_held_against_the_checksum_of_their_channel(r
     with open_recording(path) as recording:
         found = recording.check_seal("whole")
     assert found.state is SealState.DAMAGED
-    assert found.sentence == "it has no seal, and the samples of m0_velocity do not have their checksum"
+    assert found.sentence == "it has no seal, and the samples of m0_velocity do not match their checksum"
 
 
 @pytest.mark.parametrize("change", ["attribute", "dataset", "all but the group"])

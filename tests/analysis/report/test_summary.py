@@ -91,10 +91,10 @@ def test_undecided_motion_is_called_so_and_many_frequencies_stay_short():
     [
         ([YES], "The simulation agrees with the recording."),
         ([YES, YES], "The simulation agrees with both recordings."),
-        ([OPEN, OPEN], "Whether a simulation agrees cannot be told."),
+        ([OPEN, OPEN], "Agreement with a simulation was not determined."),
         (
             [YES, YES, NO, OPEN],
-            "the simulation agrees with two, disagrees with one and cannot be judged for one.",
+            "the simulation agrees with two, disagrees with one and was not compared with one.",
         ),
         ([NO], "The simulation disagrees with the recording."),
     ],

@@ -8,5 +8,5 @@ import pytest
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Ask for the instrument and its bench, by names that no other project defines."""
     group = parser.getgroup("vibench", "an instrument of vibench, for vibench.acquisition.contract")
-    group.addoption("--vibench-instrument", help="name of its entry point, as a bench file gives it")
-    group.addoption("--vibench-bench", help="bench file that names it; else a shipped virtual one")
+    group.addoption("--vibench-instrument", help="name of its entry point, as in a bench file")
+    group.addoption("--vibench-bench", help="bench file that uses it; default: a shipped virtual bench")

@@ -78,7 +78,7 @@ def exchanged(
     except OSError as error:
         connection.close()
         raise EngineGone(
-            f"the engine was killed, or has closed this connection ({error}). {SWITCH_OFF}"
+            f"the engine was killed, or closed this connection ({error}). {SWITCH_OFF}"
         ) from error
     facts = json.loads(answer.text)
     if "refused" in facts:

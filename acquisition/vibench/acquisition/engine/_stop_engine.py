@@ -78,7 +78,7 @@ def stop_engine(
         if isinstance(engine, Announcement):
             return _tell(engine, level, reason)
         raise EngineGone(
-            f"no stop could be left in the state folder for process {engine.pid}: {error}. {SWITCH_OFF}"
+            f"no stop could be written to the state folder for process {engine.pid}: {error}. {SWITCH_OFF}"
         ) from error
     match fate_of(stop, lambda: engine.is_alive):
         case Fate.SILENT:

@@ -51,13 +51,13 @@ QUESTIONS = (
     Question("accelerometer.serial", "Its serial number?"),
     Question(
         "accelerometer.sensitivity_v_per_m_per_s2",
-        "Its sensitivity, from its certificate [V per m/s2, or with its unit: 100 mV/g]?",
+        "Its sensitivity, from its certificate [V per m/s2, or with a unit: 100 mV/g]?",
     ),
     Question("accelerometer.calibrated", "The date on that certificate (YYYY-MM-DD)?"),
     Question("vibrometer.serial", "Serial number of the vibrometer?"),
     Question("vibrometer.decoder", "Its decoder?"),
     Question(
-        "vibrometer.range_mm_per_s_per_v", "Its range, as on its screen [mm/s per volt, or with its unit]?"
+        "vibrometer.range_mm_per_s_per_v", "Its range, as on its screen [mm/s per volt, or with a unit]?"
     ),
     Question("vibrometer.delay_s", "Delay of its output [s]? 0 if nobody has measured it"),
     Question("vibrometer.calibrated", "The date of its calibration (YYYY-MM-DD)?"),

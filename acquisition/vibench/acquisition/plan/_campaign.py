@@ -73,8 +73,8 @@ class Campaign(FrozenModel):
                 defaults = {present_word(str(key)): value for key, value in given.items()}
                 if len(defaults) < len(given):
                     raise ValueError(
-                        "[defaults] has one kind of excitation by its present name and by its former name; "
-                        "put their values into one table"
+                        "[defaults] lists one kind of excitation under its present and its former name; "
+                        "put the values into one table"
                     )
                 measurements = [_filled(each, defaults) for each in _listed(rest, "measurements")]
                 sweeps = [_filled_sweep(each, defaults) for each in _listed(rest, "sweeps")]

@@ -111,9 +111,9 @@ class Committer:
     def _require_health(self, has_room: bool) -> None:  # noqa: FBT001 - the answer of a wait
         if self._failure is not None:
             self._is_failure_seen = True
-            kept = f"the {self._committed_samples} samples committed before are kept"
+            kept = f"the {self._committed_samples} samples saved before are kept"
             if isinstance(self._failure, FileNotFoundError):
-                kept = "what was committed is gone with the file"
+                kept = "the samples saved before are lost with the file"
             raise RecordingError(
                 f"The disk refused the recording: {self._failure}. Recording has ended; {kept}. Make room or"
                 " change the disk, and measure again."

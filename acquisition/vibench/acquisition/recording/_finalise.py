@@ -160,7 +160,7 @@ def discard(part: Path) -> None:
         sync_folder(part.parent)
     except OSError as error:
         name = part.with_suffix("").name
-        LOG.warning("%s is complete; %s was kept, for the disk refused (%s)", name, part.name, error)
+        LOG.warning("%s is complete; %s could not be deleted (%s)", name, part.name, error)
 
 
 def _largest_size(part: Path) -> int:

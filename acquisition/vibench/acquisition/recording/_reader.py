@@ -224,7 +224,7 @@ class Recording(RecordingDescription):
         if found.state in (SealState.UNFINISHED, SealState.DAMAGED) or not noted or found.seal in noted:
             return found
         name = next(iter(noted.values()))
-        sentence = f"its seal is not the one that the campaign noted for {name}: another recording"
+        sentence = f"its seal is not the one in the campaign's journal for {name}: another recording"
         return SealCheck(SealState.DAMAGED, sentence, found.seal)
 
     def _check_own_seal(self, depth: SealDepth, key: SealKey | None) -> SealCheck:

@@ -287,7 +287,7 @@ def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> Sea
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
         return SealCheck(SealState.DAMAGED, f"it has no seal, and cannot be read ({error})", "")
     if other:
-        sentence = f"it has no seal, and the samples of {', '.join(other)} do not have their checksum"
+        sentence = f"it has no seal, and the samples of {', '.join(other)} do not match their checksum"
         return SealCheck(SealState.DAMAGED, sentence, "")
     if key is None and is_of_a_sealing_version(file):
         version = str(read_attributes(file).get("software_version", ""))

@@ -47,11 +47,11 @@ def volts_per_unit(text: str, unit: str) -> float:
     example = _EXAMPLES.get(unit, f"'50 mV/({unit})'")
     if re.search(r"\b[pn]C\b", spelled):
         raise ValueError(
-            f"{text!r} is a charge, and the converter reads volts; give the sensitivity of the sensor with "
-            f"its charge amplifier, such as {example}"
+            f"{text!r} is a charge, and the converter measures volts; give the sensitivity of the sensor "
+            f"with its charge amplifier, such as {example}"
         )
     raise ValueError(
-        f"{text!r} is no sensitivity for {unit!r}; give a number above 0 and its unit, such as {example}"
+        f"{text!r} is not a sensitivity for {unit!r}; give a number above 0 with a unit, such as {example}"
     )
 
 

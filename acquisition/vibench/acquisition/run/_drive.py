@@ -93,7 +93,7 @@ def _dead_man(bench: RunBench, measurement: Measurement) -> DeadMan | None:
     frequencies_hz = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
     frequency_hz = frequencies_hz.pop() if len(frequencies_hz) == 1 else None
     if frequency_hz is None:  # nothing is known of what is decided while it plays
-        raise _without_dead_man(f"{measurement.name} is no sine of one frequency")
+        raise _without_dead_man(f"{measurement.name} is not a sine of one frequency")
     if frequency_hz * longest_s < 1:
         raise _without_dead_man(f"{measurement.name} has a period longer than dead_man_s = {longest_s:g} s")
     return DeadMan(bench.generator, longest_s)

@@ -34,7 +34,7 @@ class DriveGuard(ClosedOnLeaving):
         self._drive = drive
         self._switch = switch
         self._is_heard = is_heard
-        reason = f"the run has stood still for {STANDSTILL_BLOCKS * BLOCK_S:g} s"
+        reason = f"the run has hung for {STANDSTILL_BLOCKS * BLOCK_S:g} s"
         self._standstill = StopRequest(Cause.FAULT, StopLevel.OFF, reason)
         self._blocks = self._seen = 0
         self._still_s, self._round_s = 0.0, monotonic()

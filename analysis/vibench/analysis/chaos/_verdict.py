@@ -283,7 +283,7 @@ def _judged(
         return _noisy(evidence, noise_test)
     if not bent_test.rejects_linear_noise:
         return _undecided(
-            f"noise behind a static nonlinearity explains the points as well (p = {bent_test.p:.2f})",
+            f"noise after a static nonlinearity also explains the points (p = {bent_test.p:.2f})",
             evidence,
         )
     if test.is_oversampled:

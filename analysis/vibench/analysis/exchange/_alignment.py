@@ -65,7 +65,7 @@ def align(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path)
             remarks[f"{each.name} starts {offset / rate_hz:.6g} s after the first channel"] = None
         if len(own) > 1 or own[-1].end - own[0].place != each.samples:
             missing = own[-1].end - own[0].place - sum(one.samples for one in own)
-            remarks[f"the times of {each.name} jump, and {missing} samples are lost there"] = None
+            remarks[f"the times of {each.name} jump; {missing} samples are lost there"] = None
     late_s = tuple((offset - round(offset)) / rate_hz for offset in offsets)
     return Alignment(rate_hz, places, tuple(cut), late_s, tuple(remarks))
 
@@ -83,11 +83,11 @@ def _overridden(channels: Sequence[SourceChannel], mapping: ImportMapping) -> It
             yield f"the mapping's {given:.9g} samples/s replace what the file says ({said})"
         elif each.time_unit is not None and mapping.time_unit not in {None, each.time_unit}:
             said = each.time_unit or "no unit"
-            yield f"times are in {mapping.time_unit} by the mapping; the file says {said}"
+            yield f"times are in {mapping.time_unit} according to the mapping; the file says {said}"
         elif each.time_unit == "" and given is not None:
             unit = _with_unit(each, mapping).time_unit
             if unit:
-                yield f"times without a unit are taken as {unit}, as the mapping's sample rate demands"
+                yield f"times without a unit are taken as {unit}, to match the mapping's sample rate"
 
 
 def _with_unit(channel: SourceChannel, mapping: ImportMapping) -> SourceChannel:
@@ -139,7 +139,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
         highest_hz = mapping.measurement.excitation.band_hz[1]
         if each.time_unit == "" and 2 * highest_hz > rate:
             raise InvalidRequest(
-                f"the times of {path.name} have no unit; in seconds they make {rate:.6g} samples/s, too few "
+                f"the times of {path.name} have no unit; in seconds they give {rate:.6g} samples/s, too few "
                 f"for the {highest_hz:g} Hz of the plan; give time_unit in the mapping"
             )
     if not _same(said, longest):
@@ -165,12 +165,12 @@ def _offsets(channels: Sequence[SourceChannel], rate_hz: float, path: Path) -> l
     unknown = [each.name for each in channels if each.start_s is None]
     if unknown:
         raise InvalidRequest(
-            f"{path.name} says when some channels start, and not when {', '.join(unknown)} does; choose "
+            f"{path.name} states when some channels start, but not {', '.join(unknown)}; choose "
             f"channels of one kind, or {_IGNORE}"
         )
     if max(each.start_error_s for each in channels) * rate_hz > _APART:
         raise InvalidRequest(
-            f"the channels of {path.name} start at different times, in too few digits to align them; export "
-            f"them with one start, or {_IGNORE}"
+            f"the channels of {path.name} start at different times, with too few digits to align them; "
+            f"export them with one start, or {_IGNORE}"
         )
     return [(each.start_s - min(known)) * rate_hz for each in channels if each.start_s is not None]

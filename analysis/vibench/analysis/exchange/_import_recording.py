@@ -215,7 +215,7 @@ def _header(source: Source, each: _Wanted) -> ChannelHeader:
     quantity, unit = mapped.kind
     if isinstance(mapped.scale, str) and found.unit not in {"", "V"}:
         raise InvalidRequest(
-            f"{found.name} is in {found.unit!r}, and scale = {mapped.scale!r} is for a file in volts; give "
+            f"{found.name} is in {found.unit!r}, but scale = {mapped.scale!r} is for a file in volts; give "
             f"scale as a number of {unit!r} per {found.unit!r}"
         )
     full_scale = mapped.full_scale or found.full_scale

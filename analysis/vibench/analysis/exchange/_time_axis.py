@@ -170,7 +170,7 @@ class _Scan:
     def add(self, block: Reals) -> None:
         """Take the next times."""
         if not np.isfinite(block).all():
-            self._trouble = "has times that are no numbers"
+            self._trouble = "has times that are not numbers"
             return
         if self._last is None:
             self._start = float(block[0])
@@ -206,7 +206,7 @@ class _Scan:
         trouble = self._trouble or _impossible(self._runs, self._samples, span)
         if not trouble and spread > allowed:
             trouble = (
-                f"has times that lie up to {spread / interval:.3g} sample intervals off an even axis, and no "
+                f"has times up to {spread / interval:.3g} sample intervals off an even axis, and no "
                 "whole number of lost samples explains that"
             )
         is_exact = spread < EVEN * interval

@@ -171,7 +171,7 @@ def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
 def regions_text(found: Collisions) -> str:
     """Say in words where a sweep collided."""
     unclear = " and ".join(f"from {first:.1f} to {last:.1f} Hz" for first, last in found.too_fast_hz)
-    unclear = f"; {unclear} the sweep was too fast to tell ringing from collisions" if unclear else ""
+    unclear = f"; {unclear} the sweep was too fast to distinguish ringing from collisions" if unclear else ""
     if not found.regions:
         return f"no collisions were found{unclear}" if unclear else "the masses did not collide"
     parts = []

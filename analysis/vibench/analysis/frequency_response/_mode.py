@@ -43,7 +43,7 @@ class Resonance:
         if self.is_explained:
             return ""
         return (
-            f"one mode does not describe the lines about {self.frequency_hz:.5g} Hz (reduced chi² = "
+            f"one mode does not describe the lines near {self.frequency_hz:.5g} Hz (reduced chi² = "
             f"{self.reduced_chi_square:.3g}, at most {max(self.chi_square_limit, WELL_FITTED):.3g} by chance)"
         )
 

@@ -139,7 +139,7 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
     if laid is None:
         return Agreement.OPEN, "not simulated" if failure is None else failure.sentence
     if not laid.run.driven.by_voltage:
-        return Agreement.OPEN, f"simulated under the recorded base, once{laid.run.why and ': '}{laid.run.why}"
+        return Agreement.OPEN, f"simulated once, under the recorded base{laid.run.why and ': '}{laid.run.why}"
     outside = [each.name for each in laid.ensemble if each.compared and not each.agrees]
     if outside:
         return Agreement.NO, f"outside of the simulated draws: {', '.join(outside)}"

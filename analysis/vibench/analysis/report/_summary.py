@@ -103,12 +103,12 @@ def _agreement(verdicts: Sequence[Agreement]) -> str:
         return {
             Agreement.YES: f"The simulation agrees with {which}.",
             Agreement.NO: f"The simulation disagrees with {which}.",
-            Agreement.OPEN: "Whether a simulation agrees cannot be told.",
+            Agreement.OPEN: "Agreement with a simulation was not determined.",
         }[verdicts[0]]
     counts = [
         (text, sum(each is one for each in verdicts))
         for text, one in zip(
-            ("agrees with", "disagrees with", "cannot be judged for"), Agreement, strict=True
+            ("agrees with", "disagrees with", "was not compared with"), Agreement, strict=True
         )
     ]
     parts = [f"{text} {_number(count)}" for text, count in counts if count]

@@ -264,8 +264,8 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
     clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]
     if np.mean(clear) < LEAST_CLEAR:
         raise UnusableData(
-            f"the vibrometer lost its light often: {100 * np.mean(clear):.0f} % of the window are clear "
-            f"of drop-outs, and {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser and measure again"
+            f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the window is clear "
+            f"of drop-outs, and {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
         )
     return clear
 

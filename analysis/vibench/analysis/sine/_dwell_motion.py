@@ -131,8 +131,8 @@ def dwell_motion(channels: Channels, response: DwellResponse) -> DwellMotion:
     # Bridges make no motion repeat, but one that repeats irregular.
     if clear < _CLEAR_MOTION and verdict.kind in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         why = (
-            f"drop-outs of the vibrometer touch {100 * (1 - clear):.0f} % of the dwell, and may make it look "
-            f"{verdict.kind.value}; refocus the laser"
+            f"drop-outs of the vibrometer affect {100 * (1 - clear):.0f} % of the dwell, and may make it "
+            f"look {verdict.kind.value}; refocus the laser"
         )
         verdict = replace(verdict, kind=MotionKind.UNDECIDED, why=why)
     return DwellMotion(section, verdict)

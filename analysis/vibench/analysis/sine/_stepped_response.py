@@ -156,7 +156,7 @@ def settled_check(response: SteppedResponse) -> Check:
         return Check("Steps settled", Verdict.PASSED, "no response changed steadily during its step")
     text = (
         f"{changing_hz.size} of {response.frequency_hz.size} responses still changed during their steps, "
-        f"first at {changing_hz[0]:.6g} Hz, and their bounds are not stated; let them settle for longer"
+        f"first at {changing_hz[0]:.6g} Hz, and their bounds are not stated; increase the settling time"
     )
     return Check("Steps settled", Verdict.WARNING, text)
 

@@ -125,7 +125,7 @@ def measured_sweep(
     found = sums.response(delay_s=channels.response_delay_s, linear=linear)
     if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
         raise UnusableData(
-            f"the vibrometer lost its light often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
+            f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
             f"intervals are without a drop-out, and {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser "
             "and measure again"
         )

@@ -201,7 +201,7 @@ class QuantityEdit(QAbstractSpinBox):
         self._asked_about = value
         self._complaint = (
             f"{quantity_text(value, self._unit)} is {abs(value / self._value):.3g} times the last value, "
-            f"{quantity_text(self._value, self._unit)}; press Return again to take it, or type another"
+            f"{quantity_text(self._value, self._unit)}; press Return again to accept it, or type another"
         )
 
     def _read(self, text: str) -> float | int | None:

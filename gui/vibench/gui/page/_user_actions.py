@@ -84,7 +84,7 @@ class UserActions(QObject):
             self._context.bridge.order(EngineClient.start)
         else:
             self._warn(
-                "Cannot start: the end of what will happen has not been in sight.",
+                "Cannot start: the description of the test has not been shown to its end.",
                 "Read it on the Run page (Ctrl+3); PgDn scrolls.",
             )
             self._context.page_wanted.emit(RUN)

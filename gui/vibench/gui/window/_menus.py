@@ -84,7 +84,7 @@ class MenuTarget(Protocol):
 OTHER_KEYS: tuple[tuple[str, str], ...] = (
     ("Esc, Pause", "abort: ramp down as fast as the shaker bears, from anywhere"),
     ("Space", "freeze the picture (Run page); the recording goes on"),
-    ("PgDn, PgUp", "read on what will happen (Run page)"),
+    ("PgDn, PgUp", "scroll the description of the test (Run page)"),
     ("M", "mark an event in the recording (Run page)"),
     ("A, L", "in a plot: show everything, logarithmic axis"),
     ("G, D", "in a plot: read values, tell differences from there"),

@@ -76,9 +76,7 @@ class Engine:
         for index, (name, of) in enumerate(types.items()):
             size = self._library.vibench_size_of(index)
             if size != of.itemsize:
-                msg = (
-                    f"{self.path} has {size} bytes for a {name}, Python {of.itemsize}: rebuild it, {REBUILD}."
-                )
+                msg = f"{self.path} uses {size} bytes for a {name}, Python {of.itemsize}: run {REBUILD}."
                 raise EngineError(msg)
         return types
 
@@ -177,7 +175,7 @@ def _lent(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
     if numbers.dtype.names:
         return numbers
     if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
-        msg = f"An array of {numbers.dtype} was given: the native engine takes contiguous ones of float64."
+        msg = f"An array of {numbers.dtype} was given: the native engine takes contiguous float64 arrays."
         raise TypeError(msg)
     return numbers.__array_interface__["data"][0], numbers.size
 

@@ -316,5 +316,5 @@ def check_known_answer(engine: Engine) -> None:
     outcome = run.advance(KNOWN_DURATION_S, RunRecord(100, engine=engine))
     off = np.abs(run.motion - KNOWN_MOTION) / np.repeat([1e-4, 0.1], 3)
     if outcome is not Outcome.REACHED_END or not math.isfinite(off.max()) or off.max() > KNOWN_TO:
-        msg = f"{engine.path} answers a known scene wrongly, by {off.max():.1e}: rebuild it, or report this."
+        msg = f"{engine.path} fails its self-test by {off.max():.1e}: rebuild it, or report this."
         raise EngineError(msg)

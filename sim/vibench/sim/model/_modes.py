@@ -122,8 +122,8 @@ def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
     modes, omega = modes[:, ::-1], omega[::-1]
     if not WIDEST * omega[0] > omega[-1]:
         msg = (
-            "The natural frequencies lie further apart than double precision resolves: "
-            "give masses and stiffnesses that are more alike."
+            f"Natural frequencies from {omega[0]:.3g} to {omega[-1]:.3g} rad/s span more than double "
+            "precision resolves: give masses and stiffnesses closer to each other."
         )
         raise ValueError(msg)
     losses = modes.T @ (damping / np.outer(root, root)) @ modes

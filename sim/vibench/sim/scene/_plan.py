@@ -84,7 +84,7 @@ def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
         frequency_hz = scene.drive.frequency_hz
         msg = (
             f"Window {scene.duration.window_s:g} s is not allowed at {frequency_hz:g} Hz: "
-            f"a state is kept in each drive period; give {MOST_STATES / frequency_hz:.3g} s or less."
+            f"a state is stored in each drive period; give {MOST_STATES / frequency_hz:.3g} s or less."
         )
         raise ValueError(msg)
     sentences = (

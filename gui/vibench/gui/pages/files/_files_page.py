@@ -272,7 +272,7 @@ class FilesPage(Page):
         self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
 
     def _write_note(self) -> None:
-        text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "It is kept in the recording.")
+        text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "It is stored in the recording.")
         if is_given and text.strip():
             self.context.background.ask(
                 noted, self._choose, self._failed, self.table.chosen_paths()[0], text.strip()
@@ -320,7 +320,7 @@ class FilesPage(Page):
             "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
         )
         self._export = push_button("E&xport…", "Write it for other programs", self._choose_export)
-        self._note = push_button("Add a &note…", "Keep a note in the recording", self._write_note)
+        self._note = push_button("Add a &note…", "Store a note in the recording", self._write_note)
         for button in (self._compare, self._export, self._note):
             button.setEnabled(False)
         bar = row(

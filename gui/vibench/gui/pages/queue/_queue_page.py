@@ -323,7 +323,7 @@ class QueuePage(Page):
             push_button("&Remove", "Remove the chosen entry", self._remove),
         )
         campaign = boxed("Campaign", self.entries, edits)
-        attended = SentenceLabel("goes on when the window freezes or is closed", rank="second")
+        attended = SentenceLabel("continues when the window freezes or is closed", rank="second")
         left = column(self.choice, files, (campaign, 1), self.sweep)
         right = column(
             self.summary,

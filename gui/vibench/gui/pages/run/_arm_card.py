@@ -15,7 +15,7 @@ _HINTS = {
 }
 
 
-UNREAD = "Read on first  (PgDn)"
+UNREAD = "Read to the end  (PgDn)"
 
 
 class ArmCard(QGroupBox):

@@ -134,7 +134,7 @@ class WatchCard(QGroupBox):
         self.averages = QLabel("–")
         self.averages.setToolTip("Averages of noise begun and planned")
         self.reject_button = push_button(
-            "Reject this one", "Leave the average that is played out of all results", self.reject_wanted.emit
+            "Reject this one", "Exclude the current average from all results", self.reject_wanted.emit
         )
         self.mark = LineField("event")
         self.mark.setToolTip("What the mark in the recording says")
