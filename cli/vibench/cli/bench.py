@@ -27,7 +27,7 @@ from .exit_code import ExitCode
 from .output import bold, console, paragraph, print_json
 from .paths import AsJson, BenchPath, bench_path
 
-bench = typer.Typer(help="Look at the instruments.", no_args_is_help=True, add_completion=False)
+bench = typer.Typer(help="Check and list instruments.", no_args_is_help=True, add_completion=False)
 
 
 @bench.command("list")

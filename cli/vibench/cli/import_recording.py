@@ -33,7 +33,7 @@ def import_file(
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Make a recording of another program's file, or say what is in it."""
+    """Convert another program's file to a recording, or list its contents."""
     with external_data(allow_external):
         _import(file, mapping, out, as_json=as_json)
 

@@ -54,7 +54,7 @@ def study(
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
-    """Predict responses over every combination of what a file lists, longest first."""
+    """Predict responses for every combination listed in a file, longest first."""
     asked = load_toml(named(plan, "studies"), Study)
     print_warnings(
         plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)

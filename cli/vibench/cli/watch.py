@@ -119,7 +119,7 @@ def _said(name: str, delivery: StopDelivery, level: StopLevel) -> str:
 
 
 def release(pid: Pid = None) -> None:
-    """Let a run go on that was held with vibench stop --level hold, or in the window."""
+    """Continue a run that was held with vibench stop --level hold, or in the window."""
     engine = the_engine(pid)
     with EngineClient.attach(engine.address) as client:
         # A hold may be asked for before there is anything to hold, as in a rest: it is taken back as well.
