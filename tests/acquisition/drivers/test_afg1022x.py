@@ -1,6 +1,7 @@
 """The AFG1022 driver over real pyvisa, against a simulated AFG1022 on a USB bus in memory."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from vibench.acquisition.drivers._generator_limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
 from vibench.virtual_rig.generator import Panel, Quirks
-from vibench.virtual_rig.generator._afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP
+from vibench.virtual_rig.generator._afg1022_settings import OPEN_AMPLITUDE_RANGE_VPP, RunMode
 
 SINE = np.sin(2 * np.pi * np.arange(1024) / 1024)
 
@@ -48,10 +49,10 @@ class TestOpening:
             "SOUR1:VOLT 3VPP",
             "SOUR1:VOLT:OFFS 0.5",
             "SOUR1:FUNC RAMP",
-            "SOUR1:AM:STAT ON",
             "OUTP1 ON",
         ):
             plugged.instrument.execute(message.encode())
+        plugged.instrument.configure(1, replace(plugged.instrument.settings(1), mode=RunMode.AM))
         generator = AFG1022X.open(plugged.config)
         state = plugged.instrument.settings(1)
         assert not plugged.is_on

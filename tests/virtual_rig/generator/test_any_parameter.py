@@ -31,8 +31,8 @@ PARAMETERS = (
 @pytest.mark.parametrize("kind", [AFG1022, Keysight33500B])
 def test_every_command_takes_any_parameter(kind):
     generator = kind(lambda: 0.0)
-    for command in generator._commands:
-        header = command.pattern.text.translate(str.maketrans("#", "1", "[]")).encode()
+    for command in generator.commands:
+        header = command.header.translate(str.maketrans("#", "1", "[]")).encode()
         for mark in (b"", b"?"):
             for parameter in PARAMETERS:
                 generator.execute(header + mark + b" " + parameter)

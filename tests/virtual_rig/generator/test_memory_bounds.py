@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.virtual_rig.generator import AFG1022, Keysight33500B
-from vibench.virtual_rig.generator._afg1022 import LONGEST_REPLY, MOST_SPELLINGS
+from vibench.virtual_rig.generator._scpi_instrument import LONGEST_REPLY, MOST_SPELLINGS
 from vibench.virtual_rig.usb import UsbTmcInstrument
 from vibench.virtual_rig.usb._usbtmc import MOST_NOTIFICATIONS, Request, Setup
 

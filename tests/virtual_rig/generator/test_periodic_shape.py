@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator import _built_in_shape as built_in_shape
 from vibench.virtual_rig.generator._arbitrary_memory import TOP_CODE
 from vibench.virtual_rig.generator._periodic_shape import Rectangle, Sine, Table, Triangle
 
@@ -60,12 +59,3 @@ def test_a_stretch_far_below_the_resolution_of_a_point_still_reads_the_point():
 
 def test_a_sine_averages_to_nothing_over_a_whole_cycle():
     assert mean(Sine(), 0.3, 1.0) == pytest.approx(0, abs=1e-15)
-
-
-def test_there_are_45_built_in_shapes_and_all_fill_the_range_but_dc():
-    assert len(built_in_shape.FORMULAS) == 45
-    for name in built_in_shape.FORMULAS:
-        codes = built_in_shape.codes(name)
-        assert len(codes) == 8192
-        if name != "DC":
-            assert (codes.min(), codes.max()) == (0, TOP_CODE), name

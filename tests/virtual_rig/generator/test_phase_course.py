@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator._periodic_shape import Rectangle, Sine
-from vibench.virtual_rig.generator._phase_course import (
-    FrequencyModulatedPhase,
-    Modulator,
-    PhaseModulatedPhase,
-    Spacing,
-    SteadyPhase,
-    SweptPhase,
-)
+from vibench.virtual_rig.generator._phase_course import Spacing, SteadyPhase, SweptPhase
 
 DAY_S = 86_400.0
 TIMES = st.floats(0, DAY_S)
@@ -53,29 +45,3 @@ def test_a_repeating_sweep_never_jumps_in_phase():
     sweep = SweptPhase(100.0, 900.0, 0.25, Spacing.LINEAR, begin_s=0.1, offset=0.2)
     for turn_s in (0.35, 0.6, 0.85):
         assert turn(sweep.phase(turn_s - 1e-9), sweep.phase(turn_s + 1e-9)) < 5e-6
-
-
-def test_the_spans_of_frequency_modulation_add_up_to_its_phase():
-    modulator = Modulator(Sine(), SteadyPhase(7_000_000, 0.0))
-    course = FrequencyModulatedPhase(SteadyPhase(100_000_000, 0.1), 30.0, modulator)
-    edges = np.linspace(0, 3.3, 5001)
-    start, span = course.stretches(edges)
-    assert turn(start[0] + span.sum(), course.phase(3.3)) < 1e-9
-    # The closed form: carrier plus (deviation / modulating) (1 - cos) / (2 pi).
-    expected = 0.1 + 330.0 + 30.0 / 7.0 * (1 - np.cos(2 * np.pi * 7 * 3.3)) / (2 * np.pi)
-    assert turn(course.phase(3.3), expected) < 1e-9
-
-
-def test_frequency_shift_keying_spends_half_its_time_at_each_frequency():
-    modulator = Modulator(Rectangle(), SteadyPhase(10_000_000, 0.0))
-    course = FrequencyModulatedPhase(SteadyPhase(300_000_000, 0.0), 100.0, modulator)
-    _, span = course.stretches(np.array([0.0, 0.05, 0.1]))
-    assert span == pytest.approx([0.05 * 400, 0.05 * 200])
-
-
-def test_phase_modulation_swings_by_its_deviation():
-    modulator = Modulator(Sine(), SteadyPhase(1_000_000, 0.0))
-    course = PhaseModulatedPhase(SteadyPhase(50_000_000, 0.0), 0.2, modulator)
-    carrier, _ = course.carrier.stretches(np.array([0.25, 0.2501]))
-    start, _ = course.stretches(np.array([0.25, 0.2501]))
-    assert turn(start[0] - carrier[0], 0.2) < 1e-6

@@ -1,15 +1,15 @@
 from ._afg1022 import (
     AFG1022 as AFG1022,
-    Reply as Reply,
+)
+from ._channel_output import (
+    Panel as Panel,
 )
 from ._keysight_33500b import (
     Keysight33500B as Keysight33500B,
 )
-from ._output_signal import (
-    Panel as Panel,
-)
-from ._scpi_command import (
+from ._scpi_instrument import (
     Quirks as Quirks,
+    Reply as Reply,
 )
 from ._scpi_message import (
     LONGEST_MESSAGE as LONGEST_MESSAGE,

@@ -59,12 +59,6 @@ class ArbitraryMemory:
         """Copy one memory onto another."""
         self._waveforms[target] = self.codes(source)
 
-    def delete(self, name: str) -> None:
-        """Empty a user memory; the edit memory cannot be deleted."""
-        if name == EDIT_MEMORY or name not in self._waveforms:
-            raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-        del self._waveforms[name]
-
     @property
     def catalogue(self) -> tuple[str, ...]:
         """Names of all memories that hold a waveform, the edit memory first."""

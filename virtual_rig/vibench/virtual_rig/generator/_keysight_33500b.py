@@ -4,15 +4,13 @@ Source: Keysight Trueform Series Operating and Service Guide, as public drivers 
 ``agilent33500``, MATLAB and Python programs of laboratories); nothing was compared with an instrument.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _channel_commands as channel_commands
-from ._afg1022 import AFG1022
+from ._afg1022 import AFG1022, SHARED_COMMANDS, burst_cycles, load_command, modulation_switch, with_mode
 from ._afg1022_settings import (
     SINE,
     BurstMode,
@@ -22,11 +20,9 @@ from ._afg1022_settings import (
     SweepTrigger,
 )
 from ._arbitrary_memory import EDIT_MEMORY, ArbitraryMemory, Codes
-from ._channel_commands import COMMON_CHANNEL_COMMANDS, LOAD, with_mode
-from ._common_commands import COMMON_COMMANDS
 from ._phase_course import Spacing
-from ._scpi_command import Command, Generator, Number, Parameters, Quirks, choice, none, only, switch
-from ._scpi_header import HeaderPattern
+from ._scpi_command import Command, Parameters, choice, none, only, switch
+from ._scpi_instrument import Quirks
 from ._scpi_status import ErrorCode, ScpiError
 from ._scpi_value import NO_UNITS, Limit, as_number, block, integer, number_or_limit, text
 
@@ -43,10 +39,7 @@ _QUIRKS = Quirks(
     first_identity_after_clear_is_empty=False,
     high_impedance_has_ohm_sign=False,
     unknown_is_syntax_error=False,
-    noise_is_not_played=False,
     out_of_range_becomes_default=False,
-    dc_ignores_offset=False,
-    duty_queues_error=False,
 )
 
 
@@ -95,13 +88,9 @@ class Keysight33500B(AFG1022):
             declared_load_ohm=declared_load_ohm, frequency_hz=1e3, amplitude_vpp=0.2, sweep=OwnSweep()
         )
 
-    def _table(self) -> tuple[Command, ...]:
-        return (*_COMMANDS, *COMMON_CHANNEL_COMMANDS, *COMMON_COMMANDS)
-
-
-def _own(generator: Generator) -> Keysight33500B:
-    assert isinstance(generator, Keysight33500B)
-    return generator
+    def _table(self, quirks: Quirks) -> tuple[Command, ...]:
+        del quirks
+        return (*_COMMANDS, *SHARED_COMMANDS)
 
 
 def _sweep(settings: ChannelSettings) -> OwnSweep:
@@ -112,10 +101,9 @@ def _name(parameter: bytes) -> str:
     return text(parameter).strip('"').upper()
 
 
-def _write_dac(generator: Generator, channel: int, parameters: Parameters) -> None:
+def _write_dac(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
     """Take a waveform as a binary block of 16-bit numbers, or as a list of them."""
     del channel
-    own = _own(generator)
     if len(parameters) < 2:
         raise ScpiError(ErrorCode.MISSING_PARAMETER)
     name = _name(parameters[0])
@@ -139,8 +127,8 @@ def _numbers(own: Keysight33500B, parameters: Parameters) -> NDArray[np.float64]
     return np.array([float(integer(each)) for each in parameters])
 
 
-def _select(generator: Generator, channel: int, parameters: Parameters) -> None:
-    own, name = _own(generator), _name(only(parameters))
+def _select(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
+    name = _name(only(parameters))
     if name not in own.waveforms:
         raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
     rate_hz = _rate_hz(own, channel)
@@ -151,24 +139,23 @@ def _select(generator: Generator, channel: int, parameters: Parameters) -> None:
         _set_rate(own, channel, rate_hz)
 
 
-def _clear(generator: Generator, channel: int, parameters: Parameters) -> None:
+def _clear(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
     none(parameters)
-    own = _own(generator)
     if own.settings(channel).shape == EDIT_MEMORY:
         own.configure(channel, replace(own.settings(channel), shape=SINE))
     own.waveforms.clear()
     own.selected = ""
 
 
-def _points(generator: Generator, _: int, parameters: Parameters) -> bytes:
-    own, name = _own(generator), _name(only(parameters))
+def _points(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
+    name = _name(only(parameters))
     if name not in own.waveforms:
         raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
     return as_number(len(own.waveforms[name]))
 
 
-def _average(generator: Generator, _: int, parameters: Parameters) -> bytes:
-    own, name = _own(generator), _name(only(parameters))
+def _average(own: Keysight33500B, _: int, parameters: Parameters) -> bytes:
+    name = _name(only(parameters))
     if name not in own.waveforms:
         raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
     return as_number(float(np.mean(own.waveforms[name])) / _MIDDLE - 1)
@@ -183,109 +170,79 @@ def _set_rate(own: Keysight33500B, channel: int, rate_hz: float) -> None:
     own.configure(channel, replace(own.settings(channel), frequency_hz=rate_hz / points))
 
 
-def _write_rate(generator: Generator, channel: int, parameters: Parameters) -> None:
+def _write_rate(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
     rate_hz = number_or_limit(only(parameters), NO_UNITS)
     if isinstance(rate_hz, Limit) or not 0 < rate_hz <= HIGHEST_RATE_HZ:
         raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-    _set_rate(_own(generator), channel, rate_hz)
+    _set_rate(own, channel, rate_hz)
 
 
-def _set_shape(settings: ChannelSettings, word: _Shape) -> ChannelSettings:
-    return replace(settings, shape=SINE if word is _Shape.SINE else EDIT_MEMORY)
-
-
-def _write_order(generator: Generator, _: int, parameters: Parameters) -> None:
+def _write_order(own: Keysight33500B, _: int, parameters: Parameters) -> None:
     word = _name(only(parameters))
-    _own(generator).order = _Order.SWAPPED if word.startswith("SWAP") else _Order.NORMAL
+    own.order = _Order.SWAPPED if word.startswith("SWAP") else _Order.NORMAL
 
 
-def _write_filter(generator: Generator, _: int, parameters: Parameters) -> None:
+def _write_filter(own: Keysight33500B, _: int, parameters: Parameters) -> None:
     word = _name(only(parameters))
     if word not in ("OFF", "STEP", "NORM", "NORMAL"):
         raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-    _own(generator).filter = _Filter[{"NORM": "NORMAL"}.get(word, word)]
+    own.filter = _Filter[{"NORM": "NORMAL"}.get(word, word)]
 
 
-def _sweep_number(
-    node: str,
-    get: Callable[[OwnSweep], float],
-    put: Callable[[OwnSweep, float], OwnSweep],
-    range_s: tuple[float, float],
-) -> Command:
-    return Number(
-        f"[SOURce#:]SWEep:{node}",
-        {"": 1.0, "S": 1.0, "MS": 1e-3},
-        lambda s: get(_sweep(s)),
-        lambda s, value: replace(s, sweep=put(_sweep(s), value)),
-        lambda _: range_s,
-        default=1.0,
-        decimals=6,
-    ).command()
+def _set_sweep(own: Keysight33500B, channel: int, field: str, value: object) -> None:
+    settings = own.settings(channel)
+    own.configure(channel, replace(settings, sweep=replace(_sweep(settings), **{field: value})))  # type: ignore[arg-type]
 
 
-def _modulation(mode: RunMode) -> Command:
-    return switch(
-        f"[SOURce#:]{mode.value}:STATe",
-        lambda s: s.mode is mode,
-        lambda s, on: with_mode(mode, s, on),
-    )
+def _sweep_seconds(node: str, field: str, range_s: tuple[float, float]) -> Command:
+    """Return the row of a time of the sweep [s]."""
+
+    def write(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
+        seconds = number_or_limit(only(parameters), _SECONDS)
+        if isinstance(seconds, Limit) or not range_s[0] <= seconds <= range_s[1]:
+            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+        _set_sweep(own, channel, field, round(seconds, 6))
+
+    def ask(own: Keysight33500B, channel: int, parameters: Parameters) -> bytes:
+        none(parameters)
+        return as_number(getattr(_sweep(own.settings(channel)), field))
+
+    return Command(f"[SOURce#:]SWEep:{node}", _GUIDE, write, ask)
 
 
+_GUIDE = "Operating and Service Guide"
+_SECONDS = {"": 1.0, "S": 1.0, "MS": 1e-3}
+# fmt: off
 _COMMANDS = (
-    replace(LOAD, pattern="OUTPut#:LOAD").command(),
-    choice(
-        "[SOURce#:]FUNCtion",
-        _Shape,
+    load_command("OUTPut#:LOAD"),
+    choice("[SOURce#:]FUNCtion", _GUIDE, _Shape,
         lambda s: _Shape.ARBITRARY if s.shape == EDIT_MEMORY else _Shape.SINE,
-        _set_shape,
-    ),
-    Command(HeaderPattern("[SOURce#:]FUNCtion:ARBitrary"), _select, lambda g, *_: _own(g).selected.encode()),
-    Command(
-        HeaderPattern("[SOURce#:]FUNCtion:ARBitrary:SRATe"),
-        _write_rate,
-        lambda g, channel, _: as_number(_rate_hz(_own(g), channel)),
-    ),
-    Command(
-        HeaderPattern("[SOURce#:]FUNCtion:ARBitrary:FILTer"),
-        _write_filter,
-        lambda g, *_: _own(g).filter.name[:4].encode(),
-    ),
-    Command(HeaderPattern("[SOURce#:]DATA:ARBitrary:DAC"), _write_dac, None),
-    Command(HeaderPattern("[SOURce#:]DATA:VOLatile:CLEar"), _clear, None),
-    Command(HeaderPattern("[SOURce#:]DATA:ATTRibute:POINts"), None, _points),
-    Command(HeaderPattern("[SOURce#:]DATA:ATTRibute:AVERage"), None, _average),
-    Command(HeaderPattern("FORMat:BORDer"), _write_order, lambda g, *_: _own(g).order.name[:4].encode()),
-    choice("[SOURce#:]VOLTage:UNIT", _Unit, lambda _: _Unit.VPP, lambda s, _: s),
-    switch(
-        "[SOURce#:]SWEep:STATe",
-        lambda s: s.mode is RunMode.SWEEP,
-        lambda s, on: with_mode(RunMode.SWEEP, s, on),
-    ),
-    _sweep_number("TIME", lambda s: s.sweep_s, lambda s, value: replace(s, sweep_s=value), SWEEP_S),
-    _sweep_number("HTIMe", lambda s: s.hold_s, lambda s, value: replace(s, hold_s=value), HOLD_S),
-    choice(
-        "[SOURce#:]SWEep:SPACing",
-        _Spacing,
+        lambda s, word: replace(s, shape=SINE if word is _Shape.SINE else EDIT_MEMORY)),
+    Command("[SOURce#:]FUNCtion:ARBitrary", _GUIDE, _select, lambda own, *_: own.selected.encode()),
+    Command("[SOURce#:]FUNCtion:ARBitrary:SRATe", _GUIDE, _write_rate,
+        lambda own, channel, _: as_number(_rate_hz(own, channel))),
+    Command("[SOURce#:]FUNCtion:ARBitrary:FILTer", _GUIDE, _write_filter,
+        lambda own, *_: own.filter.name[:4].encode()),
+    Command("[SOURce#:]DATA:ARBitrary:DAC", _GUIDE, _write_dac, None),
+    Command("[SOURce#:]DATA:VOLatile:CLEar", _GUIDE, _clear, None),
+    Command("[SOURce#:]DATA:ATTRibute:POINts", _GUIDE, None, _points),
+    Command("[SOURce#:]DATA:ATTRibute:AVERage", _GUIDE, None, _average),
+    Command("FORMat:BORDer", _GUIDE, _write_order, lambda own, *_: own.order.name[:4].encode()),
+    choice("[SOURce#:]VOLTage:UNIT", _GUIDE, _Unit, lambda _: _Unit.VPP, lambda s, _: s),
+    switch("[SOURce#:]SWEep:STATe", _GUIDE,
+        lambda s: s.mode is RunMode.SWEEP, lambda s, on: with_mode(RunMode.SWEEP, s, on)),
+    _sweep_seconds("TIME", "sweep_s", SWEEP_S),
+    _sweep_seconds("HTIMe", "hold_s", HOLD_S),
+    choice("[SOURce#:]SWEep:SPACing", _GUIDE, _Spacing,
         lambda s: _Spacing[_sweep(s).spacing.name],
-        lambda s, word: replace(s, sweep=replace(_sweep(s), spacing=Spacing[word.name])),
-    ),
-    choice(
-        "TRIGger#:SOURce",
-        SweepTrigger,
-        lambda s: _sweep(s).trigger,
-        lambda s, word: replace(s, sweep=replace(_sweep(s), trigger=word)),
-    ),
-    switch(
-        "[SOURce#:]BURSt:STATe",
-        lambda s: s.mode is RunMode.BURST,
-        lambda s, on: with_mode(RunMode.BURST, s, on),
-    ),
-    replace(channel_commands.BURST_CYCLES, limits=lambda _: (1, MOST_BURST_CYCLES), channels=2).command(),
-    choice(
-        "[SOURce#:]BURSt:MODE",
-        BurstMode,
-        lambda s: s.burst_mode,
-        lambda s, mode: replace(s, burst_mode=mode),
-    ),
-    *map(_modulation, (RunMode.AM, RunMode.FM, RunMode.PM, RunMode.FSK, RunMode.PWM)),
+        lambda s, word: replace(s, sweep=replace(_sweep(s), spacing=Spacing[word.name]))),
+    choice("TRIGger#:SOURce", _GUIDE, SweepTrigger,
+        lambda s: _sweep(s).trigger, lambda s, word: replace(s, sweep=replace(_sweep(s), trigger=word))),
+    switch("[SOURce#:]BURSt:STATe", _GUIDE,
+        lambda s: s.mode is RunMode.BURST, lambda s, on: with_mode(RunMode.BURST, s, on)),
+    burst_cycles(MOST_BURST_CYCLES, channels=2),
+    choice("[SOURce#:]BURSt:MODE", _GUIDE, BurstMode,
+        lambda s: s.burst_mode, lambda s, mode: replace(s, burst_mode=mode)),
+    *map(modulation_switch, (RunMode.AM, RunMode.FM, RunMode.PM, RunMode.FSK, RunMode.PWM)),
 )
+# fmt: on

@@ -41,9 +41,9 @@ class Flat:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """1 for the first ``duty`` of the cycle, then -1; ``duty`` may differ from element to element."""
+    """1 for the first ``duty`` of the cycle, then -1."""
 
-    duty: float | Samples = 0.5
+    duty: float = 0.5
 
     def mean(self, start: Samples, span: Samples) -> Samples:
         """Return the mean from the share of the stretch that lies in the high part."""

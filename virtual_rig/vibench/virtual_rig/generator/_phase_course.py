@@ -1,4 +1,4 @@
-"""How the phase of a generator runs with its own time: steady, swept, or modulated.
+"""How the phase of a generator runs with its own time: steady or swept.
 
 Phase is in cycles, time in seconds of the generator's own clock. Frequencies are whole microhertz,
 the resolution of the instrument, so that whole seconds contribute an exact fraction of a cycle and
@@ -12,8 +12,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._periodic_shape import PeriodicShape
-
 Samples = NDArray[np.float64]
 
 MICROHERTZ = 1e-6
@@ -22,8 +20,6 @@ CURVATURE_TOLERANCE_CYCLES = 1e-6
 """How far the phase inside a piece may bend away from a straight line."""
 FINEST_SPLIT = 256
 """At most so many pieces of one interval; only sweeps above some 1e9 Hz/s would need more."""
-MODULATION_STEPS = 64
-"""Pieces per cycle of the modulating shape (an even number, so that a square's edges fall on one)."""
 NO_TIMES: Samples = np.empty(0)
 
 
@@ -180,97 +176,6 @@ class TriggeredSweepPhase:
             return corners
         inside = SweptPhase(self.start_hz, self.stop_hz, self.sweep_s, self.spacing, self.begin_s, 0.0)
         return np.concatenate((corners, inside.breakpoints(first_s, last_s, interval_s)))
-
-
-@dataclass(frozen=True)
-class Modulator:
-    """The internal modulating signal: a shape between -1 and 1 at its own frequency."""
-
-    shape: PeriodicShape
-    course: SteadyPhase
-
-    def values(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return the signal at both ends of every piece, seen from inside the piece (jumps fall between)."""
-        return self._at(edges_s[:-1], np.diff(edges_s)), self._at(edges_s[1:], -np.diff(edges_s))
-
-    def _at(self, time_s: Samples, inwards_s: Samples) -> Samples:
-        inside = time_s + 1e-6 * inwards_s
-        start, _ = self.course.stretches(np.append(inside, inside[-1:]))
-        return self.shape.mean(start, np.zeros_like(start))
-
-    def means(self, edges_s: Samples) -> Samples:
-        """Return the exact mean of the signal over every piece."""
-        return self.shape.mean(*self.course.stretches(edges_s))
-
-    def breakpoints(self, begin_s: float, end_s: float) -> Samples:
-        """Return a grid on the modulating cycle, fixed in time."""
-        period_s = 1 / (self.course.frequency_uhz * MICROHERTZ)
-        return _grid(-self.course.offset * period_s, period_s / MODULATION_STEPS, begin_s, end_s)
-
-
-@dataclass(frozen=True)
-class FrequencyModulatedPhase:
-    """Frequency modulation; frequency-shift keying is the same with a square.
-
-    The deviation adds ``deviation * mean(signal) * duration`` to every piece; the running sum of a
-    piece starts from the modulating signal's integral, so that any two renderings agree.
-    """
-
-    carrier: SteadyPhase
-    deviation_hz: float
-    modulator: Modulator
-
-    def phase(self, time_s: float) -> float:
-        """Return the phase at one instant [cycles, 0..1)."""
-        return float(self._starts(np.asarray([time_s]))[0])
-
-    def _starts(self, time_s: Samples) -> Samples:
-        start, _ = self.carrier.stretches(np.append(time_s, time_s[-1:]))
-        modulating, _ = self.modulator.course.stretches(np.append(time_s, time_s[-1:]))
-        begin = np.zeros_like(modulating)
-        modulating_hz = self.modulator.course.frequency_uhz * MICROHERTZ
-        # The integral over whole modulating cycles is linear in time; the rest is the open cycle's.
-        cycle_mean = self.modulator.shape.mean(np.zeros(1), np.ones(1))[0]
-        open_cycle = modulating * (self.modulator.shape.mean(begin, modulating) - cycle_mean)
-        extra = self.deviation_hz * (cycle_mean * time_s + open_cycle / modulating_hz)
-        return _fraction(start + extra)
-
-    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return start and span between consecutive edges."""
-        _, span = self.carrier.stretches(edges_s)
-        extra = self.deviation_hz * self.modulator.means(edges_s) * np.diff(edges_s)
-        return self._starts(edges_s[:-1]), np.maximum(span + extra, 0.0)
-
-    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:  # noqa: ARG002
-        """Return the modulator's grid."""
-        return self.modulator.breakpoints(begin_s, end_s)
-
-
-@dataclass(frozen=True)
-class PhaseModulatedPhase:
-    """Phase modulation; phase-shift keying is the same with a square."""
-
-    carrier: SteadyPhase
-    deviation: float
-    """Largest shift [cycles]."""
-    modulator: Modulator
-
-    def phase(self, time_s: float) -> float:
-        """Return the carrier's phase at one instant: what goes on when the modulation ends."""
-        return self.carrier.phase(time_s)
-
-    def stretches(self, edges_s: Samples) -> tuple[Samples, Samples]:
-        """Return start and span between consecutive edges."""
-        start, span = self.carrier.stretches(edges_s)
-        first, last = self.modulator.values(edges_s)
-        return (
-            _fraction(start + self.deviation * first),
-            np.maximum(span + self.deviation * (last - first), 0.0),
-        )
-
-    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:  # noqa: ARG002
-        """Return the modulator's grid."""
-        return self.modulator.breakpoints(begin_s, end_s)
 
 
 def _fraction(cycles: Samples) -> Samples:

@@ -1,15 +1,14 @@
-"""One entry of the generator's command table, and the kinds that repeat: numbers, words, switches."""
+"""Rows of a generator's command table: what a header sets, what its query answers, and who says so."""
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Protocol, TypeVar
+from typing import Any
 
 from ._afg1022_settings import ChannelSettings
-from ._arbitrary_memory import ArbitraryMemory
 from ._scpi_header import HeaderPattern, mnemonic_matches, short_form
-from ._scpi_status import ErrorCode, ScpiError, Status
+from ._scpi_status import ErrorCode, ScpiError
 from ._scpi_value import INFINITE, Limit, as_number, boolean, number_or_limit, text
 
 CHANNELS = 2
@@ -17,191 +16,94 @@ _RANGE_ROUNDING = 1e-9
 """Relative slack at the ends of a range, for numbers that arrive in another unit."""
 
 Parameters = tuple[bytes, ...]
-
-
-@dataclass(frozen=True)
-class Quirks:
-    """Documented habits of the family's firmware; the defaults are what FV:V1.0.2 does.
-
-    Sources: hardware reference, sections 1.1, 1.2 and 1.4.
-    """
-
-    first_identity_after_clear_is_empty: bool = True
-    """The first ``*IDN?`` after ``*CLS`` answers an empty line."""
-    high_impedance_has_ohm_sign: bool = True
-    """``OUTP:IMP?`` at high impedance answers ``9.9E+37`` and an ohm sign in GBK, which is not ASCII."""
-    unknown_is_syntax_error: bool = True
-    """An unknown command queues -102; an unknown query also answers an empty line (else -113, silence)."""
-    noise_is_not_played: bool = True
-    """``FUNC:SHAP PRN`` is accepted and reported, but the shape before it goes on playing."""
-    out_of_range_becomes_default: bool = True
-    """A number out of range silently sets the parameter's default (else -222, setting unchanged)."""
-    dc_ignores_offset: bool = True
-    """The built-in DC shape stays at zero whatever the offset."""
-    duty_queues_error: bool = True
-    """``PULS:DCYC`` works, and queues -102 all the same."""
-    load_is_panel_only: bool = False
-    """``OUTP:IMP`` is unknown: the load can be set at the front panel only (one driver's report)."""
-    sweep_is_unknown: bool = False
-    """The sweep commands are unknown."""
-
-
-class Generator(Protocol):
-    """What a command may do to the generator."""
-
-    quirks: Quirks
-    status: Status
-    memory: ArbitraryMemory
-
-    def settings(self, channel: int) -> ChannelSettings:
-        """Return the settings of a channel."""
-
-    def configure(self, channel: int, settings: ChannelSettings) -> None:
-        """Check and take over new settings."""
-
-    def memory_changed(self) -> None:
-        """Let a changed waveform act at once if it is playing."""
-
-    @property
-    def frequencies_are_locked(self) -> bool:
-        """Whether both channels share one frequency."""
-
-    def lock_frequencies(self, channel: int, *, locked: bool) -> None:
-        """Let the other channel follow the frequency of this one, or not."""
-
-    def identity(self) -> bytes:
-        """Return who the instrument is."""
-
-    def reset(self) -> None:
-        """Return to the defaults."""
-
-    def clear_status(self) -> None:
-        """Empty error queue and event register."""
-
-    def trigger(self) -> None:
-        """Start a waiting burst."""
-
-    def align_phases(self) -> None:
-        """Start both channels at their start phase now."""
-
-    def save(self, number: int) -> None:
-        """Keep the present settings under a number."""
-
-    def recall(self, number: int) -> None:
-        """Return to settings that were kept; the outputs are off."""
-
-
-Setter = Callable[[Generator, int, Parameters], None]
-Query = Callable[[Generator, int, Parameters], bytes]
+Setter = Callable[[Any, int, Parameters], None]
+"""Takes the generator, the channel, and what was sent."""
+Query = Callable[[Any, int, Parameters], bytes]
+Reader = Callable[[bytes, Mapping[str, float]], float | Limit]
 
 
 @dataclass(frozen=True)
 class Command:
-    """A header with what it does and what it answers; either may be missing."""
+    """One row; without ``write`` it can only be asked for, without ``ask`` only be sent."""
 
-    pattern: HeaderPattern
+    header: str
+    """As manuals print it, see `HeaderPattern`."""
+    source: str
+    """Where its behaviour is described."""
     write: Setter | None
     ask: Query | None
     channels: int = CHANNELS
     """The highest numeric suffix."""
 
-
-Getter = Callable[[ChannelSettings], float]
-Putter = Callable[[ChannelSettings, float], ChannelSettings]
-Range = Callable[[ChannelSettings], tuple[float, float]]
-Reader = Callable[[bytes, Mapping[str, float]], float | Limit]
-Word = TypeVar("Word", bound=Enum)
+    @property
+    def pattern(self) -> HeaderPattern:
+        """What matches a header that a program sends."""
+        return HeaderPattern(self.header)
 
 
-@dataclass(frozen=True)
-class Number:
-    """A numeric setting: its unit, its range, its default and its resolution."""
+def number(
+    header: str,
+    source: str,
+    field: str,
+    units: Mapping[str, float],
+    limits: Callable[[ChannelSettings], tuple[float, float]],
+    default: float,
+    decimals: int,
+    *,
+    channels: int = CHANNELS,
+    scale: Callable[[ChannelSettings], float] = lambda _: 1.0,
+    largest: float = math.nan,
+) -> Command:
+    """Return the row of a number: a ``field`` of the settings, in ``units``, kept to so many ``decimals``.
 
-    pattern: str
-    units: Mapping[str, float]
-    get: Getter
-    put: Putter
-    limits: Range
-    default: float
-    decimals: int
-    """Digits after the point that the instrument keeps."""
-    channels: int = CHANNELS
-    read: Reader = number_or_limit
-    infinity_allowed: Callable[[ChannelSettings], bool] = lambda _: False
+    ``scale`` is the displayed number over the field's. A number of ``INFINITE`` sets ``largest``, if given.
+    """
 
-    def command(self) -> Command:
-        """Return the table entry."""
-        return Command(HeaderPattern(self.pattern), self.write, self.ask, self.channels)
+    def meant(limit: Limit, settings: ChannelSettings) -> float:
+        low, high = limits(settings)
+        usual = min(max(default, low), high)
+        words = {Limit.MINIMUM: low, Limit.MAXIMUM: high, Limit.DEFAULT: usual, Limit.INFINITY: math.inf}
+        return words[limit]
 
-    def write(self, generator: Generator, channel: int, parameters: Parameters) -> None:
-        """Take a number, or a word that stands for one."""
+    def write(generator: Any, channel: int, parameters: Parameters) -> None:
         settings = generator.settings(channel)
-        value = self.read(only(parameters), self.units)
-        number = self._meant(value, settings) if isinstance(value, Limit) else value
-        infinite = number >= INFINITE and self.infinity_allowed(settings)
-        low, high = self.limits(settings)
-        if infinite:
-            number = math.inf
-        elif low - _RANGE_ROUNDING * abs(low) <= number <= high + _RANGE_ROUNDING * abs(high):
-            number = round(number, self.decimals)
+        value = number_or_limit(only(parameters), units)
+        shown = meant(value, settings) if isinstance(value, Limit) else value
+        low, high = limits(settings)
+        if shown >= INFINITE and not math.isnan(largest):
+            shown = largest
+        elif low - _RANGE_ROUNDING * abs(low) <= shown <= high + _RANGE_ROUNDING * abs(high):
+            shown = round(shown, decimals)
         elif generator.quirks.out_of_range_becomes_default:
-            number = min(max(self.default, low), high)
+            shown = meant(Limit.DEFAULT, settings)
         else:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-        generator.configure(channel, self.put(settings, number))
+        generator.configure(channel, replace(settings, **{field: shown / scale(settings)}))
 
-    def ask(self, generator: Generator, channel: int, parameters: Parameters) -> bytes:
-        """Answer the value, or what MIN, MAX or DEF would be."""
+    def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
         settings = generator.settings(channel)
-        if not parameters:
-            value = self.get(settings)
-        else:
-            limit = self.read(only(parameters), self.units)
-            if not isinstance(limit, Limit):
+        shown = getattr(settings, field) * scale(settings)
+        if parameters:
+            word = number_or_limit(only(parameters), units)
+            if not isinstance(word, Limit):
                 raise ScpiError(ErrorCode.PARAMETER_NOT_ALLOWED)
-            value = self._meant(limit, settings)
-        return as_number(INFINITE if math.isinf(value) else value)
+            shown = meant(word, settings)
+        return as_number(INFINITE if math.isinf(shown) else shown)
 
-    def _meant(self, limit: Limit, settings: ChannelSettings) -> float:
-        """Return the number a word stands for."""
-        low, high = self.limits(settings)
-        meaning = {
-            Limit.MINIMUM: low,
-            Limit.MAXIMUM: high,
-            Limit.DEFAULT: min(max(self.default, low), high),
-            Limit.INFINITY: math.inf,
-        }
-        return meaning[limit]
-
-
-def switch(
-    pattern: str,
-    get: Callable[[ChannelSettings], bool],
-    put: Callable[[ChannelSettings, bool], ChannelSettings],
-    channels: int = CHANNELS,
-) -> Command:
-    """Return the entry of something that is on or off."""
-
-    def write(generator: Generator, channel: int, parameters: Parameters) -> None:
-        generator.configure(channel, put(generator.settings(channel), boolean(only(parameters))))
-
-    def ask(generator: Generator, channel: int, parameters: Parameters) -> bytes:
-        none(parameters)
-        return b"1" if get(generator.settings(channel)) else b"0"
-
-    return Command(HeaderPattern(pattern), write, ask, channels)
+    return Command(header, source, write, ask, channels)
 
 
 def choice(
-    pattern: str,
-    words: type[Word],
-    get: Callable[[ChannelSettings], Word],
-    put: Callable[[ChannelSettings, Word], ChannelSettings],
+    header: str,
+    source: str,
+    words: type[Enum],
+    get: Callable[[ChannelSettings], Enum],
+    put: Callable[[ChannelSettings, Any], ChannelSettings],
     channels: int = CHANNELS,
 ) -> Command:
-    """Return the entry of a setting that is one of several words (the values of an enum)."""
+    """Return the row of a setting that is one of several words, the values of an enum."""
 
-    def write(generator: Generator, channel: int, parameters: Parameters) -> None:
+    def write(generator: Any, channel: int, parameters: Parameters) -> None:
         word = text(only(parameters))
         for candidate in words:
             if mnemonic_matches(word, candidate.value):
@@ -209,29 +111,64 @@ def choice(
                 return
         raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
 
-    def ask(generator: Generator, channel: int, parameters: Parameters) -> bytes:
+    def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
         none(parameters)
         return short_form(get(generator.settings(channel)).value).encode("ascii")
 
-    return Command(HeaderPattern(pattern), write, ask, channels)
+    return Command(header, source, write, ask, channels)
 
 
-def only(parameters: Parameters) -> bytes:
-    """Return the one parameter that a command takes; -109 without, -108 with more."""
-    if not parameters or not parameters[0]:
-        raise ScpiError(ErrorCode.MISSING_PARAMETER)
-    if len(parameters) > 1:
-        raise ScpiError(ErrorCode.PARAMETER_NOT_ALLOWED)
-    return parameters[0]
+def switch(
+    header: str,
+    source: str,
+    get: Callable[[ChannelSettings], bool],
+    put: Callable[[ChannelSettings, bool], ChannelSettings],
+    channels: int = CHANNELS,
+) -> Command:
+    """Return the row of something that is on or off."""
+
+    def write(generator: Any, channel: int, parameters: Parameters) -> None:
+        generator.configure(channel, put(generator.settings(channel), boolean(only(parameters))))
+
+    def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
+        none(parameters)
+        return b"1" if get(generator.settings(channel)) else b"0"
+
+    return Command(header, source, write, ask, channels)
+
+
+def action(header: str, source: str, act: Callable[[Any], None]) -> Command:
+    """Return the row of a command without parameters."""
+
+    def write(generator: Any, _: int, parameters: Parameters) -> None:
+        none(parameters)
+        act(generator)
+
+    return Command(header, source, write, None)
+
+
+def report(header: str, source: str, tell: Callable[[Any], bytes]) -> Command:
+    """Return the row of a query without parameters."""
+
+    def ask(generator: Any, _: int, parameters: Parameters) -> bytes:
+        none(parameters)
+        return tell(generator)
+
+    return Command(header, source, None, ask)
 
 
 def exactly(parameters: Parameters, count: int) -> Parameters:
-    """Return the parameters if there are as many as a command takes."""
-    if len(parameters) < count:
+    """Return the parameters if there are as many as a command takes; -109 or -108 otherwise."""
+    if len(parameters) < count or not all(parameters):
         raise ScpiError(ErrorCode.MISSING_PARAMETER)
     if len(parameters) > count:
         raise ScpiError(ErrorCode.PARAMETER_NOT_ALLOWED)
     return parameters
+
+
+def only(parameters: Parameters) -> bytes:
+    """Return the one parameter that a command takes."""
+    return exactly(parameters, 1)[0]
 
 
 def none(parameters: Parameters) -> None:

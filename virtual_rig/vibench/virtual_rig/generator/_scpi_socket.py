@@ -10,7 +10,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import Protocol
 
-from ._afg1022 import Reply
+from ._scpi_instrument import Reply
 from ._scpi_message import LONGEST_MESSAGE, message_end
 
 LOOPBACK = "127.0.0.1"

@@ -16,7 +16,7 @@ class ErrorCode(IntEnum):
     PARAMETER_NOT_ALLOWED = -108
     MISSING_PARAMETER = -109
     UNDEFINED_HEADER = -113
-    SUFFIX_OUT_OF_RANGE = -114
+    HEADER_SUFFIX_OUT_OF_RANGE = -114
     EXPONENT_TOO_LARGE = -123
     INVALID_SUFFIX = -131
     INVALID_BLOCK_DATA = -161
@@ -24,6 +24,7 @@ class ErrorCode(IntEnum):
     DATA_OUT_OF_RANGE = -222
     ILLEGAL_PARAMETER_VALUE = -224
     OUT_OF_MEMORY = -225
+    HARDWARE_MISSING = -241
     QUEUE_OVERFLOW = -350
     QUERY_INTERRUPTED = -410
     QUERY_UNTERMINATED = -420
@@ -32,29 +33,9 @@ class ErrorCode(IntEnum):
     @property
     def text(self) -> str:
         """The words that SYST:ERR? sends with the number."""
-        return _TEXTS[self]
-
-
-_TEXTS = {
-    ErrorCode.NO_ERROR: "No error",
-    ErrorCode.SYNTAX_ERROR: "Syntax error",
-    ErrorCode.DATA_TYPE_ERROR: "Data type error",
-    ErrorCode.PARAMETER_NOT_ALLOWED: "Parameter not allowed",
-    ErrorCode.MISSING_PARAMETER: "Missing parameter",
-    ErrorCode.UNDEFINED_HEADER: "Undefined header",
-    ErrorCode.SUFFIX_OUT_OF_RANGE: "Header suffix out of range",
-    ErrorCode.EXPONENT_TOO_LARGE: "Exponent too large",
-    ErrorCode.INVALID_SUFFIX: "Invalid suffix",
-    ErrorCode.INVALID_BLOCK_DATA: "Invalid block data",
-    ErrorCode.SETTINGS_CONFLICT: "Settings conflict",
-    ErrorCode.DATA_OUT_OF_RANGE: "Data out of range",
-    ErrorCode.ILLEGAL_PARAMETER_VALUE: "Illegal parameter value",
-    ErrorCode.OUT_OF_MEMORY: "Out of memory",
-    ErrorCode.QUEUE_OVERFLOW: "Queue overflow",
-    ErrorCode.QUERY_INTERRUPTED: "Query INTERRUPTED",
-    ErrorCode.QUERY_UNTERMINATED: "Query UNTERMINATED",
-    ErrorCode.QUERY_DEADLOCKED: "Query DEADLOCKED",
-}
+        words = self.name.replace("_", " ").capitalize()
+        kind, _, problem = words.partition(" ")
+        return f"{kind} {problem.upper()}" if kind == "Query" else words
 
 
 class ScpiError(Exception):

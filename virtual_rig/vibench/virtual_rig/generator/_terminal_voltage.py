@@ -7,13 +7,12 @@ functions of the generator's own time, so rendering in blocks of any size gives 
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ._periodic_shape import PeriodicShape, Rectangle, Sine
-from ._phase_course import NO_TIMES, Modulator, PhaseCourse, SteadyPhase
+from ._periodic_shape import PeriodicShape, Sine
+from ._phase_course import PhaseCourse, SteadyPhase
 
 Samples = NDArray[np.float64]
 
@@ -21,10 +20,6 @@ OUTPUT_RESISTANCE_OHM = 50.0
 NO_BLOCK = -1
 NOISE_BLOCK = 4096
 """Samples of noise that one draw of the random generator makes; a block is drawn from its own seed."""
-PRN_BANDWIDTH_HZ = 25e6
-"""Bandwidth of the built-in noise (hardware reference, unverified)."""
-PRN_PEAK_TO_RMS = 6.0
-"""Peak-to-peak amplitude of the built-in noise over its rms (hardware reference, section 2)."""
 _CONTINUES = 1e-3
 """A block whose start is this close (in intervals) to the end of the last one continues it."""
 
@@ -34,59 +29,6 @@ class Relay(Enum):
 
     OPEN = "open"
     CLOSED = "closed"
-
-
-class Envelope(Protocol):
-    """How the amplitude changes within a signal."""
-
-    def factors(self, edges_s: Samples) -> Samples:
-        """Return the amplitude's factor on every piece."""
-
-    def breakpoints(self, begin_s: float, end_s: float) -> Samples:
-        """Return where the factor must be cut to be constant enough."""
-
-
-@dataclass(frozen=True)
-class Constant:
-    """No modulation of the amplitude."""
-
-    def factors(self, edges_s: Samples) -> Samples:
-        """Return ones."""
-        return np.ones(len(edges_s) - 1)
-
-    def breakpoints(self, begin_s: float, end_s: float) -> Samples:  # noqa: ARG002 - there are none
-        """Return none."""
-        return NO_TIMES
-
-
-@dataclass(frozen=True)
-class AmplitudeModulation:
-    """Between ``low`` and ``high``, following the modulating signal from -1 to 1."""
-
-    low: float
-    high: float
-    modulator: Modulator
-
-    def factors(self, edges_s: Samples) -> Samples:
-        """Return the mean factor on every piece."""
-        return self.low + (self.high - self.low) * 0.5 * (1 + self.modulator.means(edges_s))
-
-    def breakpoints(self, begin_s: float, end_s: float) -> Samples:
-        """Return the modulator's grid."""
-        return self.modulator.breakpoints(begin_s, end_s)
-
-
-@dataclass(frozen=True)
-class PulseWidthModulation:
-    """The duty cycle of a pulse, following the modulating signal."""
-
-    duty: float
-    deviation: float
-    modulator: Modulator
-
-    def shape(self, edges_s: Samples) -> Rectangle:
-        """Return the pulse with its duty on every piece."""
-        return Rectangle(np.clip(self.duty + self.deviation * self.modulator.means(edges_s), 0, 1))
 
 
 @dataclass(frozen=True)
@@ -104,41 +46,29 @@ class Signal:
 
     relay: Relay = Relay.OPEN
     course: PhaseCourse = field(default_factory=lambda: SteadyPhase(0, 0.0))
-    shape: PeriodicShape | None = field(default_factory=Sine)
-    """None: the built-in noise."""
+    shape: PeriodicShape = field(default_factory=Sine)
     amplitude_vpp: float = 0.0
     """Peak to peak, without load."""
     offset_v: float = 0.0
-    envelope: Envelope = field(default_factory=Constant)
     burst: Burst | None = None
-    pulse_width: PulseWidthModulation | None = None
 
     def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
         """Return every instant inside (begin, end) at which the signal must be cut."""
-        times = [
-            self.course.breakpoints(begin_s, end_s, interval_s),
-            self.envelope.breakpoints(begin_s, end_s),
-        ]
-        if self.pulse_width is not None:
-            times.append(self.pulse_width.modulator.breakpoints(begin_s, end_s))
-        if self.burst is not None:
-            ends = np.asarray([self.burst.begin_s, self.burst.end_s])
-            times.append(ends[(ends > begin_s) & (ends < end_s)])
-        return np.concatenate(times)
+        times = self.course.breakpoints(begin_s, end_s, interval_s)
+        if self.burst is None:
+            return times
+        ends = np.asarray([self.burst.begin_s, self.burst.end_s])
+        return np.concatenate([times, ends[(ends > begin_s) & (ends < end_s)]])
 
     def means(self, edges_s: Samples) -> Samples:
-        """Return the mean open-circuit voltage of every piece between edges; noise is left out."""
-        level = np.full(len(edges_s) - 1, self.offset_v)
-        shape = self.shape if self.pulse_width is None else self.pulse_width.shape(edges_s)
-        if shape is None:
-            return level
+        """Return the mean open-circuit voltage of every piece between edges."""
         start, span = self.course.stretches(edges_s)
         if self.burst is not None:
             middle = 0.5 * (edges_s[:-1] + edges_s[1:])
             runs = (middle >= self.burst.begin_s) & (middle < self.burst.end_s)
             start = np.where(runs, start, self.burst.start_phase)
             span = np.where(runs, span, 0.0)
-        return level + 0.5 * self.amplitude_vpp * self.envelope.factors(edges_s) * shape.mean(start, span)
+        return self.offset_v + 0.5 * self.amplitude_vpp * self.shape.mean(start, span)
 
 
 @dataclass(frozen=True)
@@ -243,16 +173,10 @@ class Timeline:
         weights = np.diff(local) / self._interval_s
         means = signal.means(own) if len(cuts) == 0 else _mean_over_pieces(signal, own, cuts)
         volts = np.zeros(len(edges_s) - 1)
-        volts[first:last] = weights * means + np.sqrt(weights) * self._noise_rms(signal) * noise[first:last]
+        # Noise in the mean over one interval: density times the bandwidth 1/(2 interval).
+        rms_v = self.terminal.noise_v_per_rt_hz / np.sqrt(2 * self._interval_s)
+        volts[first:last] = weights * means + np.sqrt(weights) * rms_v * noise[first:last]
         return volts
-
-    def _noise_rms(self, signal: Signal) -> float:
-        """Rms of the noise in the mean over one interval: density times the bandwidth 1/(2 interval)."""
-        density = self.terminal.noise_v_per_rt_hz**2
-        if signal.shape is None:
-            prn_rms_v = signal.amplitude_vpp / PRN_PEAK_TO_RMS
-            density += prn_rms_v**2 / PRN_BANDWIDTH_HZ
-        return float(np.sqrt(density / (2 * self._interval_s)))
 
     def _noise(self, count: int) -> Samples:
         """Return unit noise that depends on the seed and the sample's number alone."""
