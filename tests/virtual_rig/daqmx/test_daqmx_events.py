@@ -5,7 +5,7 @@ import queue
 import numpy as np
 import pytest
 from nidaqmx import DaqError, Task
-from nidaqmx.constants import AcquisitionType, Signal
+from nidaqmx.constants import AcquisitionType
 from nidaqmx.error_codes import DAQmxErrors
 
 PATIENCE_S = 20.0
@@ -51,44 +51,12 @@ def test_a_callback_that_does_not_read_is_not_called_for_ever(task):
     assert calls.empty()
 
 
-def test_the_end_of_a_finite_task_is_told_once_per_run(task):
-    task.timing.cfg_samp_clk_timing(10000, samps_per_chan=500)
-    ends = queue.Queue()
-
-    def on_done(handle, status, data):
-        ends.put(status)
-        return 0
-
-    task.register_done_event(on_done)
-    for _ in range(2):
-        task.start()
-        assert ends.get(timeout=PATIENCE_S) == 0
-        assert len(task.read(500)) == 500
-        task.stop()
-    assert ends.empty()
-
-
-def test_every_sample_can_be_told(task):
-    task.timing.cfg_samp_clk_timing(1000, sample_mode=AcquisitionType.CONTINUOUS)
-    ticks = queue.Queue()
-
-    def on_tick(handle, signal, data):
-        ticks.put(Signal(signal))
-        return 0
-
-    task.register_signal_event(Signal.SAMPLE_COMPLETE, on_tick)
-    task.start()
-    for _ in range(3):
-        assert ticks.get(timeout=PATIENCE_S) is Signal.SAMPLE_COMPLETE
-        task.read(1)
-
-
 def test_a_task_can_be_closed_while_its_events_are_listened_to(daq):
     for number in range(3):
         task = Task(grpc_options=daq.options)
         task.ai_channels.add_ai_voltage_chan("Dev1/ai1")
         task.timing.cfg_samp_clk_timing(1000, samps_per_chan=10 + number)
-        task.register_done_event(lambda handle, status, data: 0)
+        task.register_every_n_samples_acquired_into_buffer_event(5, lambda *event: 0)
         task.start()
         task.close()
 
@@ -98,5 +66,3 @@ def test_events_that_make_no_sense_are_refused(task):
     with pytest.raises(DaqError) as caught:
         task.register_every_n_samples_transferred_from_buffer_event(10, lambda *event: 0)
     assert caught.value.error_code == DAQmxErrors.EVERY_N_SAMPS_TRANSFERRED_FROM_BUFFER_NOT_FOR_INPUT
-    with pytest.raises(DaqError, match="SAMPLE_CLOCK"):
-        task.register_signal_event(Signal.CHANGE_DETECTION_EVENT, lambda *event: 0)

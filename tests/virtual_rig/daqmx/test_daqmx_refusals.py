@@ -172,7 +172,7 @@ def test_every_call_of_the_protocol_is_answered_and_what_is_not_simulated_is_nam
     for name, request in [
         ("CreateDIChan", nidaqmx_pb2.CreateDIChanRequest()),
         ("ReadCounterF64", nidaqmx_pb2.ReadCounterF64Request()),
-        ("CfgAnlgWindowRefTrig", nidaqmx_pb2.CfgAnlgWindowRefTrigRequest(task=Session(name="x"))),
+        ("CfgAnlgEdgeRefTrig", nidaqmx_pb2.CfgAnlgEdgeRefTrigRequest(task=Session(name="x"))),
     ]:
         with pytest.raises(grpc.RpcError, match=name) as caught:
             getattr(stub, name)(request)
@@ -216,11 +216,7 @@ def test_a_server_that_is_gone_answers_nothing_until_it_is_back(daq, task):
 @pytest.mark.parametrize(
     ("name", "fields"),
     [
-        ("CreateAIVoltageChan", {"terminal_config_raw": 77}),
-        (
-            "CreateAIAccelChan",
-            {"current_excit_source_raw": 77, "sensitivity": 1.0, "terminal_config_raw": -1},
-        ),
+        ("CreateAIVoltageChan", {"terminal_config_raw": 77, "units_raw": 10348}),
         (
             "CfgSampClkTiming",
             {"active_edge_raw": 77, "sample_mode_raw": 10123, "rate": 1e3, "samps_per_chan": 9},

@@ -4,21 +4,16 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from nidaqmx.constants import OverwriteMode
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
 from ..analogue import Sampler
 from ._errors import DaqmxRefusal
 from ._pace import Overflow
-from ._reference_trigger import TriggerWatch
-from ._timing import MOST_SAMPLES
+from ._timing import MOST_SAMPLES, ReferenceTrigger
 
 _ROUNDING_SAMPLES = 1e-5
 """Rig time is a sum of many durations: a sample is due although the sum falls this much of a period short."""
-
-_LOOK_S = 0.1
-"""Rig time between two looks for an analogue reference trigger."""
 
 
 class Acquisition:
@@ -33,16 +28,13 @@ class Acquisition:
         total: float,
         buffer_size: int,
         overflow: Overflow,
-        overwrite: OverwriteMode,
-        watch: TriggerWatch | None = None,
+        reference: ReferenceTrigger | None = None,
         logged: Callable[[NDArray[np.float64], float], None] | None = None,
     ) -> None:
-        """Begin at rig time ``began_s``; ``total`` samples, or infinity, around what ``watch`` waits for."""
+        """Begin at rig time ``began_s``; ``total`` samples, or infinity, around a ``reference`` trigger."""
         self.rate_hz = rate_hz
         self.began_s = began_s
-        self.total = total if watch is None else math.inf
-        self.triggered_at = 0
-        """The sample that is the first after the reference trigger."""
+        self.total = total if reference is None else math.inf
         self.acquired = 0
         self.position = 0
         self.asked_at = -1
@@ -52,8 +44,8 @@ class Acquisition:
         self._sampler = sampler
         self._ring = np.empty((channels, max(1, buffer_size)))
         self._overflow = overflow
-        self._overwrite = overwrite
-        self._watch = watch
+        self._samples = total
+        self._reference = reference
         self._logged = logged
         """Is given what goes into the buffer, and the rig time of its first sample."""
         self._is_open = True
@@ -101,49 +93,34 @@ class Acquisition:
         due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
         due = int(min(due, self.total))
         while self.acquired < min(due, self.total) and self._is_open and self.failure is None:
-            count = min(due - self.acquired, self.buffer_size)
-            block = self._sampler.read(count)
-            if self._watch is not None:
-                self._look_for_trigger(self._watch, block)
-                block = block[:, : int(min(count, self.total - self.acquired))]
-            self._store(block)
+            self._store(self._sampler.read(min(due - self.acquired, self.buffer_size)))
         if self.is_done:
             self.close()
 
     @property
     def awaits_trigger(self) -> bool:
         """Whether it keeps only the newest samples, until its reference trigger comes."""
-        return self._watch is not None and self._is_open and self.total == math.inf
+        return self._reference is not None and self._is_open and self.total == math.inf
 
     @property
-    def next_look_s(self) -> float:
-        """Rig time by which the reference trigger may have come; infinite if others must raise it [s]."""
-        assert self._watch is not None
-        missing = self._watch.trigger.pretrigger - self.acquired
-        if missing <= 0 and self._watch.trigger.level is None:
-            return math.inf
-        return self.began_s + (self.acquired + max(missing, 1, self.rate_hz * _LOOK_S)) / self.rate_hz
+    def enough_before_s(self) -> float:
+        """Rig time by which the reference trigger counts; infinite when that has passed [s]."""
+        assert self._reference is not None
+        kept = self._reference.pretrigger
+        return self.began_s + kept / self.rate_hz if self.acquired < kept else math.inf
 
-    def trigger(self, after: int = 0) -> bool:
-        """Let the reference trigger come ``after`` so many samples more; say whether it counts.
+    def trigger(self) -> bool:
+        """Let the reference trigger come now; say whether it counts.
 
         It does not while there are fewer samples than are to be kept from before it.
         """
-        assert self._watch is not None
-        kept, at = self._watch.trigger.pretrigger, self.acquired + after
-        if not self.awaits_trigger or at < kept:
+        assert self._reference is not None
+        kept = self._reference.pretrigger
+        if not self.awaits_trigger or self.acquired < kept:
             return False
-        self.triggered_at, self.position = at, at - kept
-        self.total = at + self._watch.samples - kept
+        self.position = self.acquired - kept
+        self.total = self.position + self._samples
         return True
-
-    def _look_for_trigger(self, watch: TriggerWatch, block: NDArray[np.float64]) -> None:
-        if self.awaits_trigger:
-            first = max(0, watch.trigger.pretrigger - self.acquired)
-            for edge in watch.edges(block):
-                if edge >= first:
-                    self.trigger(edge)
-                    return
 
     def _store(self, block: NDArray[np.float64]) -> None:
         count = block.shape[1]
@@ -163,10 +140,7 @@ class Acquisition:
         needed = self.available + count
         if self._overflow is Overflow.GROW and self._ring.shape[0] * needed <= MOST_SAMPLES:
             self._grow(needed)
-        elif (
-            self._overflow is Overflow.GROW
-            or self._overwrite is OverwriteMode.DO_NOT_OVERWRITE_UNREAD_SAMPLES
-        ):
+        else:
             self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
 
     def _grow(self, needed: int) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,10 @@ from nidaqmx.constants import FillMode, SampleTimingType, WaveformAttributeMode
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from ._calls import NOTHING, Call, Fields, pick
+from ._calls import NOTHING, Call, Fields, pick, task_of
 from ._errors import DaqmxRefusal, unsupported_value
 from ._generation import Generation
-from ._reading import READ_ALL, Reading, default_samples, read
+from ._reading import READ_ALL, Reading, default_samples, read, require_inputs
 from ._system import DaqmxSystem
 from ._tasks import Task
 from ._timing import StartsItself, check_memory
@@ -48,8 +49,8 @@ def packed_response(status: int, values: NDArray[np.float64], samples: int) -> b
     return b"".join((_STATUS_TAG, varint(status), array, _COUNT_TAG, varint(samples)))
 
 
-def write(task: Task, values: NDArray[np.float64], start: StartsItself, timeout_s: float) -> int:
-    """Write ``values``, shape (channels, samples) in the channels' units; return samples per channel written.
+def write(task: Task, volts: NDArray[np.float64], start: StartsItself, timeout_s: float) -> int:
+    """Write samples, shape (channels, samples) [V]; return samples per channel written.
 
     Raises
     ------
@@ -59,10 +60,8 @@ def write(task: Task, values: NDArray[np.float64], start: StartsItself, timeout_
 
     """
     require_outputs(task)
-    volts = np.empty_like(values)
     for row, channel in enumerate(task.outputs):
-        channel.check(values[row])
-        volts[row] = channel.to_volts(values[row])
+        channel.check(volts[row])
     if task.kind is SampleTimingType.ON_DEMAND:
         return _write_on_demand(task, volts, start)
     if task.is_running:
@@ -138,135 +137,100 @@ def _await_space(task: Task, generation: Generation, samples: int, deadline_s: f
 
 _SECONDS_1904_TO_1970 = 2_082_844_800
 """NI's time stamps count from 1904."""
-_SIZES = {"I16": 16, "U16": 16, "I32": 32, "U32": 32}
+_READ_BITS = {"I16": 16, "I32": 32}
 
 
-class DataCalls:
-    """Reads and writes."""
+def _read_scaled(system: DaqmxSystem, request: Any) -> bytes:
+    reading = _read_what_fits(task_of(system, request), request)
+    return packed_response(reading.status, _laid_out(reading.volts, request), reading.samples)
 
-    def __init__(self, system: DaqmxSystem) -> None:
-        """Work on that system."""
-        self._system = system
 
-    def calls(self) -> dict[str, Call]:
-        """Give the calls by their name in the protocol."""
-        binary_reads = {f"ReadBinary{kind}": self._binary_reader(size) for kind, size in _SIZES.items()}
-        binary_writes = {f"WriteBinary{kind}": self._binary_writer(size) for kind, size in _SIZES.items()}
-        return {
-            "ReadAnalogF64": self._read,
-            "ReadAnalogScalarF64": self._read_scalar,
-            "ReadAnalogWaveforms": self._read_waveforms,
-            "ReadRaw": self._read_raw,
-            "WriteAnalogF64": self._write,
-            "WriteAnalogScalarF64": self._write_scalar,
-            "WriteAnalogWaveforms": self._write_waveforms,
-            **binary_reads,
-            **binary_writes,
-        }
+def _read_scalar(system: DaqmxSystem, request: Any) -> Fields:
+    reading = _whole(read(task_of(system, request), 1, request.timeout))
+    return {"value": float(reading.volts[0, 0])}
 
-    def _task(self, request: Any) -> Task:
-        return self._system.task(request.task.name)
 
-    # --- reading -------------------------------------------------------------------------
-
-    def _read(self, request: Any) -> bytes:
-        task = self._task(request)
-        reading = _read_what_fits(task, request)
-        rows = _rows(task)
-        values = np.stack([task.inputs[row].to_units(reading.volts[row]) for row in rows])
-        return packed_response(reading.status, _laid_out(values, request), reading.samples)
-
-    def _read_scalar(self, request: Any) -> Fields:
-        task = self._task(request)
-        reading = _whole(read(task, 1, request.timeout))
-        row = _rows(task)[0]
-        return {"value": float(task.inputs[row].to_units(reading.volts[row])[0])}
-
-    def _read_waveforms(self, request: Any) -> Fields:
-        task = self._task(request)
-        reading = read(task, request.num_samps_per_chan, request.timeout)
-        mode = WaveformAttributeMode(pick(request, "waveform_attribute_mode"))
-        waveforms = [_waveform(task, row, reading, mode) for row in _rows(task)]
-        return {"status": reading.status, "waveforms": waveforms, "samps_per_chan_read": reading.samples}
-
-    def _read_raw(self, request: Any) -> Fields:
-        task = self._task(request)
-        reading = _whole(read(task, request.num_samps_per_chan, request.timeout))
-        counts = _counts(task, reading)
-        size = 2 if task.side.bits <= _SIZES["I16"] else 4
-        raw = np.ascontiguousarray(counts.T).astype(f"<i{size}").tobytes()
-        return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(counts)}
-
-    def _binary_reader(self, bits: int) -> Call:
-        def read_binary(request: Any) -> Fields:
-            task = self._task(request)
-            _require_width(task, bits)
-            reading = _read_what_fits(task, request)
-            counts = _laid_out(_counts(task, reading).astype(np.float64), request).astype(np.int64)
-            return {
-                "status": reading.status,
-                "read_array": counts.ravel().tolist(),
-                "samps_per_chan_read": reading.samples,
-            }
-
-        return read_binary
-
-    # --- writing -------------------------------------------------------------------------
-
-    def _write(self, request: Any) -> Fields:
-        task = self._task(request)
-        values = _incoming(task, request)
-        return {"samps_per_chan_written": write(task, values, _start(request), request.timeout)}
-
-    def _write_scalar(self, request: Any) -> Fields:
-        task = self._task(request)
-        require_outputs(task)
-        _check_size(task, 1, 1)
-        write(task, np.array([[request.value]]), _start(request), request.timeout)
-        return NOTHING
-
-    def _write_waveforms(self, request: Any) -> Fields:
-        task = self._task(request)
-        require_outputs(task)
-        rows = [np.array(waveform.y_data) for waveform in request.waveforms]
-        if len({row.size for row in rows}) != 1:
-            raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
-        _check_size(task, sum(row.size for row in rows), rows[0].size)
-        return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), request.timeout)}
-
-    def _binary_writer(self, bits: int) -> Call:
-        def write_binary(request: Any) -> Fields:
-            task = self._task(request)
-            _require_width(task, bits)
-            counts = _incoming(task, request)
-            volts = np.array([[channel.volts_per_count] for channel in task.outputs]) * counts
-            return {"samps_per_chan_written": write(task, volts, _start(request), request.timeout)}
-
-        return write_binary
+def _read_waveforms(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    reading = read(task, request.num_samps_per_chan, request.timeout)
+    mode = WaveformAttributeMode(pick(request, "waveform_attribute_mode"))
+    waveforms = [_waveform(task, row, reading, mode) for row in range(len(task.inputs))]
+    return {"status": reading.status, "waveforms": waveforms, "samps_per_chan_read": reading.samples}
 
 
 def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMode) -> DoubleAnalogWaveform:
-    channel = task.inputs[row]
-    waveform = DoubleAnalogWaveform(y_data=channel.to_units(reading.volts[row]))
+    waveform = DoubleAnalogWaveform(y_data=reading.volts[row])
     if WaveformAttributeMode.TIMING in mode:
         part_s, whole_s = math.modf(task.rig.wall_s(reading.began_s))
         waveform.t0.seconds = int(whole_s) + _SECONDS_1904_TO_1970
         waveform.t0.fractional_seconds = int(part_s * 2**64)
         waveform.dt = 1 / task.rate_hz
     if WaveformAttributeMode.EXTENDED_PROPERTIES in mode:
-        waveform.attributes["NI_ChannelName"].string_value = channel.name
-        waveform.attributes["NI_UnitDescription"].string_value = channel.unit_name
+        waveform.attributes["NI_ChannelName"].string_value = task.inputs[row].name
+        waveform.attributes["NI_UnitDescription"].string_value = "Volts"
     return waveform
 
 
-def _rows(task: Task) -> list[int]:
-    names = [channel.name for channel in task.inputs]
-    return [names.index(channel.name) for channel in task.find(", ".join(task.reading.channels))]
+def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    reading = _whole(read(task, request.num_samps_per_chan, request.timeout))
+    size = task.inputs[0].raw_bits // 8
+    raw = np.ascontiguousarray(_counts(task, reading).T).astype(f"<i{size}").tobytes()
+    return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(task.inputs)}
+
+
+def _binary_reader(bits: int) -> Call:
+    """Return the call that reads unscaled samples of so many bits."""
+
+    def read_binary(system: DaqmxSystem, request: Any) -> Fields:
+        task = task_of(system, request)
+        require_inputs(task)
+        if task.inputs[0].inputs.bits > bits:
+            detail = f"{task.inputs[0].inputs.bits}-bit samples need the 32-bit call\nTask Name: {task.name}"
+            raise DaqmxRefusal(DAQmxErrors.CHANNEL_SIZE_TOO_BIG_FOR_PORT_READ_TYPE, detail)
+        reading = _read_what_fits(task, request)
+        counts = _laid_out(_counts(task, reading), request)
+        return {
+            "status": reading.status,
+            "read_array": counts.astype(np.int64).ravel().tolist(),
+            "samps_per_chan_read": reading.samples,
+        }
+
+    return read_binary
+
+
+def _write(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    require_outputs(task)
+    values = np.array(request.write_array, dtype=np.float64)
+    samples = request.num_samps_per_chan
+    _check_size(task, values.size, samples)
+    is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
+    rows = values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)
+    return {"samps_per_chan_written": write(task, rows, _start(request), request.timeout)}
+
+
+def _write_scalar(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    require_outputs(task)
+    _check_size(task, 1, 1)
+    write(task, np.array([[request.value]]), _start(request), request.timeout)
+    return NOTHING
+
+
+def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    require_outputs(task)
+    rows = [np.array(waveform.y_data) for waveform in request.waveforms]
+    if len({row.size for row in rows}) != 1:
+        raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
+    _check_size(task, sum(row.size for row in rows), rows[0].size)
+    return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), request.timeout)}
 
 
 def _read_what_fits(task: Task, request: Any) -> Reading:
     """Read what was asked for; "all" means as much as the caller has room for."""
-    channels = max(1, len(task.channels_to_read))
+    channels = max(1, len(task.channels))
     room = request.array_size_in_samps // channels
     wanted = request.num_samps_per_chan
     if wanted == READ_ALL:
@@ -297,18 +261,11 @@ def _whole(reading: Reading) -> Reading:
     return reading
 
 
-def _counts(task: Task, reading: Reading) -> NDArray[np.int64]:
-    rows = _rows(task)
-    steps = np.array([[task.inputs[row].volts_per_count] for row in rows])
-    largest = 2 ** (task.side.bits - 1)
-    counts: NDArray[np.float64] = np.clip(np.rint(reading.volts[rows] / steps), -largest, largest - 1)
-    return counts.astype(np.int64)
-
-
-def _require_width(task: Task, bits: int) -> None:
-    if task.side.bits > bits:
-        detail = f"{task.side.bits}-bit samples need the 32-bit call, not {bits} bits\nTask Name: {task.name}"
-        raise DaqmxRefusal(DAQmxErrors.CHANNEL_SIZE_TOO_BIG_FOR_PORT_READ_TYPE, detail)
+def _counts(task: Task, reading: Reading) -> NDArray[np.float64]:
+    steps = np.array([[channel.volts_per_count] for channel in task.inputs])
+    largest = 2 ** (task.inputs[0].inputs.bits - 1)
+    counts: NDArray[np.float64] = np.clip(np.rint(reading.volts / steps), -largest, largest - 1)
+    return counts
 
 
 def _start(request: Any) -> StartsItself:
@@ -323,11 +280,14 @@ def _check_size(task: Task, size: int, samples: int) -> None:
         raise DaqmxRefusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, detail, samples_written=0)
 
 
-def _incoming(task: Task, request: Any) -> NDArray[np.float64]:
-    """Shape the written array into (channels, samples)."""
-    require_outputs(task)
-    values = np.array(request.write_array, dtype=np.float64)
-    samples = request.num_samps_per_chan
-    _check_size(task, values.size, samples)
-    is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
-    return values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)
+DATA_CALLS: Mapping[str, Call] = {
+    "ReadAnalogF64": _read_scaled,
+    "ReadAnalogScalarF64": _read_scalar,
+    "ReadAnalogWaveforms": _read_waveforms,
+    "ReadRaw": _read_raw,
+    **{f"ReadBinary{kind}": _binary_reader(bits) for kind, bits in _READ_BITS.items()},
+    "WriteAnalogF64": _write,
+    "WriteAnalogScalarF64": _write_scalar,
+    "WriteAnalogWaveforms": _write_waveforms,
+}
+"""The calls by their names in the protocol."""

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 
-from nidaqmx.constants import BusType, ProductCategory, TerminalConfiguration, TriggerUsage, UsageTypeAI
+from nidaqmx.constants import ProductCategory, TerminalConfiguration
 
 from vibench.acquisition import ConfigurationError
 
@@ -22,14 +22,6 @@ _M_SERIES_TIMEBASE_HZ = 20e6
 
 _ROUNDING = 1e-12
 """A rate read back and asked for again must not jump to the next one."""
-
-_SENSOR_MEASUREMENTS = (
-    UsageTypeAI.VOLTAGE,
-    UsageTypeAI.ACCELERATION_ACCELEROMETER_CURRENT_INPUT,
-    UsageTypeAI.VELOCITY_IEPE_SENSOR,
-    UsageTypeAI.FORCE_IEPE_SENSOR,
-    UsageTypeAI.SOUND_PRESSURE_MICROPHONE,
-)
 
 
 @dataclass(frozen=True)
@@ -107,12 +99,6 @@ class AnalogInputs:
     untimed: Untimed
     overloads: Overloads
     conversion: Conversion
-    measurements: tuple[UsageTypeAI, ...] = (UsageTypeAI.VOLTAGE,)
-
-    @property
-    def has_analog_trigger(self) -> bool:
-        """Whether a level of its own input can trigger it: delta-sigma devices can, a USB-621x cannot."""
-        return self.untimed is Untimed.SAMPLE_CLOCK
 
 
 @dataclass(frozen=True)
@@ -122,10 +108,8 @@ class AnalogOutputs:
     count: int
     range_v: float
     rates: Rates
-    bits: int
     idle: Idle
     untimed: Untimed
-    terminal: TerminalConfiguration
     memory: int
     """Samples per channel that wait on the device itself, between the program's buffer and the converter."""
 
@@ -136,20 +120,13 @@ class Device:
 
     name: str
     product_type: str
-    product_number: int
     serial: int
     category: ProductCategory
-    bus: BusType
     inputs: AnalogInputs | None = None
     outputs: AnalogOutputs | None = None
     chassis: str = ""
-    slot: int = 0
     modules: tuple[str, ...] = ()
     pfi_lines: int = 0
-    trigger_usage: tuple[TriggerUsage, ...] = ()
-    calibrated: tuple[int, int, int, int, int] = (2024, 3, 14, 9, 30)
-    """Year, month, day, hour, minute of the last external calibration."""
-    calibration_interval_months: int = 12
 
     @property
     def clock_name(self) -> str:
@@ -180,43 +157,40 @@ class Device:
 
 
 CDAQ1 = Device(
-    name="cDAQ1", product_type="cDAQ-9174", product_number=0x74A8, serial=0x01D0C0DE,
-    category=ProductCategory.COMPACT_DAQ_CHASSIS, bus=BusType.USB, modules=("cDAQ1Mod1",),
-    pfi_lines=2, trigger_usage=(TriggerUsage.START,),
+    name="cDAQ1", product_type="cDAQ-9174", serial=0x01D0C0DE,
+    category=ProductCategory.COMPACT_DAQ_CHASSIS, modules=("cDAQ1Mod1",), pfi_lines=2,
 )  # fmt: skip
 
 NI_9234 = Device(
-    name="cDAQ1Mod1", product_type="NI 9234", product_number=0x73A1, serial=0x01D09234,
-    category=ProductCategory.C_SERIES_MODULE, bus=BusType.COMPACT_DAQ, chassis="cDAQ1", slot=1,
-    trigger_usage=(TriggerUsage.START,),
+    name="cDAQ1Mod1", product_type="NI 9234", serial=0x01D09234,
+    category=ProductCategory.C_SERIES_MODULE, chassis="cDAQ1",
     inputs=AnalogInputs(
         count=4, ranges_v=(5.0,), bits=24,
         rates=DividedRate(_NI_9234_RATE_HZ, _NI_9234_RATE_HZ / _NI_9234_MAX_DIVISOR, _NI_9234_RATE_HZ),
         couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.002,),
         terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=Untimed.SAMPLE_CLOCK,
         overloads=Overloads.NOT_DETECTED, conversion=Conversion.SIMULTANEOUS,
-        measurements=_SENSOR_MEASUREMENTS,
     ),
 )  # fmt: skip
 
 USB_4431 = Device(
-    name="Dev1", product_type="USB-4431", product_number=0x73F2, serial=0x01D04431,
-    category=ProductCategory.DSA, bus=BusType.USB, pfi_lines=8, trigger_usage=(TriggerUsage.START,),
+    name="Dev1", product_type="USB-4431", serial=0x01D04431,
+    category=ProductCategory.DSA, pfi_lines=8,
     inputs=AnalogInputs(
         count=4, ranges_v=(10.0,), bits=24, rates=AnyRate(1000.0, 102.4e3),
         couplings=(Coupling.AC, Coupling.DC), iepe_currents_a=(0.0021,),
         terminals=(TerminalConfiguration.PSEUDO_DIFF,), untimed=Untimed.SAMPLE_CLOCK,
-        overloads=Overloads.DETECTED, conversion=Conversion.SIMULTANEOUS, measurements=_SENSOR_MEASUREMENTS,
+        overloads=Overloads.DETECTED, conversion=Conversion.SIMULTANEOUS,
     ),
     outputs=AnalogOutputs(
-        count=1, range_v=3.5, rates=AnyRate(1000.0, 96e3), bits=24, idle=Idle.ZERO,
-        untimed=Untimed.SAMPLE_CLOCK, terminal=TerminalConfiguration.PSEUDO_DIFF, memory=1023,
+        count=1, range_v=3.5, rates=AnyRate(1000.0, 96e3), idle=Idle.ZERO,
+        untimed=Untimed.SAMPLE_CLOCK, memory=1023,
     ),
 )  # fmt: skip
 
 USB_6211 = Device(
-    name="Dev2", product_type="USB-6211", product_number=0x7270, serial=0x01D06211,
-    category=ProductCategory.M_SERIES_DAQ, bus=BusType.USB, pfi_lines=8, trigger_usage=(TriggerUsage.START,),
+    name="Dev2", product_type="USB-6211", serial=0x01D06211,
+    category=ProductCategory.M_SERIES_DAQ, pfi_lines=8,
     inputs=AnalogInputs(
         count=16, ranges_v=(0.2, 1.0, 5.0, 10.0), bits=16,
         rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
@@ -225,8 +199,7 @@ USB_6211 = Device(
         untimed=Untimed.ON_DEMAND, overloads=Overloads.NOT_DETECTED, conversion=Conversion.MULTIPLEXED,
     ),
     outputs=AnalogOutputs(
-        count=2, range_v=10.0, bits=16, idle=Idle.HOLD, untimed=Untimed.ON_DEMAND,
-        terminal=TerminalConfiguration.RSE, memory=8191,
+        count=2, range_v=10.0, idle=Idle.HOLD, untimed=Untimed.ON_DEMAND, memory=8191,
         rates=DividedRate(_M_SERIES_TIMEBASE_HZ, _M_SERIES_TIMEBASE_HZ / 2**32, 250e3),
     ),
 )  # fmt: skip

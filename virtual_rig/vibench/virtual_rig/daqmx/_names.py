@@ -7,14 +7,11 @@ _RANGE = re.compile(r"^(?P<stem>.*?)(?P<first>\d+):(?P<stem_again>.*?)(?P<last>\
 
 
 def expand(text: str) -> tuple[str, ...]:
-    """Every single name in a list of names and ranges, in the order given.
+    """Return every single name in a list of names and ranges, in the order given.
 
     ``"Dev1/ai0:2"`` and ``"Dev1/ai0:Dev1/ai2"`` both give three names; ``"ai2:0"`` counts down.
     """
-    names: list[str] = []
-    for part in text.split(","):
-        names.extend(_expand_one(part.strip()))
-    return tuple(names)
+    return tuple(name for part in text.split(",") for name in _expand_one(part.strip()))
 
 
 def _expand_one(part: str) -> Iterable[str]:
@@ -28,13 +25,8 @@ def _expand_one(part: str) -> Iterable[str]:
     return (f"{found['stem']}{number}" for number in range(first, last + step, step))
 
 
-def join(names: Iterable[str]) -> str:
-    """One list of names, as a string attribute carries it."""
-    return ", ".join(names)
-
-
 def assigned_names(given: str, physical: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the virtual channels: the physical names, or what the caller gave, numbered if they are many.
+    """Return the names of virtual channels: the physical ones, or what was given, numbered if they are many.
 
     A list or range with as many names as there are channels is used as it is.
     """

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from nidaqmx.constants import AcquisitionType, ReadRelativeTo, SampleTimingType
+from nidaqmx.constants import AcquisitionType, SampleTimingType
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
@@ -44,13 +44,11 @@ def read(task: Task, samples: int, timeout_s: float) -> Reading:
         -200279 for lost samples, -200278 past the end, -200284 if nothing at all came in time.
 
     """
-    if not task.inputs:
-        task.require_channels()
-        raise DaqmxRefusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
+    require_inputs(task)
     check_memory(samples, len(task.inputs))
     has_to_start = not task.is_running
     if has_to_start:
-        _start_for_reading(task)
+        task.start()
     if task.kind is SampleTimingType.ON_DEMAND:
         reading = _read_on_demand(task, max(1, samples))
     else:
@@ -61,11 +59,11 @@ def read(task: Task, samples: int, timeout_s: float) -> Reading:
     return reading
 
 
-def _start_for_reading(task: Task) -> None:
-    if not task.reading.starts_by_itself:
-        code = DAQmxErrors.CANNOT_READ_WHEN_AUTO_START_FALSE_ON_DEMAND_AND_TASK_NOT_RUNNING
-        raise DaqmxRefusal(code, f"Task Name: {task.name}", samples_read=0)
-    task.start()
+def require_inputs(task: Task) -> None:
+    """Refuse to read from a task without inputs."""
+    if not task.inputs:
+        task.require_channels()
+        raise DaqmxRefusal(DAQmxErrors.READ_NO_INPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
 
 
 def _is_used_up(task: Task) -> bool:
@@ -79,7 +77,7 @@ def default_samples(task: Task) -> int:
     """How many samples "all" are: a finite task's whole number, a continuous one's unread samples."""
     if task.inputs and task.kind is SampleTimingType.ON_DEMAND:
         return 1
-    if task.timing.mode is AcquisitionType.FINITE and not task.reading.reads_all_available:
+    if task.timing.mode is AcquisitionType.FINITE:
         return task.timing.samples
     return available(task)
 
@@ -91,6 +89,12 @@ def available(task: Task) -> int:
     if task.acquisition.available == 0 and not task.acquisition.is_done:
         task.rig.pace.answer_progress(task.rig)
     return min(task.acquisition.available, task.acquisition.buffer_size)
+
+
+def newest(task: Task) -> int:
+    """Return how many samples per channel have been acquired so far."""
+    available(task)
+    return task.acquisition.acquired if task.acquisition else 0
 
 
 def asked_available(task: Task) -> int:
@@ -121,7 +125,7 @@ def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
         raise DaqmxRefusal(DAQmxErrors.READ_NOT_SUPPORTED_FOR_LOGGING_MODE, f"Task Name: {task.name}")
     if not task.await_reference(deadline_s):
         return _nothing_in_time(task, wanted)
-    first = _first_sample(task, acquisition)
+    first = acquisition.position
     count = int(min(wanted, max(0, acquisition.total - first)))
     status = 0 if count == wanted else int(DAQmxErrors.SAMPLES_WILL_NEVER_BE_AVAILABLE)
     if status and not count:
@@ -143,23 +147,6 @@ def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
     if task.log is not None and volts.size:
         task.log.write(volts, began_s)
     return Reading(volts, status, began_s)
-
-
-def _first_sample(task: Task, acquisition: Acquisition) -> int:
-    match task.reading.relative_to:
-        case ReadRelativeTo.CURRENT_READ_POSITION:
-            origin = acquisition.position
-        case ReadRelativeTo.FIRST_SAMPLE:
-            origin = 0
-        case ReadRelativeTo.REFERENCE_TRIGGER:
-            origin = acquisition.triggered_at
-        case ReadRelativeTo.FIRST_PRETRIGGER_SAMPLE:
-            reference = task.timing.reference
-            origin = acquisition.triggered_at - (reference.pretrigger if reference else 0)
-        case _:
-            task.rig.pace.answer_progress(task.rig)
-            origin = acquisition.acquired
-    return max(0, origin + task.reading.offset)
 
 
 def _nothing_in_time(task: Task, wanted: int) -> Reading:

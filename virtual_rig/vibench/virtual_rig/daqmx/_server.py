@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from types import TracebackType
 from typing import Any, Self
 
@@ -13,13 +14,12 @@ from nidaqmx.error_codes import DAQmxErrors
 from vibench.acquisition import ConfigurationError
 
 from ..analogue import AnalogueWorld
-from ._attribute_calls import SERVICE, AttributeCalls
-from ._calls import Call, Fields, SystemCalls, TaskCalls
-from ._channel_calls import ChannelCalls
-from ._data_calls import DataCalls
+from ._attributes import SERVICE, attribute_calls
+from ._calls import CALLS, Fields
+from ._data_calls import DATA_CALLS
 from ._devices import Catalogue
 from ._errors import DaqmxRefusal
-from ._events import EventCalls, Listener
+from ._events import EVENTS, Listener
 from ._faults import Faults, Unavailable
 from ._pace import OnDemandPace, Pace
 from ._rig import Rig
@@ -129,19 +129,15 @@ class DaqServer:
     # --- from a request to its answer ----------------------------------------------------
 
     def _unary_calls(self) -> dict[str, Handler]:
-        calls: dict[str, Call] = {
-            **TaskCalls(self._system).calls(),
-            **SystemCalls(self._system).calls(),
-            **ChannelCalls(self._system).calls(),
-            **DataCalls(self._system).calls(),
-            **AttributeCalls(self._system).calls(),
-        }
+        calls: dict[str, Callable[[Any], Fields | bytes]] = {**attribute_calls(self._system)}
+        for name, call in {**CALLS, **DATA_CALLS}.items():
+            calls[name] = partial(call, self._system)
         return {name: self._answer(name, call) for name, call in calls.items()}
 
     def _listening_calls(self) -> dict[str, Handler]:
-        return {name: self._listen(name, call) for name, call in EventCalls(self._system).calls().items()}
+        return {name: self._listen(name, partial(call, self._system)) for name, call in EVENTS.items()}
 
-    def _answer(self, name: str, call: Call) -> Handler:
+    def _answer(self, name: str, call: Callable[[Any], Fields | bytes]) -> Handler:
         def handle(request: Any, context: grpc.ServicerContext) -> Fields | bytes:
             with _refusals_reported(context), self._rig.changed:
                 self._check_faults(name)

@@ -1,15 +1,13 @@
-"""The simulated DAQmx driver: its devices, tasks, scales, and who holds which device."""
+"""The simulated DAQmx driver: its devices, tasks, and who holds which device."""
 
 from collections.abc import Callable, Iterable
 
 from nidaqmx.error_codes import DAQmxErrors
 
-from ._device_attributes import PhysicalChannel, System
 from ._devices import Catalogue, Device
 from ._errors import DaqmxRefusal
 from ._names import expand
 from ._rig import Rig
-from ._scales import Scale
 from ._tasks import Task
 
 
@@ -21,14 +19,8 @@ class DaqmxSystem:
         self.rig = rig
         self.catalogue = catalogue
         self.tasks: dict[str, Task] = {}
-        self.scales: dict[str, Scale] = {}
         self._holders: dict[str, Task] = {}
         self._unnamed = 0
-
-    @property
-    def description(self) -> System:
-        """The system as its attributes show it."""
-        return System(self.catalogue, lambda: tuple(self.scales))
 
     # --- tasks ---------------------------------------------------------------------------
 
@@ -56,10 +48,9 @@ class DaqmxSystem:
         self.rig.changed.notify_all()
 
     def reset(self) -> None:
-        """Clear every task, also those whose client is gone, and every scale."""
+        """Clear every task, also those whose client is gone."""
         for name in tuple(self.tasks):
             self.clear_task(name)
-        self.scales.clear()
 
     # --- devices -------------------------------------------------------------------------
 
@@ -79,32 +70,29 @@ class DaqmxSystem:
             if any(used.name in touched for used in task.devices):
                 task.abort()
 
-    def physical(self, name: str) -> PhysicalChannel:
-        """One physical channel (-200220, -200170 if there is no such thing)."""
-        device = self.device(name)
-        names = (*device.input_names, *device.output_names)
-        for known in names:
-            if known.lower() == name.lower():
-                return PhysicalChannel(device, known)
-        detail = f"Physical Channel: {name}\nPhysical Channels: {', '.join(names) or 'none'}"
-        raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, detail)
-
-    def inputs(self, names: str) -> tuple[PhysicalChannel, ...]:
-        """Find the physical inputs in a list of names and ranges."""
+    def inputs(self, names: str) -> tuple[str, ...]:
+        """Return the physical inputs in a list of names and ranges."""
         return self._of_side(names, lambda device: device.input_names)
 
-    def outputs(self, names: str) -> tuple[PhysicalChannel, ...]:
-        """Find the physical outputs in a list of names and ranges."""
+    def outputs(self, names: str) -> tuple[str, ...]:
+        """Return the physical outputs in a list of names and ranges."""
         return self._of_side(names, lambda device: device.output_names)
 
-    def _of_side(self, names: str, side: Callable[[Device], Iterable[str]]) -> tuple[PhysicalChannel, ...]:
-        channels = tuple(self.physical(name) for name in _with_devices(expand(names)))
-        if not channels:
+    def _of_side(self, names: str, side: Callable[[Device], tuple[str, ...]]) -> tuple[str, ...]:
+        """Spell channels as their devices do (-200220, -200170, -200096 for those that do not exist)."""
+        found = []
+        for name in _with_devices(expand(names)):
+            device = self.device(name)
+            known = {each.lower(): each for each in (*device.input_names, *device.output_names)}
+            if name.lower() not in known:
+                detail = f"Physical Channel: {name}\nPhysical Channels: {', '.join(known.values()) or 'none'}"
+                raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, detail)
+            if known[name.lower()] not in side(device):
+                raise DaqmxRefusal(DAQmxErrors.INVALID_PHYS_CHAN_TYPE, f"Physical Channel: {name}")
+            found.append(known[name.lower()])
+        if not found:
             raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, "No physical channel was given.")
-        for channel in channels:
-            if channel.name not in side(channel.device):
-                raise DaqmxRefusal(DAQmxErrors.INVALID_PHYS_CHAN_TYPE, f"Physical Channel: {channel.name}")
-        return channels
+        return tuple(found)
 
     def require_terminal(self, name: str) -> None:
         """Refuse a terminal that no device has (-89120)."""
@@ -112,18 +100,6 @@ class DaqmxSystem:
         if name.lower() not in known:
             detail = f"Source Terminal: {name}"
             raise DaqmxRefusal(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING, detail)
-
-    # --- scales --------------------------------------------------------------------------
-
-    def add_scale(self, scale: Scale) -> None:
-        """Keep a custom scale, in place of an older one of that name."""
-        self.scales[scale.name] = scale
-
-    def scale(self, name: str) -> Scale:
-        """Find a custom scale by name (-200378 if there is none)."""
-        if name not in self.scales:
-            raise DaqmxRefusal(DAQmxErrors.CUSTOM_SCALE_DOES_NOT_EXIST, f"Custom Scale: {name}")
-        return self.scales[name]
 
     # --- reservations --------------------------------------------------------------------
 

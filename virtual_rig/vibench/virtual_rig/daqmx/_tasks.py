@@ -16,10 +16,8 @@ from ._devices import AnalogInputs, AnalogOutputs, Device
 from ._errors import DaqmxRefusal
 from ._generation import Generation, OutputBuffer
 from ._names import expand
-from ._reference_trigger import TriggerWatch, verify_reference
 from ._rig import Rig
 from ._tdms_log import TdmsLog
-from ._terminals import SAMPLE_CLOCK, START_TRIGGER, awaited_terminal, terminal
 from ._timing import (
     InputSettings,
     OutputSettings,
@@ -31,10 +29,7 @@ from ._timing import (
 )
 
 _BREATH_S = 1e-4
-
-
-INPUT_SIDE = "ai"
-OUTPUT_SIDE = "ao"
+_OWN_CLOCKS = ("", "onboardclock")
 
 
 class TaskState(IntEnum):
@@ -88,11 +83,6 @@ class Task:
         return [*self.inputs, *self.outputs]
 
     @property
-    def channels_to_read(self) -> tuple[str, ...]:
-        """Names of the channels that a read hands over."""
-        return self.reading.channels or tuple(channel.name for channel in self.channels)
-
-    @property
     def devices(self) -> tuple[Device, ...]:
         """The devices the channels lie on, each once."""
         return tuple({channel.device.name: channel.device for channel in self.channels}.values())
@@ -135,30 +125,43 @@ class Task:
         """Whether its timing engine is only known once it is reserved."""
         return any(device.chassis for device in self.devices)
 
-    def _terminal(self, signal: str) -> str:
+    @property
+    def _side_name(self) -> str:
+        return "ai" if self.inputs else "ao"
+
+    def full_terminal(self, name: str) -> str:
+        """Return a terminal with its device: ``"PFI0"`` is one of the task's own, ``"/Dev1/PFI0"``."""
         self.require_channels()
-        return terminal(self.devices[0], INPUT_SIDE if self.inputs else OUTPUT_SIDE, signal)
+        return name if name.startswith("/") else f"/{self.devices[0].clock_name}/{name}"
 
     @property
     def start_terminal(self) -> str:
         """Terminal of its own start trigger."""
-        return self._terminal(START_TRIGGER)
+        return self.full_terminal(f"{self._side_name}/StartTrigger")
 
     @property
-    def clock_terminal(self) -> str:
-        """Terminal of its own sample clock."""
-        return self._terminal(SAMPLE_CLOCK)
+    def _awaited_terminal(self) -> str:
+        """Terminal whose edge makes the task begin; empty: its own start.
+
+        Another task's sample clock begins to tick with that task, so waiting for it is waiting for its start.
+        """
+        if self.timing.trigger_source:
+            return self.timing.trigger_source
+        source = self.timing.clock_source
+        own_clock = self.full_terminal(f"{self._side_name}/SampleClock")
+        is_own = source.lower() in (*_OWN_CLOCKS, own_clock.lower())
+        return "" if is_own else source.replace("SampleClock", "StartTrigger")
 
     def find(self, names: str) -> list[Channel]:
-        """Find the channels named; all of them for an empty list."""
+        """Return the channels in a list of names; all of them for an empty list."""
         if not names:
             return self.channels
         by_name = {channel.name.lower(): channel for channel in self.channels}
-        wanted = expand(names)
+        wanted = [name.lower() for name in expand(names)]
         for name in wanted:
-            if name.lower() not in by_name:
+            if name not in by_name:
                 raise DaqmxRefusal(DAQmxErrors.INVALID_CHAN_NAME, f"Channel: {name}\nTask Name: {self.name}")
-        return [by_name[name.lower()] for name in wanted]
+        return [by_name[name] for name in wanted]
 
     def require_channels(self) -> None:
         """Refuse to go on without channels (-200478)."""
@@ -221,17 +224,18 @@ class Task:
             channel.verify()
         if self.kind is not SampleTimingType.ON_DEMAND:
             _ = self.rate_hz
-            if awaited := awaited_terminal(self.timing, self.clock_terminal):
+            if awaited := self._awaited_terminal:
                 self._reservations.require_terminal(awaited)
             if self.inputs:
                 check_memory(self.buffer_size, len(self.inputs))
-        verify_reference(self.timing, self.inputs, self._reservations.require_terminal)
+        self.timing.verify_reference()
+        if self.timing.reference is not None:
+            self._reservations.require_terminal(self.timing.reference.terminal)
 
     def _reserve(self) -> None:
-        side = INPUT_SIDE if self.inputs else OUTPUT_SIDE
         for device in self.devices:
             try:
-                self._reservations.reserve(f"{device.name}/{side}", self)
+                self._reservations.reserve(f"{device.name}/{self._side_name}", self)
             except DaqmxRefusal:
                 if self.state < TaskState.RESERVED:
                     self._reservations.release(self)
@@ -248,9 +252,8 @@ class Task:
         self.state = TaskState.RUNNING
         if self.kind is SampleTimingType.ON_DEMAND:
             return
-        awaited = awaited_terminal(self.timing, self.clock_terminal)
-        if awaited:
-            self.rig.arm(awaited, self._begin)
+        if self._awaited_terminal:
+            self.rig.arm(self._awaited_terminal, self._begin)
             return
         try:
             self._begin()
@@ -276,26 +279,18 @@ class Task:
         self.rig.edge(self.start_terminal)
 
     def _acquire(self) -> Acquisition:
-        self.log = self._new_log()
+        logging = self.reading.logging
+        self.log = None if logging is None else TdmsLog(logging, self.inputs, self.rate_hz, self.rig.wall_s)
         logged = self.log.write if self.log is not None and not self.log.is_read else None
         sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
         return Acquisition(
             sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
-            self.buffer_size, self.rig.pace.overflow, self.reading.overwrite, self._watch(), logged,
+            self.buffer_size, self.rig.pace.overflow, self.timing.reference, logged,
         )  # fmt: skip
 
-    def _new_log(self) -> TdmsLog | None:
-        settings = self.reading.logging
-        return None if settings is None else TdmsLog(settings, self.inputs, self.rate_hz, self.rig.wall_s)
-
-    def _watch(self) -> TriggerWatch | None:
-        reference = self.timing.reference
-        return None if reference is None else TriggerWatch(reference, self.timing.samples, self.inputs)
-
     def _await_reference_edge(self) -> None:
-        reference = self.timing.reference
-        if reference is not None and reference.level is None:
-            self.rig.arm(reference.source, self._reference_edge)
+        if self.timing.reference is not None:
+            self.rig.arm(self.timing.reference.terminal, self._reference_edge)
 
     def _reference_edge(self) -> None:
         """Take an edge for the reference trigger; one that comes too early is ignored."""
@@ -313,7 +308,7 @@ class Task:
 
         while not is_there() and (left_s := deadline_s - time.monotonic()) > 0:
             wait_s = -1.0 if math.isinf(left_s) else left_s
-            self.rig.pace.ask(self.rig, acquisition.next_look_s, is_there, wait_s)
+            self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, wait_s)
             self.rig.changed.wait(_BREATH_S)  # who wants to stop this task is let in
         return is_there()
 

@@ -65,11 +65,11 @@ class TdmsLog:
                     ChannelObject(
                         self._settings.group,
                         channel.name,
-                        channel.to_units(row),
+                        row,
                         {
                             "wf_start_time": self._began,
                             "wf_increment": self._interval_s,
-                            "unit_string": channel.unit_name,
+                            "unit_string": "Volts",
                         },
                     )
                     for channel, row in zip(self._inputs, volts, strict=True)
