@@ -64,7 +64,7 @@ def broken_scpi(chance: random.Random) -> bytes:
 # --- USB ----------------------------------------------------------------------------------
 
 USB = "/vibench.virtual.UsbDevice/"
-USB_METHODS = ("Identify", "BulkOut", "BulkIn", "InterruptIn", "Control", "ClearHalt")
+USB_METHODS = ("Identify", "BulkOut", "BulkIn", "Control", "ClearHalt")
 
 
 def broken_usb(chance: random.Random) -> tuple[str, bytes]:
@@ -77,7 +77,7 @@ def broken_usb(chance: random.Random) -> tuple[str, bytes]:
             line = broken_scpi(chance)
             size = chance.choice((len(line), chance.choice(EDGES))) % 2**32
             frame = header[:4] + struct.pack("<I", size) + header[8:] + line
-        case "BulkIn" | "InterruptIn":
+        case "BulkIn":
             frame = struct.pack(">II", chance.choice(EDGES) % 2**32, chance.choice((0, 1, 2000, 2**32 - 1)))
         case "Control":
             numbers = (chance.choice(EDGES) % 2**16 for _ in range(3))

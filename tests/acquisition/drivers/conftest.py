@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import pytest
 
 from vibench.acquisition.rig import GeneratorConfig
-from vibench.virtual_rig.generator import AFG1022, ErrorCode, Panel, Quirks, Reply, StatusByte
+from vibench.virtual_rig.generator import AFG1022, ErrorCode, Panel, Quirks, Reply
 from vibench.virtual_rig.generator._afg1022_settings import ChannelSettings
 from vibench.virtual_rig.usb import UsbTmcInstrument, plug_in, unplug
 
@@ -40,10 +40,6 @@ class Logged:
 
     def report(self, code: ErrorCode) -> None:
         self._instrument.report(code)
-
-    @property
-    def status_byte(self) -> StatusByte:
-        return self._instrument.status_byte
 
     def commands(self) -> list[str]:
         """What was told, without the questions."""

@@ -6,7 +6,6 @@ import pytest
 from vibench.virtual_rig.generator import AFG1022, Keysight33500B
 from vibench.virtual_rig.generator._scpi_instrument import LONGEST_REPLY, MOST_SPELLINGS
 from vibench.virtual_rig.usb import UsbTmcInstrument
-from vibench.virtual_rig.usb._usbtmc import MOST_NOTIFICATIONS, Request, Setup
 
 
 @pytest.fixture
@@ -63,13 +62,3 @@ def test_the_longest_waveform_that_it_tells_to_hold_arrives_through_usb():
     header = bytes([1, 1, 254, 0]) + len(message).to_bytes(4, "little") + bytes([1, 0, 0, 0])
     instrument.bulk_out(header + message + bytes(-len(message) % 4))
     assert float(asked(generator, b"DATA:ATTR:POIN? LONGEST")) == 1_048_576
-
-
-def test_status_bytes_that_nobody_fetches_are_dropped(afg):
-    instrument = UsbTmcInstrument(afg)
-    for tag in range(2, 2 + 3 * MOST_NOTIFICATIONS):
-        instrument.control(Setup(0xA1, Request.READ_STATUS_BYTE, tag, 0, 3), b"")
-    kept = [instrument.interrupt_in(2, 10) for _ in range(MOST_NOTIFICATIONS)]
-    assert kept[-1][0] == (1 + 3 * MOST_NOTIFICATIONS) | 0x80
-    with pytest.raises(TimeoutError):
-        instrument.interrupt_in(2, 10)

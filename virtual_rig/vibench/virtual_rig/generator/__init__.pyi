@@ -20,7 +20,6 @@ from ._scpi_socket import (
 from ._scpi_status import (
     BYTE as BYTE,
     ErrorCode as ErrorCode,
-    StatusByte as StatusByte,
 )
 from ._terminal_voltage import (
     Terminal as Terminal,

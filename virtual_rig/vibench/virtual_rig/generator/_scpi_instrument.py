@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ._scpi_command import Command, action, only, report
 from ._scpi_header import HeaderPath
 from ._scpi_message import Unit, units
-from ._scpi_status import BYTE, ErrorCode, ScpiError, Status, StatusByte
+from ._scpi_status import BYTE, ErrorCode, ScpiError, Status
 from ._scpi_value import integer
 
 LONGEST_REPLY = 1 << 20
@@ -95,12 +95,6 @@ class ScpiInstrument:
         """Queue an error that the interface has found: an unread reply, or a read without a query."""
         with self.lock:
             self.status.report(code)
-
-    @property
-    def status_byte(self) -> StatusByte:
-        """The status byte without the bit for a waiting message."""
-        with self.lock:
-            return self.status.byte
 
     def delay_next_reply(self, delay_s: float) -> None:
         """Let the next reply come late; beyond the host's timeout it is found by the read after."""

@@ -182,12 +182,6 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         with _usb_errors():
             return _fill(buff, device.bulk_in(len(buff), timeout))
 
-    def intr_read(self, dev_handle: _Handle, ep: int, intf: int, size: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002
-        """Fill the buffer from the interrupt endpoint."""
-        device = self._present(dev_handle)
-        with _usb_errors():
-            return _fill(size, device.interrupt_in(len(size), timeout))
-
     def ctrl_transfer(
         self,
         dev_handle: _Handle,

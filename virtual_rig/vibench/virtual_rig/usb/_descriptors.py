@@ -5,21 +5,16 @@ from types import SimpleNamespace
 
 import usb.util
 
-from ._device import BULK_IN, BULK_OUT, INTERRUPT_IN, Identification
+from ._device import BULK_IN, BULK_OUT, Identification
 
 _TMC_CLASS, _TMC_SUBCLASS, _USB488_PROTOCOL = 0xFE, 3, 1
 _MAKER, _PRODUCT, _SERIAL = 1, 2, 3
 _ENGLISH = 0x0409
 _HIGH_SPEED = 3
 _CONTROL_PACKET_BYTES = 64
-_INTERRUPT_PACKET_BYTES = 2
 _DEVICE_BYTES, _CONFIGURATION_BYTES, _INTERFACE_BYTES, _ENDPOINT_BYTES = 18, 9, 9, 7
 _SELF_POWERED = 0xC0
-_ENDPOINTS = (
-    (BULK_OUT, usb.util.ENDPOINT_TYPE_BULK),
-    (BULK_IN, usb.util.ENDPOINT_TYPE_BULK),
-    (INTERRUPT_IN, usb.util.ENDPOINT_TYPE_INTR),
-)
+_ENDPOINTS = (BULK_OUT, BULK_IN)
 
 
 def device_descriptor(identification: Identification, address: int) -> SimpleNamespace:
@@ -83,16 +78,14 @@ def interface_descriptor(interface: int, alternate: int) -> SimpleNamespace:
 
 
 def endpoint_descriptor(identification: Identification, endpoint: int) -> SimpleNamespace:
-    """Return bulk out, bulk in or interrupt in (table 9-13); IndexError past them."""
-    address, kind = _ENDPOINTS[endpoint]
-    is_bulk = kind == usb.util.ENDPOINT_TYPE_BULK
+    """Return bulk out or bulk in (table 9-13); IndexError past them."""
     return SimpleNamespace(
         bLength=_ENDPOINT_BYTES,
         bDescriptorType=usb.util.DESC_TYPE_ENDPOINT,
-        bEndpointAddress=address,
-        bmAttributes=kind,
-        wMaxPacketSize=identification.packet_bytes if is_bulk else _INTERRUPT_PACKET_BYTES,
-        bInterval=0 if is_bulk else 1,
+        bEndpointAddress=_ENDPOINTS[endpoint],
+        bmAttributes=usb.util.ENDPOINT_TYPE_BULK,
+        wMaxPacketSize=identification.packet_bytes,
+        bInterval=0,
         bRefresh=0,
         bSynchAddress=0,
         extra_descriptors=array("B"),

@@ -10,7 +10,6 @@ from typing import Protocol
 
 BULK_OUT = 0x01
 BULK_IN = 0x82
-INTERRUPT_IN = 0x83
 
 
 @dataclass(frozen=True)
@@ -54,9 +53,6 @@ class UsbDevice(Protocol):
 
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
         """Hand one transfer of at most ``length`` bytes to the host."""
-
-    def interrupt_in(self, length: int, timeout_ms: int) -> bytes:
-        """Hand one notification to the host."""
 
     def control(self, setup: Setup, data: bytes) -> bytes:
         """Carry out a class request; return what the device sends back."""

@@ -56,7 +56,6 @@ def usb_service(device: UsbDevice) -> grpc.GenericRpcHandler:
         "Identify": identify,
         "BulkOut": bulk_out,
         "BulkIn": lambda request: device.bulk_in(*_READ.unpack(request)),
-        "InterruptIn": lambda request: device.interrupt_in(*_READ.unpack(request)),
         "Control": control,
         "ClearHalt": clear_halt,
     }
@@ -118,10 +117,6 @@ class RemoteUsbDevice:
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
         """Receive one transfer."""
         return self._call("BulkIn", _READ.pack(length, timeout_ms), timeout_ms)
-
-    def interrupt_in(self, length: int, timeout_ms: int) -> bytes:
-        """Receive one notification."""
-        return self._call("InterruptIn", _READ.pack(length, timeout_ms), timeout_ms)
 
     def control(self, setup: Setup, data: bytes) -> bytes:
         """Carry out a class request."""

@@ -9,13 +9,12 @@ import errno
 import os
 import struct
 import threading
-from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum, IntFlag
 from typing import NoReturn, Protocol
 
-from ..generator import BYTE, LONGEST_MESSAGE, ErrorCode, Reply, StatusByte
+from ..generator import BYTE, LONGEST_MESSAGE, ErrorCode, Reply
 from ._device import BULK_IN, BULK_OUT, Identification, Setup
 
 VENDOR_ID = 0x0699
@@ -24,17 +23,14 @@ PRODUCT_ID = 0x0353
 HEADER = struct.Struct("<BBBxIBBxx")
 """Message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
 ALIGNMENT = 4
-MOST_NOTIFICATIONS = 16
-"""Status bytes that wait for the host; older ones are dropped."""
 NEVER_MS = 2**32 - 1
 
 
 class MessageId(IntEnum):
-    """What a bulk transfer is (table 2; USB488 table 1)."""
+    """What a bulk transfer is (table 2)."""
 
     OUT = 1
     REQUEST_IN = 2
-    TRIGGER = 128
 
 
 class Attributes(IntFlag):
@@ -44,35 +40,12 @@ class Attributes(IntFlag):
     TERMINATION_CHARACTER = 2
 
 
-class Request(IntEnum):
-    """Class requests on the control endpoint (table 15; USB488 table 9)."""
+SUCCESS = 1
+TRANSFER_NOT_IN_PROGRESS = 0x81
+"""First byte of the answer to a class request (table 16)."""
 
-    INITIATE_ABORT_BULK_OUT = 1
-    CHECK_ABORT_BULK_OUT = 2
-    INITIATE_ABORT_BULK_IN = 3
-    CHECK_ABORT_BULK_IN = 4
-    INITIATE_CLEAR = 5
-    CHECK_CLEAR = 6
-    GET_CAPABILITIES = 7
-    INDICATOR_PULSE = 64
-    READ_STATUS_BYTE = 128
-    REN_CONTROL = 160
-    GO_TO_LOCAL = 161
-    LOCAL_LOCKOUT = 162
-
-
-class TmcStatus(IntEnum):
-    """First byte of the answer to a class request (table 16)."""
-
-    SUCCESS = 1
-    TRANSFER_NOT_IN_PROGRESS = 0x81
-
-
-_CAPABILITIES = bytes(
-    [TmcStatus.SUCCESS, 0, 0x00, 0x01, 0b100, 0b001, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b111, 0]
-)
-"""Answer to GET_CAPABILITIES, 4.2.1.8: USBTMC 1.0 with indicator pulse and termination character;
-USB488 1.0 with 488.2, remote control and trigger. Eight reserved bytes follow."""
+_CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 1, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b100, 0, *bytes(8)])
+"""USBTMC 1.0 with termination character; USB488 1.0 with 488.2; eight reserved bytes."""
 
 
 class MessageDevice(Protocol):
@@ -87,10 +60,6 @@ class MessageDevice(Protocol):
 
     def report(self, code: ErrorCode) -> None:
         """Queue an error that the interface has found."""
-
-    @property
-    def status_byte(self) -> StatusByte:
-        """The status byte without the bit for a waiting message."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +87,6 @@ class _Flight:
     """The part of a transfer that did not fit into the host's buffer."""
     aborting: bool = False
     """An aborted transfer still owes its short packet."""
-    notifications: deque[bytes] = field(default_factory=lambda: deque(maxlen=MOST_NOTIFICATIONS))
     stalled: set[int] = field(default_factory=set)
 
 
@@ -170,7 +138,7 @@ class UsbTmcInstrument:
     # Transfers
 
     def bulk_out(self, data: bytes) -> None:
-        """Take one bulk-OUT transfer: a piece of a message, a request for a reply, or a trigger (3.2)."""
+        """Take one bulk-OUT transfer: a piece of a message, or a request for a reply (3.2)."""
         with self._lock:
             self._check_cable()
             if BULK_OUT in self._flight.stalled or len(data) < HEADER.size:
@@ -184,8 +152,6 @@ class UsbTmcInstrument:
             elif message_id == MessageId.REQUEST_IN:
                 stops = bool(attributes & Attributes.TERMINATION_CHARACTER)
                 self._flight.request = _Request(tag, length, bytes([terminator]) if stops else b"")
-            elif message_id == MessageId.TRIGGER:
-                self._execute(b"*TRG")
             else:
                 self._stall(BULK_OUT)
 
@@ -217,21 +183,13 @@ class UsbTmcInstrument:
             self._flight.request = None
             return self._hand_over(length)
 
-    def interrupt_in(self, length: int, timeout_ms: int) -> bytes:  # noqa: ARG002 - waiting is not lived through
-        """Hand over the status byte that a READ_STATUS_BYTE has asked for (USB488, 3.4)."""
-        with self._lock:
-            self._check_cable()
-            if not self._flight.notifications:
-                _time_out()
-            return self._flight.notifications.popleft()[:length]
-
     def control(self, setup: Setup, data: bytes) -> bytes:  # noqa: ARG002 - no class request carries data
-        """Answer a class request (4.2.1; USB488, 4.3)."""
+        """Answer a class request (4.2.1)."""
         with self._lock:
             self._check_cable()
-            if setup.request not in Request.__members__.values():
+            if setup.request not in _REQUESTS:
                 raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
-            return self._answer(Request(setup.request), setup)[: setup.length]
+            return _REQUESTS[setup.request](self, setup.value & BYTE)[: setup.length]
 
     def clear_halt(self, endpoint: int) -> None:
         """Let a stalled endpoint work again."""
@@ -278,48 +236,14 @@ class UsbTmcInstrument:
         transfer, self._flight.rest = self._flight.rest[:length], self._flight.rest[length:]
         return transfer
 
-    def _answer(self, request: Request, setup: Setup) -> bytes:
-        """Return the answer to a class request; remote, local and the indicator have nothing to show."""
-        tag = setup.value & BYTE
-        success = bytes([TmcStatus.SUCCESS])
-        answers: dict[Request, Callable[[], bytes]] = {
-            Request.GET_CAPABILITIES: lambda: _CAPABILITIES + bytes(8),
-            Request.READ_STATUS_BYTE: lambda: self._status_byte(tag),
-            Request.INITIATE_ABORT_BULK_OUT: lambda: self._abort_bulk_out(tag),
-            Request.CHECK_ABORT_BULK_OUT: lambda: success + bytes(7),
-            Request.INITIATE_ABORT_BULK_IN: lambda: self._abort_bulk_in(tag),
-            Request.CHECK_ABORT_BULK_IN: lambda: success + bytes(7),
-            Request.INITIATE_CLEAR: self._clear,
-            Request.CHECK_CLEAR: lambda: success + bytes(1),
-        }
-        return answers.get(request, lambda: success)()
-
-    def _clear(self) -> bytes:
-        """Drop everything in flight (4.2.1.6)."""
-        self._flight = _Flight()
-        return bytes([TmcStatus.SUCCESS])
-
-    def _abort_bulk_out(self, tag: int) -> bytes:
-        """Drop the message that was coming in (4.2.1.2)."""
-        self._flight.message = b""
-        return bytes([TmcStatus.SUCCESS, tag])
-
-    def _abort_bulk_in(self, tag: int) -> bytes:
-        """Give up a transfer that the host no longer waits for (4.2.1.4); the reply stays."""
+    def abort_bulk_in(self, tag: int) -> bytes:
+        """Give up a transfer that the host no longer waits for; the reply stays."""
         if self._flight.request is None or self._flight.request.tag != tag:
-            return bytes([TmcStatus.TRANSFER_NOT_IN_PROGRESS, 0])
+            return bytes([TRANSFER_NOT_IN_PROGRESS, 0])
         self._flight.request = None
         self._flight.rest = b""
         self._flight.aborting = True
-        return bytes([TmcStatus.SUCCESS, tag])
-
-    def _status_byte(self, tag: int) -> bytes:
-        """Send the status byte through the interrupt endpoint (USB488, 4.3.1.2)."""
-        status = self._device.status_byte
-        if self._flight.reply or self._flight.rest:
-            status |= StatusByte.MESSAGE_AVAILABLE
-        self._flight.notifications.append(bytes([tag | 0x80, int(status)]))
-        return bytes([TmcStatus.SUCCESS, tag, 0])
+        return bytes([SUCCESS, tag])
 
     def _check_cable(self) -> None:
         if not self._is_plugged_in:
@@ -334,3 +258,11 @@ class UsbTmcInstrument:
 
 def _time_out() -> NoReturn:
     raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
+
+
+_REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {
+    3: UsbTmcInstrument.abort_bulk_in,  # INITIATE_ABORT_BULK_IN, 4.2.1.4
+    4: lambda *_: bytes([SUCCESS, *bytes(7)]),  # CHECK_ABORT_BULK_IN_STATUS, 4.2.1.5: it is done
+    7: lambda *_: _CAPABILITIES,  # GET_CAPABILITIES, 4.2.1.8
+}
+"""The class requests that pyvisa makes (table 15), by number; each is given the tag. Any other one stalls."""
