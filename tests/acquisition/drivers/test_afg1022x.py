@@ -8,7 +8,7 @@ import pytest
 
 from vibench.acquisition import InstrumentError, InstrumentLost, LimitExceeded
 from vibench.acquisition.drivers import AFG1022X
-from vibench.acquisition.drivers._afg1022_modes import Unsupported
+from vibench.acquisition.drivers._afg1022x import Unsupported
 from vibench.acquisition.drivers._generator_limits import Shape
 from vibench.acquisition.errors import InstrumentBusy, SettingRefused
 from vibench.acquisition.instruments import Knob
@@ -115,7 +115,7 @@ class TestPlaying:
         generator.load_sine(266.2, 1.5)
         state = plugged.instrument.settings(1)
         assert (state.frequency_hz, state.amplitude_vpp, state.offset_v) == (266.2, 1.5, 0.0)
-        assert (generator.playing.frequency_hz, generator.playing.panel_vpp) == (266.2, 1.5)
+        assert (generator.frequency_hz, generator.panel_vpp) == (266.2, 1.5)
         assert not plugged.is_on
 
     def test_the_dialogue_is_the_manuals(self, plugged, generator):
@@ -154,10 +154,9 @@ class TestPlaying:
         values = np.cos(2 * np.pi * np.arange(points) / points)
         generator.load_waveform(values, 2.0, 0.5)
         held = plugged.instrument.memory.codes("EMEM")
-        playing = generator.playing
-        assert playing.shape is Shape.EDIT_MEMORY
-        assert held.tolist() == playing.codes.codes.tolist()
-        volts = (held / 8191.5 - 1) * playing.panel_vpp / 2
+        assert generator.playing is Shape.EDIT_MEMORY
+        assert held.tolist() == generator.codes.codes.tolist()
+        volts = (held / 8191.5 - 1) * generator.panel_vpp / 2
         assert np.max(np.abs(volts - 0.25 * (values - values.mean()))) < 0.5 / 16383 + 0.5e-4
 
     def test_an_uneven_waveform_keeps_its_volts_when_the_amplitude_changes(self, plugged, generator):

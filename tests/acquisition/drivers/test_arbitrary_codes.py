@@ -7,7 +7,7 @@ from hypothesis.extra.numpy import arrays
 
 from vibench.acquisition import LimitExceeded
 from vibench.acquisition.drivers import AFG1022_MODEL
-from vibench.acquisition.drivers._arbitrary_codes import arbitrary_codes as codes_for
+from vibench.acquisition.drivers._generator_limits import arbitrary_codes as codes_for
 
 waveforms = arrays(np.float64, st.integers(2, 300), elements=st.floats(-1, 1, allow_subnormal=False)).filter(
     lambda values: np.ptp(values) > 1e-6

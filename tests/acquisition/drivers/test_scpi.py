@@ -147,7 +147,7 @@ def test_a_question_after_a_timeout_waits_for_no_answer_that_never_came():
 
 def test_codes_go_out_big_endian_in_a_block_of_known_length():
     instrument = Instrument()
-    port(instrument).write_codes("DATA:DATA EMEM,", np.array([0, 10, 16383], dtype=np.uint16))
+    port(instrument).command("DATA:DATA EMEM,", np.array([0, 10, 16383], dtype=np.uint16))
     assert instrument.written[0] == b"DATA:DATA EMEM,#16\x00\x00\x00\x0a\x3f\xff\n"
 
 

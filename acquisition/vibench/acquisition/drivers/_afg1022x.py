@@ -7,16 +7,27 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import ClassVar, Self
 
-from ..errors import AcquisitionError, InstrumentError, InstrumentLost
+import numpy as np
+
+from ..errors import AcquisitionError, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
 from ..instruments import Identity, Knob, Samples, Sweep
-from ..rig import GeneratorConfig
-from ._afg1022_channel import Afg1022Channel, Playing
-from ._afg1022_modes import trigger
-from ._arbitrary_codes import arbitrary_codes
-from ._generator_limits import AFG1022_MODEL, GeneratorModel, Shape
-from ._scpi import ScpiPort
-from ._verified_settings import VerifiedSettings
+from ..rig import HIGH_Z, GeneratorConfig
+from ._generator_limits import AFG1022_MODEL, ArbitraryCodes, GeneratorModel, Shape, arbitrary_codes
+from ._scpi import SWITCH, Number, ScpiPort, Verified, Word, end_if_known, number_in
 from ._visa_link import Link, open_link
+
+OUTPUT = Word("OUTP{c}:STAT", SWITCH)
+_BURST_CHANNEL = 1
+_QUIET_FREQUENCY_HZ = 1000.0
+_STOP_ATTEMPTS = 2
+_LATENCY_TRIALS = 9
+# High impedance is answered 9.9E+37; anything beyond the largest finite load (10 kohm) means it.
+_INFINITE_OHM = 1e6
+_SAME_LOAD = 0.01
+
+
+class Unsupported(InstrumentError):
+    """The instrument, or its firmware, cannot do that remotely."""
 
 
 @contextmanager
@@ -28,11 +39,7 @@ def noted(error: BaseException) -> Iterator[None]:
         error.add_note(f"While cleaning up: {failure}")
 
 
-_STOP_ATTEMPTS = 2
-_LATENCY_TRIALS = 9
-
-
-class AFG1022X:
+class AFG1022X(Verified):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
     Made by `open`, with the output off, 1 kHz sine at the smallest amplitude, no offset. Frequency
@@ -46,12 +53,29 @@ class AFG1022X:
     """Maker and model that ``*IDN?`` must answer, for people."""
     answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
     """And as they are compared."""
+    load_header: ClassVar[str] = "OUTP{c}:IMP"
+
+    output = OUTPUT
+    shape = Word(
+        "SOUR{c}:FUNC:SHAP", {Shape.SINE: ("SIN", "SINUSOID"), Shape.EDIT_MEMORY: ("EMEM", "EMEMORY")}
+    )
+    # Frequencies are sent to 1 uHz; seven digits are the least that a reply has been seen to carry.
+    frequency_hz = Number("SOUR{c}:FREQ", "{:.6f}", absolute=1.5e-6, relative=1e-6)
+    # The panel resolves 1 mVpp; more than that, or 0.1 %, is another value.
+    panel_vpp = Number("SOUR{c}:VOLT", "{:.4f}VPP", absolute=0.6e-3, relative=1e-3)
+    offset_v = Number("SOUR{c}:VOLT:OFFS", "{:.4f}", absolute=0.6e-3, relative=1e-3)
+    burst_mode = Word("SOUR{c}:BURS:MODE", {"TRIG": ("TRIG", "TRIGGERED")})
+    burst_cycles = Number("SOUR{c}:BURS:NCYC", "{:.0f}")
+    burst = Word("SOUR{c}:BURS:STAT", SWITCH)
 
     def __init__(self, config: GeneratorConfig, connect: Callable[[], Link]) -> None:
         self._config = config
         self._connect = connect
-        self._port = self._new_port()
-        self._channel = self._new_channel()
+        self._name = f"the generator at {config.resource}"
+        super().__init__(self._new_port(), config.channel)
+        self.codes: ArbitraryCodes | None = None
+        """What the memory holds while it is selected."""
+        self._is_known = False
         self._identity: Identity | None = None
         self._unconfirmed: tuple[Knob, ...] = ()
         self._is_silent_and_closed = False
@@ -72,10 +96,12 @@ class AFG1022X:
             generator._identify()
         except BaseException as error:
             with noted(error):
-                generator._port.close()  # another instrument is not ours to command any further
+                generator.port.close()  # another instrument is not ours to command any further
             raise
         try:
-            generator._bring_up()
+            OUTPUT.insist(generator, "OFF")
+            generator._unconfirmed = generator._agree_on_load()
+            generator._to_quiet_sine()
         except BaseException as error:
             with noted(error):
                 generator.close()
@@ -95,14 +121,15 @@ class AFG1022X:
         return self._unconfirmed
 
     @property
-    def playing(self) -> Playing:
-        """What the instrument holds, as read back."""
-        return self._channel.playing
-
-    @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
         """Smallest and largest amplitude that may be set here, peak to peak [V]."""
         return self.model.amplitude_range_vpp(self._config)
+
+    @property
+    def playing(self) -> Shape:
+        """The shape that the instrument holds; raises InstrumentError when a change has failed."""
+        _ = self.panel_vpp
+        return Shape.SINE if self.codes is None else Shape.EDIT_MEMORY
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
         """Set up a sine. The output keeps its state."""
@@ -110,14 +137,14 @@ class AFG1022X:
         self.model.check_amplitude(self._config, amplitude_vpp, 0.0)
         with self._changing():
             self._ensure_known()
-            if self.playing.shape is not Shape.SINE:
-                self._channel.mute()
-                self._channel.select_sine()
-            if amplitude_vpp < self.playing.panel_vpp:
-                self._channel.set_panel(amplitude_vpp)
-            self._channel.set_offset(0.0)
-            self._channel.set_frequency(frequency_hz)
-            self._channel.set_panel(amplitude_vpp)
+            if self.playing is not Shape.SINE:
+                self._mute()
+                self._select(None)
+            if amplitude_vpp < self.panel_vpp:  # noqa: PLR1730 - assigning sends a command
+                self.panel_vpp = amplitude_vpp
+            self.offset_v = 0.0
+            self._set_frequency(frequency_hz)
+            self.panel_vpp = amplitude_vpp
 
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
         """Put one period in memory, compare the memory with it, and select it. The output keeps its state.
@@ -139,14 +166,14 @@ class AFG1022X:
         self.model.check_amplitude(self._config, panel_vpp, 0.0)
         with self._changing():
             self._ensure_known()
-            self._channel.mute()
-            self._channel.set_offset(0.0)
-            self._channel.upload(codes)
+            self._mute()
+            self.offset_v = 0.0
+            self._upload(codes)
             # Before the shape as well: a sine's frequency may be too high for the memory.
-            self._channel.set_frequency(repetition_hz)
-            self._channel.select_memory(codes)
-            self._channel.set_frequency(repetition_hz)
-            self._channel.set_panel(panel_vpp)
+            self._set_frequency(repetition_hz)
+            self._select(codes)
+            self._set_frequency(repetition_hz)
+            self.panel_vpp = panel_vpp
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
         """Refuse: its sweep time is set on the panel only."""
@@ -155,37 +182,41 @@ class AFG1022X:
 
     def set_frequency(self, frequency_hz: float) -> None:
         """Change the frequency of what is playing; the phase goes on without a jump."""
-        self.model.check_frequency(self.playing.shape, frequency_hz)
+        self.model.check_frequency(self.playing, frequency_hz)
         with self._changing():
-            self._channel.set_frequency(frequency_hz)
+            self._set_frequency(frequency_hz)
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
         """Change the peak-to-peak amplitude of what is playing."""
-        playing = self.playing
-        panel_vpp = amplitude_vpp * playing.panel_factor
-        self.model.check_amplitude(self._config, panel_vpp, playing.offset_v)
+        panel_vpp = amplitude_vpp * self._panel_factor
+        self.model.check_amplitude(self._config, panel_vpp, self.offset_v)
         with self._changing():
-            self._channel.set_panel(panel_vpp)
+            self.panel_vpp = panel_vpp
 
     def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each `trigger` instead of playing on."""
+        """Play ``cycles`` periods at each `trigger`; Unsupported on channel 2, which has no bursts."""
+        if self.channel != _BURST_CHANNEL:
+            raise Unsupported(f"a burst was asked of channel {self.channel}; only channel 1 has bursts")
+        self._check_burst(cycles)
         with self._changing():
-            self._channel.arm_burst(cycles)
+            self._set_burst(cycles)
 
     def trigger(self) -> None:
         """Fire an armed burst."""
         with self._changing():
-            trigger(self._channel.settings)
+            self.port.command("*TRG")
 
     def end_burst(self) -> None:
         """Play on without a trigger."""
-        with self._changing():
-            self._channel.end_burst()
+        if self.channel == _BURST_CHANNEL:
+            with self._changing():
+                self.burst = "OFF"
 
     def start(self) -> None:
         """Turn the output on, and see that it is."""
         with self._changing():
-            self._channel.output_on()
+            _ = self.playing  # with unknown settings it stays off
+            self.output = "ON"
 
     def stop(self) -> None:
         """Turn the output off. Legal at any time; tries again, over a new session too.
@@ -203,7 +234,7 @@ class AFG1022X:
             try:
                 if attempt >= _STOP_ATTEMPTS:
                     self._reconnect()
-                self._channel.output_off()
+                OUTPUT.insist(self, "OFF")
             except InstrumentError as failure:
                 failures.append(str(failure))
             else:
@@ -222,8 +253,8 @@ class AFG1022X:
             self.stop()
             self._is_silent_and_closed = True
         finally:
-            self._channel.forget()
-            self._port.close()
+            self._forget()
+            self.port.close()
 
     def measured_latency_s(self) -> float:
         """How long one verified change of amplitude takes: the floor of any emergency stop [s].
@@ -233,36 +264,96 @@ class AFG1022X:
         durations_s = []
         for _ in range(_LATENCY_TRIALS):
             began_s = time.perf_counter()
-            self.set_amplitude(self.playing.panel_vpp / self.playing.panel_factor)
+            self.set_amplitude(self.panel_vpp / self._panel_factor)
             durations_s.append(time.perf_counter() - began_s)
         return statistics.median(durations_s)
 
+    # What another model of generator does otherwise
+
+    def _end_modes(self) -> None:
+        """End sweep, burst, modulation and frequency lock."""
+        end_if_known(self, "SOUR{c}:FREQ:MODE", "CW", ("CW", "FIX", "FIXED"))
+        bursts = ("BURS",) if self.channel == _BURST_CHANNEL else ()
+        for node in (*bursts, "AM", "FM", "PM", "FSK", "PWM", "ASK", "PSK"):
+            end_if_known(self, f"SOUR{{c}}:{node}:STAT", "OFF", SWITCH["OFF"])
+        end_if_known(self, "SOUR{c}:FREQ:CONC", "OFF", SWITCH["OFF"])
+
+    def _set_frequency(self, frequency_hz: float) -> None:
+        """Set the frequency of the sine, or how often a second the memory is played."""
+        self.frequency_hz = frequency_hz
+
+    def _select(self, codes: ArbitraryCodes | None) -> None:
+        """Play the memory, which holds ``codes``, or a sine."""
+        self.shape = Shape.SINE if codes is None else Shape.EDIT_MEMORY
+        self.codes = codes
+
+    def _upload(self, codes: ArbitraryCodes) -> None:
+        """Fill the edit memory, and compare it point by point."""
+        points = codes.codes.size
+        self.port.command(f"DATA:DEF EMEM,{points}")
+        self.port.command("DATA:DATA EMEM,", codes.codes)
+        held = self.port.query_codes("DATA:DATA? EMEM")
+        if not np.array_equal(held, codes.codes):
+            compared = min(points, held.size)
+            same = int(np.count_nonzero(held[:compared] == codes.codes[:compared]))
+            raise SettingRefused(
+                f"{self._name}: {points} points were put in its memory, and {held.size} read back, "
+                f"of which {same} agree. Upload again; if it fails again, check the USB cable"
+            )
+
+    # Inside
+
     @property
-    def _name(self) -> str:
-        return f"the generator at {self._config.resource}"
+    def _panel_factor(self) -> float:
+        """Panel amplitude per amplitude that was asked for; other than 1 only for an uneven waveform."""
+        return 1.0 if self.codes is None else self.codes.panel_factor
+
+    def _mute(self) -> None:
+        self.panel_vpp = self.amplitude_range_vpp[0]
+
+    def _check_burst(self, cycles: int) -> None:
+        fewest, most = self.model.burst_cycles
+        if not fewest <= cycles <= most:
+            raise LimitExceeded(f"a burst of {cycles} cycles was asked for; {fewest} to {most} are allowed")
+
+    def _set_burst(self, cycles: int) -> None:
+        self.burst_mode = "TRIG"
+        self.burst_cycles = cycles
+        self.burst = "ON"
+
+    def _ensure_known(self) -> None:
+        if not self._is_known:
+            OUTPUT.insist(self, "OFF")
+            self._to_quiet_sine()
+
+    def _to_quiet_sine(self) -> None:
+        """Whatever it was: no modes, no offset, the smallest amplitude, a sine."""
+        # *RST is not used: what it does to the output of this model is not documented.
+        self._end_modes()
+        self.offset_v = 0.0  # first: it lowers the peak whatever the amplitude is
+        self._mute()
+        self._select(None)
+        self._set_frequency(_QUIET_FREQUENCY_HZ)
+        self._is_known = True
+
+    def _forget(self) -> None:
+        """Hold nothing for known any more: a change was broken off."""
+        self.held.clear()
+        self._is_known = False
 
     def _new_port(self) -> ScpiPort:
         return ScpiPort(self._connect(), self._name, self._config.settle_s)
 
-    def _new_channel(self) -> Afg1022Channel:
-        settings = VerifiedSettings(self._port, self._name)
-        return Afg1022Channel(settings, self._config.channel, self.amplitude_range_vpp[0])
-
     def _reconnect(self) -> None:
         with suppress(InstrumentError):  # the old session is what is broken: the new one is tried in any case
-            self._port.close()
-        self._port = self._new_port()
-        self._channel = self._new_channel()
-
-    def _bring_up(self) -> None:
-        self._channel.output_off()
-        self._unconfirmed = self._channel.agree_on_load(self._config.load_ohm)
-        self._channel.to_quiet_sine()
+            self.port.close()
+        self.port = self._new_port()
+        self._forget()
 
     def _identify(self) -> None:
-        self._port.send(f"OUTP{self._config.channel}:STAT OFF")
-        self._port.send("*CLS")
-        reply = self._port.query_patiently("*IDN?")
+        self.port.send(f"OUTP{self.channel}:STAT OFF")
+        self.port.send("*CLS")
+        reply = self.port.query_patiently("*IDN?")
         fields = [field.strip() for field in reply.split(",")]
         maker, model, serial, firmware = (*fields, "", "", "", "")[:4]
         if self.answers.match(f"{maker},{model}") is None:
@@ -272,10 +363,34 @@ class AFG1022X:
             )
         self._identity = Identity(maker, model, serial, firmware, reply)
 
-    def _ensure_known(self) -> None:
-        if not self._channel.is_known:
-            self._channel.output_off()
-            self._channel.to_quiet_sine()
+    def _agree_on_load(self) -> tuple[Knob, ...]:
+        """Make the generator expect the load; return what the operator must confirm when it cannot be known.
+
+        Sources contradict each other on whether an AFG1022 takes its load remotely (hardware reference
+        1.2), so it is tried. A wrong load is a factor of two at the terminal. Raises SettingRefused when
+        the generator says that it expects another one, and does not let it be changed.
+        """
+        header, load = self.load_header.format(c=self.channel), self._config.load_ohm
+        refusal: InstrumentError | None = None
+        try:
+            self.port.command(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
+        except InstrumentError as error:
+            refusal = error
+        reply = self.port.query(f"{header}?")
+        self.port.complaints()  # an unknown query leaves one; the empty answer has already said so
+        wanted = load if isinstance(load, str) else f"{load:g} ohm"
+        if not reply:
+            return (Knob(instrument="generator", setting="output load", value=wanted),)
+        held_ohm = number_in(reply, f"{header}?")
+        is_open = held_ohm > _INFINITE_OHM
+        if is_open if isinstance(load, str) else abs(held_ohm - load) <= _SAME_LOAD * load:
+            return ()
+        raise SettingRefused(
+            f"the generator expects a load of {HIGH_Z if is_open else f'{held_ohm:g} ohm'} where "
+            f"generator.load_ohm says {load}: every amplitude would be wrong, by a factor of two between 50 "
+            f"ohm and high-Z. The output is off; set the load to {wanted} on its panel, or correct the "
+            "configuration"
+        ) from refusal
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
@@ -283,7 +398,7 @@ class AFG1022X:
         try:
             yield
         except InstrumentError as error:
-            self._channel.forget()
+            self._forget()
             try:
                 self.stop()
             except InstrumentLost as shout:
@@ -291,5 +406,5 @@ class AFG1022X:
             error.add_note("The output was switched off.")
             raise
         except KeyboardInterrupt:
-            self._channel.forget()
+            self._forget()
             raise

@@ -1,4 +1,4 @@
-"""What a model of generator can do: ranges by shape and load, checked before anything is sent.
+"""What a model of generator can do: ranges and waveforms, checked before anything is sent.
 
 Nothing here needs the library by which it is spoken to: plans are held against it without.
 """
@@ -9,8 +9,11 @@ from importlib import import_module
 from math import inf
 from typing import Literal, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import LimitExceeded
-from ..instruments import FunctionGenerator, GeneratorDescription, Sweep
+from ..instruments import FunctionGenerator, GeneratorDescription, Samples, Sweep
 from ..rig import HIGH_Z, GeneratorConfig, GeneratorDriver
 
 Load = Literal["high-z"] | float
@@ -81,7 +84,7 @@ class GeneratorModel:
         highest_hz = self.highest_hz[shape]
         if not self.lowest_hz <= frequency_hz <= highest_hz:
             raise LimitExceeded(
-                f"{frequency_hz:g} Hz was asked for; {_article(self.name)} plays {shape.value} from "
+                f"{frequency_hz:g} Hz was asked for; the {self.name} plays {shape.value} from "
                 f"{self.lowest_hz:g} to {highest_hz:g} Hz. Nothing was sent; choose a frequency in that range"
             )
 
@@ -92,7 +95,7 @@ class GeneratorModel:
         if not 0 < sweep.duration_s <= self.longest_sweep_s:
             most = f"up to {self.longest_sweep_s:g} s" if self.longest_sweep_s else "not at all"
             raise LimitExceeded(
-                f"a sweep of {sweep.duration_s:g} s was asked for; {_article(self.name)} sweeps by "
+                f"a sweep of {sweep.duration_s:g} s was asked for; the {self.name} sweeps by "
                 f"itself {most}. Nothing was sent; use sine_sweep, which steps the frequency"
             )
 
@@ -103,7 +106,7 @@ class GeneratorModel:
             reason = (
                 f"generator.amplitude_limit_vpp = {config.amplitude_limit_vpp:g}"
                 if highest == config.amplitude_limit_vpp
-                else f"the {self.name}'s range into {_load_text(config.load_ohm)}"
+                else f"the {self.name}'s range with load_ohm = {config.load_ohm}"
             )
             raise LimitExceeded(
                 f"{amplitude_vpp:g} Vpp was asked for; {lowest:g} to {highest:g} Vpp are allowed here "
@@ -119,6 +122,66 @@ class GeneratorModel:
                 "allowed (abs(offset) + Vpp/2, of the generator and of generator.amplitude_limit_vpp). "
                 "Nothing was sent; lower one of them"
             )
+
+
+@dataclass(frozen=True)
+class ArbitraryCodes:
+    """One period as the generator's memory holds it: free of DC, over the full range of codes.
+
+    The terminal plays ``achieved * amplitude_vpp / 2``, where the panel is set to
+    ``amplitude_vpp * panel_factor``.
+    """
+
+    codes: NDArray[np.uint16]
+    """0 to ``top_code``, shape (points,)."""
+    top_code: int
+    """The code of plus half of the amplitude on the panel; 0 is that of minus half."""
+    panel_factor: float
+    """Largest magnitude that is left: 1 for a waveform that is free of DC and reaches 1."""
+
+    @property
+    def achieved(self) -> Samples:
+        """Values that the codes stand for, on the scale of the values as given."""
+        return self.panel_factor * (2 * self.codes / self.top_code - 1.0)
+
+
+def arbitrary_codes(waveform: Samples, model: GeneratorModel) -> ArbitraryCodes:
+    """Turn one period of values into codes of the full range.
+
+    Code 0 stands for minus, and the highest one for plus, half of the amplitude on the panel. The mean is
+    removed, since DC would push the shaker off its centre, and what is left is scaled so that its largest
+    magnitude takes an outermost code.
+
+    Raises
+    ------
+    LimitExceeded
+        When the waveform has too few or too many points, is not finite, leaves -1 to 1, or is constant.
+
+    """
+    values = np.asarray(waveform, dtype=np.float64)
+    fewest, most = model.memory_points
+    if values.ndim != 1 or not fewest <= values.size <= most:
+        raise LimitExceeded(
+            f"the waveform has the shape {values.shape}; the generator's memory takes one period of "
+            f"{fewest} to {most} points. Nothing was sent; resample it"
+        )
+    peak = float(np.max(np.abs(values)))
+    # Not "peak > 1": a NaN must not pass.
+    if not peak <= 1.0 + 1e-9:
+        raise LimitExceeded(
+            f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "
+            "(the amplitude is given apart). Nothing was sent; scale it"
+        )
+    swing = values - values.mean()
+    factor = float(np.max(np.abs(swing)))
+    if factor <= np.finfo(np.float64).eps:
+        raise LimitExceeded(
+            "the waveform is constant: without its mean nothing is left to play. Nothing was sent; "
+            "give one period that moves"
+        )
+    middle = model.top_code / 2
+    codes = np.clip(np.rint(middle + swing / factor * middle), 0, model.top_code).astype(np.uint16)
+    return ArbitraryCodes(codes, model.top_code, factor)
 
 
 AFG1022_MODEL = GeneratorModel(
@@ -150,11 +213,3 @@ KEYSIGHT_33500B_MODEL = GeneratorModel(
     usb_ids=tuple((0x0957, product) for product in (0x2507, 0x2607, 0x2707, 0x2807, 0x2A07, 0x2B07, 0x2C07)),
     longest_sweep_s=500.0,  # linear ones may last longer, logarithmic ones may not
 )
-
-
-def _article(name: str) -> str:
-    return f"an {name}" if name[0] in "AEIOU" else f"a {name}"
-
-
-def _load_text(load: Load) -> str:
-    return load if isinstance(load, str) else f"{load:g} ohm"

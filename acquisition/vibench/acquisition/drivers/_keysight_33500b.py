@@ -5,120 +5,22 @@ compared with an instrument.
 """
 
 import re
-from dataclasses import replace
 from typing import ClassVar
 
 import numpy as np
 
 from ..errors import SettingRefused
-from ..instruments import Knob, Spacing, Sweep
-from ._afg1022_channel import Afg1022Channel, agree_on_load
-from ._afg1022_modes import set_burst
+from ..instruments import Spacing, Sweep
 from ._afg1022x import AFG1022X
-from ._arbitrary_codes import ArbitraryCodes
-from ._generator_limits import KEYSIGHT_33500B_MODEL, GeneratorModel, Load, Shape
-from ._scpi import number_in
-from ._verified_settings import Tolerance, VerifiedSettings
+from ._generator_limits import KEYSIGHT_33500B_MODEL, ArbitraryCodes, GeneratorModel
+from ._scpi import SWITCH, Number, Word, number_in
 
 _NAME = "VIBENCH"
 _MIDDLE = KEYSIGHT_33500B_MODEL.top_code // 2
-_RATE = Tolerance(absolute=1e-6, relative=1e-6)
-_TIME = Tolerance(absolute=1e-6, relative=1e-6)
-_OFF = frozenset({"0", "OFF"})
-_ON = frozenset({"1", "ON"})
-_SHAPES = {Shape.SINE: ("SIN", frozenset({"SIN"})), Shape.EDIT_MEMORY: ("ARB", frozenset({"ARB"}))}
 _SPACINGS = {Spacing.LINEAR: "LIN", Spacing.LOGARITHMIC: "LOG"}
-_SWITCHED = ("SWE", "BURS", "AM", "FM", "PM", "FSK", "PWM")
 _SAME_MEAN = 1e-4
 LONGEST_HOLD_S = 3600.0
 """How long the stop frequency is held behind a sweep."""
-
-
-class Keysight33500BChannel(Afg1022Channel):
-    """One channel: what its commands call differently, and its sweep."""
-
-    def switch_off_modes(self) -> None:
-        """End sweep, burst and modulation; amplitudes are peak to peak, waveforms held, not smoothed."""
-        for mode in _SWITCHED:
-            self.settings.set_word(f"SOUR{self._channel}:{mode}:STAT", "OFF", _OFF)
-        self.settings.set_word(f"SOUR{self._channel}:VOLT:UNIT", "VPP", frozenset({"VPP"}))
-        self.settings.set_word(f"SOUR{self._channel}:FUNC:ARB:FILT", "OFF", frozenset({"OFF"}))
-
-    def set_frequency(self, frequency_hz: float) -> None:
-        """Set the frequency of the sine, or how often a second the waveform is played."""
-        codes = self.playing.codes
-        if codes is None:
-            super().set_frequency(frequency_hz)
-            return
-        rate_hz = frequency_hz * codes.codes.size
-        header = f"SOUR{self._channel}:FUNC:ARB:SRAT"
-        got_hz = self.settings.set_number(header, rate_hz, f"{rate_hz:.6f}", _RATE)
-        self._playing = replace(self.playing, frequency_hz=got_hz / codes.codes.size)
-
-    def upload(self, codes: ArbitraryCodes) -> None:
-        """Fill the memory; it tells the number of points and their mean, not the points."""
-        port = self.settings.port
-        port.command(f"SOUR{self._channel}:DATA:VOL:CLE")
-        self.settings.set_word("FORM:BORD", "NORM", frozenset({"NORM"}))
-        signed = (codes.codes.astype(np.int32) - _MIDDLE).astype(np.int16)
-        port.write_codes(f"SOUR{self._channel}:DATA:ARB:DAC {_NAME},", signed.view(np.uint16))
-        attribute = f"SOUR{self._channel}:DATA:ATTR"
-        points, mean = (
-            number_in(
-                port.query(f"{attribute}:{each}? {_NAME}"), f"{self.settings.name}: {attribute}:{each}?"
-            )
-            for each in ("POIN", "AVER")
-        )
-        sent_mean = float(signed.mean()) / _MIDDLE
-        if round(points) != signed.size or abs(mean - sent_mean) > _SAME_MEAN:
-            raise SettingRefused(
-                f"{self.settings.name}: {signed.size} points with a mean of {sent_mean:.4f} were put in its "
-                f"memory, and it tells {points:g} with {mean:.4f}. Upload again; if it fails again, check "
-                "the USB cable"
-            )
-
-    def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each trigger of the bus."""
-        self._triggered_by_bus()
-        set_burst(self.settings, self._channel, cycles, KEYSIGHT_33500B_MODEL)
-
-    def end_burst(self) -> None:
-        """Play on without a trigger."""
-        self.settings.set_word(f"SOUR{self._channel}:BURS:STAT", "OFF", _OFF)
-
-    def arm_sweep(self, sweep: Sweep) -> None:
-        """Stay at the start frequency until a trigger, then go to the stop frequency, and hold it."""
-        source = f"SOUR{self._channel}"
-        self._triggered_by_bus()
-        frequency = Tolerance(absolute=1.5e-6, relative=1e-6)
-        for node, value, tolerance in (
-            ("FREQ:STAR", sweep.start_hz, frequency),
-            ("FREQ:STOP", sweep.stop_hz, frequency),
-            ("SWE:TIME", sweep.duration_s, _TIME),
-            ("SWE:HTIM", LONGEST_HOLD_S, _TIME),
-        ):
-            self.settings.set_number(f"{source}:{node}", value, f"{value:.6f}", tolerance)
-        word = _SPACINGS[sweep.spacing]
-        self.settings.set_word(f"{source}:SWE:SPAC", word, frozenset({word}))
-        self.settings.set_word(f"{source}:SWE:STAT", "ON", _ON)
-
-    def end_sweep(self) -> None:
-        """Play one frequency."""
-        self.settings.set_word(f"SOUR{self._channel}:SWE:STAT", "OFF", _OFF)
-
-    def agree_on_load(self, load: Load) -> tuple[Knob, ...]:
-        """Make the generator expect ``load``."""
-        return agree_on_load(self.settings.port, f"OUTP{self._channel}:LOAD", load)
-
-    def _triggered_by_bus(self) -> None:
-        self.settings.set_word(f"TRIG{self._channel}:SOUR", "BUS", frozenset({"BUS"}))
-
-    def _select(self, shape: Shape, codes: ArbitraryCodes | None) -> None:
-        if codes is not None:
-            self.settings.set_word(f"SOUR{self._channel}:FUNC:ARB", _NAME, frozenset({_NAME}))
-        word, answers = _SHAPES[shape]
-        self.settings.set_word(f"SOUR{self._channel}:FUNC", word, answers)
-        self._playing = replace(self.playing, shape=shape, codes=codes)
 
 
 class Keysight33500B(AFG1022X):
@@ -129,11 +31,30 @@ class Keysight33500B(AFG1022X):
     answers: ClassVar[re.Pattern[str]] = re.compile(
         r"(AGILENT|KEYSIGHT) TECHNOLOGIES,335\d\dB", re.IGNORECASE
     )
-    _channel: Keysight33500BChannel
+    load_header: ClassVar[str] = "OUTP{c}:LOAD"
+
+    shape = Word("SOUR{c}:FUNC", {"SIN": ("SIN",), "ARB": ("ARB",)})
+    waveform = Word("SOUR{c}:FUNC:ARB", {_NAME: (_NAME,)})
+    sample_rate_hz = Number("SOUR{c}:FUNC:ARB:SRAT", "{:.6f}", absolute=1e-6, relative=1e-6)
+    output_filter = Word("SOUR{c}:FUNC:ARB:FILT", {"OFF": ("OFF",)})
+    amplitude_unit = Word("SOUR{c}:VOLT:UNIT", {"VPP": ("VPP",)})
+    byte_order = Word("FORM:BORD", {"NORM": ("NORM",)})
+    trigger_source = Word("TRIG{c}:SOUR", {"BUS": ("BUS",)})
+    sweep_start_hz = Number("SOUR{c}:FREQ:STAR", "{:.6f}", absolute=1.5e-6, relative=1e-6)
+    sweep_stop_hz = Number("SOUR{c}:FREQ:STOP", "{:.6f}", absolute=1.5e-6, relative=1e-6)
+    sweep_s = Number("SOUR{c}:SWE:TIME", "{:.6f}", absolute=1e-6, relative=1e-6)
+    hold_s = Number("SOUR{c}:SWE:HTIM", "{:.6f}", absolute=1e-6, relative=1e-6)
+    spacing = Word("SOUR{c}:SWE:SPAC", {"LIN": ("LIN",), "LOG": ("LOG",)})
+    sweep = Word("SOUR{c}:SWE:STAT", SWITCH)
+    am, fm, pm, fsk, pwm = (
+        Word(f"SOUR{{c}}:{node}:STAT", SWITCH) for node in ("AM", "FM", "PM", "FSK", "PWM")
+    )
 
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
         """Set up a sine. The output keeps its state."""
-        self._end_sweep()
+        with self._changing():
+            if self._is_known:
+                self.sweep = "OFF"
         super().load_sine(frequency_hz, amplitude_vpp)
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
@@ -141,13 +62,60 @@ class Keysight33500B(AFG1022X):
         self.model.check_sweep(sweep)
         self.load_sine(sweep.start_hz, amplitude_vpp)
         with self._changing():
-            self._channel.arm_sweep(sweep)
+            self.trigger_source = "BUS"
+            self.sweep_start_hz = sweep.start_hz
+            self.sweep_stop_hz = sweep.stop_hz
+            self.sweep_s = sweep.duration_s
+            self.hold_s = LONGEST_HOLD_S
+            self.spacing = _SPACINGS[sweep.spacing]
+            self.sweep = "ON"
 
-    def _end_sweep(self) -> None:
+    def arm_burst(self, cycles: int) -> None:
+        """Play ``cycles`` periods at each trigger of the bus."""
+        self._check_burst(cycles)
         with self._changing():
-            if self._channel.is_known:
-                self._channel.end_sweep()
+            self.trigger_source = "BUS"
+            self._set_burst(cycles)
 
-    def _new_channel(self) -> Keysight33500BChannel:
-        settings = VerifiedSettings(self._port, self._name)
-        return Keysight33500BChannel(settings, self._config.channel, self.amplitude_range_vpp[0])
+    def end_burst(self) -> None:
+        """Play on without a trigger."""
+        with self._changing():
+            self.burst = "OFF"
+
+    def _end_modes(self) -> None:
+        """End sweep, burst and modulation; amplitudes are peak to peak, waveforms held, not smoothed."""
+        self.sweep = self.burst = self.am = self.fm = self.pm = self.fsk = self.pwm = "OFF"
+        self.amplitude_unit = "VPP"
+        self.output_filter = "OFF"
+
+    def _set_frequency(self, frequency_hz: float) -> None:
+        """Set the frequency of the sine, or how often a second the waveform is played."""
+        if self.codes is None:
+            self.frequency_hz = frequency_hz
+        else:
+            self.sample_rate_hz = frequency_hz * self.codes.codes.size
+
+    def _select(self, codes: ArbitraryCodes | None) -> None:
+        if codes is not None:
+            self.waveform = _NAME
+        self.shape = "SIN" if codes is None else "ARB"
+        self.codes = codes
+
+    def _upload(self, codes: ArbitraryCodes) -> None:
+        """Fill the memory; it tells the number of points and their mean, not the points."""
+        source = f"SOUR{self.channel}:DATA"
+        self.port.command(f"{source}:VOL:CLE")
+        self.byte_order = "NORM"
+        signed = (codes.codes.astype(np.int32) - _MIDDLE).astype(np.int16)
+        self.port.command(f"{source}:ARB:DAC {_NAME},", signed.view(np.uint16))
+        points, mean = (
+            number_in(self.port.query(f"{source}:ATTR:{each}? {_NAME}"), f"{source}:ATTR:{each}?")
+            for each in ("POIN", "AVER")
+        )
+        sent_mean = float(signed.mean()) / _MIDDLE
+        if round(points) != signed.size or abs(mean - sent_mean) > _SAME_MEAN:
+            raise SettingRefused(
+                f"{self.port.name}: {signed.size} points with a mean of {sent_mean:.4f} were put in its "
+                f"memory, and it tells {points:g} with {mean:.4f}. Upload again; if it fails again, check "
+                "the USB cable"
+            )

@@ -1,43 +1,32 @@
-"""One SCPI port for all drivers: no complaint of an instrument is lost, and no loss goes unnamed."""
+"""One SCPI port for all drivers: no complaint is lost, no loss goes unnamed, every setting is read back."""
 
 import re
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyvisa
 from numpy.typing import NDArray
 
-from ..errors import InstrumentError, InstrumentLost
+from ..errors import InstrumentError, InstrumentLost, SettingRefused
 from ..host import LOG
 from ._visa_link import Link
 
 Codes = NDArray[np.uint16]
 
-NO_ERROR = 0
 # An error queue holds some tens of entries; more replies than this mean that it is not being emptied.
 _LONGEST_QUEUE = 64
 # Long enough for a stale reply that is already under way, short enough for an emergency stop [ms].
 _STALE_REPLY_MS = 100.0
-_QUIET = frozenset({pyvisa.constants.StatusCode.error_timeout})
+_LATE = pyvisa.constants.StatusCode.error_timeout
 # pyvisa-py lets the ValueError and OSError of PyUSB through when the device is gone.
 _LOST = (ValueError, OSError, pyvisa.errors.InvalidSession)
 _QUEUE_ENTRY = re.compile(r'([+-]?\d+)\s*,\s*"?([^"]*)"?')
 _LEADING_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
-
-
-@dataclass(frozen=True)
-class Complaint:
-    """One entry of an instrument's error queue."""
-
-    code: int
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.text} ({self.code})"
 
 
 class ScpiPort:
@@ -61,146 +50,119 @@ class ScpiPort:
     def __init__(
         self, link: Link, name: str, settle_s: float = 0.0, pause: Callable[[float], None] = time.sleep
     ) -> None:
+        self.name = name
         self._link = link
-        self._name = name
         self._settle_s = settle_s
         self._pause = pause
         self._reply_due = False
         self._lock = threading.RLock()
 
-    def command(self, message: str) -> None:
+    def command(self, message: str, codes: Codes | None = None) -> None:
         """Send a command; raises InstrumentError when the instrument queues any complaint about it."""
-        self._refuse(message, self.send(message))
+        if complaints := self.send(message, codes):
+            raise InstrumentError(
+                f"{self.name} refused {message!r}: {'; '.join(complaints)}. The setting is not in force; "
+                "correct the value, or check that this firmware knows the command"
+            )
 
-    def send(self, message: str) -> tuple[Complaint, ...]:
-        """Send a command and return the complaints that are then in the queue, older ones among them."""
+    def send(self, message: str, codes: Codes | None = None) -> tuple[str, ...]:
+        """Send a command, with 16-bit codes as a big-endian block behind it; return what is complained about.
+
+        The complaints may be older than the command.
+        """
         with self._lock:
-            self._write(message)
-            return tuple(self._drain())
+            self._resynchronise()
+            with self._dialogue(message):
+                if codes is None:
+                    self._link.write(message)
+                else:
+                    payload = codes.astype(">u2").tobytes()
+                    length = str(len(payload))
+                    header = f"{message}#{len(length)}{length}".encode("ascii")
+                    self._link.write_raw(header + payload + b"\n")
+                # Some firmware drops messages that come too soon after a command, and has no flag for it.
+                if self._settle_s > 0:
+                    self._pause(self._settle_s)
+            return self.complaints()
 
     def query(self, message: str) -> str:
         """Ask, and return the answer without its line end; bytes outside ASCII are kept readable."""
-        with self._lock:
-            return _decoded(self._ask(message))
+        # This family marks ohms with the GBK character A6 B8: what is not text must not stop a query.
+        return self._ask(message).decode("gb18030", errors="replace").strip()
 
     def query_patiently(self, message: str) -> str:
         """Ask, and once more when the answer is empty, as the first one after ``*CLS`` may be."""
         return self.query(message) or self.query(message)
 
-    def complaints(self) -> tuple[Complaint, ...]:
-        """Empty the error queue and return what was in it."""
-        with self._lock:
-            return tuple(self._drain())
-
-    def write_codes(self, message: str, codes: Codes) -> None:
-        """Send ``message`` followed by 16-bit codes as a big-endian binary block."""
-        payload = codes.astype(">u2").tobytes()
-        length = str(len(payload))
-        block = f"{message}#{len(length)}{length}".encode("ascii") + payload + b"\n"
-        shown = f"{message}<{codes.size} points>"
-        with self._lock:
-            self._resynchronise()
-            with self._dialogue(shown):
-                self._link.write_raw(block)
-                self._settle()
-            self._refuse(shown, tuple(self._drain()))
-
     def query_codes(self, message: str) -> Codes:
         """Ask for a big-endian binary block of 16-bit codes."""
-        with self._lock:
-            reply = self._ask(message)
-        return _block_codes(reply, f"{self._name}: {message}")
+        return _block_codes(self._ask(message), f"{self.name}: {message}")
+
+    def complaints(self) -> tuple[str, ...]:
+        """Empty the error queue and return what was in it."""
+        found: list[str] = []
+        for _ in range(_LONGEST_QUEUE):
+            reply = self.query_patiently("SYST:ERR?")
+            entry = _QUEUE_ENTRY.fullmatch(reply)
+            if entry is None:
+                raise InstrumentError(
+                    f"{self.name} answered SYST:ERR? with {reply!r}, which is no entry of an error queue; "
+                    "check the cable, and try again"
+                )
+            if int(entry[1]) == 0:
+                return tuple(found)
+            found.append(f"{entry[2]} ({int(entry[1])})")
+        raise InstrumentError(
+            f"{self.name} reports errors without end ({_LONGEST_QUEUE} read); "
+            "switch it off and on, and open the bench again"
+        )
 
     def close(self) -> None:
         """Give the session back. Legal at any time: a session that is gone is not missed."""
         with self._lock, self._dialogue("closing the session"):
             self._link.close()
 
-    def _write(self, message: str) -> None:
-        self._resynchronise()
-        with self._dialogue(message):
-            self._link.write(message)
-            self._settle()
-
     def _ask(self, message: str) -> bytes:
-        self._resynchronise()
-        with self._dialogue(message):
-            self._reply_due = True
-            self._link.write(message)
-            reply = self._link.read_raw()
-            self._reply_due = False
-        LOG.debug("%s answers %r", self._name, reply)
+        with self._lock:
+            self._resynchronise()
+            with self._dialogue(message):
+                self._reply_due = True
+                self._link.write(message)
+                reply = self._link.read_raw()
+                self._reply_due = False
+        LOG.debug("%s answers %r", self.name, reply)
         return reply
-
-    def _settle(self) -> None:
-        # Some firmware drops messages that come too soon after a command, and has no flag to wait for.
-        if self._settle_s > 0:
-            self._pause(self._settle_s)
-
-    def _refuse(self, message: str, found: tuple[Complaint, ...]) -> None:
-        if found:
-            told = "; ".join(str(complaint) for complaint in found)
-            raise InstrumentError(
-                f"{self._name} refused {message!r}: {told}. The setting is not in force; "
-                "correct the value, or check that this firmware knows the command"
-            )
-
-    def _drain(self) -> Iterator[Complaint]:
-        for _ in range(_LONGEST_QUEUE):
-            reply = self.query_patiently("SYST:ERR?")
-            entry = _QUEUE_ENTRY.fullmatch(reply)
-            if entry is None:
-                raise InstrumentError(
-                    f"{self._name} answered SYST:ERR? with {reply!r}, which is no entry of an error queue; "
-                    "check the cable, and try again"
-                )
-            if int(entry[1]) == NO_ERROR:
-                return
-            yield Complaint(int(entry[1]), entry[2])
-        raise InstrumentError(
-            f"{self._name} reports errors without end ({_LONGEST_QUEUE} read); "
-            "switch it off and on, and open the bench again"
-        )
 
     def _resynchronise(self) -> None:
         """Read away the answer to a question that was broken off."""
         if not self._reply_due:
             return
         self._reply_due = False
-        doing = "resuming the dialogue"
-        try:
-            usual_ms = self._link.timeout
-            self._link.timeout = _STALE_REPLY_MS
+        with self._dialogue("resuming the dialogue"):
+            usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
             try:
                 self._link.read_raw()
+            except pyvisa.VisaIOError as error:
+                if error.error_code != _LATE:
+                    raise
             finally:
                 self._link.timeout = usual_ms
-        except pyvisa.VisaIOError as error:
-            if error.error_code not in _QUIET:
-                raise InstrumentLost(self._gone(doing, error)) from error
-        except _LOST as error:
-            raise InstrumentLost(self._gone(doing, error)) from error
 
     @contextmanager
     def _dialogue(self, doing: str) -> Iterator[None]:
-        LOG.debug("%s: %s", self._name, doing)
+        LOG.debug("%s: %s", self.name, doing)
         try:
             yield
-        except pyvisa.VisaIOError as error:
-            if error.error_code in _QUIET:
+        except (pyvisa.VisaIOError, *_LOST) as error:
+            if isinstance(error, pyvisa.VisaIOError) and error.error_code == _LATE:
                 raise InstrumentError(
-                    f"{self._name} did not answer {doing!r} within {self._link.timeout / 1000:g} s; "
+                    f"{self.name} did not answer {doing!r} within {self._link.timeout / 1000:g} s; "
                     "what it does now is unknown. Check that it is not busy or on a menu, and try again"
                 ) from error
-            raise InstrumentLost(self._gone(doing, error)) from error
-        except _LOST as error:
-            raise InstrumentLost(self._gone(doing, error)) from error
-
-    def _gone(self, doing: str, error: Exception) -> str:
-        return (
-            f"{self._name} is gone: {doing!r} failed ({error}). Its output state is unknown; "
-            "check its cable and power, then open the bench again"
-        )
+            raise InstrumentLost(
+                f"{self.name} is gone: {doing!r} failed ({error}). Its output state is unknown; "
+                "check its cable and power, then open the bench again"
+            ) from error
 
 
 def number_in(reply: str, asked: str) -> float:
@@ -211,22 +173,117 @@ def number_in(reply: str, asked: str) -> float:
     return float(found.group(1))
 
 
-def _decoded(reply: bytes) -> str:
-    # This family marks ohms with the GBK character A6 B8: anything that is not text must not stop a query.
-    return reply.decode("gb18030", errors="replace").strip()
-
-
 def _block_codes(reply: bytes, asked: str) -> Codes:
-    start = reply.find(b"#")
-    digits = int(reply[start + 1 : start + 2]) if reply[start + 1 : start + 2].isdigit() else 0
-    length_text = reply[start + 2 : start + 2 + digits]
-    if start < 0 or digits == 0 or not length_text.isdigit():
+    block = re.search(rb"#([1-9])", reply)
+    digits = int(block[1]) if block else 0
+    first = block.end() + digits if block else 0
+    length_text = reply[first - digits : first]
+    if block is None or not length_text.isdigit() or len(length_text) != digits:
         raise InstrumentError(f"{asked} was answered without a binary block ({reply[:20]!r}); try again")
-    length = int(length_text)
-    payload = reply[start + 2 + digits : start + 2 + digits + length]
+    length, payload = int(length_text), reply[first : first + int(length_text)]
     if len(payload) != length or length % 2:
         raise InstrumentError(
             f"{asked} announced {length} bytes and sent {len(payload)}; "
             "an even number, complete, is needed. Upload again"
         )
     return np.frombuffer(payload, dtype=">u2").astype(np.uint16)
+
+
+# Settings as declarations: assigning one sends it, reads it back, and keeps what the instrument holds.
+# This family answers a value out of range with a silent default (Tektronix AFG1000 programmer manual,
+# general syntax), so that a command without a complaint proves nothing.
+
+
+class Verified:
+    """An instrument with verified settings."""
+
+    def __init__(self, port: ScpiPort, channel: int) -> None:
+        self.port = port
+        self.channel = channel
+        self.held: dict[str, Any] = {}
+        """What was read back since the last failure, by header."""
+
+    def refused(self, header: str, sent: str, got: str) -> SettingRefused:
+        """Return the error for a setting that reads back differently."""
+        return SettingRefused(
+            f"{self.port.name}: {header} was set to {sent} and reads back {got!r}: the instrument took "
+            "another value without a word. Stop, check the setting on its panel, and look whether its limits "
+            "allow it"
+        )
+
+    def known(self, header: str) -> Any:
+        """Return what the instrument holds; raises InstrumentError since a change has failed."""
+        if header not in self.held:
+            raise InstrumentError(
+                f"{self.port.name} has no known settings since a change failed; "
+                "load a sine or a waveform first"
+            )
+        return self.held[header]
+
+
+@dataclass(frozen=True)
+class Number:
+    """A number, sent as ``form`` says; read back within the resolution of the instrument, or refused."""
+
+    header: str
+    """``{c}`` stands for the channel."""
+    form: str = "{:g}"
+    absolute: float = 0.0
+    relative: float = 0.0
+
+    def __get__(self, owner: Verified, _: type | None = None) -> float:
+        return float(owner.known(self.header))
+
+    def __set__(self, owner: Verified, value: float) -> None:
+        header, text = self.header.format(c=owner.channel), self.form.format(value)
+        owner.port.command(f"{header} {text}")
+        reply = owner.port.query(f"{header}?")
+        got = number_in(reply, f"{owner.port.name}: {header}?")
+        if not abs(got - value) <= self.absolute + self.relative * abs(value):  # so that a NaN is refused
+            raise owner.refused(header, text, reply)
+        owner.held[self.header] = got
+
+
+@dataclass(frozen=True)
+class Word:
+    """One of several words, each with every answer that means it (upper case)."""
+
+    header: str
+    answers: Mapping[str, tuple[str, ...]]
+
+    def __get__(self, owner: Verified, _: type | None = None) -> str:
+        return str(owner.known(self.header))
+
+    def __set__(self, owner: Verified, word: str) -> None:
+        owner.port.command(f"{self.header.format(c=owner.channel)} {word}")
+        self.expect(owner, word)
+
+    def insist(self, owner: Verified, word: str) -> None:
+        """Set it whatever is complained about, old complaints above all: what it reads back decides."""
+        owner.port.send(f"{self.header.format(c=owner.channel)} {word}")
+        self.expect(owner, word)
+
+    def expect(self, owner: Verified, word: str) -> None:
+        """Raise SettingRefused unless the instrument holds a word."""
+        header = self.header.format(c=owner.channel)
+        reply = owner.port.query(f"{header}?")
+        if reply.strip('"').upper() not in self.answers[word]:
+            raise owner.refused(header, word, reply)
+        owner.held[self.header] = word
+
+
+SWITCH = {"ON": ("1", "ON"), "OFF": ("0", "OFF")}
+"""The words of what is on or off."""
+
+
+def end_if_known(owner: Verified, header: str, word: str, answers: tuple[str, ...]) -> None:
+    """End a mode; what the firmware does not know, and answers with nothing, cannot be on."""
+    header = header.format(c=owner.channel)
+    owner.port.send(f"{header} {word}")
+    reply = owner.port.query(f"{header}?")
+    owner.port.complaints()  # an unknown query leaves one behind its empty answer
+    if reply and reply.strip('"').upper() not in answers:
+        raise SettingRefused(
+            f"{owner.port.name}: {header} was set to {word} and still reads {reply!r}; "
+            "the output is off. End that mode on its panel and open the bench again"
+        )

@@ -4,7 +4,7 @@ import os
 import re
 import warnings
 from pathlib import Path
-from typing import Protocol, cast
+from typing import cast
 
 import pyvisa
 from pyvisa.resources import MessageBasedResource
@@ -21,23 +21,8 @@ _USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECA
 _MS_PER_S = 1000.0
 
 
-class Link(Protocol):
-    """What a SCPI port needs of a VISA session; `pyvisa`'s message-based resources offer it."""
-
-    timeout: float
-    """How long a read waits [ms], as VISA counts it."""
-
-    def write(self, message: str) -> int:
-        """Send text with its termination."""
-
-    def read_raw(self) -> bytes:
-        """One whole reply, as it came."""
-
-    def write_raw(self, message: bytes) -> int:
-        """Send bytes as they are."""
-
-    def close(self) -> None:
-        """Give the resource back."""
+Link = MessageBasedResource
+"""A VISA session."""
 
 
 def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) -> Link:
@@ -64,12 +49,12 @@ def open_link(resource: str, visa_library: str, timeout_s: float = TIMEOUT_S) ->
         raise _absent(resource, error) from error
     except (ValueError, OSError) as error:  # pyvisa-py reports an absent or dead USB device so
         raise _absent(resource, error) from error
-    message_link = cast("MessageBasedResource", link)
+    message_link = cast("Link", link)
     message_link.timeout = timeout_s * _MS_PER_S
     message_link.write_termination = "\n"
     if resource.upper().endswith("::SOCKET"):  # a stream does not tell where a reply ends, USB does
         message_link.read_termination = "\n"
-    return cast("Link", message_link)
+    return message_link
 
 
 def list_visa_resources(visa_library: str = "@py") -> tuple[str, ...]:
