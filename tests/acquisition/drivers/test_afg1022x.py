@@ -275,7 +275,9 @@ class TestFaults:
     def test_a_memory_that_reads_back_differently_is_a_fault(self, plugged, generator):
         def spoil(message):
             if message.startswith(b"DATA:DATA EMEM"):
-                plugged.instrument.execute(b"DATA:VAL EMEM,5,0")
+                spoilt = plugged.instrument.memory.codes("EMEM").copy()
+                spoilt[4] = 0
+                plugged.instrument.memory.hold(spoilt)
 
         plugged.log.after = spoil
         with pytest.raises(SettingRefused, match=r"1024 points were put in its memory.*1023 agree"):

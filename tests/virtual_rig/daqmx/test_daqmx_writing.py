@@ -181,7 +181,7 @@ def test_a_software_timed_output_holds_its_value(daq):
     inputs, outputs = daq.task(), daq.task()
     outputs.ao_channels.add_ao_voltage_chan("Dev2/ao0")
     inputs.ai_channels.add_ai_voltage_chan("Dev2/ai0", min_val=-10, max_val=10)
-    AnalogSingleChannelWriter(outputs.out_stream, auto_start=True).write_one_sample(1.25)
+    outputs.write(1.25)
     assert daq.world.played["Dev2/ao0"][-1].volts.tolist() == [1.25]
     assert inputs.read() == 1.25
 

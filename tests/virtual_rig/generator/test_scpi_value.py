@@ -6,11 +6,10 @@ from vibench.virtual_rig.generator._scpi_status import ScpiError
 from vibench.virtual_rig.generator._scpi_value import (
     AMPLITUDE_UNITS,
     FREQUENCY_UNITS,
-    Limit,
     as_number,
     block,
     boolean,
-    number_or_limit,
+    number,
 )
 
 
@@ -28,17 +27,12 @@ from vibench.virtual_rig.generator._scpi_value import (
     ],
 )
 def test_a_frequency_may_carry_its_unit_and_m_means_mega_before_hertz(text, hertz):
-    assert number_or_limit(text, FREQUENCY_UNITS) == pytest.approx(hertz, rel=1e-15)
+    assert number(text, FREQUENCY_UNITS) == pytest.approx(hertz, rel=1e-15)
 
 
 @pytest.mark.parametrize(("text", "volts"), [(b"2.5VPP", 2.5), (b"50 mVpp", 0.05), (b"50mV", 0.05)])
 def test_an_amplitude_in_millivolts_is_not_in_megavolts(text, volts):
-    assert number_or_limit(text, AMPLITUDE_UNITS) == pytest.approx(volts, rel=1e-15)
-
-
-@pytest.mark.parametrize("word", [b"MIN", b"minimum", b"Minimum"])
-def test_minimum_is_a_word_and_no_number(word):
-    assert number_or_limit(word, FREQUENCY_UNITS) is Limit.MINIMUM
+    assert number(text, AMPLITUDE_UNITS) == pytest.approx(volts, rel=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +40,7 @@ def test_minimum_is_a_word_and_no_number(word):
 )
 def test_a_wrong_unit_and_a_wrong_word_are_refused_with_their_own_numbers(text, code):
     with pytest.raises(ScpiError) as refusal:
-        number_or_limit(text, FREQUENCY_UNITS)
+        number(text, FREQUENCY_UNITS)
     assert refusal.value.code is code
 
 
@@ -75,5 +69,5 @@ def test_infinity_reads_as_the_standard_asks():
 @pytest.mark.parametrize("text", [b"1e999", b"-1e999", b"9e307kHz"])
 def test_a_number_beyond_all_numbers_is_an_error_and_no_infinity(text):
     with pytest.raises(ScpiError) as refused:
-        number_or_limit(text, FREQUENCY_UNITS)
+        number(text, FREQUENCY_UNITS)
     assert refused.value.code is ErrorCode.EXPONENT_TOO_LARGE

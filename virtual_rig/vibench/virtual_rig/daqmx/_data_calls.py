@@ -11,7 +11,7 @@ from nidaqmx.constants import FillMode, SampleTimingType, WaveformAttributeMode
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from ._calls import NOTHING, Call, Fields, pick, task_of
+from ._calls import Call, Fields, pick, task_of
 from ._errors import DaqmxRefusal, unsupported_value
 from ._generation import Generation
 from ._reading import READ_ALL, Reading, default_samples, read, require_inputs
@@ -145,11 +145,6 @@ def _read_scaled(system: DaqmxSystem, request: Any) -> bytes:
     return packed_response(reading.status, _laid_out(reading.volts, request), reading.samples)
 
 
-def _read_scalar(system: DaqmxSystem, request: Any) -> Fields:
-    reading = _whole(read(task_of(system, request), 1, request.timeout))
-    return {"value": float(reading.volts[0, 0])}
-
-
 def _read_waveforms(system: DaqmxSystem, request: Any) -> Fields:
     task = task_of(system, request)
     reading = read(task, request.num_samps_per_chan, request.timeout)
@@ -208,14 +203,6 @@ def _write(system: DaqmxSystem, request: Any) -> Fields:
     is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
     rows = values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)
     return {"samps_per_chan_written": write(task, rows, _start(request), request.timeout)}
-
-
-def _write_scalar(system: DaqmxSystem, request: Any) -> Fields:
-    task = task_of(system, request)
-    require_outputs(task)
-    _check_size(task, 1, 1)
-    write(task, np.array([[request.value]]), _start(request), request.timeout)
-    return NOTHING
 
 
 def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
@@ -282,12 +269,10 @@ def _check_size(task: Task, size: int, samples: int) -> None:
 
 DATA_CALLS: Mapping[str, Call] = {
     "ReadAnalogF64": _read_scaled,
-    "ReadAnalogScalarF64": _read_scalar,
     "ReadAnalogWaveforms": _read_waveforms,
     "ReadRaw": _read_raw,
     **{f"ReadBinary{kind}": _binary_reader(bits) for kind, bits in _READ_BITS.items()},
     "WriteAnalogF64": _write,
-    "WriteAnalogScalarF64": _write_scalar,
     "WriteAnalogWaveforms": _write_waveforms,
 }
 """The calls by their names in the protocol."""

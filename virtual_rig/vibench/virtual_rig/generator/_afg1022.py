@@ -49,14 +49,12 @@ from ._scpi_value import (
     PERCENT_UNITS,
     RESISTANCE_UNITS,
     VOLTAGE_UNITS,
-    Limit,
     as_block,
     as_number,
     block,
     boolean,
     integer,
     number_and_unit,
-    number_or_limit,
     text,
 )
 from ._terminal_voltage import Relay, Terminal
@@ -262,15 +260,10 @@ def _ask_shape(generator: AFG1022, channel: int, parameters: Parameters) -> byte
 def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> None:
     """Take ``31DEG``, or radians without a unit; whole degrees are kept, negative ones refused."""
     full_turn_deg = 360.0
-    parameter = only(parameters)
-    if parameter[:1].isalpha():
-        word = number_or_limit(parameter, NO_UNITS)
-        angle_deg = full_turn_deg if word is Limit.MAXIMUM else 0.0
-    else:
-        angle, unit = number_and_unit(parameter)
-        if unit not in ("", "RAD", "DEG"):
-            raise ScpiError(ErrorCode.INVALID_SUFFIX)
-        angle_deg = angle if unit == "DEG" else math.degrees(angle)
+    angle, unit = number_and_unit(only(parameters))
+    if unit not in ("", "RAD", "DEG"):
+        raise ScpiError(ErrorCode.INVALID_SUFFIX)
+    angle_deg = angle if unit == "DEG" else math.degrees(angle)
     if not 0 <= angle_deg <= full_turn_deg:
         raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
     # A hair is added so that 31 degrees, sent in radians, are not truncated to 30.
@@ -320,13 +313,6 @@ def _ask_points(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
     return str(len(generator.memory.codes(_memory(only(parameters))))).encode("ascii")
 
 
-def _set_point(generator: AFG1022, _: int, parameters: Parameters) -> None:
-    target, point, code = exactly(parameters, 3)
-    _edit_memory(target)
-    generator.memory.set_value(integer(point), integer(code))
-    generator.memory_changed()
-
-
 def _copy_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
     target, source = exactly(parameters, 2)
     generator.memory.copy(_memory(source), _memory(target))
@@ -347,7 +333,7 @@ def load_command(header: str) -> Command:
     def ask(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
         assert row.ask is not None
         reply = row.ask(generator, channel, parameters)
-        is_open = math.isinf(generator.settings(channel).declared_load_ohm) and not parameters
+        is_open = math.isinf(generator.settings(channel).declared_load_ohm)
         gbk_ohm_sign = b"\xa6\xb8"
         return reply + gbk_ohm_sign if is_open and generator.quirks.high_impedance_has_ohm_sign else reply
 
@@ -416,7 +402,6 @@ COMMANDS = (
         lambda s: s.burst_mode, lambda s, mode: replace(s, burst_mode=mode), channels=1),
     *(modulation_switch(mode) for mode in MODULATIONS),
     Command("DATA[:DATA]", "IVI, drivers", _load_memory, _read_memory),
-    Command("DATA[:DATA]:VALue", "IVI", _set_point, None),
     Command("DATA:DEFine", "IVI", _define_memory, None),
     Command("DATA:POINts", "IVI, drivers", None, _ask_points),
     Command("DATA:COPY", "IVI, drivers", _copy_memory, None),

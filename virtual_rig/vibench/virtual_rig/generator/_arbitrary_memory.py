@@ -47,14 +47,6 @@ class ArbitraryMemory:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
         self._store(name, codes)
 
-    def set_value(self, point: int, code: int) -> None:
-        """Change one point of the edit memory; points count from 1."""
-        codes = self._waveforms[EDIT_MEMORY].copy()
-        if not 1 <= point <= len(codes) or not 0 <= code <= self.top_code:
-            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-        codes[point - 1] = code
-        self._store(EDIT_MEMORY, codes)
-
     def copy(self, source: str, target: str) -> None:
         """Copy one memory onto another."""
         self._waveforms[target] = self.codes(source)

@@ -24,7 +24,7 @@ from ._phase_course import Spacing
 from ._scpi_command import Command, Parameters, choice, none, only, switch
 from ._scpi_instrument import Quirks
 from ._scpi_status import ErrorCode, ScpiError
-from ._scpi_value import NO_UNITS, Limit, as_number, block, integer, number_or_limit, text
+from ._scpi_value import NO_UNITS, as_number, block, integer, number, text
 
 TOP_CODE = 65_534
 """Codes -32767 to 32767, counted from zero."""
@@ -171,8 +171,8 @@ def _set_rate(own: Keysight33500B, channel: int, rate_hz: float) -> None:
 
 
 def _write_rate(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-    rate_hz = number_or_limit(only(parameters), NO_UNITS)
-    if isinstance(rate_hz, Limit) or not 0 < rate_hz <= HIGHEST_RATE_HZ:
+    rate_hz = number(only(parameters), NO_UNITS)
+    if not 0 < rate_hz <= HIGHEST_RATE_HZ:
         raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
     _set_rate(own, channel, rate_hz)
 
@@ -198,8 +198,8 @@ def _sweep_seconds(node: str, field: str, range_s: tuple[float, float]) -> Comma
     """Return the row of a time of the sweep [s]."""
 
     def write(own: Keysight33500B, channel: int, parameters: Parameters) -> None:
-        seconds = number_or_limit(only(parameters), _SECONDS)
-        if isinstance(seconds, Limit) or not range_s[0] <= seconds <= range_s[1]:
+        seconds = number(only(parameters), _SECONDS)
+        if not range_s[0] <= seconds <= range_s[1]:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
         _set_sweep(own, channel, field, round(seconds, 6))
 

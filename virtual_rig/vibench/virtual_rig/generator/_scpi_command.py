@@ -9,7 +9,7 @@ from typing import Any
 from ._afg1022_settings import ChannelSettings
 from ._scpi_header import HeaderPattern, mnemonic_matches, short_form
 from ._scpi_status import ErrorCode, ScpiError
-from ._scpi_value import INFINITE, Limit, as_number, boolean, number_or_limit, text
+from ._scpi_value import INFINITE, as_number, boolean, number as value_of, text
 
 CHANNELS = 2
 _RANGE_ROUNDING = 1e-9
@@ -19,7 +19,6 @@ Parameters = tuple[bytes, ...]
 Setter = Callable[[Any, int, Parameters], None]
 """Takes the generator, the channel, and what was sent."""
 Query = Callable[[Any, int, Parameters], bytes]
-Reader = Callable[[bytes, Mapping[str, float]], float | Limit]
 
 
 @dataclass(frozen=True)
@@ -59,35 +58,24 @@ def number(
     ``scale`` is the displayed number over the field's. A number of ``INFINITE`` sets ``largest``, if given.
     """
 
-    def meant(limit: Limit, settings: ChannelSettings) -> float:
-        low, high = limits(settings)
-        usual = min(max(default, low), high)
-        words = {Limit.MINIMUM: low, Limit.MAXIMUM: high, Limit.DEFAULT: usual, Limit.INFINITY: math.inf}
-        return words[limit]
-
     def write(generator: Any, channel: int, parameters: Parameters) -> None:
         settings = generator.settings(channel)
-        value = number_or_limit(only(parameters), units)
-        shown = meant(value, settings) if isinstance(value, Limit) else value
+        shown = value_of(only(parameters), units)
         low, high = limits(settings)
         if shown >= INFINITE and not math.isnan(largest):
             shown = largest
         elif low - _RANGE_ROUNDING * abs(low) <= shown <= high + _RANGE_ROUNDING * abs(high):
             shown = round(shown, decimals)
         elif generator.quirks.out_of_range_becomes_default:
-            shown = meant(Limit.DEFAULT, settings)
+            shown = min(max(default, low), high)
         else:
             raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
         generator.configure(channel, replace(settings, **{field: shown / scale(settings)}))
 
     def ask(generator: Any, channel: int, parameters: Parameters) -> bytes:
+        none(parameters)
         settings = generator.settings(channel)
         shown = getattr(settings, field) * scale(settings)
-        if parameters:
-            word = number_or_limit(only(parameters), units)
-            if not isinstance(word, Limit):
-                raise ScpiError(ErrorCode.PARAMETER_NOT_ALLOWED)
-            shown = meant(word, settings)
         return as_number(INFINITE if math.isinf(shown) else shown)
 
     return Command(header, source, write, ask, channels)

@@ -4,16 +4,13 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ._scpi_command import Command, action, only, report
+from ._scpi_command import Command, action, report
 from ._scpi_header import HeaderPath
 from ._scpi_message import Unit, units
 from ._scpi_status import BYTE, ErrorCode, ScpiError, Status
-from ._scpi_value import integer
 
 LONGEST_REPLY = 1 << 20
 """Bytes of the answers to one message; the longest that is of use has 17 kB."""
-MOST_SPELLINGS = 4096
-"""Headers that are remembered in the spelling in which they came."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,6 @@ class ScpiInstrument:
         self._identity_is_due_empty = False
         self._next_delay_s = 0.0
         self._next_is_corrupted = False
-        self._found: dict[str, tuple[Command, int]] = {}
 
     def execute(self, message: bytes) -> Reply:
         """Carry out one complete message and return its reply."""
@@ -157,14 +153,9 @@ class ScpiInstrument:
 
     def _find(self, header: str) -> tuple[Command | None, int]:
         """Return the command of a header, and its numeric suffix."""
-        if header in self._found:
-            return self._found[header]
         for pattern, command in self._patterns:
             suffix = pattern.match(header)
             if suffix is not None:
-                if len(self._found) >= MOST_SPELLINGS:
-                    self._found.clear()
-                self._found[header] = command, suffix
                 return command, suffix
         return None, 1
 
@@ -185,18 +176,6 @@ def _decimal(value: int) -> bytes:
     return str(int(value)).encode("ascii")
 
 
-def _register(header: str, source: str, field: str) -> Command:
-    """Return the row of an enable register, 0 to 255."""
-
-    def write(instrument: ScpiInstrument, _: int, parameters: tuple[bytes, ...]) -> None:
-        value = integer(only(parameters))
-        if not 0 <= value <= BYTE:
-            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
-        setattr(instrument.status, field, value)
-
-    return Command(header, source, write, lambda instrument, *_: _decimal(getattr(instrument.status, field)))
-
-
 def _next_error(instrument: ScpiInstrument) -> bytes:
     code = instrument.status.next_error()
     return f'{int(code)},"{code.text}"'.encode("ascii")
@@ -209,12 +188,7 @@ COMMON_COMMANDS = (
     action("*TRG", "IEEE 488.2, 10.37", lambda instrument: instrument.trigger()),
     action("*WAI", "IEEE 488.2, 10.39", lambda _: None),
     Command("*OPC", "IEEE 488.2, 10.18", lambda each, *_: each.status.operation_complete(), lambda *_: b"1"),
-    report("*TST", "IEEE 488.2, 10.38", lambda _: b"0"),
     report("*ESR", "IEEE 488.2, 10.12", lambda instrument: _decimal(instrument.status.take_events())),
-    report("*STB", "IEEE 488.2, 10.36", lambda instrument: _decimal(instrument.status.byte)),
-    _register("*ESE", "IEEE 488.2, 10.10", "event_enable"),
-    _register("*SRE", "IEEE 488.2, 10.34", "service_enable"),
     report("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", _next_error),
-    report("SYSTem:VERSion", "SCPI-1999, volume 2, 21.21", lambda _: b"1999.0"),
 )
 """What every instrument obeys."""

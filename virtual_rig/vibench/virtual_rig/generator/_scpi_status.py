@@ -1,4 +1,4 @@
-"""What a SCPI instrument remembers of its troubles: error queue, event register, status byte."""
+"""What a SCPI instrument remembers of its troubles: error queue and event register."""
 
 from collections import deque
 from enum import IntEnum, IntFlag
@@ -58,16 +58,6 @@ class Event(IntFlag):
     POWER_ON = 128
 
 
-class StatusByte(IntFlag):
-    """Bits of the status byte (IEEE 488.2-1992, 11.2; error bit from SCPI-1999)."""
-
-    NONE = 0
-    ERROR_QUEUED = 4
-    MESSAGE_AVAILABLE = 16
-    EVENT_SUMMARY = 32
-    SERVICE_REQUEST = 64
-
-
 _EVENT_OF_HUNDRED = {
     1: Event.COMMAND_ERROR,
     2: Event.EXECUTION_ERROR,
@@ -83,8 +73,6 @@ class Status:
     def __init__(self) -> None:
         self._errors: deque[ErrorCode] = deque()
         self._events = Event.POWER_ON
-        self.event_enable = 0
-        self.service_enable = 0
 
     def report(self, code: ErrorCode) -> None:
         """Queue an error and set its bit in the event register."""
@@ -108,16 +96,6 @@ class Status:
         self._events |= Event.OPERATION_COMPLETE
 
     def clear(self) -> None:
-        """Empty queue and event register (``*CLS``); the enable registers stay."""
+        """Empty queue and event register (``*CLS``)."""
         self._errors.clear()
         self._events = Event.NONE
-
-    @property
-    def byte(self) -> StatusByte:
-        """The status byte, without the bit for a waiting message, which only the interface knows."""
-        byte = StatusByte.ERROR_QUEUED if self._errors else StatusByte.NONE
-        if self._events & self.event_enable:
-            byte |= StatusByte.EVENT_SUMMARY
-        if byte & self.service_enable:
-            byte |= StatusByte.SERVICE_REQUEST
-        return byte

@@ -4,7 +4,6 @@ import math
 import re
 from collections.abc import Mapping
 from decimal import Decimal
-from enum import Enum
 
 from ._scpi_header import mnemonic_matches
 from ._scpi_status import ErrorCode, ScpiError
@@ -36,15 +35,6 @@ NO_UNITS: Mapping[str, float] = {"": 1.0}
 _NUMBER = re.compile(r"(?P<number>[+-]?(?:\d+\.?\d*|\.\d+)(?:E[+-]?\d+)?)\s*(?P<unit>[A-Z%]*)", re.IGNORECASE)
 
 
-class Limit(Enum):
-    """A word that stands for a number (SCPI-1999, volume 1, 7.2.1.2)."""
-
-    MINIMUM = "MINimum"
-    MAXIMUM = "MAXimum"
-    DEFAULT = "DEFault"
-    INFINITY = "INFinity"
-
-
 def text(parameter: bytes) -> str:
     """Decode a parameter that must be plain text."""
     try:
@@ -53,15 +43,13 @@ def text(parameter: bytes) -> str:
         raise ScpiError(ErrorCode.DATA_TYPE_ERROR) from None
 
 
-def number_or_limit(parameter: bytes, units: Mapping[str, float]) -> float | Limit:
-    """Read ``1.5kHz``, ``MIN``, ``INF`` ...: the value in the base unit, or the word's meaning.
+def number(parameter: bytes, units: Mapping[str, float]) -> float:
+    """Read ``1.5kHz`` or ``INF``: the value in the base unit.
 
     Raises ScpiError: -131 for a unit that does not belong here, -104 for what is no number.
     """
-    word = text(parameter)
-    for limit in Limit:
-        if mnemonic_matches(word, limit.value):
-            return limit
+    if mnemonic_matches(text(parameter), "INFinity"):
+        return INFINITE
     value, unit = number_and_unit(parameter)
     if unit not in units:
         raise ScpiError(ErrorCode.INVALID_SUFFIX)
@@ -85,10 +73,7 @@ def number_and_unit(parameter: bytes) -> tuple[float, str]:
 
 def integer(parameter: bytes) -> int:
     """Read a whole number; fractions are rounded, as SCPI asks."""
-    value = number_or_limit(parameter, NO_UNITS)
-    if isinstance(value, Limit):
-        raise ScpiError(ErrorCode.DATA_TYPE_ERROR)
-    return round(value)
+    return round(number(parameter, NO_UNITS))
 
 
 def boolean(parameter: bytes) -> bool:

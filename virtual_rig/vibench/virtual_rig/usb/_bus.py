@@ -27,7 +27,7 @@ import usb.util
 from vibench.acquisition import ConfigurationError
 
 from . import _descriptors as usb_descriptors
-from ._device import BULK_IN, BULK_OUT, Setup, UsbDevice
+from ._device import Setup, UsbDevice
 from ._remote import RemoteUsbDevice
 
 _GET_DESCRIPTOR = 6
@@ -81,10 +81,6 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         with self._lock:
             return list(self._ports)
 
-    def get_parent(self, dev: _Port) -> None:  # noqa: ARG002 - signature of PyUSB
-        """Return nothing: there are no hubs."""
-        return
-
     def get_device_descriptor(self, dev: _Port) -> SimpleNamespace:
         """Return the device descriptor."""
         return usb_descriptors.device_descriptor(dev.device.identification, dev.address)
@@ -129,10 +125,6 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         self._present(dev_handle)
         return 1
 
-    def set_interface_altsetting(self, dev_handle: _Handle, intf: int, altsetting: int) -> None:  # noqa: ARG002
-        """Accept the one setting."""
-        self._present(dev_handle)
-
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:  # noqa: ARG002 - there is one
         """Take the interface for one handle alone; EBUSY if another one has it, as with libusb."""
         self._present(dev_handle)
@@ -145,21 +137,6 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
         with self._lock:
             if self._owners.get(dev_handle.port) is dev_handle:
                 del self._owners[dev_handle.port]
-
-    def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:  # noqa: ARG002
-        """Say no: no kernel knows of this bus."""
-        return False
-
-    def detach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
-        """Do nothing: no kernel driver is there."""
-
-    def attach_kernel_driver(self, dev_handle: _Handle, intf: int) -> None:
-        """Do nothing: no kernel driver is there."""
-
-    def reset_device(self, dev_handle: _Handle) -> None:
-        """Let both bulk endpoints work again."""
-        for endpoint in (BULK_OUT, BULK_IN):
-            self.clear_halt(dev_handle, endpoint)
 
     def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
         """Let a stalled endpoint work again."""
