@@ -26,10 +26,6 @@ _INFINITE_OHM = 1e6
 _SAME_LOAD = 0.01
 
 
-class Unsupported(InstrumentError):
-    """The instrument, or its firmware, cannot do that remotely."""
-
-
 @contextmanager
 def noted(error: BaseException) -> Iterator[None]:
     """Clean up after ``error``: a further failure of an instrument is added to it as a note."""
@@ -76,8 +72,10 @@ class AFG1022X(Verified):
         self.codes: ArbitraryCodes | None = None
         """What the memory holds while it is selected."""
         self._is_known = False
-        self._identity: Identity | None = None
-        self._unconfirmed: tuple[Knob, ...] = ()
+        self.identity: Identity
+        """Who answered ``*IDN?``; the reply is kept whole, since its last field varies."""
+        self.unconfirmed: tuple[Knob, ...] = ()
+        """Settings that could be neither made nor read remotely: the operator must confirm them."""
         self._is_silent_and_closed = False
 
     @classmethod
@@ -100,25 +98,13 @@ class AFG1022X(Verified):
             raise
         try:
             OUTPUT.insist(generator, "OFF")
-            generator._unconfirmed = generator._agree_on_load()
+            generator.unconfirmed = generator._agree_on_load()
             generator._to_quiet_sine()
         except BaseException as error:
             with noted(error):
                 generator.close()
             raise
         return generator
-
-    @property
-    def identity(self) -> Identity:
-        """Who answered ``*IDN?``; the reply is kept whole, since its last field varies."""
-        if self._identity is None:
-            raise InstrumentError(f"{self._name} has not been identified yet; make it with AFG1022X.open")
-        return self._identity
-
-    @property
-    def unconfirmed(self) -> tuple[Knob, ...]:
-        """Settings that could be neither made nor read remotely: the operator must confirm them."""
-        return self._unconfirmed
 
     @property
     def amplitude_range_vpp(self) -> tuple[float, float]:
@@ -194,10 +180,10 @@ class AFG1022X(Verified):
             self.panel_vpp = panel_vpp
 
     def arm_burst(self, cycles: int) -> None:
-        """Play ``cycles`` periods at each `trigger`; Unsupported on channel 2, which has no bursts."""
+        """Play ``cycles`` periods at each `trigger`; LimitExceeded on channel 2, which has no bursts."""
         if self.channel != _BURST_CHANNEL:
-            raise Unsupported(f"a burst was asked of channel {self.channel}; only channel 1 has bursts")
-        self._check_burst(cycles)
+            raise LimitExceeded(f"a burst was asked of channel {self.channel}; only channel 1 has bursts")
+        self.model.check_burst(cycles)
         with self._changing():
             self._set_burst(cycles)
 
@@ -311,11 +297,6 @@ class AFG1022X(Verified):
     def _mute(self) -> None:
         self.panel_vpp = self.amplitude_range_vpp[0]
 
-    def _check_burst(self, cycles: int) -> None:
-        fewest, most = self.model.burst_cycles
-        if not fewest <= cycles <= most:
-            raise LimitExceeded(f"a burst of {cycles} cycles was asked for; {fewest} to {most} are allowed")
-
     def _set_burst(self, cycles: int) -> None:
         self.burst_mode = "TRIG"
         self.burst_cycles = cycles
@@ -361,7 +342,7 @@ class AFG1022X(Verified):
                 f"{self._config.resource} answers *IDN? with {reply!r}; {self.wanted} is needed. "
                 "It was told to switch its output off; correct generator.resource in the configuration"
             )
-        self._identity = Identity(maker, model, serial, firmware, reply)
+        self.identity = Identity(maker, model, serial, firmware, reply)
 
     def _agree_on_load(self) -> tuple[Knob, ...]:
         """Make the generator expect the load; return what the operator must confirm when it cannot be known.

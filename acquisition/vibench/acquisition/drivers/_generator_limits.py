@@ -88,6 +88,12 @@ class GeneratorModel:
                 f"{self.lowest_hz:g} to {highest_hz:g} Hz. Nothing was sent; choose a frequency in that range"
             )
 
+    def check_burst(self, cycles: int) -> None:
+        """Raise LimitExceeded for a number of periods that the generator cannot count."""
+        fewest, most = self.burst_cycles
+        if not fewest <= cycles <= most:
+            raise LimitExceeded(f"a burst of {cycles} cycles was asked for; {fewest} to {most} are allowed")
+
     def check_sweep(self, sweep: Sweep) -> None:
         """Raise LimitExceeded unless the generator makes such a sweep by itself."""
         self.check_frequency(Shape.SINE, sweep.start_hz)

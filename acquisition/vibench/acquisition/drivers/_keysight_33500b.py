@@ -72,7 +72,7 @@ class Keysight33500B(AFG1022X):
 
     def arm_burst(self, cycles: int) -> None:
         """Play ``cycles`` periods at each trigger of the bus."""
-        self._check_burst(cycles)
+        self.model.check_burst(cycles)
         with self._changing():
             self.trigger_source = "BUS"
             self._set_burst(cycles)

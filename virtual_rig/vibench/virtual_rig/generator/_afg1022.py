@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from enum import Enum
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,9 +77,7 @@ class AFG1022(ScpiInstrument):
 
     """
 
-    maker: ClassVar[str] = "TEKTRONIX"
-    model: ClassVar[str] = "AFG1022"
-    firmware: ClassVar[str] = "SCPI:99.0 FV:V1.0.2"
+    maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
 
     def __init__(
         self,
