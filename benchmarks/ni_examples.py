@@ -30,7 +30,7 @@ from nidaqmx import GrpcSessionOptions
 
 from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.daqmx import WallPace, catalogue_with, serve
+from vibench.virtual_rig.daqmx import DaqServer, WallPace, catalogue_with
 
 PRODUCTS = ("USB-4431", "USB-6211")
 PATIENCE_S = 15.0
@@ -79,7 +79,7 @@ def run_one(example: Path, product: str) -> None:
     warnings.filterwarnings("ignore", message="FigureCanvasAgg")
     world = VirtualRig(load_rig("virtual_rig_streaming")).world
     with (
-        serve(world, WallPace(), catalogue=catalogue(product)) as server,
+        DaqServer(world, WallPace(), catalogue=catalogue(product)) as server,
         grpc.insecure_channel(server.address) as channel,
     ):
         connect(GrpcSessionOptions(channel, ""))

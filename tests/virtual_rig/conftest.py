@@ -11,7 +11,7 @@ from nidaqmx import GrpcSessionOptions, Task
 
 from vibench.acquisition import ConfigurationError
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.daqmx import DaqServer, Pace, serve
+from vibench.virtual_rig.daqmx import DaqServer, Pace
 
 OFFSET_V = 0.5
 LOOPED_BACK = {"Dev1/ai0": "Dev1/ao0", "Dev2/ai0": "Dev2/ao0"}
@@ -143,7 +143,7 @@ def connect() -> Iterator:
 
         def open_daq(pace: Pace | None = None, **options) -> Daq:
             world = LoopbackWorld()
-            server = resources.enter_context(serve(world, pace, **options))
+            server = resources.enter_context(DaqServer(world, pace, **options))
             unlimited = [("grpc.max_receive_message_length", -1), ("grpc.max_send_message_length", -1)]
             channel = resources.enter_context(grpc.insecure_channel(server.address, options=unlimited))
             tasks = resources.enter_context(ExitStack())

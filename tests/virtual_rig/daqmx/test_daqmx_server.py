@@ -13,7 +13,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
 from vibench.acquisition import ConfigurationError
-from vibench.virtual_rig.daqmx import serve
+from vibench.virtual_rig.daqmx import DaqServer
 
 PATIENCE_S = 20.0
 
@@ -109,7 +109,7 @@ def test_closing_ends_every_thread_of_the_server(connect):
 
 def test_an_address_in_use_is_refused_in_a_sentence(daq):
     with pytest.raises(ConfigurationError, match=f"{daq.server.address}.*port 0"):
-        serve(daq.world, address=daq.server.address)
+        DaqServer(daq.world, address=daq.server.address)
 
 
 def test_the_default_address_is_this_computer_only(daq):

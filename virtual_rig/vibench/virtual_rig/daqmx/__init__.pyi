@@ -5,7 +5,7 @@ from ._faults import (
     Fault as Fault,
     ServerGone as ServerGone,
 )
-from ._pace import (
+from ._rig import (
     OnDemandPace as OnDemandPace,
     Pace as Pace,
     WallPace as WallPace,
@@ -13,7 +13,6 @@ from ._pace import (
 from ._server import (
     LOOPBACK as LOOPBACK,
     DaqServer as DaqServer,
-    serve as serve,
 )
 from ._token import (
     token_for as token_for,

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from ..analogue import Sampler
 from ._errors import DaqmxRefusal
-from ._pace import Overflow
-from ._timing import MOST_SAMPLES, ReferenceTrigger
+from ._timing import MOST_SAMPLES, Overflow, ReferenceTrigger
 
 _ROUNDING_SAMPLES = 1e-5
 """Rig time is a sum of many durations: a sample is due although the sum falls this much of a period short."""

@@ -12,9 +12,9 @@ from ._acquisition import Acquisition
 from ._calls import pick, task_of
 from ._errors import DaqmxRefusal, member
 from ._generation import Generation
-from ._pace import Overflow
 from ._system import DaqmxSystem
 from ._tasks import Task
+from ._timing import Overflow
 
 Listener = Iterator[Any]
 Stream = Acquisition | Generation

@@ -21,8 +21,7 @@ from ._devices import Catalogue
 from ._errors import DaqmxRefusal
 from ._events import EVENTS, Listener
 from ._faults import Faults, Unavailable
-from ._pace import OnDemandPace, Pace
-from ._rig import Rig
+from ._rig import OnDemandPace, Pace, Rig
 from ._system import DaqmxSystem
 from ._token import TokenRequired
 
@@ -47,25 +46,47 @@ Metadata = tuple[tuple[str, str], ...]
 
 
 class DaqServer:
-    """A running server; leaving it clears every task and ends every thread."""
+    """The simulated DAQmx system, served; leaving it clears every task and ends every thread.
+
+    Parameters
+    ----------
+    world
+        What the converters are wired to.
+    pace
+        How rig time passes; default: on demand.
+    address
+        ``"host:port"``; port 0 takes a free one, see `DaqServer.address`.
+    catalogue
+        The devices; default: a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
+    handlers
+        Further gRPC services for the same port.
+    token
+        What every call must carry; None lets everybody in who can reach the port.
+
+    Raises
+    ------
+    ConfigurationError
+        When the address cannot be used.
+
+    """
 
     def __init__(
         self,
         world: AnalogueWorld,
-        pace: Pace,
-        address: str,
-        catalogue: Catalogue,
-        handlers: Iterable[grpc.GenericRpcHandler],
-        token: str | None,
+        pace: Pace | None = None,
+        address: str = LOOPBACK,
+        *,
+        catalogue: Catalogue | None = None,
+        handlers: Iterable[grpc.GenericRpcHandler] = (),
+        token: str | None = None,
     ) -> None:
-        """See `serve`."""
         _require_address(address)
         self.faults = Faults()
         self._refused: set[str] = set()
         """Calls that were refused the last time they were made."""
-        self._pace = pace
-        self._rig = Rig(world, pace)
-        self._system = DaqmxSystem(self._rig, catalogue)
+        self._pace = pace or OnDemandPace()
+        self._rig = Rig(world, self._pace)
+        self._system = DaqmxSystem(self._rig, catalogue or Catalogue())
         self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
         guards = () if token is None else (TokenRequired(token),)
         self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)
@@ -81,7 +102,7 @@ class DaqServer:
             ) from error
         self.address = f"{address.rpartition(':')[0]}:{port}"
         with self._rig.changed:
-            pace.open(self._rig)
+            self._pace.open(self._rig)
         self._server.start()
 
     def __enter__(self) -> Self:
@@ -247,38 +268,3 @@ def _not_simulated(name: str) -> Handler:
         context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not part of the simulated DAQmx driver.")
 
     return handle
-
-
-def serve(
-    world: AnalogueWorld,
-    pace: Pace | None = None,
-    address: str = LOOPBACK,
-    *,
-    catalogue: Catalogue | None = None,
-    handlers: Iterable[grpc.GenericRpcHandler] = (),
-    token: str | None = None,
-) -> DaqServer:
-    """Serve the simulated DAQmx system until the returned server is closed; use it in a ``with``.
-
-    Parameters
-    ----------
-    world
-        What the converters are wired to.
-    pace
-        How rig time passes; default: on demand.
-    address
-        ``"host:port"``; port 0 takes a free one, see `DaqServer.address`.
-    catalogue
-        The devices; default: a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
-    handlers
-        Further gRPC services for the same port.
-    token
-        What every call must carry; None lets everybody in who can reach the port.
-
-    Raises
-    ------
-    ConfigurationError
-        When the address cannot be used.
-
-    """
-    return DaqServer(world, pace or OnDemandPace(), address, catalogue or Catalogue(), handlers, token)

@@ -66,6 +66,15 @@ class Timing:
             raise unsupported_value("RefTrig_PretrigSamples", self.reference.pretrigger, allowed)
 
 
+class Overflow(Enum):
+    """What becomes of samples that find their buffer full."""
+
+    GROW = auto()
+    """The buffer grows: nothing is lost."""
+    LOSE = auto()
+    """The oldest samples are overwritten, as on the real device."""
+
+
 @dataclass(frozen=True)
 class LogSettings:
     """The TDMS file that a task logs to, and what."""

@@ -12,7 +12,7 @@ from vibench.acquisition.recording import DiskTrouble, troubled_disks
 from vibench.acquisition.rig import Rig, VirtualConfig
 
 from ..controller import controller_of
-from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue_with, serve, token_for
+from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue_with, token_for
 from ..generator import AFG1022, Keysight33500B, Panel, Quirks, ScpiSocket, Terminal
 from ..usb import UsbTmcInstrument, plug_in, unplug, usb_service
 from ..world import FULL_BAND_HZ, World, relative_clock_ppm, virtual_section, warm_up
@@ -168,7 +168,7 @@ class VirtualRig:
             ) from error
 
     def _serve(self) -> DaqServer:
-        return serve(
+        return DaqServer(
             self.world,
             self._pace,
             self._address,
