@@ -60,11 +60,6 @@ class Acquisition:
         return int(self._ring.shape[1])
 
     @property
-    def oldest(self) -> int:
-        """First sample that is still in the buffer."""
-        return max(0, self.acquired - self.buffer_size)
-
-    @property
     def is_done(self) -> bool:
         """Whether nothing more will be acquired."""
         return self.acquired >= self.total or self.failure is not None
@@ -159,12 +154,10 @@ class Acquisition:
     def read_at(self, first: int, count: int) -> NDArray[np.float64]:
         """Hand over ``count`` samples from number ``first`` on, shape (channels, count) [V].
 
-        Raises DaqmxRefusal when they have been overwritten (-200279).
+        Raises DaqmxRefusal when the buffer has overflown (-200279).
         """
         if self.failure is not None:
             raise self.failure
-        if first < self.oldest:
-            raise DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
         block = self._copy(first, count)
         self.position = first + count
         return block

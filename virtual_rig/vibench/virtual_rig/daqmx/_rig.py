@@ -3,7 +3,7 @@
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Any, Protocol
 
 from nidaqmx.error_codes import DAQmxErrors
 
@@ -11,6 +11,7 @@ from vibench.acquisition import AcquisitionError
 
 from ..analogue import AnalogueWorld
 from ._acquisition import Acquisition
+from ._devices import Catalogue
 from ._errors import DaqmxRefusal
 from ._generation import Generation
 from ._timing import Overflow
@@ -42,15 +43,18 @@ class Rig:
     ``changed`` guards the tasks and the trigger lines. The world guards itself: others use it too.
     """
 
-    def __init__(self, world: AnalogueWorld, pace: "Pace") -> None:
+    def __init__(self, world: AnalogueWorld, pace: "Pace", catalogue: Catalogue) -> None:
         """Begin at the world's time, with nothing running."""
         self.world = world
+        self.catalogue = catalogue
         self.pace = pace
         self.changed = threading.Condition(threading.RLock())
         self._epoch_s = time.time() - world.time_s
         self._acquisitions: list[Acquisition] = []
         self._generations: list[Generation] = []
         self._armed: dict[str, list[Callable[[], None]]] = {}
+        self._holders: dict[str, Any] = {}
+        """Which task holds which side of which device."""
 
     @property
     def now_s(self) -> float:
@@ -107,6 +111,24 @@ class Rig:
         self._acquisitions = [other for other in self._acquisitions if other is not stream]
         self._generations = [other for other in self._generations if other is not stream]
         self.changed.notify_all()
+
+    def reserve(self, resource: str, task: Any) -> None:
+        """Give one side of a device to a task (-50103 if another one holds it)."""
+        other = self._holders.setdefault(resource, task)
+        if other is not task:
+            detail = f"Resource: {resource}, held by task {other.name}\nTask Name: {task.name}"
+            raise DaqmxRefusal(DAQmxErrors.PAL_RESOURCE_RESERVED, detail)
+
+    def release(self, task: Any) -> None:
+        """Take back everything a task holds."""
+        self._holders = {resource: other for resource, other in self._holders.items() if other is not task}
+
+    def require_terminal(self, name: str) -> None:
+        """Refuse a terminal that no device has (-89120)."""
+        known = {known.lower() for device in self.catalogue.devices for known in device.terminals}
+        if name.lower() not in known:
+            detail = f"Source Terminal: {name}"
+            raise DaqmxRefusal(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING, detail)
 
     def arm(self, terminal: str, begin: Callable[[], None]) -> None:
         """Call ``begin`` at the next edge on that terminal."""

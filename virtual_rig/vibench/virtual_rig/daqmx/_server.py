@@ -85,8 +85,8 @@ class DaqServer:
         self._refused: set[str] = set()
         """Calls that were refused the last time they were made."""
         self._pace = pace or OnDemandPace()
-        self._rig = Rig(world, self._pace)
-        self._system = DaqmxSystem(self._rig, catalogue or Catalogue())
+        self._rig = Rig(world, self._pace, catalogue or Catalogue())
+        self._system = DaqmxSystem(self._rig)
         self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
         guards = () if token is None else (TokenRequired(token),)
         self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)

@@ -1,10 +1,10 @@
-"""The simulated DAQmx driver: its devices, tasks, and who holds which device."""
+"""The simulated DAQmx driver: its devices and its tasks."""
 
 from collections.abc import Callable, Iterable
 
 from nidaqmx.error_codes import DAQmxErrors
 
-from ._devices import Catalogue, Device
+from ._devices import Device
 from ._errors import DaqmxRefusal
 from ._names import expand
 from ._rig import Rig
@@ -14,12 +14,11 @@ from ._tasks import Task
 class DaqmxSystem:
     """Everything one driver knows; used with the rig's lock held."""
 
-    def __init__(self, rig: Rig, catalogue: Catalogue) -> None:
+    def __init__(self, rig: Rig) -> None:
         """Begin without tasks."""
         self.rig = rig
-        self.catalogue = catalogue
+        self.catalogue = rig.catalogue
         self.tasks: dict[str, Task] = {}
-        self._holders: dict[str, Task] = {}
         self._unnamed = 0
 
     # --- tasks ---------------------------------------------------------------------------
@@ -31,7 +30,7 @@ class DaqmxSystem:
             self._unnamed += 1
         if name in self.tasks:
             raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
-        task = Task(name, self.rig, self)
+        task = Task(name, self.rig)
         self.tasks[name] = task
         return task
 
@@ -93,26 +92,6 @@ class DaqmxSystem:
         if not found:
             raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, "No physical channel was given.")
         return tuple(found)
-
-    def require_terminal(self, name: str) -> None:
-        """Refuse a terminal that no device has (-89120)."""
-        known = {known.lower() for device in self.catalogue.devices for known in device.terminals}
-        if name.lower() not in known:
-            detail = f"Source Terminal: {name}"
-            raise DaqmxRefusal(DAQmxErrors.INVALID_ROUTING_SOURCE_TERMINAL_NAME_ROUTING, detail)
-
-    # --- reservations --------------------------------------------------------------------
-
-    def reserve(self, resource: str, holder: Task) -> None:
-        """Give one side of a device to a task (-50103 if another one holds it)."""
-        other = self._holders.setdefault(resource, holder)
-        if other is not holder:
-            detail = f"Resource: {resource}, held by task {other.name}\nTask Name: {holder.name}"
-            raise DaqmxRefusal(DAQmxErrors.PAL_RESOURCE_RESERVED, detail)
-
-    def release(self, holder: Task) -> None:
-        """Take back everything a task holds."""
-        self._holders = {resource: other for resource, other in self._holders.items() if other is not holder}
 
 
 def _with_devices(names: Iterable[str]) -> Iterable[str]:

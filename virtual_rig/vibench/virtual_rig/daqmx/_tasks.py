@@ -3,33 +3,26 @@
 import math
 import time
 from enum import IntEnum
-from typing import Protocol
 
-from nidaqmx.constants import SampleTimingType, TaskMode
+from nidaqmx.constants import AcquisitionType, SampleTimingType, TaskMode
 from nidaqmx.error_codes import DAQmxErrors
 
 from vibench.acquisition import AcquisitionError
 
 from ._acquisition import Acquisition
 from ._channels import Channel, InputChannel, OutputChannel
-from ._devices import AnalogInputs, AnalogOutputs, Device
-from ._errors import DaqmxRefusal
+from ._devices import AnalogInputs, AnalogOutputs, Conversion, Device, Untimed
+from ._errors import DaqmxRefusal, unsupported_value
 from ._generation import Generation, OutputBuffer
 from ._names import expand
 from ._rig import Rig
 from ._tdms_log import TdmsLog
-from ._timing import (
-    InputSettings,
-    OutputSettings,
-    Timing,
-    actual_rate,
-    check_memory,
-    input_buffer_size,
-    kind_of,
-)
+from ._timing import InputSettings, OutputSettings, Timing, check_memory
 
 _BREATH_S = 1e-4
 _OWN_CLOCKS = ("", "onboardclock")
+_DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
+"""Up to that rate, that many samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
 
 
 class TaskState(IntEnum):
@@ -42,23 +35,10 @@ class TaskState(IntEnum):
     RUNNING = 4
 
 
-class Reservations(Protocol):
-    """Who holds which side of which device."""
-
-    def reserve(self, resource: str, holder: "Task") -> None:
-        """Take it, or refuse (-50103)."""
-
-    def release(self, holder: "Task") -> None:
-        """Give back everything that task holds."""
-
-    def require_terminal(self, name: str) -> None:
-        """Refuse a terminal that no device has (-89120)."""
-
-
 class Task:
     """One task; every method is called with the rig's lock held."""
 
-    def __init__(self, name: str, rig: Rig, reservations: Reservations) -> None:
+    def __init__(self, name: str, rig: Rig) -> None:
         """Begin empty and unverified."""
         self.name = name
         self.rig = rig
@@ -72,7 +52,6 @@ class Task:
         self.generation: Generation | None = None
         self.buffer: OutputBuffer | None = None
         self.log: TdmsLog | None = None
-        self._reservations = reservations
         self._rests_in = TaskState.UNVERIFIED
 
     # --- what it consists of -------------------------------------------------------------
@@ -100,20 +79,36 @@ class Task:
 
     @property
     def kind(self) -> SampleTimingType:
-        """The timing in force."""
-        return kind_of(self.timing, self.side)
+        """The timing in force: what was configured, or what the device does without."""
+        if self.timing.kind is not None:
+            return self.timing.kind
+        is_on_demand = self.side.untimed is Untimed.ON_DEMAND
+        return SampleTimingType.ON_DEMAND if is_on_demand else SampleTimingType.SAMPLE_CLOCK
 
     @property
     def rate_hz(self) -> float:
-        """The rate the device really runs at [Hz]."""
-        return actual_rate(self.timing, self.side, len(self.channels))
+        """The rate the device really runs at, the next one up that it has [Hz]; -200077 out of its range."""
+        side, asked_hz = self.side, self.timing.requested_hz
+        is_shared = isinstance(side, AnalogInputs) and side.conversion is Conversion.MULTIPLEXED
+        highest = side.rates.maximum_hz / (len(self.channels) if is_shared else 1)
+        lowest = side.rates.minimum_hz
+        asked_hz = max(asked_hz, lowest) if self.timing.kind is None else asked_hz
+        if not lowest * (1 - 1e-9) <= asked_hz <= highest * (1 + 1e-9):
+            allowed = f"{lowest:.6g} to {highest:.6g} samples per second"
+            raise unsupported_value("SampClk_Rate", f"{asked_hz:g}", allowed)
+        return min(highest, side.rates.next_up(asked_hz))
 
     @property
     def buffer_size(self) -> int:
         """Samples per channel of the input buffer."""
         if self.kind is SampleTimingType.ON_DEMAND:
             return 0
-        return input_buffer_size(self.timing, self.reading, self.rate_hz)
+        if self.reading.buffer_size is not None:
+            return self.reading.buffer_size
+        if self.timing.mode is AcquisitionType.FINITE:
+            return self.timing.samples
+        usual = next(size for limit_hz, size in _DEFAULT_BUFFERS if self.rate_hz <= limit_hz)
+        return max(usual, self.timing.samples)
 
     @property
     def is_running(self) -> bool:
@@ -225,20 +220,20 @@ class Task:
         if self.kind is not SampleTimingType.ON_DEMAND:
             _ = self.rate_hz
             if awaited := self._awaited_terminal:
-                self._reservations.require_terminal(awaited)
+                self.rig.require_terminal(awaited)
             if self.inputs:
                 check_memory(self.buffer_size, len(self.inputs))
         self.timing.verify_reference()
         if self.timing.reference is not None:
-            self._reservations.require_terminal(self.timing.reference.terminal)
+            self.rig.require_terminal(self.timing.reference.terminal)
 
     def _reserve(self) -> None:
         for device in self.devices:
             try:
-                self._reservations.reserve(f"{device.name}/{self._side_name}", self)
+                self.rig.reserve(f"{device.name}/{self._side_name}", self)
             except DaqmxRefusal:
                 if self.state < TaskState.RESERVED:
-                    self._reservations.release(self)
+                    self.rig.release(self)
                 raise
 
     def start(self) -> None:
@@ -351,11 +346,11 @@ class Task:
         self.acquisition = self.generation = self.log = None
         self.state = self._rests_in
         if self.state < TaskState.RESERVED:
-            self._reservations.release(self)
+            self.rig.release(self)
         self.rig.changed.notify_all()
 
     def abort(self) -> None:
         """End what runs and give everything back."""
         self.stop()
-        self._reservations.release(self)
+        self.rig.release(self)
         self.state = self._rests_in = TaskState.UNVERIFIED

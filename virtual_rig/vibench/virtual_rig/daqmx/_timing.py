@@ -14,14 +14,11 @@ from nidaqmx.constants import (
 )
 from nidaqmx.error_codes import DAQmxErrors
 
-from ._devices import AnalogInputs, AnalogOutputs, Conversion, Untimed
 from ._errors import DaqmxRefusal, unsupported_value
 
 MOST_SAMPLES = 1 << 27
 """Values that one buffer or one read may have: 1 GiB."""
 
-_DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
-"""Up to that rate, that many samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
 _LEAST_PRETRIGGER = 2
 
 
@@ -108,39 +105,6 @@ class OutputSettings:
     buffer_size: int = 0
     """0: as large as the first writes."""
     regeneration: RegenerationMode = RegenerationMode.ALLOW_REGENERATION
-
-
-def kind_of(timing: Timing, side: AnalogInputs | AnalogOutputs) -> SampleTimingType:
-    """Return the timing in force on that device."""
-    if timing.kind is not None:
-        return timing.kind
-    is_on_demand = side.untimed is Untimed.ON_DEMAND
-    return SampleTimingType.ON_DEMAND if is_on_demand else SampleTimingType.SAMPLE_CLOCK
-
-
-def actual_rate(timing: Timing, side: AnalogInputs | AnalogOutputs, channels: int) -> float:
-    """Return the rate the device really runs at [Hz]: the next one up that it has.
-
-    Raises DaqmxRefusal when the request lies outside what the device can do (-200077).
-    """
-    is_shared = isinstance(side, AnalogInputs) and side.conversion is Conversion.MULTIPLEXED
-    highest = side.rates.maximum_hz / (channels if is_shared else 1)
-    lowest = side.rates.minimum_hz
-    request = lowest if timing.kind is None and timing.requested_hz < lowest else timing.requested_hz
-    if not lowest * (1 - 1e-9) <= request <= highest * (1 + 1e-9):
-        allowed = f"{lowest:.6g} to {highest:.6g} samples per second"
-        raise unsupported_value("SampClk_Rate", f"{request:g}", allowed)
-    return min(highest, side.rates.next_up(request))
-
-
-def input_buffer_size(timing: Timing, settings: InputSettings, rate_hz: float) -> int:
-    """Return the size of the buffer between device and program, in samples per channel."""
-    if settings.buffer_size is not None:
-        return settings.buffer_size
-    if timing.mode is AcquisitionType.FINITE:
-        return timing.samples
-    usual = next(size for limit_hz, size in _DEFAULT_BUFFERS if rate_hz <= limit_hz)
-    return max(usual, timing.samples)
 
 
 def check_memory(samples: int, channels: int) -> None:
