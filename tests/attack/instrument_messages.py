@@ -64,7 +64,7 @@ def broken_scpi(chance: random.Random) -> bytes:
 # --- USB ----------------------------------------------------------------------------------
 
 USB = "/vibench.virtual.UsbDevice/"
-USB_METHODS = ("Identify", "BulkOut", "BulkIn", "Control", "ClearHalt")
+USB_METHODS = ("Identify", "BulkOut", "BulkIn", "Control")
 
 
 def broken_usb(chance: random.Random) -> tuple[str, bytes]:

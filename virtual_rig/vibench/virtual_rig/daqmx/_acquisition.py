@@ -1,7 +1,6 @@
 """A running acquisition: the sampler, and the circular buffer between the device and the reader."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 from nidaqmx.error_codes import DAQmxErrors
@@ -28,7 +27,6 @@ class Acquisition:
         buffer_size: int,
         overflow: Overflow,
         reference: ReferenceTrigger | None = None,
-        logged: Callable[[NDArray[np.float64], float], None] | None = None,
     ) -> None:
         """Begin at rig time ``began_s``; ``total`` samples, or infinity, around a ``reference`` trigger."""
         self.rate_hz = rate_hz
@@ -45,8 +43,6 @@ class Acquisition:
         self._overflow = overflow
         self._samples = total
         self._reference = reference
-        self._logged = logged
-        """Is given what goes into the buffer, and the rig time of its first sample."""
         self._is_open = True
 
     @property
@@ -126,8 +122,6 @@ class Acquisition:
         head = min(count, self.buffer_size - first)
         self._ring[:, first : first + head] = block[:, :head]
         self._ring[:, : count - head] = block[:, head:]
-        if self._logged is not None:
-            self._logged(block, self.began_s + self.acquired / self.rate_hz)
         self.acquired += count
 
     def _overrun(self, count: int) -> None:

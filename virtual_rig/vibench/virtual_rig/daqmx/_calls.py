@@ -139,7 +139,11 @@ def _set_logging(system: DaqmxSystem, request: Any) -> Fields:
         raise DaqmxRefusal(DAQmxErrors.LOGGING_NOT_SUPPORT_ON_OUTPUT_TASKS, f"Task Name: {task.name}")
     mode = member(LoggingMode, pick(request, "logging_mode"), "Logging_Mode")
     operation = member(LoggingOperation, pick(request, "operation"), "Logging_TDMS_Operation")
-    settings = LogSettings(Path(request.file_path), mode, request.group_name or task.name, operation)
+    if mode is LoggingMode.LOG:
+        raise unsupported_value("Logging_Mode", mode.name, "OFF, LOG_AND_READ")
+    if mode is LoggingMode.LOG_AND_READ and operation is not LoggingOperation.CREATE_OR_REPLACE:
+        raise unsupported_value("Logging_TDMS_Operation", operation.name, "CREATE_OR_REPLACE")
+    settings = LogSettings(Path(request.file_path), request.group_name or task.name)
     task.reading.logging = None if mode is LoggingMode.OFF else settings
     return NOTHING
 

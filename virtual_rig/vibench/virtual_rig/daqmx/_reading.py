@@ -121,8 +121,6 @@ def _read_buffered(task: Task, wanted: int, timeout_s: float) -> Reading:
     acquisition = task.acquisition
     if acquisition is None:
         raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", samples_read=0)
-    if task.log is not None and not task.log.is_read:
-        raise DaqmxRefusal(DAQmxErrors.READ_NOT_SUPPORTED_FOR_LOGGING_MODE, f"Task Name: {task.name}")
     if not task.await_reference(deadline_s):
         return _nothing_in_time(task, wanted)
     first = acquisition.position

@@ -276,11 +276,10 @@ class Task:
     def _acquire(self) -> Acquisition:
         logging = self.reading.logging
         self.log = None if logging is None else TdmsLog(logging, self.inputs, self.rate_hz, self.rig.wall_s)
-        logged = self.log.write if self.log is not None and not self.log.is_read else None
         sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
         return Acquisition(
             sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
-            self.buffer_size, self.rig.pace.overflow, self.timing.reference, logged,
+            self.buffer_size, self.rig.pace.overflow, self.timing.reference,
         )  # fmt: skip
 
     def _await_reference_edge(self) -> None:

@@ -7,8 +7,6 @@ from pathlib import Path
 
 from nidaqmx.constants import (
     AcquisitionType,
-    LoggingMode,
-    LoggingOperation,
     RegenerationMode,
     SampleTimingType,
 )
@@ -74,12 +72,10 @@ class Overflow(Enum):
 
 @dataclass(frozen=True)
 class LogSettings:
-    """The TDMS file that a task logs to, and what."""
+    """The TDMS file that a task logs to what is read."""
 
     path: Path
-    mode: LoggingMode
     group: str
-    operation: LoggingOperation
 
 
 @dataclass

@@ -138,12 +138,6 @@ class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
             if self._owners.get(dev_handle.port) is dev_handle:
                 del self._owners[dev_handle.port]
 
-    def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
-        """Let a stalled endpoint work again."""
-        device = self._present(dev_handle)
-        with _usb_errors():
-            device.clear_halt(ep)
-
     # Transfers
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002

@@ -56,6 +56,3 @@ class UsbDevice(Protocol):
 
     def control(self, setup: Setup, data: bytes) -> bytes:
         """Carry out a class request; return what the device sends back."""
-
-    def clear_halt(self, endpoint: int) -> None:
-        """Let a stalled endpoint work again."""

@@ -25,7 +25,6 @@ _NEVER_MS = 2**32 - 1
 _ERRNO = struct.Struct(">i")
 _READ = struct.Struct(">II")
 _SETUP = struct.Struct(">BBHHH")
-_ENDPOINT = struct.Struct(">B")
 _IDENTIFICATION = struct.Struct(">HHI")
 _TEXT_SEPARATOR = "\0"
 
@@ -48,16 +47,11 @@ def usb_service(device: UsbDevice) -> grpc.GenericRpcHandler:
         setup = Setup(*_SETUP.unpack_from(request))
         return device.control(setup, request[_SETUP.size :])
 
-    def clear_halt(request: bytes) -> bytes:
-        device.clear_halt(*_ENDPOINT.unpack(request))
-        return b""
-
     methods: dict[str, _Method] = {
         "Identify": identify,
         "BulkOut": bulk_out,
         "BulkIn": lambda request: device.bulk_in(*_READ.unpack(request)),
         "Control": control,
-        "ClearHalt": clear_halt,
     }
     handlers = {
         name: grpc.unary_unary_rpc_method_handler(_served(name, act)) for name, act in methods.items()
@@ -122,10 +116,6 @@ class RemoteUsbDevice:
         """Carry out a class request."""
         packed = _SETUP.pack(setup.request_type, setup.request, setup.value, setup.index, setup.length)
         return self._call("Control", packed + data)
-
-    def clear_halt(self, endpoint: int) -> None:
-        """Let a stalled endpoint work again."""
-        self._call("ClearHalt", _ENDPOINT.pack(endpoint))
 
     def close(self) -> None:
         """Close the connection; every later transfer fails with ENODEV. Legal at any time."""

@@ -10,12 +10,12 @@ import os
 import struct
 import threading
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 from typing import NoReturn, Protocol
 
 from ..generator import BYTE, LONGEST_MESSAGE, ErrorCode, Reply
-from ._device import BULK_IN, BULK_OUT, Identification, Setup
+from ._device import Identification, Setup
 
 VENDOR_ID = 0x0699
 PRODUCT_ID = 0x0353
@@ -87,7 +87,6 @@ class _Flight:
     """The part of a transfer that did not fit into the host's buffer."""
     aborting: bool = False
     """An aborted transfer still owes its short packet."""
-    stalled: set[int] = field(default_factory=set)
 
 
 class UsbTmcInstrument:
@@ -141,11 +140,11 @@ class UsbTmcInstrument:
         """Take one bulk-OUT transfer: a piece of a message, or a request for a reply (3.2)."""
         with self._lock:
             self._check_cable()
-            if BULK_OUT in self._flight.stalled or len(data) < HEADER.size:
-                self._stall(BULK_OUT)
+            if len(data) < HEADER.size:
+                _stall()
             message_id, tag, inverse, length, attributes, terminator = HEADER.unpack_from(data)
             if tag == 0 or tag ^ inverse != BYTE:
-                self._stall(BULK_OUT)
+                _stall()
             if message_id == MessageId.OUT:
                 payload = data[HEADER.size : HEADER.size + length]
                 self._take(payload, Attributes(attributes & Attributes.END_OF_MESSAGE))
@@ -153,7 +152,7 @@ class UsbTmcInstrument:
                 stops = bool(attributes & Attributes.TERMINATION_CHARACTER)
                 self._flight.request = _Request(tag, length, bytes([terminator]) if stops else b"")
             else:
-                self._stall(BULK_OUT)
+                _stall()
 
     def bulk_in(self, length: int, timeout_ms: int) -> bytes:
         """Hand over the reply that was asked for (3.3), or time out.
@@ -163,8 +162,6 @@ class UsbTmcInstrument:
         """
         with self._lock:
             self._check_cable()
-            if BULK_IN in self._flight.stalled:
-                self._stall(BULK_IN)
             if self._flight.rest:
                 return self._hand_over(length)
             if self._flight.aborting:
@@ -188,14 +185,8 @@ class UsbTmcInstrument:
         with self._lock:
             self._check_cable()
             if setup.request not in _REQUESTS:
-                raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
+                _stall()
             return _REQUESTS[setup.request](self, setup.value & BYTE)[: setup.length]
-
-    def clear_halt(self, endpoint: int) -> None:
-        """Let a stalled endpoint work again."""
-        with self._lock:
-            self._check_cable()
-            self._flight.stalled.discard(endpoint)
 
     # Inside
 
@@ -204,7 +195,7 @@ class UsbTmcInstrument:
         self._flight.message += payload
         if len(self._flight.message) > LONGEST_MESSAGE:
             self._flight.message = b""
-            self._stall(BULK_OUT)
+            _stall()
         if Attributes.END_OF_MESSAGE in attributes:
             message, self._flight.message = self._flight.message, b""
             self._execute(message)
@@ -251,9 +242,9 @@ class UsbTmcInstrument:
         if self._is_hung:
             _time_out()
 
-    def _stall(self, endpoint: int) -> NoReturn:
-        self._flight.stalled.add(endpoint)
-        raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
+
+def _stall() -> NoReturn:
+    raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
 
 
 def _time_out() -> NoReturn:
