@@ -1,5 +1,7 @@
 """`vibench stop` reaches `vibench measure` between two runs, and while one is held, at the wall's pace."""
 
+import re
+import signal
 import subprocess
 import sys
 import time
@@ -13,15 +15,18 @@ import pytest
 from tests.windows_here import sees_locks
 from vibench.acquisition import open_recording
 from vibench.acquisition.campaign import JournalPointState, read_journal
-from vibench.acquisition.engine import EngineClient, EngineError, EngineState, the_engine
+from vibench.acquisition.engine import Engine, EngineClient, EngineError, EngineState, the_engine
+from vibench.acquisition.plan import RunState
 from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.run import _drive_guard as drive_guard
+from vibench.acquisition.stopping import Cause, StopRequest
 from vibench.cli.exit_code import ExitCode
 
 RIG = (Path(__file__).resolve().parents[2] / "hardware_configs" / "virtual_rig.toml").read_text()
 RUN = """
 [[measurements]]
 name = "{name}"
-ramp_s = 0.3
+ramp_s = {ramp_s}
 ramp_step_s = 0.03
 
 [measurements.excitation]
@@ -47,14 +52,17 @@ def own_state(tmp_path_factory, monkeypatch):
 
 
 @contextmanager
-def measuring(folder, first_s, rest_s):
+def measuring(folder, first_s, rest_s, ramp_s=0.3):
     """Let a campaign of two runs be measured by a command of its own."""
-    runs = RUN.format(name="first", duration_s=first_s) + RUN.format(name="second", duration_s=LONG_S)
+    runs = "".join(
+        RUN.format(name=name, duration_s=duration_s, ramp_s=ramp_s)
+        for name, duration_s in (("first", first_s), ("second", LONG_S))
+    )
     (folder / "c.toml").write_text(f'name = "c"\nrest_s = {rest_s}\n{runs}')
     (folder / "rig.toml").write_text(RIG.replace('pace = "free"', 'pace = "wall"'))
     words = ("measure", "c.toml", "--bench", "rig.toml", "--out", "out", "--check", "waived")
     command = [sys.executable, "-m", "vibench.cli", *words]
-    with subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as program:
+    with subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as program:
         try:
             yield program
         finally:
@@ -70,7 +78,7 @@ def until(program, is_so):
                 return
         clock.wait(0.02)
     program.kill()
-    pytest.fail(f"never so: {program.stdout.read().decode()}")
+    pytest.fail(f"never so: {program.stderr.read().decode()}")
 
 
 def rests(status):
@@ -85,6 +93,10 @@ def dwells(status):
     return status.run is not None and status.run.segment == "dwell"
 
 
+def ramps_down(status):
+    return status.run is not None and status.run.run_state is RunState.RAMPING_DOWN
+
+
 def states(folder):
     return [each.state for each in read_journal(folder / "out" / "c.campaign.sqlite")]
 
@@ -93,9 +105,10 @@ def states(folder):
 def test_a_stop_while_the_rig_cools_ends_the_campaign(vibench_here, tmp_path, level):
     with measuring(tmp_path, first_s=0.2, rest_s=LONG_S) as program:
         until(program, rests)
-        told = vibench_here("stop", "--level", level, cwd=tmp_path)
+        told = vibench_here("stop", "--level", level, "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         assert program.wait(SOON_S) == ExitCode.STOPPED
+        assert program.stderr.read() == b"stopped: smoke. The output is off.\n"
     assert states(tmp_path) == [JournalPointState.DONE, JournalPointState.QUEUED]
     assert not list((tmp_path / "out").glob("second*"))
 
@@ -111,7 +124,52 @@ def test_a_stop_of_a_held_run_keeps_it_and_ends_silent(vibench_here, tmp_path, l
         told = vibench_here("stop", "--level", level, "--reason", "smoke", cwd=tmp_path)
         assert told.returncode == 0, told.stderr
         assert program.wait(SOON_S) == ExitCode.STOPPED
+        assert program.stderr.read() == b"stopped: smoke. The output is off.\n"
     assert states(tmp_path) == [JournalPointState.INTERRUPTED, JournalPointState.QUEUED]
     with open_recording(tmp_path / "out" / "first.h5") as recording:
         assert (recording.state, recording.reason) == (RecordingState.STOPPED, "smoke")
         assert np.max(np.abs(recording.read("drive_voltage", recording.samples - 32))) < SILENT_V
+
+
+def test_a_run_that_stalls_has_failed_and_says_so(vibench_here, tmp_path, monkeypatch):
+    runs = "".join(RUN.format(name=name, duration_s=LONG_S, ramp_s=0.3) for name in ("first", "second"))
+    (tmp_path / "c.toml").write_text(f'name = "c"\n{runs}')
+    (tmp_path / "f.toml").write_text(
+        '[[faults]]\nat_s = 1.0\nfault = "slow_disk"\ndelay_s = 1.0\nfor_s = 9.0\n'
+    )
+    monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 3)
+    words = ("measure", "c.toml", "--out", "out", "--check", "waived", "--faults", "f.toml")
+    ended = vibench_here(*words, cwd=tmp_path)
+    assert ended.returncode == ExitCode.FAILED
+    assert ended.stderr.startswith("error: the run read no samples for")
+    assert states(tmp_path) == [JournalPointState.FAILED, JournalPointState.QUEUED]
+    with open_recording(tmp_path / "out" / "first.h5") as recording:
+        assert recording.state is RecordingState.FAILED
+        assert "read no samples" in recording.reason
+
+
+class StoppedBefore(Engine):
+    """A stop that comes while the bench opens."""
+
+    def __init__(self, supervision):
+        super().__init__(supervision)
+        self.switch.ask(StopRequest.by(Cause.KEYBOARD, "SIGINT"))
+
+
+def test_a_campaign_that_is_stopped_in_its_check_says_so(vibench_here, tmp_path, monkeypatch):
+    (tmp_path / "c.toml").write_text(f'name = "c"\n{RUN.format(name="first", duration_s=0.1, ramp_s=0.3)}')
+    monkeypatch.setattr("vibench.cli.measure.Engine", StoppedBefore)
+    ended = vibench_here("measure", "c.toml", "--out", "out", cwd=tmp_path)
+    assert (ended.returncode, ended.stderr) == (ExitCode.STOPPED, "stopped: SIGINT. The output is off.\n")
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no SIGINT to children")
+def test_a_second_ctrl_c_says_that_the_output_is_off(tmp_path):
+    with measuring(tmp_path, first_s=LONG_S, rest_s=0.0, ramp_s=5.0) as program:
+        until(program, dwells)
+        program.send_signal(signal.SIGINT)
+        until(program, ramps_down)
+        program.send_signal(signal.SIGINT)
+        assert program.wait(SOON_S) == 128 + signal.SIGINT
+        assert re.fullmatch(rb"stopped: SIGINT: .*\. The output is off\.\n", program.stderr.read())

@@ -46,6 +46,10 @@ class DriveLate(AcquisitionError):
     """The generator takes longer for a setting than the plan leaves it: what it plays lags behind."""
 
 
+class RunStalled(AcquisitionError):
+    """A run or a bench check read no samples for too long, and its output was switched off."""
+
+
 class DataLost(AcquisitionError):
     """Samples were overwritten before they were read: the record has a hole and ends here."""
 

@@ -461,6 +461,7 @@ def vibench(
 
 def main() -> None:
     """Run the command line. An error that a user can fix is one sentence and a non-zero exit."""
+    os.environ.setdefault("GRPC_VERBOSITY", "ERROR")  # read when imported; a killed call is noted otherwise
     warnings.formatwarning = lambda message, *_place, **_named: f"warning: {message}\n"
     try:
         app()

@@ -13,7 +13,7 @@ from vibench.sim.study import software
 
 from .exit_code import ExitCode
 from .interruption import told_to_stop
-from .output import bold, console, print_json
+from .output import bold, console, errors, print_json
 from .paths import room_for_folder
 
 if TYPE_CHECKING:
@@ -80,4 +80,5 @@ def print_answer(document: Mapping[str, object], *, is_complete: bool) -> None:
 def leave(*, is_complete: bool) -> None:
     """End with the exit code that says whether an answer is whole."""
     if not is_complete:
+        errors.print("stopped: the answer holds what was computed until then")
         raise typer.Exit(ExitCode.STOPPED)

@@ -8,9 +8,19 @@ from typing import Self
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TimeElapsedColumn, TimeRemainingColumn
 
-from vibench.acquisition.engine import DRIVING, EngineMessage, EngineStatus, MessageKind, RowStatus, RunStatus
+from vibench.acquisition.engine import (
+    DRIVING,
+    Engine,
+    EngineMessage,
+    EngineStatus,
+    MessageKind,
+    RowStatus,
+    RunStatus,
+)
+from vibench.acquisition.stopping import DRIVES_ON, Cause
+from vibench.stop_files import SWITCH_OFF
 
-from .output import console, words
+from .output import console, errors, words
 from .progress_bars import shown
 
 INTERVAL_S = 0.1
@@ -97,10 +107,14 @@ def sentence(message: EngineMessage) -> str:
 
 
 class Watching:
-    """Draws in a thread of its own, the newest only: a terminal that is held up holds nothing else up."""
+    """Draws the newest status in a separate thread, so that a blocked terminal blocks nothing else.
 
-    def __init__(self, ask: Callable[[], EngineStatus], on: Console = console) -> None:
+    At the end it prints on standard error who stopped the engine, if anybody did, and whether it drives.
+    """
+
+    def __init__(self, ask: Callable[[], EngineStatus], engine: Engine, on: Console = console) -> None:
         self._ask = ask
+        self._engine = engine
         self._on = on
         self._ending = Event()
         self._thread = Thread(target=self._draw, name="progress", daemon=True)
@@ -121,3 +135,6 @@ class Watching:
             while not self._ending.wait(INTERVAL_S):
                 bars.draw(self._ask())
             bars.draw(self._ask())
+        if (request := self._engine.switch.request) is not None and request.cause is not Cause.FAULT:
+            silence = SWITCH_OFF if DRIVES_ON else "The output is off"
+            errors.print(f"stopped: {request.reason}. {silence}.")

@@ -45,7 +45,7 @@ from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 
 from .engine_bars import Watching
 from .exit_code import ExitCode
-from .output import console, leave_output_to_json, paragraph, print_json
+from .output import console, errors, leave_output_to_json, paragraph, print_json
 from .paths import AsJson, BenchPath, FaultsPath, rig_at
 
 if TYPE_CHECKING:
@@ -196,7 +196,10 @@ def measure(
             for each in point_results
         ]
         print_json({"recordings": rows})
-    if any(point_result.outcome is PointOutcome.FAILED for point_result in point_results):
+    failed = [each for each in point_results if each.outcome is PointOutcome.FAILED]
+    for each in failed:
+        errors.print(f"error: {each.name}: {each.reason}")
+    if failed:
         raise typer.Exit(ExitCode.FAILED)
     if engine.switch.request is not None:
         raise typer.Exit(ExitCode.STOPPED)
@@ -209,7 +212,7 @@ def the_bench(rig: Rig, what: str, confirm: Confirm | None = None) -> Iterator[E
     handler = RequestHandler(engine, JobQueue(engine))
     try:
         engine.open(rig, confirm)
-        with serving(handler, what), stop_on_signal(engine.switch, what), Watching(handler.status):
+        with serving(handler, what), stop_on_signal(engine.switch, what), Watching(handler.status, engine):
             yield engine
     except BaseException as error:
         try:

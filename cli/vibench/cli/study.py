@@ -113,6 +113,8 @@ def complain_about_points(results: GridResults[Plan]) -> None:
     if say_failures(results) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if not results.is_complete:
+        kept, size = results.kept, results.plan.grid.size
+        errors.print(f"stopped after {kept} of {size} points; a file goes on with --resume")
         raise typer.Exit(ExitCode.STOPPED)
 
 

@@ -11,7 +11,7 @@ from vibench.acquisition import BenchReport, InstrumentLost, StopSwitch, Verdict
 from vibench.acquisition.bench import Bounds
 from vibench.acquisition.check._bench_report import bench_report
 from vibench.acquisition.check._loop import clock_ratio, fit_sine
-from vibench.acquisition.errors import CheckStopped, InstrumentError
+from vibench.acquisition.errors import CheckStopped, InstrumentError, RunStalled
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping import Cause, StopRequest
 from vibench.virtual_rig.generator import Panel, Quirks
@@ -134,6 +134,18 @@ def test_a_check_can_be_stopped_while_it_sounds_and_leaves_silence(bench_of, rig
         with pytest.raises(CheckStopped, match=r"was stopped: SIGTERM\. The output is off"):
             bench_report(bench, tmp_path, switch)
         assert virtual.generator.execute(b"OUTP1?").data == b"0\n"
+
+
+class StalledOnceItSounds(PressedOnceItSounds):
+    """The request of the drive guard."""
+
+    def ask(self, request):
+        super().ask(StopRequest.by(Cause.FAULT, "the run read no samples for 5 s"))
+
+
+def test_a_check_that_stalls_has_failed_and_nobody_has_stopped_it(bench_of, rig, tmp_path):
+    with bench_of(rig) as (bench, virtual), pytest.raises(RunStalled, match="no samples for 5 s"):
+        bench_report(bench, tmp_path, StalledOnceItSounds(virtual.generator))
 
 
 def test_a_converter_that_hands_over_nothing_ends_the_check_in_silence(bench_of, rig, tmp_path, monkeypatch):

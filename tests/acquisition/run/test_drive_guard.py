@@ -8,9 +8,18 @@ from time import monotonic
 import numpy as np
 import pytest
 
-from vibench.acquisition import AcquisitionError, InstrumentLost, StopLevel, StopSwitch, open_bench
+from vibench.acquisition import (
+    AcquisitionError,
+    InstrumentLost,
+    StopLevel,
+    StopSwitch,
+    open_bench,
+    open_recording,
+)
+from vibench.acquisition.errors import RunStalled
 from vibench.acquisition.host import Beside
 from vibench.acquisition.plan import Dwell, Measurement, RunState
+from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.acquisition.run import DriveGuard, _drive_guard as drive_guard
 from vibench.acquisition.run._run import Run
@@ -68,6 +77,12 @@ def test_a_run_that_stands_still_is_silenced(recording, monkeypatch):
     until(lambda: terminal_v(virtual) < SILENT_V)
     assert run.switch.request.cause is Cause.FAULT
     assert not DRIVES_ON
+    with pytest.raises(RunStalled, match="read no samples for 5 s"):
+        list(run)
+    assert run.outcome.state is RunState.FAILED
+    with open_recording(run.outcome.path) as recorded:
+        assert recorded.state is RecordingState.FAILED
+        assert recorded.reason.startswith("the run read no samples for 5 s; its output was switched off")
 
 
 def test_a_run_that_stands_still_is_silenced_sooner_once_it_is_stopped(recording):

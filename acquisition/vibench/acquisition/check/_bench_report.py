@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ..bench import Bench, BenchReport, Bounds, Finding, Verdict, judged
-from ..errors import CheckStopped, ConfigurationError, DataLost
+from ..errors import CheckStopped, ConfigurationError, DataLost, RunStalled
 from ..excitation import Dwell, Tone
 from ..instruments import AnalogOutput, IdleOutput, Samples, read_block
 from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState, check_amplitude_vpp
 from ..rig import Channel, calibrations
 from ..run import BLOCK_S, Drive, DriveGuard, drive_for
-from ..stopping import StopSwitch
+from ..stopping import Cause, StopSwitch
 from ._loop import LoopCheck
 
 CHECK_SHARE = 0.02
@@ -136,6 +136,8 @@ class _BlockReader:
         blocks = []
         while left > 0:
             if (request := self._switch.request) is not None:
+                if request.cause is Cause.FAULT:
+                    raise RunStalled(request.reason)
                 raise CheckStopped(
                     f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
                 )

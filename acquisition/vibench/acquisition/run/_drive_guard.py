@@ -34,7 +34,10 @@ class DriveGuard(ClosedOnLeaving):
         self._drive = drive
         self._switch = switch
         self._is_heard = is_heard
-        reason = f"the run has hung for {STANDSTILL_BLOCKS * BLOCK_S:g} s"
+        reason = (
+            f"the run read no samples for {STANDSTILL_BLOCKS * BLOCK_S:g} s; its output was switched off. "
+            "Look for what holds up this computer or its disk, then start again"
+        )
         self._standstill = StopRequest(Cause.FAULT, StopLevel.OFF, reason)
         self._blocks = self._seen = 0
         self._still_s, self._round_s = 0.0, monotonic()

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from enum import Enum, auto
 
-from ..errors import DriveLate
+from ..errors import DriveLate, RunStalled
 from ..excitation import Play, Tone
 from ..instruments import Block, LoopBlock, Sweep
 from ..plan import Phase, RunState
@@ -64,8 +64,8 @@ class Stopped(Exception):
 class PhaseRunner:
     """The part of a run in which samples pass: phases, holds, and the ramp of an early end.
 
-    After every block it checks the limits and the switch: it raises LimitExceeded or `Stopped`,
-    and it is up to the run to let it ramp down.
+    After every block it checks the limits and the switch: it raises LimitExceeded, RunStalled or
+    `Stopped`, and it is up to the run to let it ramp down.
     """
 
     def __init__(
@@ -284,10 +284,10 @@ class PhaseRunner:
         self._enter(before)
 
     def _go_on(self, block: Block) -> None:
-        """Raise what ends the run early: a limit, or somebody's wish."""
+        """Raise what ends the run early: a limit, a stall, or somebody's wish."""
         self._limit_monitor.require_safe(block)
         if (request := self._switch.request) is not None:
-            raise Stopped(request)
+            raise RunStalled(request.reason) if request.cause is Cause.FAULT else Stopped(request)
 
     def _told(self, block: Block) -> Progress:
         """Note what others want to be noted, and tell where the run stands."""

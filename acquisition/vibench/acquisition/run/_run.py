@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..bench import RunBench
 from ..control import CONTROLLERS, Controller, feedback_controller, phase_samples
-from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded
+from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded, RunStalled
 from ..host import ClosedOnLeaving
 from ..instruments import Block
 from ..plan import (
@@ -124,8 +124,9 @@ class Run(ClosedOnLeaving):
                 print(progress.state, progress.elapsed_s)
 
     Iterating raises LimitExceeded (before anything moves when the plan passes a limit, later when a
-    measured value does), CheckFailed when the bench does not answer at low level as it should, and
-    InstrumentError, DataLost or RecordingError when an instrument or the disk fails.
+    measured value does), CheckFailed when the bench does not answer at low level as it should, RunStalled
+    when it read no samples for too long, and InstrumentError, DataLost or RecordingError when an instrument
+    or the disk fails.
     """
 
     def __init__(
@@ -200,7 +201,7 @@ class Run(ClosedOnLeaving):
         )
         try:
             yield from self._played_or_stopped(self._runner)
-        except (GeneratorExit, DriveLate, LimitExceeded):
+        except (GeneratorExit, DriveLate, LimitExceeded, RunStalled):
             raise
         except KeyboardInterrupt:
             self._ending.is_stopped("interrupted from the keyboard", Cause.KEYBOARD)
@@ -225,11 +226,12 @@ class Run(ClosedOnLeaving):
         except Stopped as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
             yield from self._ramped_down_early(runner, stop.request.level)
-        except (DriveLate, LimitExceeded) as error:
+        except (DriveLate, LimitExceeded, RunStalled) as error:
             self._ending.is_failed(error, str(error))
             if isinstance(error, LimitExceeded):
                 runner.loop.log_limit_trip(error)
-            yield from self._ramped_down_early(runner, LEVELS[Cause.LIMIT])
+            cause = Cause.FAULT if isinstance(error, RunStalled) else Cause.LIMIT
+            yield from self._ramped_down_early(runner, LEVELS[cause])
             raise
         except GeneratorExit:
             self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
