@@ -1,10 +1,15 @@
 """Names and messages of files and instruments take no effect as markup or control characters."""
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import Qt as Text, QTextDocument
 
-from vibench.gui.widgets import ElidedLabel, Notice, NoticeKind, ReadTable, SentenceLabel
+from vibench.analysis import Curve, CurveKind, CurveOrigin
+from vibench.gui.pages.compare._curve_list import CurveList, PairBox
+from vibench.gui.pages.rig._rig_choice import RigChoice
+from vibench.gui.plots import LIMIT, TIME, Plot, PlotAxis, curve_style
+from vibench.gui.widgets import LIGHT, ElidedLabel, Notice, NoticeKind, ReadTable, SentenceLabel
 from vibench.gui.window._message_strip import MessageStrip
 from vibench.gui.window._status_line import StatusField, StatusLine
 
@@ -50,3 +55,43 @@ def test_messages_and_status_show_foreign_text_as_it_is_written(qtbot):
     assert SHOWN in read(strip._text.toolTip())
     assert status.text_of(StatusField.FILE) == SHOWN
     assert read(status.tip_of(StatusField.FILE)) == SHOWN
+
+
+def curve(source):
+    ones = np.ones(2)
+    return Curve(source, CurveOrigin.MEASURED, CurveKind.RESPONSE_II, ones, ones, ones)
+
+
+def test_a_list_of_curves_shows_foreign_names_as_they_are_written(qtbot):
+    curves, pair = CurveList(LIGHT), PairBox()
+    qtbot.addWidget(curves)
+    qtbot.addWidget(pair)
+    made = (curve(HOSTILE), curve("other"))
+    curves.replace_source(HOSTILE, made)
+    pair.offer(made, made)
+    assert curves.item(0).text() == f"{SHOWN}, Response II, measured"
+    assert pair.pair() == (made[1], made[0])
+
+
+def test_a_plot_shows_foreign_names_and_units_as_they_are_written(qtbot):
+    plot = Plot("picture", TIME, PlotAxis("velocity", HOSTILE), LIGHT).with_legend()
+    qtbot.addWidget(plot)
+    plot.curve(curve_style(0), HOSTILE).setData([0.0, 1.0], [1.0, 1.0])
+    plot.curve(curve_style(1), "other").setData([0.0, 1.0], [2.0, 2.0])
+    line = plot.upright(LIMIT, 0.5, "{" + HOSTILE)
+    plot.resize(1400, 1400)
+    plot.show()
+    assert SHOWN in plot._legend.accessibleName()
+    assert SHOWN in read(plot._legend.text()).replace("\xa0", " ")
+    assert read(plot.up.labelString()) == f"velocity ({SHOWN})"
+    assert line.label.toPlainText() == "{" + SHOWN
+
+
+def test_a_rig_of_a_foreign_name_is_listed_as_it_is_written(qtbot, tmp_path):
+    choice = RigChoice()
+    qtbot.addWidget(choice)
+    choice._add(tmp_path / "<h1>a\u202eb.toml")
+    last = choice._box.count() - 1
+    assert choice._box.itemText(last) == r"<h1>a\u202eb"
+    tip = choice._box.itemData(last, Qt.ItemDataRole.ToolTipRole)
+    assert read(tip) == str(tmp_path / r"<h1>a\u202eb.toml")

@@ -20,8 +20,6 @@ def printable(text: str) -> str:
     """
     if text.isprintable():
         return text
-    if text.isprintable():
-        return text
     return "".join(
         each if each.isprintable() or category(each) == "Zs" else each.encode("unicode_escape").decode()
         for each in text

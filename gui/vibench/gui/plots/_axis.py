@@ -3,12 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
+from html import escape
 from math import ceil, floor, log10
 
 import pyqtgraph as pg
 from PySide6.QtCore import QLineF
 from PySide6.QtGui import QColor, QFontMetricsF, QPainter
 from PySide6.QtWidgets import QGraphicsItem, QGraphicsSceneResizeEvent
+
+from vibench.acquisition import printable
 
 from ..widgets import CHOICES, UNITS, ShownUnit, Theme
 
@@ -126,6 +129,11 @@ class AxisItem(pg.AxisItem):  # type: ignore[misc] # untyped library
         if blankness is not self._blankness:
             self._blankness = blankness
             self.update()
+
+    def labelString(self) -> str:
+        """Show units of files as they are written: pyqtgraph takes the label as HTML."""
+        style = "; ".join(f"{name}: {value}" for name, value in self.labelStyle.items())
+        return f"<span style='{style}'>{escape(printable(self.labelText))}</span>"
 
     def showLabel(self, show: bool = True) -> None:  # noqa: FBT001, FBT002 - pyqtgraph's own
         """Show the label or not; to write another text, which shows it, does not count."""

@@ -7,6 +7,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QFont, QPalette
 from PySide6.QtWidgets import QLabel, QWidget
 
+from vibench.acquisition import printable
+
 _ROOM = 4
 """Pixels above and below the text."""
 
@@ -45,12 +47,12 @@ class LegendLine(QLabel):
         """Name these curves."""
         said = "&nbsp;&nbsp;&nbsp; ".join(
             f'<span style="color:{each.colour}">{each.sign}</span>&nbsp;'
-            f"{escape(each.name).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
+            f"{escape(printable(each.name)).replace(' ', '&nbsp;').replace('-', '&#8209;')}"
             for each in entries
         )
         if said != self.text():
             self.setText(said)
-            self.setAccessibleName("Legend: " + ", ".join(each.name for each in entries))
+            self.setAccessibleName("Legend: " + ", ".join(printable(each.name) for each in entries))
 
     def height_for(self, width: int) -> int:
         """Height that the entries need; none without entries."""

@@ -8,6 +8,8 @@ from PySide6.QtCore import QEvent, QRectF, Qt
 from PySide6.QtGui import QColor, QKeyEvent, QPainter, QResizeEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
+from vibench.acquisition import printable
+
 from ..widgets import UNITS, Theme, paint_hint
 from ._axis import AxisItem, Blankness, Grid, PlotAxis, Scale
 from ._band import Band
@@ -325,6 +327,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self, line_style: LineStyle, position: float, angle: float, label: str, at: float
     ) -> pg.InfiniteLine:
         options = {"position": at, "movable": False}
+        label = printable(label).replace("{", "{{").replace("}", "}}")  # pyqtgraph takes it as a format
         item = pg.InfiniteLine(position, angle, label=label or None, labelOpts=options if label else None)
         self.addItem(item, ignoreBounds=True)
 

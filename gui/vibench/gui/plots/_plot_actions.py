@@ -8,7 +8,7 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMessageBox
 
-from ..widgets import new_path
+from ..widgets import new_path, plain_tip
 
 if TYPE_CHECKING:
     from ._plot import Plot
@@ -46,9 +46,8 @@ def save_plot(plot: "Plot") -> None:
     try:
         write_plot(plot, path)
     except OSError as error:
-        QMessageBox.warning(
-            plot, "Not written", f"{path} was not written: {error.strerror}. Choose another name."
-        )
+        why = plain_tip(f"{path} was not written: {error.strerror}. Choose another name.")
+        QMessageBox.warning(plot, "Not written", why)
 
 
 def write_plot(plot: "Plot", path: Path) -> None:

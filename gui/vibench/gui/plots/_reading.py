@@ -9,6 +9,8 @@ from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QGuiApplication, QPalette
 from PySide6.QtWidgets import QLabel
 
+from vibench.acquisition import printable
+
 from ..widgets import UNITS, Theme
 from ._axis import PlotAxis, Scale
 
@@ -139,11 +141,12 @@ class Reading:
     def _tell(self, text: str) -> None:
         if self._label is None:
             self._label = QLabel(self._plot)
+            self._label.setTextFormat(Qt.TextFormat.PlainText)
             self._label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
             self._label.setBackgroundRole(QPalette.ColorRole.Base)
             self._label.setAutoFillBackground(True)
             self._label.setContentsMargins(4, 1, 4, 1)
-        self._label.setText(text)
+        self._label.setText(printable(text))
         self._label.adjustSize()
         size, room = self._label.size(), self._plot.size()
         self._label.move(max(0, room.width() - size.width() - 2), room.height() - size.height() - 2)

@@ -10,6 +10,8 @@ from PySide6.QtCore import QEvent, QObject, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMenu, QMessageBox
 
+from vibench.acquisition import printable
+
 from ..page import AppContext, UserActions
 from ..widgets import DARK, LIGHT, Theme
 from ._manual import show_about, show_manual
@@ -160,7 +162,8 @@ def build_menus(
 def _list_recent(menu: QMenu, target: MenuTarget, context: AppContext) -> None:
     menu.clear()
     for path in context.recent_files:
-        menu.addAction(str(path)).triggered.connect(lambda _checked=False, path=path: target.open_path(path))
+        name = printable(str(path)).replace("&", "&&")
+        menu.addAction(name).triggered.connect(lambda _checked=False, path=path: target.open_path(path))
     if not context.recent_files:
         menu.addAction("nothing yet").setEnabled(False)
 

@@ -6,6 +6,7 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPixmap
 from PySide6.QtWidgets import QFormLayout, QGroupBox, QLabel, QListWidget, QListWidgetItem
 
+from vibench.acquisition import printable
 from vibench.analysis import AnalysisError, Curve, CurveDifference, CurveKind, CurveOrigin, curve_difference
 
 from ...forms import Choice
@@ -109,7 +110,7 @@ class CurveList(QListWidget):
         blocked = self.blockSignals(True)
         self.clear()
         for each in self._curves:
-            item = QListWidgetItem(UNITS.told(each.name))
+            item = QListWidgetItem(_name(each))
             item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
             wanted = is_ticked(each)
             item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
@@ -118,6 +119,10 @@ class CurveList(QListWidget):
             self.addItem(item)
         self.blockSignals(blocked)
         self.changed.emit()
+
+
+def _name(each: Curve) -> str:
+    return printable(UNITS.told(each.name))
 
 
 def _is_of(each: Curve, source: str) -> bool:
@@ -180,7 +185,7 @@ class PairBox(QGroupBox):
 
     def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
         """Let these be chosen; what was chosen stays."""
-        self._curves = {UNITS.told(each.name): each for each in curves}
+        self._curves = {_name(each): each for each in curves}
         names = list(self._curves)
         for place, box in enumerate((self._reference, self._curve)):
             if names == [box.itemText(number) for number in range(1, box.count())]:
@@ -189,7 +194,7 @@ class PairBox(QGroupBox):
             blocked = box.blockSignals(True)
             box.clear()
             box.addItems([_NOBODY, *names])
-            default = UNITS.told(shown[place].name) if len(shown) > 1 else _NOBODY
+            default = _name(shown[place]) if len(shown) > 1 else _NOBODY
             box.setCurrentText(chosen if chosen in names else default)
             box.blockSignals(blocked)
 

@@ -1,5 +1,6 @@
 """How sizes, times and states of recordings are written in a list."""
 
+from vibench.acquisition import printable
 from vibench.acquisition.recording import Recording, RecordingState, SealDepth, SealState
 
 from ...widgets import outcome_text
@@ -44,7 +45,7 @@ def duration_text(duration_s: float) -> str:
 
 def role_text(role: str) -> str:
     """``"m0 velocity"``."""
-    return role.replace("_", " ")
+    return printable(role.replace("_", " "))
 
 
 def facts_text(recording: Recording) -> str:

@@ -52,7 +52,7 @@ class CampaignChoice(Choice):
         self._campaigns = campaigns
         blocked = self.blockSignals(True)
         self.clear()
-        self.addItems([ALL, *(each.text for each in campaigns)])
+        self.addItems([ALL, *(printable(each.text) for each in campaigns)])
         names = [each.name for each in campaigns]
         self.setCurrentIndex(names.index(name) + 1 if name in names else 0)
         self.blockSignals(blocked)

@@ -177,6 +177,7 @@ class RecordingTimeHistories(QWidget):
             plot.setMouseEnabled(x=True, y=False)
             plot.setFocusProxy(self)
             title = QLabel(role_text(channel.role), plot)
+            title.setTextFormat(Qt.TextFormat.PlainText)
             title.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
             title.setBackgroundRole(QPalette.ColorRole.Base)
             title.setAutoFillBackground(True)

@@ -5,10 +5,11 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QPushButton, QWidget
 
-from vibench.acquisition import ConfigurationError, all_shipped
+from vibench.acquisition import ConfigurationError, all_shipped, printable
 from vibench.acquisition.rig import Rig, load_rig
 
 from ...forms import Choice
+from ...widgets import plain_tip
 
 PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
 """How fast a simulated bench runs."""
@@ -83,8 +84,8 @@ class RigChoice(QWidget):
 
     def _add(self, path: Path) -> None:
         self._paths.append(path)
-        self._box.addItem(path.stem.replace("_", " "))
-        self._box.setItemData(self._box.count() - 1, str(path), Qt.ItemDataRole.ToolTipRole)
+        self._box.addItem(printable(path.stem.replace("_", " ")))
+        self._box.setItemData(self._box.count() - 1, plain_tip(str(path)), Qt.ItemDataRole.ToolTipRole)
 
     def _ask(self) -> None:
         given, _ = QFileDialog.getOpenFileName(self, "Hardware configuration", "", "Configurations (*.toml)")

@@ -12,7 +12,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.acquisition import ConfigurationError, save_toml, toml_text, validated
+from vibench.acquisition import ConfigurationError, printable, save_toml, toml_text, validated
 from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview, excitation_text
 from vibench.acquisition.rig import BaseQuantity, Rig
 
@@ -251,7 +251,7 @@ class TestPage(Page):
         self.choice.clear()
         self.choice.addItem("take over a test…")
         for test in self._tests:
-            self.choice.addItem(test.label)
+            self.choice.addItem(printable(test.label))
         self.choice.blockSignals(False)
 
     @property
