@@ -53,7 +53,8 @@ template <class T, class Stops> class Run {
       if (record.steps_left <= 0) return TOO_LONG;
       Outcome outcome = m.contact.side == 0.0 ? fly_on(until, longest) : stay(until, longest);
       if (outcome != REACHED_END) return outcome;
-      if constexpr (is_dual<T>) keep_in_range(m);
+      if constexpr (is_dual<T>)
+        if (keep_in_range(m)) is_drive_known = false;  // its derivatives have the factor still
     }
   }
 

@@ -1,0 +1,23 @@
+"""How much a small change grows over a long time, in which it becomes larger than any number."""
+
+import numpy as np
+import pytest
+
+from vibench.sim import Accuracy, Harmonic, gong2025
+from vibench.sim.scene._followed_run import FollowedRun
+
+SLICE_S, SLICES = 0.25, 8
+LOST_E = 10.0
+"""A small change that begins anew turns into the direction of growth, which takes some factors of e."""
+
+
+@pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(300.0, 20e-6), (200.0, 30e-6)])
+def test_a_change_grows_over_a_long_time_as_over_pieces_of_it(frequency_hz, amplitude_m):
+    drive = Harmonic(frequency_hz, amplitude_m)
+    whole = FollowedRun(gong2025(), drive, Accuracy.STANDARD.tolerance, np.zeros(6))
+    whole.follow_tangent()
+    for number in range(1, SLICES + 1):
+        piece = whole.apart()
+        piece.follow_tangent()
+        grown = whole.follow(number * SLICE_S).growth
+        assert grown == pytest.approx(piece.follow(number * SLICE_S).growth, abs=LOST_E)
