@@ -8,7 +8,8 @@ from PySide6.QtWidgets import QLabel
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
-from vibench.gui.forms import ModelForm
+from vibench.analysis.dynamics import SpecimenChoice
+from vibench.gui.forms import JudgedForm, ModelForm
 
 CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"
 MEASUREMENTS = {
@@ -98,3 +99,15 @@ def test_what_a_field_says_of_itself_in_the_plan_is_its_explanation(form):
         "Setting of the generator, peak to peak, as its panel"
         in excitation.editors["amplitude_vpp"].widget.toolTip()
     )
+
+
+def test_a_specimen_whose_springs_follow_from_another_mass_is_warned_of(qtbot, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "mine"\nmodel = "gong2025"\nmasses_kg = [5.8e-3, 3.2e-3, 2e-3]\n')
+    form = JudgedForm(SpecimenChoice, "scene", frozenset({"described"}))
+    qtbot.addWidget(form)
+    form.form.show_content({"specimen": str(path)})
+    assert form.value is not None
+    assert "single_frequencies_hz was kept; give stiffnesses_n_per_m = [" in form.warning
+    form.form.show_content({"specimen": "heavy"})
+    assert form.warning == ""

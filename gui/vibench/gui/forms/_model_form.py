@@ -1,5 +1,6 @@
 """A form for a plan model: a row a field, groups for models inside, judged by the model at every change."""
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
@@ -8,6 +9,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
+
+from vibench.sim import SpecimenWarning
 
 from ..widgets import CHOICES, UNITS, SentenceLabel, filled
 from ._editor import Choice, ChoiceEditor, Editor, unwrapped, value_editor
@@ -349,7 +352,9 @@ class JudgedForm(QWidget, Generic[Model]):
         self.form = ModelForm(model, hidden)
         self._complaint = SentenceLabel(rank="complaint")
         self._complaint.setAccessibleName(f"Complaint about the {name}")
-        filled(QVBoxLayout(self), self.form, self._complaint, margin=0)
+        self._warning = SentenceLabel()
+        self._warning.setAccessibleName(f"Warning about the {name}")
+        filled(QVBoxLayout(self), self.form, self._complaint, self._warning, margin=0)
         self.form.changed.connect(self._take)
         UNITS.on_change(self._judge)
         self.form.show_content({})
@@ -364,6 +369,11 @@ class JudgedForm(QWidget, Generic[Model]):
         """What is not allowed, all of it."""
         return self._complaint.text()
 
+    @property
+    def warning(self) -> str:
+        """What is allowed, but may not be meant: springs that follow from another mass."""
+        return self._warning.text()
+
     def show_value(self, value: Model) -> None:
         """Show other content."""
         self.form.show_content(value.model_dump(mode="json"))
@@ -376,11 +386,14 @@ class JudgedForm(QWidget, Generic[Model]):
         """Say what is not allowed, in the units that are shown."""
         complaints: dict[Loc, str] = {}
         self._value = None
-        try:
-            value = self._model.model_validate(self.form.content())
-        except ValidationError as error:
-            complaints = complaints_of(error)
-        else:
-            self._value = value if self.form.is_read else None
+        with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:
+            try:
+                value = self._model.model_validate(self.form.content())
+            except ValidationError as error:
+                complaints = complaints_of(error)
+            else:
+                self._value = value if self.form.is_read else None
+        self._warning.setText("; ".join(f"⚠ {each.message}" for each in warned))
+        self._warning.setVisible(bool(warned))
         self._complaint.setText("; ".join(self.form.complain(complaints)))
         self._complaint.setVisible(bool(self._complaint.text()))

@@ -174,10 +174,9 @@ def _picture_tabs(window: Window, folder: Path) -> None:
 
 
 def _picture_spectrogram(window: Window, folder: Path) -> None:
-    """Save the other picture of the Files page, small: noise makes large files."""
+    """Save the other picture of the Files page."""
     files = window.pages[FILES]
     assert isinstance(files, FilesPage)
-    window.resize(*OTHER_SIZES[0])
     window.show_page(FILES)
     files.pictures.setCurrentWidget(files.pictures.spectrogram)
     files.pictures.spectrogram.spacing.setCurrentText(RowSpacing.LOGARITHMIC.value)

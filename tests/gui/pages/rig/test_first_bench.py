@@ -46,3 +46,14 @@ def test_a_bench_that_can_be_used_is_remembered(opened):
     again = opened(None)
     assert again.choice.rig.name == "laboratory rig"
     assert again.context.settings.text(Remembered.BENCH) == str(lab)
+
+
+def test_a_bench_whose_springs_follow_from_another_mass_is_warned_of(opened, tmp_path):
+    bench = tmp_path / "bench.toml"
+    text = shipped("hardware_configs/virtual_rig.toml").read_text(encoding="utf-8")
+    heavier = "[specimen]\nmasses_kg = [5.8e-3, 3.2e-3, 2e-3]\n"
+    bench.write_text(text.replace("[specimen]\n", heavier), encoding="utf-8")
+    page = opened(bench)
+    assert page.choice.rig is not None
+    assert "⚠ gong2025: stiffnesses changed" in page.about.text()
+    assert "⚠" not in opened(shipped("hardware_configs/virtual_rig.toml")).about.text()

@@ -68,6 +68,8 @@ class QueuePage(Page):
             "Take over a campaign above, or add the test of the Test page, once or as a sweep.",
             wide=1,
         )
+        # Else the column of excitations, which takes what is left, has room for a few letters only.
+        self.entries.setMinimumWidth(28 * self.fontMetrics().height())
         self.rows = ReadTable(
             "Recordings of the campaign",
             ("", "recording", "level", "how it stands"),

@@ -1,5 +1,6 @@
 """Which hardware configuration: those that come with vibench, and one's own files."""
 
+import warnings
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
@@ -7,6 +8,7 @@ from PySide6.QtWidgets import QFileDialog, QFormLayout, QLabel, QPushButton, QWi
 
 from vibench.acquisition import ConfigurationError, all_shipped, printable
 from vibench.acquisition.rig import Rig, load_rig
+from vibench.sim import SpecimenWarning
 
 from ...forms import Choice
 from ...widgets import plain_tip
@@ -26,7 +28,7 @@ class RigChoice(QWidget):
         super().__init__()
         self._paths: list[Path] = []
         self._rig: Rig | None = None
-        self._complaint = ""
+        self._complaint = self._warning = ""
         self._box = Choice()
         self._box.setAccessibleName("Hardware configuration")
         self._box.setToolTip("What hangs on this computer; a simulated rig runs anywhere")
@@ -65,6 +67,11 @@ class RigChoice(QWidget):
         return self._complaint
 
     @property
+    def warning(self) -> str:
+        """What its specimen may not be meant to be."""
+        return self._warning
+
+    @property
     def rig(self) -> Rig | None:
         """The chosen rig, at the chosen pace."""
         if self._rig is None or self._rig.virtual is None:
@@ -94,13 +101,15 @@ class RigChoice(QWidget):
 
     def _load(self) -> None:
         path = self.path
-        self._rig, self._complaint = None, ""
+        self._rig, self._complaint, self._warning = None, "", ""
         if path is not None:
-            try:
-                self._rig = load_rig(path)
-            except ConfigurationError as error:
-                self._complaint = str(error)
-                self.refused.emit(error)
+            with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:
+                try:
+                    self._rig = load_rig(path)
+                except ConfigurationError as error:
+                    self._complaint = str(error)
+                    self.refused.emit(error)
+            self._warning = "; ".join(str(each.message) for each in warned)
         is_simulated = self._rig is not None and self._rig.virtual is not None
         self._form.setRowVisible(1, is_simulated)
         self.chosen.emit()

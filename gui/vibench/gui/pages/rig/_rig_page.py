@@ -187,7 +187,8 @@ class RigPage(Page):
         else:
             chain = (rig.generator.resource, rig.amplifier.model, rig.shaker.model, rig.vibrometer.model)
             kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
-            self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}")
+            warning = f"\n⚠ {self.choice.warning}" if self.choice.warning else ""
+            self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}{warning}")
             self.context.settings.keep_text(Remembered.BENCH, str(self.choice.path))
         self.context.selection.choose_rig(rig)
 
