@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
@@ -178,3 +179,14 @@ def test_a_figure_gives_one_colour_to_a_recording_and_one_dash_to_a_kind():
     assert len({lines[each.name].get_color() for each in curves}) == 2
     dashes = {str(lines[each.name]._unscaled_dash_pattern) for each in curves}
     assert len(dashes) == 6
+
+
+def test_a_name_of_a_file_is_drawn_as_it_is_and_not_as_mathematics(tmp_path):
+    frequency_hz = np.array([100.0, 300.0, 900.0])
+    named = ("a$x_{$<b>\x1b[2J", CurveOrigin.MEASURED, CurveKind.RESPONSE_I)
+    curve = Curve(*named, frequency_hz, np.array([1.0, 100.0, 10.0]), np.full(3, np.nan))
+    drawn = comparison_figure("named", [curve])
+    drawn.save(tmp_path, (ImageKind.SVG, ImageKind.PNG))
+    ET.parse(tmp_path / "named.svg")
+    (shown,) = (each.get_text() for each in drawn.figure.legends[0].get_texts())
+    assert shown == r"a\$x_{\$<b>\x1b[2J, Response I, measured"

@@ -2,6 +2,7 @@
 
 Each instrument has a file in the user's own state folder and one in a folder that all users of the computer
 share. Who holds it is written there for the others to read; what counts is the system's lock on the file.
+The file stays: if it were removed, two programs could each lock a file of that name.
 """
 
 import os

@@ -25,6 +25,7 @@ from ._style import (
     legend_above,
     magnitude_axis,
     new_figure,
+    plain_label,
     styled,
 )
 
@@ -186,7 +187,7 @@ def _measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) -> No
             marker=".",
             markersize=2.5,
             alpha=0.7,
-            label=f"{curve.source}, {curve.origin.value}",
+            label=plain_label(f"{curve.source}, {curve.origin.value}"),
         )
 
 

@@ -6,12 +6,24 @@ from typing import TypeAlias
 import numpy as np
 from matplotlib.axes import Axes
 
+from vibench.acquisition import printable
+
 from ..comparison import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
 from ..model import CurveDifference
 from ..tables import Table, table
 from ._drawn import DrawnFigure
-from ._style import BOUNDS, LEVELS, MEASURED, frequency_axis, legend_above, magnitude_axis, new_figure, styled
+from ._style import (
+    BOUNDS,
+    LEVELS,
+    MEASURED,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    plain_label,
+    styled,
+)
 
 Dashes: TypeAlias = str | tuple[int, tuple[int, ...]]
 _HEIGHT_IN = 4.6
@@ -94,8 +106,8 @@ def _curve(axes: Axes, curve: Curve, colour: str) -> None:
         marker="o" if lone else None,
         markersize=5,
         linewidth=1.0,
-        label=curve.name,
-        gid=curve.name,
+        label=plain_label(curve.name),
+        gid=printable(curve.name),
     )
 
 

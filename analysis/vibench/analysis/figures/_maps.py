@@ -34,6 +34,7 @@ from ._style import (
     legend_above,
     magnitude_axis,
     new_figure,
+    plain_label,
     prefixed,
     styled,
 )
@@ -174,7 +175,7 @@ def _scale(name: str, values: Reals) -> Normalize:
 def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
     """Draw the level of a recording as a line, and on it what was measured, in the colours of the map."""
     frequency_hz, amplitude_m = np.array(level.pairs).T
-    axes.plot(frequency_hz, MICRO * amplitude_m, color=MEASURED, linewidth=4.0, label=level.name)
+    axes.plot(frequency_hz, MICRO * amplitude_m, color=MEASURED, linewidth=4.0, label=plain_label(level.name))
     for curve in level.measured:
         place = np.interp(curve.frequency_hz, frequency_hz, MICRO * amplitude_m)
         axes.scatter(curve.frequency_hz, place, c=mesh.to_rgba(curve.magnitude), s=5.0, zorder=3)

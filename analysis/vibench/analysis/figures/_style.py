@@ -12,6 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogFormatter, NullLocator
 
+from vibench.acquisition import printable
+
 MEASURED = "#1b1b1b"
 SIMULATED = "#d55e00"
 """Under the recorded voltage or base motion (vermillion of Okabe & Ito's palette)."""
@@ -75,6 +77,11 @@ def styled() -> Iterator[None]:
     """Draw inside this: the style holds for what is drawn here and changes nothing elsewhere."""
     with mpl.rc_context(dict(STYLE)):
         yield
+
+
+def plain_label(name: str) -> str:
+    """Write a name of a file so that Matplotlib shows it as it is, also where it holds mathematics."""
+    return printable(name).replace("$", r"\$")
 
 
 def new_figure(height_in: float) -> Figure:
