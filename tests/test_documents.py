@@ -49,7 +49,7 @@ FACES_WITH_AN_EXAMPLE = [
     "vibench.analysis.hidden_motion",
     "vibench.analysis.exchange",
     "vibench.analysis.simulation",
-    "vibench.analysis.reproduction",
+    "vibench.cli.paper",
 ]
 
 every_document = pytest.mark.parametrize(

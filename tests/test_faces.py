@@ -44,7 +44,6 @@ FOR_OUR_PROGRAMS = (
     "vibench.stop_files",
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
-    "vibench.analysis.reproduction",
 )
 ONE_FILE_ROOMS = ("errors", "tables", "analogue", "command", "stop_files")
 

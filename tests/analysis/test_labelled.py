@@ -30,7 +30,7 @@ from vibench.analysis.tables import Labelled, holds_array, unit_of
 from vibench.analysis.uncertainty import Budget
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
-NOT_ROOMS_OF_RESULTS = {"exchange", "figures", "paper_figures", "simulation"}
+NOT_ROOMS_OF_RESULTS = {"exchange", "figures", "simulation"}
 """What goes into files, into pictures, and through the process that simulates."""
 NOT_RESULTS = {
     "SpectralAverages",

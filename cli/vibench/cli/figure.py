@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vibench.analysis import CampaignResults, InvalidRequest, analyse_files, recordings_in
-from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind
+from vibench.analysis.report import ImageKind
 from vibench.sim import Accuracy
 
 from .analyse import complain_about
 from .output import bold, console, leave_output_to_json, print_json
+from .paper.options import FigureOptions, FrequencyGrid
 from .paths import AsJson, room_for_folder
 from .study import KeptStudies, Workers
 
@@ -51,7 +52,7 @@ def figure(
     as_json: AsJson = False,
 ) -> None:
     """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
-    from vibench.analysis.report import PAPER_FIGURES
+    from .paper.figures import PAPER_FIGURES
 
     if as_json:
         leave_output_to_json()
@@ -78,7 +79,7 @@ def figure(
 
 
 def _numbers(asked: str) -> tuple[int, ...]:
-    from vibench.analysis.report import PAPER_FIGURES
+    from .paper.figures import PAPER_FIGURES
 
     known = (*PAPER_FIGURES, *EXPERIMENT)
     if asked == ALL:

@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from vibench.analysis.report import FigureOptions, FrequencyGrid, ImageKind
-from vibench.analysis.reproduction import OPTIONS, case_with
+from vibench.analysis.report import ImageKind
 from vibench.sim import Accuracy
 
 from .output import bold, console, leave_output_to_json, print_json, print_table
+from .paper.case import OPTIONS, case_with
+from .paper.options import FigureOptions, FrequencyGrid
 from .paths import AsJson, room_for_folder, room_for_page
 from .study import KeptStudies, Workers
 
 if TYPE_CHECKING:
-    from vibench.analysis.reproduction import Reproduction
+    from .paper.document import Reproduction
 
 PAGE = "reproduction.md"
 _FORMS = ", ".join(f"{name}={option.example} ({option.about})" for name, option in OPTIONS.items())
@@ -46,16 +47,14 @@ def reproduce(
     as_json: AsJson = False,
 ) -> None:
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
-    from vibench.analysis.report import levels_figure, write_page
-    from vibench.analysis.reproduction import (
-        SECTIONS,
-        Evidence,
-        damping_score_figure,
-        levels_asked,
-        reproduction,
-        reproduction_document,
-        reproduction_page,
-    )
+    from vibench.analysis.report import write_page
+
+    from .paper.claims import SECTIONS
+    from .paper.damping_score import damping_score_figure
+    from .paper.document import reproduction_document, reproduction_page
+    from .paper.evidence import Evidence, levels_asked
+    from .paper.figure_03_levels import levels_figure
+    from .paper.reproduce import reproduction
 
     if as_json:
         leave_output_to_json()
@@ -86,7 +85,7 @@ def reproduce(
 
 
 def _tell(found: "Reproduction") -> None:
-    from vibench.analysis.reproduction import verdict_text
+    from .paper.document import verdict_text
 
     rows = Table(title="What of the paper holds", title_justify="left")
     rows.add_column("claim")

@@ -4,12 +4,9 @@ A campaign, one recording or a comparison is written for a screen and for paper,
 sentences and what it cannot say. Also chosen here: which figures a result has, in which order. The page
 on speed and accuracy is docs/accuracy.md. Results are taken as they are: nothing is analysed here.
 
->>> from vibench.analysis.report import FigureOptions, FrequencyGrid
->>> options = FigureOptions(damping_time_s=2e-5, grid=FrequencyGrid.COARSE)
->>> len(options.frequencies_hz), options.frequencies_hz[-1]
-(120, 600.0)
->>> options.sentence.partition(" accuracy")[0]
-'Options: c = 2e-05 s · k, gap 45 µm, standard'
+>>> from vibench.analysis.report import table
+>>> table("curve", frequency_hz=[95.0, 266.0], response=[9.1, 4.2]).column("response")
+(9.1, 4.2)
 """
 
 import lazy_loader

@@ -4,9 +4,9 @@ from ._accuracy_document import (
 )
 from ._choices import (
     SHOWN as SHOWN,
-    FigureOptions as FigureOptions,
-    FrequencyGrid as FrequencyGrid,
     ImageKind as ImageKind,
+    Table as Table,
+    table as table,
 )
 from ._comparison_export import (
     write_comparison as write_comparison,
@@ -19,14 +19,25 @@ from ._drawings import (
     result_figures as result_figures,
 )
 from ._figures import (
-    PAPER_FIGURES as PAPER_FIGURES,
+    COLLIDING as COLLIDING,
+    LEVEL_STYLES as LEVEL_STYLES,
+    LEVELS as LEVELS,
+    LINEAR as LINEAR,
+    MEASURED as MEASURED,
+    SIMULATED as SIMULATED,
+    TERMINAL as TERMINAL,
     DrawnFigure as DrawnFigure,
     branches_figure as branches_figure,
     chain_figure as chain_figure,
     contact_forces_figure as contact_forces_figure,
+    draw_line as draw_line,
     exponent_spectrum_figure as exponent_spectrum_figure,
-    levels_figure as levels_figure,
+    frequency_axis as frequency_axis,
+    legend_above as legend_above,
+    magnitude_axis as magnitude_axis,
     map_figure as map_figure,
+    new_figure as new_figure,
+    styled as styled,
     tradeoff_figure as tradeoff_figure,
 )
 from ._page import (

@@ -1,6 +1,6 @@
-"""What is chosen before a figure is drawn; needs no drawing library."""
+"""What is chosen before a figure is drawn, and the columns beside it; needs no drawing library."""
 
 from ..figures import SHOWN, ImageKind
-from ..paper_figures import FigureOptions, FrequencyGrid
+from ..tables import Table, table
 
-__all__ = ["SHOWN", "FigureOptions", "FrequencyGrid", "ImageKind"]
+__all__ = ["SHOWN", "ImageKind", "Table", "table"]

@@ -1,24 +1,47 @@
-"""Figures that belong to no recording."""
+"""Figures that belong to no recording, and the style of all figures for those of your own."""
 
 from ..figures import (
+    COLLIDING,
+    LEVEL_STYLES,
+    LEVELS,
+    LINEAR,
+    MEASURED,
+    SIMULATED,
+    TERMINAL,
     DrawnFigure,
     branches_figure,
     chain_figure,
     contact_forces_figure,
+    draw_line,
     exponent_spectrum_figure,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
     map_figure,
+    new_figure,
+    styled,
     tradeoff_figure,
 )
-from ..paper_figures import PAPER_FIGURES, levels_figure
 
 __all__ = [
-    "PAPER_FIGURES",
+    "COLLIDING",
+    "LEVELS",
+    "LEVEL_STYLES",
+    "LINEAR",
+    "MEASURED",
+    "SIMULATED",
+    "TERMINAL",
     "DrawnFigure",
     "branches_figure",
     "chain_figure",
     "contact_forces_figure",
+    "draw_line",
     "exponent_spectrum_figure",
-    "levels_figure",
+    "frequency_axis",
+    "legend_above",
+    "magnitude_axis",
     "map_figure",
+    "new_figure",
+    "styled",
     "tradeoff_figure",
 ]

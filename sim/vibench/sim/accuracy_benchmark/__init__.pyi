@@ -17,10 +17,10 @@ from ._measuring import (
     Thoroughness as Thoroughness,
     measure_accuracy as measure_accuracy,
 )
-from ._textbook_methods import (
-    TextbookMethod as TextbookMethod,
-    ode45 as ode45,
-    runge_kutta as runge_kutta,
-    textbook_exponent as textbook_exponent,
-    textbook_state as textbook_state,
+from ._plain_equations import (
+    Law as Law,
+    Place as Place,
+    law_of as law_of,
+    numbers_of as numbers_of,
+    rates as rates,
 )

@@ -48,7 +48,7 @@ class Law(NamedTuple):
 def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:
     """Give d/dt of the state for as long as m1 stays at a place."""
     where = int(place)
-    return lambda time_s, state: _rates(time_s, state, where, law, numbers)
+    return lambda time_s, state: rates(time_s, state, where, law, numbers)
 
 
 def law_of(specimen: Specimen) -> Law:
@@ -109,7 +109,7 @@ def _stop_force(depth: float, rate: float, law: Law) -> float:
 
 
 @kernel
-def _rates(time_s: float, state: Floats, place: int, law: Law, numbers: Floats) -> Floats:
+def rates(time_s: float, state: Floats, place: int, law: Law, numbers: Floats) -> Floats:
     """d/dt of x, y, z, vx, vy, vz. On a stop the force ends at depth zero; in flight there is none."""
     m0, m1, m2, k0, k1, k2, c0, c1, c2, amplitude, omega, phase = numbers
     x, y, z, vx, vy, vz = state

@@ -1,0 +1,1 @@
+"""Figures and claims of Gong et al. (2025); run by `vibench figure` and `vibench reproduce`."""

@@ -1,0 +1,98 @@
+"""Fig. 5: what damping does, and what a larger amplitude does, to Responses I and II."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from vibench.analysis import InvalidRequest
+from vibench.analysis.report import LEVELS, MEASURED, DrawnFigure, new_figure, styled, table
+from vibench.sim.study import Study, StudyResults
+
+from .options import FigureOptions
+from .responses import Responses, finish, responses
+
+_LOW_M, _HIGH_M = 5e-6, 7e-6
+
+
+def damping_study(options: FigureOptions) -> Study:
+    """With and without damping, at 5 and 7 um.
+
+    Raises InvalidRequest where there is no damping to compare with none.
+    """
+    damped_s = options.only_damping_time_s
+    if damped_s == 0.0:
+        raise InvalidRequest("figure 5 compares damping with none; give a damping time above 0 s")
+    return options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, damped_s))
+
+
+def damping_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
+    """Draw both comparisons for both responses, with the colliding regions as bars."""
+    damped = responses(results, damping_time=options.damping_time_s, amplitude=_LOW_M)
+    undamped = responses(results, damping_time=0.0, amplitude=_LOW_M)
+    higher = responses(results, damping_time=options.damping_time_s, amplitude=_HIGH_M)
+    with styled():
+        figure = new_figure(6.2)
+        panels = figure.subplots(2, 2, sharex=True, sharey=True)
+        for row, pair in zip(
+            panels,
+            (
+                (("with damping", damped), ("without damping", undamped)),
+                (("A0 = 5 µm", damped), ("A0 = 7 µm", higher)),
+            ),
+            strict=True,
+        ):
+            for axes, what in zip(row, ("response_i", "response_ii"), strict=True):
+                _compare(axes, pair, what)
+        panels[0, 0].set_title("Response I")
+        panels[0, 1].set_title("Response II")
+        for axes in panels[1]:
+            axes.set_xlabel("drive frequency [Hz]")
+        for axes in panels[:, 1]:
+            axes.set_ylabel("")
+        for axes in panels[:, 0]:
+            axes.legend(loc="center left")
+    return DrawnFigure(
+        name="figure_5",
+        title="Figure 5: influence of damping and of the amplitude",
+        caption=(
+            "Bars at the foot: frequencies at which m1 and m2 collide, in the colour of the curve. Without "
+            "damping nothing forgets how it began, and each point is one draw. "
+            f"{_regions(damped, undamped, higher)} {options.sentence}"
+        ),
+        figure=figure,
+        tables=(
+            table(
+                "figure_5",
+                frequency_hz=damped.frequency_hz,
+                **{
+                    f"{what}_{name}": getattr(curve, what).astype(np.float64)
+                    for name, curve in (("damped", damped), ("undamped", undamped), ("damped_7um", higher))
+                    for what in ("response_i", "response_ii", "collides")
+                },
+            ),
+        ),
+    )
+
+
+def _compare(axes: Axes, pair: tuple[tuple[str, Responses], tuple[str, Responses]], what: str) -> None:
+    for number, ((label, curve), colour, line) in enumerate(
+        zip(pair, (MEASURED, LEVELS[2]), ("-", "--"), strict=True)
+    ):
+        axes.plot(curve.frequency_hz, getattr(curve, what), color=colour, linestyle=line, label=label)
+        axes.fill_between(
+            curve.frequency_hz,
+            0.03 * number,
+            0.03 * number + 0.025,
+            where=curve.collides.tolist(),
+            transform=axes.get_xaxis_transform(),
+            color=colour,
+            linewidth=0,
+        )
+    finish(axes, pair[0][1].frequency_hz, "response of m0 over A0")
+
+
+def _regions(damped: Responses, undamped: Responses, higher: Responses) -> str:
+    shares = [f"{np.mean(each.collides):.0%}" for each in (damped, undamped, higher)]
+    return (
+        f"Colliding at {shares[0]} of the frequencies with damping and 5 µm, {shares[1]} without damping, "
+        f"{shares[2]} at 7 µm."
+    )

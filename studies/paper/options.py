@@ -1,0 +1,137 @@
+"""What the paper leaves open in its figures, named and kept with every one of them."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from vibench.analysis import SIMILARITY_THRESHOLD, InvalidRequest, LogarithmOf
+from vibench.sim import Accuracy, Observable, Specimen, SpecimenTable, usual_specimen
+from vibench.sim.study import Study, StudyObservable, frequency_range
+
+AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
+"""The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
+CASES = ("Case 1", "Case 2", "Case 3", "Case 4")
+LOWEST_HZ = 5.0
+_LONGEST_DAMPING_TIME_S = 0.01
+"""More than fifteen times critical in the paper's third mode."""
+_LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
+"""From a thousandth of the weakest drive to two hundred times the strongest."""
+_PAPER = usual_specimen()
+WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
+"""What a figure of exponents observes."""
+
+
+class FrequencyGrid(StrEnum):
+    """How closely the frequencies lie; the paper does not say."""
+
+    COARSE = "coarse"
+    """Every 5 Hz: about what the paper's curves look like."""
+    FINE = "fine"
+    """Every 1 Hz: shows each jump."""
+
+    @property
+    def step_hz(self) -> float:
+        """Distance of neighbouring frequencies."""
+        return {FrequencyGrid.COARSE: 5.0, FrequencyGrid.FINE: 1.0}[self]
+
+
+@dataclass(frozen=True)
+class FigureOptions:
+    """Named choices that the paper leaves open."""
+
+    damping_time_s: float = 2e-5
+    """c_i = damping time * k_i."""
+    damping_ratio: float | None = None
+    """c_i = 2 * damping ratio * m_i * w_i of each mass on its own spring, in place of the damping time."""
+    gap_m: float = 45e-6
+    accuracy: Accuracy = Accuracy.STANDARD
+    grid: FrequencyGrid = FrequencyGrid.COARSE
+    highest_hz: float = 600.0
+    similarity_highest_hz: float = 500.0
+    """Upper end of the grid on which models are compared: the rates depend on it."""
+    logarithm_of: LogarithmOf = LogarithmOf.MILLIMETRES
+    threshold: float = SIMILARITY_THRESHOLD
+    duration_s: float = 30.0
+    window_s: float = 5.0
+    """The paper's: 30 s from rest, the last 5 s observed."""
+    budget_s: float = 0.0
+    """For other starts: a point of the paper is one run."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.damping_time_s <= _LONGEST_DAMPING_TIME_S:
+            raise InvalidRequest(
+                f"a damping time of {self.damping_time_s:g} s is not allowed; give 0 to "
+                f"{_LONGEST_DAMPING_TIME_S:g}"
+            )
+        if self.damping_ratio is not None and not 0.0 <= self.damping_ratio < math.inf:
+            raise InvalidRequest(
+                f"a damping ratio of {self.damping_ratio} is not allowed; give zero or a positive one"
+            )
+        if not _LEAST_GAP_M <= self.gap_m <= _LARGEST_GAP_M:
+            raise InvalidRequest(
+                f"a gap of {self.gap_m:g} m is not allowed; give {_LEAST_GAP_M:g} to {_LARGEST_GAP_M:g}"
+            )
+
+    @property
+    def frequencies_hz(self) -> tuple[float, ...]:
+        """Grid of a response curve."""
+        return frequency_range(LOWEST_HZ, self.highest_hz, self.grid.step_hz)
+
+    @property
+    def similarity_frequencies_hz(self) -> tuple[float, ...]:
+        """Grid on which models are compared."""
+        return frequency_range(LOWEST_HZ, self.similarity_highest_hz, self.grid.step_hz)
+
+    def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
+        """Ask for models at amplitudes under these options; fields of the study may be replaced."""
+        chosen: dict[str, Any] = {
+            "gaps_m": (self.gap_m,),
+            "specimen": self._described,
+            "damping_times_s": (self.damping_time_s,) if self.damping_ratio is None else None,
+            "frequencies_hz": self.frequencies_hz,
+            "accuracy": self.accuracy,
+            "duration_s": self.duration_s,
+            "window_s": self.window_s,
+            "budget_s": self.budget_s,
+        }
+        return Study(models=models, amplitudes_m=amplitudes_m, **{**chosen, **replaced})
+
+    def specimen(self, contact: str = "hertz") -> Specimen:
+        """Build the paper's specimen under these options."""
+        own_s = self.damping_time_s if self.damping_ratio is None else None
+        return self._described.specimen(contact, own_s, self.gap_m)
+
+    @property
+    def only_damping_time_s(self) -> float:
+        """Damping time of a figure that can say no other damping.
+
+        Raises InvalidRequest under a damping ratio.
+        """
+        if self.damping_ratio is not None:
+            raise InvalidRequest("this figure takes no damping ratio; give a damping time")
+        return self.damping_time_s
+
+    @property
+    def _described(self) -> SpecimenTable:
+        if self.damping_ratio is None:
+            return _PAPER
+        masses_and_springs = zip(_PAPER.masses_kg, _PAPER.stiffnesses, strict=True)
+        dampings = [2.0 * self.damping_ratio * math.sqrt(m * k) for m, k in masses_and_springs]
+        return SpecimenTable.model_validate({"dampings_ns_per_m": dampings})
+
+    @property
+    def damping(self) -> str:
+        """Say the damping."""
+        if self.damping_ratio is None:
+            return f"c = {self.damping_time_s:.3g} s · k"
+        return f"c_i = 2 · {self.damping_ratio:g} · m_i ω_i"
+
+    @property
+    def sentence(self) -> str:
+        """Say the options under a figure."""
+        return (
+            f"Options: {self.damping}, gap {1e6 * self.gap_m:g} µm, "
+            f"{self.accuracy.value} accuracy, every {self.grid.step_hz:g} Hz, {self.duration_s:g} s from "
+            f"rest, the last {self.window_s:g} s observed."
+        )

@@ -1,0 +1,129 @@
+"""Verdicts follow from the numbers alone: the defaults first, then the options, in order."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, strategies as st
+
+from vibench.analysis import InvalidRequest, LogarithmOf
+from vibench.cli.paper.case import AS_CHOSEN, Case, compared_up_to, damping, logarithm, swept_at
+from vibench.cli.paper.claim import Claim, Expectation, Verdict, about, at_least, at_most, judged
+from vibench.cli.paper.document import verdict_text
+from vibench.cli.paper.evidence import Evidence
+from vibench.cli.paper.options import FigureOptions
+
+CASE = Case(AS_CHOSEN, FigureOptions())
+DAMPED, VERY_DAMPED = damping(3e-5), damping(5e-5)
+
+
+def no_studies(study):
+    raise AssertionError(f"a synthetic measurement asked for {study}")
+
+
+def claim(measure, *wanted, alternatives=()):
+    return Claim("key", "section 3", "It is so.", "Read off.", wanted, measure, alternatives)
+
+
+def judge(values_by_damping, *wanted, alternatives=(DAMPED, VERY_DAMPED)):
+    def measure(_evidence, case):
+        return values_by_damping[case.options.damping_time_s]
+
+    return judged(claim(measure, *wanted, alternatives=alternatives), Evidence(no_studies), CASE)
+
+
+def test_a_number_within_its_bounds_holds_and_no_option_is_tried():
+    found = judge({2e-5: (95.4,)}, about("peak", "Hz", 95.0, 1.0))
+    assert found.verdict is Verdict.HOLDS
+    assert [each.case.name for each in found.findings] == [AS_CHOSEN]
+
+
+def test_a_claim_that_holds_under_a_later_option_names_the_first_one_that_upholds_it():
+    found = judge({2e-5: (80.0,), 3e-5: (120.0,), 5e-5: (130.0,)}, at_least("exponent", "1/s", 100.0))
+    assert found.verdict is Verdict.HOLDS_UNDER
+    assert found.met_under.case.name == DAMPED.name
+    assert len(found.findings) == 2
+
+
+def test_a_claim_that_no_option_upholds_fails_and_keeps_all_that_was_tried():
+    found = judge({2e-5: (1.0,), 3e-5: (2.0,), 5e-5: (3.0,)}, at_most("share", "%", 0.5))
+    assert found.verdict is Verdict.FAILS
+    assert found.met_under is None
+    assert [each.values for each in found.findings] == [(1.0,), (2.0,), (3.0,)]
+
+
+def test_a_claim_that_some_starts_uphold_holds_for_a_share_of_them_and_no_option_is_tried():
+    last_hz = (310.0, 288.0, 291.0, 330.0)
+    sweep = replace(
+        claim(lambda _, case: (last_hz[case.draw],), about("last", "Hz", 290.0, 5.0), alternatives=(DAMPED,)),
+        draws=4,
+    )
+    found = judged(sweep, Evidence(no_studies), CASE)
+    assert found.verdict is Verdict.HOLDS_FOR_SHARE
+    (only,) = found.findings
+    assert (only.met, only.values, only.spread(0)) == (2, (310.0,), (288.0, 330.0))
+    assert verdict_text(found) == "holds for a share of starts: 2 of 4 (15 to 85 %)"
+
+
+def test_a_claim_that_every_start_upholds_holds_and_one_that_none_does_is_tried_under_options():
+    def measure(_evidence, case):
+        return (100.0 + case.draw if case.options.damping_time_s == 3e-5 else 10.0,)
+
+    both = replace(claim(measure, at_least("exponent", "1/s", 50.0), alternatives=(DAMPED,)), draws=3)
+    found = judged(both, Evidence(no_studies), CASE)
+    assert found.verdict is Verdict.HOLDS_UNDER
+    assert [len(each.draws) for each in found.findings] == [3, 3]
+
+
+def test_other_starts_are_a_millionth_of_the_gap_from_rest_and_the_same_again():
+    assert CASE.start == (0.0,) * 6
+    moved = replace(CASE, draw=3)
+    assert 0.0 < max(abs(value) for value in moved.start[:3]) <= 1e-6 * CASE.options.gap_m
+    assert moved.start == replace(CASE, draw=3).start != replace(CASE, draw=4).start
+
+
+def test_one_number_out_of_bounds_is_enough_to_fail():
+    wanted = (about("first", "Hz", 201.0, 1.0), about("second", "Hz", 435.0, 1.0))
+    assert judge({2e-5: (201.5, 435.5)}, *wanted, alternatives=()).verdict is Verdict.HOLDS
+    assert judge({2e-5: (201.5, 437.0)}, *wanted, alternatives=()).verdict is Verdict.FAILS
+
+
+def test_a_number_that_could_not_be_measured_meets_nothing():
+    anything = Expectation("peak", "Hz", -math.inf, math.inf)
+    assert judge({2e-5: (math.nan,)}, anything, alternatives=()).verdict is Verdict.FAILS
+
+
+@given(low=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), value=st.floats(-2e6, 2e6))
+def test_bounds_belong_to_what_is_wanted(low, width, value):
+    wanted = Expectation("anything", "", low, low + width)
+    assert wanted.is_met_by(low)
+    assert wanted.is_met_by(low + width)
+    assert wanted.is_met_by(value) == (low <= value <= low + width)
+
+
+def test_bounds_that_hold_nothing_are_refused():
+    with pytest.raises(InvalidRequest, match="lower bound first"):
+        Expectation("peak", "Hz", 2.0, 1.0)
+
+
+def test_a_measure_must_give_a_number_for_each_expectation():
+    with pytest.raises(InvalidRequest, match="wants 1 numbers and 2"):
+        judge({2e-5: (1.0, 2.0)}, at_least("one", "", 0.0))
+
+
+def test_an_option_changes_what_it_names_and_nothing_else():
+    assert DAMPED.of(CASE) == Case(DAMPED.name, FigureOptions(damping_time_s=3e-5))
+    other = logarithm(LogarithmOf.NORMALISED).of(CASE)
+    assert other.options == FigureOptions(logarithm_of=LogarithmOf.NORMALISED)
+    assert compared_up_to(600.0).of(CASE).options == FigureOptions(similarity_highest_hz=600.0)
+    swept = swept_at(4e-6).of(CASE)
+    assert (swept.options, swept.sweep_amplitude_m) == (CASE.options, 4e-6)
+    assert "4 µm" in swept.name
+
+
+def test_numbers_are_shown_with_their_units():
+    assert about("peak", "Hz", 95.0, 1.0).sentence == "94 to 96 Hz"
+    assert at_least("share", "%", 0.9).sentence == "≥ 90 %"
+    assert at_most("largest", "1/s", 10.0).sentence == "≤ 10 1/s"
+    assert at_least("share", "%", 0.9).shown(0.5) == "50 %"
+    assert at_least("share", "%", 0.9).shown(math.nan) == "none"

@@ -1,0 +1,163 @@
+"""The page says what was found, and the page in docs was made by this code from these claims."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.reading_reports import Page
+from vibench.analysis.report import ReportTable, write_page
+from vibench.cli.paper.case import AS_CHOSEN, SCORED_S, Case, damping
+from vibench.cli.paper.claim import Claim, Verdict, at_least, judged
+from vibench.cli.paper.claims import CLAIMS, SECTIONS
+from vibench.cli.paper.damping_score import damping_score_figure
+from vibench.cli.paper.document import (
+    HEAD,
+    Reproduction,
+    reproduction_document,
+    reproduction_page,
+    wanted_text,
+)
+from vibench.cli.paper.evidence import Evidence
+from vibench.cli.paper.options import FigureOptions
+from vibench.cli.paper.score import DampingScore
+
+PAGE = Path(__file__).parents[2] / "docs" / "reproduction.md"
+CASE = Case(AS_CHOSEN, FigureOptions())
+
+
+def judgement(key, value_by_damping):
+    claim = Claim(
+        key,
+        "section 3",
+        f"It is so with {key}.",
+        "Read off.",
+        (at_least("exponent", "1/s", 100.0),),
+        lambda _, case: (value_by_damping[case.options.damping_time_s],),
+        (damping(3e-5),),
+    )
+    return judged(claim, Evidence(lambda study: pytest.fail(f"asked for {study}")), CASE)
+
+
+@pytest.fixture
+def found():
+    judgements = (
+        judgement("first", {2e-5: 120.0}),
+        judgement("second", {2e-5: 50.0, 3e-5: 130.0}),
+        judgement("third", {2e-5: 50.0, 3e-5: 60.0}),
+    )
+    return Reproduction(
+        sections={"Synthetic": judgements},
+        scores=(
+            DampingScore(2e-5, ("first",), ("second", "third"), -1.5, 120.0),
+            DampingScore(3e-5, ("first", "second"), ("third",), -2.5, 90.0),
+        ),
+        tables=(ReportTable("Regions", ("A0", "colliding"), (("1 µm", "nowhere"),), "Frequencies."),),
+        options="Defaults: these.",
+        made_with="Computed by nobody.",
+    )
+
+
+def rows(page):
+    return {
+        match[1]: line
+        for line in page.splitlines()
+        if (match := re.match(r"\| \*\*([a-z0-9-]+)\*\*: ", line)) is not None
+    }
+
+
+def test_the_verdicts_are_counted_and_written_with_what_they_rest_on(found):
+    page = reproduction_document(found)
+    assert [found.count(each) for each in Verdict] == [1, 0, 1, 1]
+    assert "Of 3 claims 1 hold under the defaults," in page
+    assert rows(page)["first"].endswith("| exponent: 120 1/s | ≥ 100 1/s | holds |")
+    assert rows(page)["second"].endswith("| holds under c = 3e-05 s · k |")
+    assert rows(page)["third"].endswith("| **does not hold** |")
+
+
+def test_what_was_tried_is_written_with_its_numbers(found):
+    page = reproduction_document(found)
+    assert "- c = 3e-05 s · k: exponent: 60 1/s (does not hold)" in page
+    assert "- c = 3e-05 s · k: exponent: 130 1/s (holds)" in page
+
+
+def test_what_differs_from_the_paper_is_said_first_with_the_option_that_would_make_us_meet(found):
+    summary = reproduction_document(found).split("## ")[0]
+    assert "**first**" not in summary
+    assert (
+        "- **second**: It is so with second. We find exponent: 50 1/s; wanted ≥ 100 1/s. We meet" in summary
+    )
+    assert "under c = 3e-05 s · k: exponent: 130 1/s." in summary
+    assert "None of 1 options tried would make us meet." in summary
+
+
+def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
+    """A sweep downwards held for most starts, and the page said that it does not hold."""
+
+    def measure(_, case):
+        return (130.0 if case.options.damping_time_s == 3e-5 and case.draw != 2 else 50.0,)
+
+    wanted = (at_least("exponent", "1/s", 100.0),)
+    claim = Claim("chance", "section 3", "It is so.", "Read off.", wanted, measure, (damping(3e-5),), draws=4)
+    found = judged(claim, Evidence(lambda study: pytest.fail(f"asked for {study}")), CASE)
+    scores = (DampingScore(2e-5, (), ("chance",), -1.5, 120.0),)
+    page = reproduction_document(Reproduction({"Synthetic": (found,)}, scores, (), "Defaults: these.", ""))
+    except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
+    assert f"None of 1 options tried would make us meet{except_it}." in page
+    assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
+    assert "(50 to 130 1/s over 4 starts) (holds for 3 of 4 starts)" in page
+
+
+def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not(found):
+    page = reproduction_document(found, (("A figure", "images/it.png"),))
+    assert "most hold at 3e-05 s." in page
+    assert "| 2e-05 s | 1 of 3 | -1.5 | 120 | second, third |" in page
+    assert "| A0 | colliding |\n|---|---|\n| 1 µm | nowhere |" in page
+    assert page.endswith("![A figure](images/it.png)\n")
+
+
+def test_the_report_begins_with_the_count_and_has_a_card_for_each_section(found, tmp_path):
+    score, levels = damping_score_figure(found.scores), damping_score_figure(found.scores)
+    path = write_page(reproduction_page(found, levels, score), tmp_path / "report.html")
+    page = Page(path.read_text(encoding="utf-8"))
+    assert page.headings == ["claims on", "result", "agreement", "what to look at"]
+    assert page.findings.startswith("Of 3 claims 1 hold under the defaults, 0 for a share of starts, 1 under")
+    assert page.findings.endswith("Those that do not hold: third.")
+    assert "Synthetic 1 of 3 claims hold under the defaults. no second, third" in page.visible
+    order = ["findings", "figure-1", "cards", "card-1", "further", "figure-2", "details"]
+    assert [each for each in page.ids if each in order] == order
+    for folded in ("third c = 3e-05 s · k: exponent: 60 1/s (does not hold)", "≥ 100 1/s", "Read off."):
+        assert folded in page.text
+    assert "exponent: 60 1/s" not in page.visible
+    assert len(page.visible.split()) <= 2000
+
+
+def test_every_claim_has_a_key_of_its_own():
+    assert len({claim.key for claim in CLAIMS}) == len(CLAIMS)
+
+
+def test_the_page_in_docs_has_the_claims_columns_and_bounds_of_this_code():
+    page = PAGE.read_text(encoding="utf-8")
+    kept = rows(page)
+    assert list(kept) == [claim.key for claim in CLAIMS]
+    assert page.count(HEAD) == len(SECTIONS)
+    for claim in CLAIMS:
+        row = kept[claim.key]
+        assert row.startswith(f"| **{claim.key}**: {claim.says} | {claim.place} |")
+        assert f"| {wanted_text(claim)} |" in row
+        assert all(f"{each.name}: ".replace("|", "&#124;") in row for each in claim.wanted)
+        assert f"- **{claim.key}**: {claim.measured_by}" in page
+
+
+def test_the_page_in_docs_scores_the_dampings_of_this_code_and_shows_its_figures():
+    page = PAGE.read_text(encoding="utf-8")
+    scored = re.findall(r"^\| (\S+) s \| \d+ of (\d+) \|", page, re.MULTILINE)
+    asked = sum(claim.is_scored for claim in CLAIMS)
+    assert [(float(each), int(of)) for each, of in scored] == [(each, asked) for each in SCORED_S]
+    pictures = re.findall(r"^!\[.*\]\((.*)\)$", page, re.MULTILINE)
+    assert pictures
+    assert all((PAGE.parent / each).is_file() for each in pictures)
+    counts = [
+        int(each) for each in re.findall(r"^(?:Of \d+ claims )?(\d+) (?:hold )?under", page, re.MULTILINE)
+    ]
+    assert sum(counts) == len(CLAIMS)

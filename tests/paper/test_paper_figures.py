@@ -1,0 +1,119 @@
+"""The paper's figures from short studies: they draw what was computed, and show what the paper shows."""
+
+import numpy as np
+import pytest
+
+from vibench.analysis import InvalidRequest, LogarithmOf
+from vibench.analysis.report import ImageKind
+from vibench.cli.paper.figures import PAPER_FIGURES
+from vibench.cli.paper.options import AMPLITUDES_M, FigureOptions
+from vibench.cli.paper.responses import responses, shade
+from vibench.sim import Accuracy
+from vibench.sim.study import solve_study
+
+SHORT = FigureOptions(accuracy=Accuracy.QUICK, duration_s=1.5, window_s=0.5)
+"""Long enough for the paper's peaks, far too short for its chaos."""
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """Solve each study once."""
+    found = {}
+
+    def solve(study):
+        key = study.model_dump_json()
+        if key not in found:
+            found[key] = solve_study(study)
+        return found[key]
+
+    return solve
+
+
+def drawn(solved, number, options=SHORT):
+    figure = PAPER_FIGURES[number]
+    return figure.draw(options, tuple(solved(each) for each in figure.studies(options)))
+
+
+def numbers(table, heading):
+    return np.array([float(cell) for cell in table.column(heading)])
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(
+    "number", [1, 2, 3, 5, 7, *(pytest.param(n, marks=pytest.mark.slow) for n in (6, 8, 9, 11))]
+)
+def test_a_figure_comes_in_every_format_with_its_numbers(solved, number, tmp_path):
+    found = drawn(solved, number)
+    paths = found.save(tmp_path, list(ImageKind))
+    heads = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
+    for path in paths:
+        if path.suffix in heads:
+            assert path.read_bytes().startswith(heads[path.suffix])
+    assert any(path.suffix == ".csv" for path in paths)
+    assert str(number) in found.title
+
+
+def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solved):
+    weak, *_, strong = drawn(solved, 3).tables
+    f = numbers(weak, "frequency_hz")
+
+    def peaks(table):
+        size = numbers(table, "response_ii")
+        inner = (size[1:-1] > size[:-2]) & (size[1:-1] > size[2:]) & (size[1:-1] > 1.5)
+        return f[1:-1][inner]
+
+    assert peaks(weak) == pytest.approx([95, 265, 500], abs=5)
+    assert peaks(strong) == pytest.approx([200, 435], abs=5)
+
+
+def test_figure_3_shades_the_frequencies_that_collide_and_no_others(solved):
+    results = solved(PAPER_FIGURES[3].studies(SHORT)[0])
+    for amplitude_m, table in zip(AMPLITUDES_M, drawn(solved, 3).tables, strict=True):
+        curve = responses(results, amplitude=amplitude_m)
+        assert np.array_equal(numbers(table, "collides") > 0, curve.collides)
+    shares = [responses(results, amplitude=each).collides.mean() for each in AMPLITUDES_M]
+    assert sorted(shares) == shares
+    assert shares[-1] > 0.5
+
+
+def test_shading_reaches_halfway_to_the_neighbours():
+    class Recorder:
+        def __init__(self):
+            self.spans = []
+
+        def axvspan(self, low, high, **_):
+            self.spans.append((low, high))
+
+    axes = Recorder()
+    shade(axes, np.array([1.0, 2.0, 4.0, 5.0]), np.array([False, True, False, True]))
+    assert axes.spans == [(1.5, 3.0), (4.5, 5.0)]
+
+
+def test_figure_5_collides_more_without_damping_and_at_a_larger_amplitude(solved):
+    (table,) = drawn(solved, 5).tables
+    share = {name: numbers(table, f"collides_{name}").mean() for name in ("damped", "undamped", "damped_7um")}
+    assert share["damped"] < share["undamped"]
+    assert share["damped"] < share["damped_7um"]
+
+
+@pytest.mark.thorough
+def test_figure_7_has_the_papers_rates_at_the_weakest_level(solved):
+    caption = drawn(solved, 7).caption
+    assert "log10 of the response [mm]" in caption
+    titles = [axes.get_title() for axes in drawn(solved, 7).figure.axes]
+    assert "Response I: R = 8" in titles[0]
+
+
+@pytest.mark.thorough
+def test_what_the_logarithm_is_taken_of_is_an_option(solved):
+    other = FigureOptions(
+        accuracy=SHORT.accuracy, duration_s=1.5, window_s=0.5, logarithm_of=LogarithmOf.NORMALISED
+    )
+    assert drawn(solved, 7, other).caption != drawn(solved, 7).caption
+    assert drawn(solved, 7, other).figure.axes[0].get_title() != drawn(solved, 7).figure.axes[0].get_title()
+
+
+@pytest.mark.parametrize(("name", "value"), [("gap_m", 0.0), ("damping_time_s", -1.0), ("gap_m", np.nan)])
+def test_options_that_cannot_be_are_refused(name, value):
+    with pytest.raises(InvalidRequest, match="not allowed"):
+        FigureOptions(**{name: value})
