@@ -1,27 +1,24 @@
-"""A claim of the paper as data, and what is found of it.
-
-A number that a claim wants, with how far it may be off.
-"""
+"""A claim of the paper: a function that measures it, with the bounds of what it wants; and verdicts."""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import partial
 
 import numpy as np
 
 from vibench.analysis import InvalidRequest
 
-from .case import AS_CHOSEN, Alternative, Case
-from .evidence import Evidence
+from .case import AS_CHOSEN, DAMPINGS, Alternative, Case
+from .reading import Evidence, Reading, Values
 
 
 @dataclass(frozen=True)
 class Expectation:
-    """Bounds within which one measured number upholds a claim; both belong to it."""
+    """Bounds, both included, within which one measured number upholds a claim."""
 
     name: str
-    """What is measured, in a few words."""
     unit: str
     """Empty for ratios and counts; ``"%"`` for shares, which are kept as fractions."""
     low: float
@@ -33,13 +30,9 @@ class Expectation:
                 f"{self.name!r} wants {self.low:g} to {self.high:g}; give the lower bound first"
             )
 
-    def is_met_by(self, value: float) -> bool:
-        """Say whether a number lies within; nothing (NaN) meets nothing."""
-        return self.low <= value <= self.high
-
     @property
     def sentence(self) -> str:
-        """Say the bounds."""
+        """The bounds in words."""
         if math.isinf(self.high):
             return f"≥ {self.shown(self.low)}"
         if math.isinf(self.low):
@@ -50,9 +43,8 @@ class Expectation:
         """Write a number with its unit."""
         if not np.isfinite(value):
             return "none"
-        named = self.unit if unit is None else unit
         text = f"{100 * value:.0f}" if self.unit == "%" else f"{value:.4g}"
-        return f"{text} {named}".rstrip()
+        return f"{text} {self.unit if unit is None else unit}".rstrip()
 
 
 def about(name: str, unit: str, value: float, within: float) -> Expectation:
@@ -70,8 +62,64 @@ def at_most(name: str, unit: str, high: float) -> Expectation:
     return Expectation(name, unit, -math.inf, high)
 
 
-Measure = Callable[[Evidence, Case], tuple[float, ...]]
-"""Measures the numbers of a claim under a case: one for each expectation, NaN where there is none."""
+def peaks_at(wanted_hz: tuple[float, ...], within_hz: float) -> tuple[Expectation, ...]:
+    """Want a peak near each frequency."""
+    return tuple(about(f"peak at {each:g} Hz", "Hz", each, within_hz) for each in wanted_hz)
+
+
+NO_THIRD = at_most("next peak over the second", "", 0.5)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Something that the paper says and that can be measured."""
+
+    key: str
+    place: str
+    """Where the paper says it."""
+    says: str
+    measured_by: str
+    """How we measure it, in one sentence."""
+    wanted: tuple[Expectation, ...]
+    """All of them must be met."""
+    measure: Callable[[Reading], Values]
+    tried: tuple[Alternative, ...]
+    """Alternatives where the defaults do not uphold it, in this order."""
+    remark: str
+    """What a reader should know where it does not hold; without numbers, which the page measures."""
+    draws: int
+    """Starts that it is measured from: more where its numbers depend on the motion that chaos ends in."""
+    is_scored: bool
+    """Whether it is measured again at every damping of the score."""
+
+    def is_met_by(self, values: Values) -> bool:
+        """Return whether every number lies within its bounds; nothing (NaN) meets nothing."""
+        return all(each.low <= value <= each.high for each, value in zip(self.wanted, values, strict=True))
+
+
+Measure = Callable[[Reading], Values]
+
+
+def claim(
+    place: str,
+    measured_by: str,
+    *wanted: Expectation,
+    tried: tuple[Alternative, ...] = DAMPINGS,
+    draws: int = 1,
+    remark: str = "",
+    is_scored: bool = True,
+) -> Callable[[Measure], Claim]:
+    """Make a claim of the function that measures it; its docstring is what the paper says."""
+
+    def made(measure: Measure) -> Claim:
+        key, says = measure.__name__.replace("_", "-"), " ".join((measure.__doc__ or "").split())
+        return Claim(key, place, says, measured_by, wanted, measure, tried, remark, draws, is_scored)
+
+    return made
+
+
+costly_claim = partial(claim, tried=(), is_scored=False)
+"""A claim that would take too long to measure at every damping."""
 
 
 class Verdict(StrEnum):
@@ -88,42 +136,23 @@ class Verdict(StrEnum):
 
 
 @dataclass(frozen=True)
-class Claim:
-    """Something that the paper says and that can be measured."""
-
-    key: str
-    """Short name, unique."""
-    place: str
-    """Where the paper says it."""
-    says: str
-    measured_by: str
-    """How we measure it, in one sentence."""
-    wanted: tuple[Expectation, ...]
-    """All of them must be met."""
-    measure: Measure
-    alternatives: tuple[Alternative, ...] = ()
-    """Options tried where the defaults do not uphold it, in this order."""
-    remark: str = ""
-    """What a reader should know where it does not hold; without numbers, which the page measures."""
-    draws: int = 1
-    """Starts that it is measured from: more where its numbers hang on which motion chaos ends in, or when."""
-    is_scored: bool = True
-    """Whether it is measured again at every damping of the score; not where that would take too long."""
-
-
-@dataclass(frozen=True)
 class Finding:
-    """The numbers of a claim under one case."""
+    """The numbers of a claim under one case, from every start, rest first."""
 
     case: Case
-    values: tuple[float, ...]
-    """From rest."""
-    is_met: bool
-    """By every start."""
-    draws: tuple[tuple[float, ...], ...] = ()
-    """The numbers of every start, rest first."""
-    met: int = 0
+    draws: tuple[tuple[float, ...], ...]
+    met: int
     """Starts that uphold the claim."""
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """The numbers from rest."""
+        return self.draws[0]
+
+    @property
+    def is_met(self) -> bool:
+        """By every start."""
+        return self.met == len(self.draws)
 
     @property
     def is_met_in_part(self) -> bool:
@@ -131,21 +160,21 @@ class Finding:
         return 0 < self.met < len(self.draws)
 
     def spread(self, number: int) -> tuple[float, float]:
-        """Give the smallest and the largest of one number over all starts; NaN where one has none."""
+        """Return the smallest and the largest of one number over all starts; NaN where one has none."""
         values = [draw[number] for draw in self.draws]
         return float(np.min(values)), float(np.max(values))
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """A claim with all that was found of it: the defaults first, then the options tried."""
+    """A claim with all that was found of it: the defaults first, then the alternatives tried."""
 
     claim: Claim
     findings: tuple[Finding, ...]
 
     @property
     def verdict(self) -> Verdict:
-        """Say whether the claim holds, and how."""
+        """Whether the claim holds, and how."""
         if self.findings[0].is_met:
             return Verdict.HOLDS
         if self.findings[0].is_met_in_part:
@@ -158,38 +187,33 @@ class Judgement:
         return next((each for each in self.findings if each.is_met), None)
 
 
-def found(claim: Claim, evidence: Evidence, case: Case) -> Finding:
+def finding(asked: Claim, evidence: Evidence, case: Case) -> Finding:
     """Measure a claim under one case, from every start.
 
-    From rest alone under an option that does not uphold it there: then it is not upheld by every start.
-    Raises InvalidRequest when the measure gives another count of numbers than the claim wants.
+    From rest alone under an alternative that does not uphold it there: then not every start upholds it.
+    Raises InvalidRequest when the measure returns another count of numbers than the claim wants.
     """
-    draws = [_measured(claim, evidence, case)]
-    if _is_met(claim, draws[0]) or case.name == AS_CHOSEN:
-        draws += [_measured(claim, evidence, replace(case, draw=number)) for number in range(1, claim.draws)]
-    met = sum(_is_met(claim, values) for values in draws)
-    return Finding(case, draws[0], met == len(draws), tuple(draws), met)
+    draws = [_measured(asked, evidence, case)]
+    if asked.is_met_by(draws[0]) or case.name == AS_CHOSEN:
+        draws += [_measured(asked, evidence, replace(case, draw=number)) for number in range(1, asked.draws)]
+    return Finding(case, tuple(draws), sum(asked.is_met_by(values) for values in draws))
 
 
-def _measured(claim: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
-    values = claim.measure(evidence, case)
-    if len(values) != len(claim.wanted):
+def _measured(asked: Claim, evidence: Evidence, case: Case) -> tuple[float, ...]:
+    values = tuple(float(each) for each in asked.measure(Reading(evidence, case)))
+    if len(values) != len(asked.wanted):
         raise InvalidRequest(
-            f"the claim {claim.key!r} wants {len(claim.wanted)} numbers and {len(values)} were measured; "
+            f"the claim {asked.key!r} wants {len(asked.wanted)} numbers and {len(values)} were measured; "
             "give one for each"
         )
     return values
 
 
-def _is_met(claim: Claim, values: tuple[float, ...]) -> bool:
-    return all(wanted.is_met_by(value) for wanted, value in zip(claim.wanted, values, strict=True))
-
-
-def judged(claim: Claim, evidence: Evidence, case: Case) -> Judgement:
+def judgement(asked: Claim, evidence: Evidence, case: Case) -> Judgement:
     """Measure a claim under a case; where it is not upheld, under each of its alternatives until one does."""
-    findings = [found(claim, evidence, case)]
-    for alternative in claim.alternatives:
+    findings = [finding(asked, evidence, case)]
+    for alternative in asked.tried:
         if findings[-1].is_met or findings[0].is_met_in_part:
             break
-        findings.append(found(claim, evidence, alternative.of(case)))
-    return Judgement(claim, tuple(findings))
+        findings.append(finding(asked, evidence, alternative.of(case)))
+    return Judgement(asked, tuple(findings))

@@ -1,19 +1,25 @@
 """All claims, in the order of the page."""
 
-from .balance_claims import BALANCE_CLAIMS
+from . import (
+    balance_claims,
+    collision_claims,
+    exponent_claims,
+    resonance_claims,
+    similarity_claims,
+    spectrum_claims,
+)
 from .claim import Claim
-from .collision_claims import COLLISION_CLAIMS
-from .exponent_claims import EXPONENT_CLAIMS
-from .resonance_claims import RESONANCE_CLAIMS
-from .similarity_claims import SIMILARITY_CLAIMS
-from .spectrum_claims import SPECTRUM_CLAIMS
 
 SECTIONS: dict[str, tuple[Claim, ...]] = {
-    "Resonances": RESONANCE_CLAIMS,
-    "Collisions": COLLISION_CLAIMS,
-    "Chaos": EXPONENT_CLAIMS,
-    "Motion at 260 Hz": SPECTRUM_CLAIMS,
-    "Analytical solution of the continuous model": BALANCE_CLAIMS,
-    "Similarity of the models": SIMILARITY_CLAIMS,
+    heading: tuple(each for each in vars(module).values() if isinstance(each, Claim))
+    for heading, module in {
+        "Resonances": resonance_claims,
+        "Collisions": collision_claims,
+        "Chaos": exponent_claims,
+        "Motion at 260 Hz": spectrum_claims,
+        "Analytical solution of the continuous model": balance_claims,
+        "Similarity of the models": similarity_claims,
+    }.items()
 }
+"""By heading; within a section in the order in which its file declares them."""
 CLAIMS = tuple(claim for claims in SECTIONS.values() for claim in claims)

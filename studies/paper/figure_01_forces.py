@@ -2,17 +2,9 @@
 
 import numpy as np
 
-from vibench.analysis.report import (
-    LEVEL_STYLES,
-    LEVELS,
-    MEASURED,
-    DrawnFigure,
-    legend_above,
-    new_figure,
-    styled,
-    table,
-)
+from vibench.analysis import report
 from vibench.sim import gong2025, spring_of
+from vibench.sim.study import Study
 
 from .options import FigureOptions
 
@@ -23,27 +15,33 @@ _HIGHEST = 1.5
 """Shown up to this multiple of the largest contact force."""
 
 
-def forces_figure(options: FigureOptions) -> DrawnFigure:
+def studies(_: FigureOptions) -> tuple[Study, ...]:
+    """Return none: forces need no study."""
+    return ()
+
+
+def draw(options: FigureOptions) -> report.DrawnFigure:
     """Draw force over relative displacement for all models."""
     p = np.linspace(0.0, _REACH * options.gap_m, 481)
     forces = {
         model: spring_of(gong2025(options.damping_time_s, options.gap_m, model)).force(p, np.zeros_like(p))
         for model in ("hertz", *_MODELS)
     }
-    with styled():
-        figure = new_figure(3.4)
+    with report.styled():
+        figure = report.new_figure(3.4)
         axes = figure.subplots()
-        axes.plot(1e6 * p, forces["hertz"], color=MEASURED, linewidth=1.8, label="Hertz stops")
-        for model, colour, line in zip(_MODELS, LEVELS, LEVEL_STYLES, strict=False):
-            axes.plot(1e6 * p, forces[model], color=colour, linestyle=line, label=_name(model))
+        axes.plot(1e6 * p, forces["hertz"], color=report.MEASURED, linewidth=1.8, label="Hertz stops")
+        for model, colour, line in zip(_MODELS, report.LEVELS, report.LEVEL_STYLES, strict=False):
+            label = f"n = {model.removeprefix('power:')}"
+            axes.plot(1e6 * p, forces[model], color=colour, linestyle=line, label=label)
         axes.axvline(1e6 * options.gap_m, color="#9a9a9a", linewidth=0.8)
         axes.set_ylim(0, _HIGHEST * float(forces["hertz"].max()))
         axes.set_xlim(0, 1e6 * float(p[-1]))
         axes.set_xlabel("relative displacement p [µm]")
         axes.set_ylabel("force between m1 and m2 [N]")
-        legend_above(figure, [axes])
-    columns = {_column(model): force for model, force in forces.items()}
-    return DrawnFigure(
+        report.legend_above(figure, [axes])
+    columns = {f"force_{model.replace(':', '_').replace('+', '_')}_n": forces[model] for model in forces}
+    return report.DrawnFigure(
         name="figure_1c",
         title="Figure 1 c: forces of the models",
         caption=(
@@ -52,13 +50,5 @@ def forces_figure(options: FigureOptions) -> DrawnFigure:
             "does not say otherwise."
         ),
         figure=figure,
-        tables=(table("figure_1c", relative_displacement_m=p, **columns),),
+        tables=(report.table("figure_1c", relative_displacement_m=p, **columns),),
     )
-
-
-def _name(model: str) -> str:
-    return f"n = {model.removeprefix('power:')}"
-
-
-def _column(model: str) -> str:
-    return f"force_{model.replace(':', '_').replace('+', '_')}_n"

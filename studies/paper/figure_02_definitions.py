@@ -1,42 +1,38 @@
 """Fig. 2: what Responses I and II are: a time signal at 200 Hz, its spectrum, and the curves."""
 
-from vibench.analysis.report import MEASURED, SIMULATED, DrawnFigure, legend_above, new_figure, styled, table
+from vibench.analysis import report
+from vibench.sim import Harmonic
 from vibench.sim.study import Study, StudyResults
 
 from .options import FigureOptions
-from .responses import draw_linear, drive_at, finish, responses
+from .responses import draw_linear, draw_responses, responses
 from .time_signal import draw_outline, draw_spectrum, time_signal
 
 _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 200.0
 
 
-def definitions_study(options: FigureOptions) -> Study:
+def studies(options: FigureOptions) -> tuple[Study, ...]:
     """Hertz stops at 5 um."""
-    return options.study(("hertz",), (_AMPLITUDE_M,))
+    return (options.study(("hertz",), (_AMPLITUDE_M,)),)
 
 
-def definitions_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
+def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
     """Draw signal, spectrum and response curves at 5 um."""
-    curve = responses(results)
-    specimen = options.specimen()
-    signal = time_signal(specimen, drive_at(_SHOWN_HZ, _AMPLITUDE_M), options)
-    with styled():
-        figure = new_figure(5.4)
+    curve, specimen = responses(results), options.specimen()
+    signal = time_signal(specimen, Harmonic(_SHOWN_HZ, _AMPLITUDE_M), options)
+    with report.styled():
+        figure = report.new_figure(5.4)
         grid = figure.add_gridspec(2, 2)
         outline, spectrum = figure.add_subplot(grid[0, 0]), figure.add_subplot(grid[0, 1])
         curves = figure.add_subplot(grid[1, :])
         draw_outline(outline, signal, options)
         draw_spectrum(spectrum, signal, specimen, _SHOWN_HZ)
         draw_linear(curves, curve.frequency_hz, specimen)
-        curves.plot(curve.frequency_hz, curve.response_i, color=MEASURED, label="Response I")
-        curves.plot(
-            curve.frequency_hz, curve.response_ii, color=SIMULATED, linestyle="-.", label="Response II"
-        )
+        draw_responses(curves, curve)
         curves.axvline(_SHOWN_HZ, color="#9a9a9a", linestyle="--", linewidth=0.8)
-        finish(curves, curve.frequency_hz, "response of m0 over A0")
         curves.set_xlabel("drive frequency [Hz]")
-        legend_above(figure, [curves])
-    return DrawnFigure(
+        report.legend_above(figure, [curves])
+    return report.DrawnFigure(
         name="figure_2",
         title="Figure 2: Responses I and II",
         caption=(
@@ -46,12 +42,14 @@ def definitions_figure(options: FigureOptions, results: StudyResults) -> DrawnFi
         ),
         figure=figure,
         tables=(
-            table(
+            report.table(
                 "figure_2",
                 frequency_hz=curve.frequency_hz,
                 response_i=curve.response_i,
                 response_ii=curve.response_ii,
             ),
-            table("figure_2_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude),
+            report.table(
+                "figure_2_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude
+            ),
         ),
     )

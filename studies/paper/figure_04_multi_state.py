@@ -2,61 +2,53 @@
 
 import numpy as np
 
-from vibench.analysis.report import (
-    LINEAR,
-    MEASURED,
-    SIMULATED,
-    TERMINAL,
-    DrawnFigure,
-    frequency_axis,
-    legend_above,
-    new_figure,
-    styled,
-    table,
-)
+from vibench.analysis import report
+from vibench.sim import Harmonic
 from vibench.sim.study import Study, StudyResults
 
 from .options import WITH_EXPONENT, FigureOptions
-from .responses import draw_linear, drive_at, finish, responses, shade
+from .responses import draw_linear, finish, responses, shade
 from .time_signal import draw_outline, draw_spectrum, time_signal
 
 _AMPLITUDE_M, _SHOWN_HZ = 5e-6, 260.0
 
 
-def multi_state_study(options: FigureOptions) -> Study:
+def studies(options: FigureOptions) -> tuple[Study, ...]:
     """Study stops and no stops at 5 um, with the largest exponent."""
-    return options.study(("hertz", "linear"), (_AMPLITUDE_M,), observe=WITH_EXPONENT)
+    return (options.study(("hertz", "linear"), (_AMPLITUDE_M,), observe=WITH_EXPONENT),)
 
 
-def multi_state_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
+def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
     """Draw response, relative displacement and exponent over frequency, and the motion at 260 Hz."""
     curve, linear = responses(results, model="hertz"), responses(results, model="linear")
     specimen = options.specimen()
-    signal = time_signal(specimen, drive_at(_SHOWN_HZ, _AMPLITUDE_M), options)
+    signal = time_signal(specimen, Harmonic(_SHOWN_HZ, _AMPLITUDE_M), options)
     f = curve.frequency_hz
-    with styled():
-        figure = new_figure(7.6)
+    with report.styled():
+        figure = report.new_figure(7.6)
         grid = figure.add_gridspec(4, 2)
         first, relative, exponent = (figure.add_subplot(grid[row, :]) for row in range(3))
         for axes in (first, relative, exponent):
             shade(axes, f, curve.collides, "m1 and m2 collide")
         draw_linear(first, f, specimen)
-        first.plot(f, curve.response_i, color=MEASURED, label="Response I")
+        first.plot(f, curve.response_i, color=report.MEASURED, label="Response I")
         finish(first, f, "x of m0 over A0")
-        relative.plot(f, linear.relative_i, color=LINEAR, linestyle="--")
-        relative.plot(f, curve.relative_i, color=MEASURED)
-        relative.axhline(options.gap_m / _AMPLITUDE_M, color=TERMINAL, linestyle=":", label="the gap over A0")
+        relative.plot(f, linear.relative_i, color=report.LINEAR, linestyle="--")
+        relative.plot(f, curve.relative_i, color=report.MEASURED)
+        relative.axhline(
+            options.gap_m / _AMPLITUDE_M, color=report.TERMINAL, linestyle=":", label="the gap over A0"
+        )
         finish(relative, f, "p over A0")
-        exponent.plot(f, curve.exponent_per_s, color=SIMULATED, label="largest exponent")
+        exponent.plot(f, curve.exponent_per_s, color=report.SIMULATED, label="largest exponent")
         exponent.axhline(0.0, color="#9a9a9a", linewidth=0.8)
-        frequency_axis(exponent, max(float(f[0]), 10.0), float(f[-1]))
+        report.frequency_axis(exponent, max(float(f[0]), 10.0), float(f[-1]))
         exponent.set_ylabel("exponent [1/s]")
         exponent.set_xlabel("drive frequency [Hz]")
         draw_outline(figure.add_subplot(grid[3, 0]), signal, options)
         draw_spectrum(figure.add_subplot(grid[3, 1]), signal, specimen, _SHOWN_HZ)
-        legend_above(figure, [first, relative, exponent])
+        report.legend_above(figure, [first, relative, exponent])
         figure.align_ylabels([first, relative, exponent])
-    return DrawnFigure(
+    return report.DrawnFigure(
         name="figure_4",
         title="Figure 4: colliding and free states at 5 µm",
         caption=(
@@ -66,7 +58,7 @@ def multi_state_figure(options: FigureOptions, results: StudyResults) -> DrawnFi
         ),
         figure=figure,
         tables=(
-            table(
+            report.table(
                 "figure_4",
                 frequency_hz=f,
                 response_i=curve.response_i,
@@ -74,6 +66,8 @@ def multi_state_figure(options: FigureOptions, results: StudyResults) -> DrawnFi
                 exponent_per_s=curve.exponent_per_s,
                 collides=curve.collides.astype(np.int64),
             ),
-            table("figure_4_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude),
+            report.table(
+                "figure_4_spectrum", frequency_hz=signal.frequency_hz, amplitude_over_a0=signal.amplitude
+            ),
         ),
     )

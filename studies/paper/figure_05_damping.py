@@ -1,19 +1,23 @@
 """Fig. 5: what damping does, and what a larger amplitude does, to Responses I and II."""
 
-import numpy as np
-from matplotlib.axes import Axes
+from typing import TYPE_CHECKING
 
-from vibench.analysis import InvalidRequest
-from vibench.analysis.report import LEVELS, MEASURED, DrawnFigure, new_figure, styled, table
+import numpy as np
+
+from vibench.analysis import InvalidRequest, report
 from vibench.sim.study import Study, StudyResults
 
 from .options import FigureOptions
 from .responses import Responses, finish, responses
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 _LOW_M, _HIGH_M = 5e-6, 7e-6
+_WHAT = ("response_i", "response_ii")
 
 
-def damping_study(options: FigureOptions) -> Study:
+def studies(options: FigureOptions) -> tuple[Study, ...]:
     """With and without damping, at 5 and 7 um.
 
     Raises InvalidRequest where there is no damping to compare with none.
@@ -21,27 +25,21 @@ def damping_study(options: FigureOptions) -> Study:
     damped_s = options.only_damping_time_s
     if damped_s == 0.0:
         raise InvalidRequest("figure 5 compares damping with none; give a damping time above 0 s")
-    return options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, damped_s))
+    return (options.study(("hertz",), (_LOW_M, _HIGH_M), damping_times_s=(0.0, damped_s)),)
 
 
-def damping_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure:
+def draw(options: FigureOptions, results: StudyResults) -> report.DrawnFigure:
     """Draw both comparisons for both responses, with the colliding regions as bars."""
     damped = responses(results, damping_time=options.damping_time_s, amplitude=_LOW_M)
     undamped = responses(results, damping_time=0.0, amplitude=_LOW_M)
     higher = responses(results, damping_time=options.damping_time_s, amplitude=_HIGH_M)
-    with styled():
-        figure = new_figure(6.2)
+    rows = ({"with damping": damped, "without damping": undamped}, {"A0 = 5 µm": damped, "A0 = 7 µm": higher})
+    with report.styled():
+        figure = report.new_figure(6.2)
         panels = figure.subplots(2, 2, sharex=True, sharey=True)
-        for row, pair in zip(
-            panels,
-            (
-                (("with damping", damped), ("without damping", undamped)),
-                (("A0 = 5 µm", damped), ("A0 = 7 µm", higher)),
-            ),
-            strict=True,
-        ):
-            for axes, what in zip(row, ("response_i", "response_ii"), strict=True):
-                _compare(axes, pair, what)
+        for row, curves in zip(panels, rows, strict=True):
+            for axes, what in zip(row, _WHAT, strict=True):
+                _compare(axes, curves, what)
         panels[0, 0].set_title("Response I")
         panels[0, 1].set_title("Response II")
         for axes in panels[1]:
@@ -50,36 +48,33 @@ def damping_figure(options: FigureOptions, results: StudyResults) -> DrawnFigure
             axes.set_ylabel("")
         for axes in panels[:, 0]:
             axes.legend(loc="center left")
-    return DrawnFigure(
+    shares = [f"{np.mean(each.collides):.0%}" for each in (damped, undamped, higher)]
+    columns = {
+        f"{what}_{name}": getattr(curve, what).astype(np.float64)
+        for name, curve in (("damped", damped), ("undamped", undamped), ("damped_7um", higher))
+        for what in (*_WHAT, "collides")
+    }
+    return report.DrawnFigure(
         name="figure_5",
         title="Figure 5: influence of damping and of the amplitude",
         caption=(
             "Bars at the foot: frequencies at which m1 and m2 collide, in the colour of the curve. Without "
             "damping nothing forgets how it began, and each point is one draw. "
-            f"{_regions(damped, undamped, higher)} {options.sentence}"
+            f"Colliding at {shares[0]} of the frequencies with damping and 5 µm, {shares[1]} without "
+            f"damping, {shares[2]} at 7 µm. {options.sentence}"
         ),
         figure=figure,
-        tables=(
-            table(
-                "figure_5",
-                frequency_hz=damped.frequency_hz,
-                **{
-                    f"{what}_{name}": getattr(curve, what).astype(np.float64)
-                    for name, curve in (("damped", damped), ("undamped", undamped), ("damped_7um", higher))
-                    for what in ("response_i", "response_ii", "collides")
-                },
-            ),
-        ),
+        tables=(report.table("figure_5", frequency_hz=damped.frequency_hz, **columns),),
     )
 
 
-def _compare(axes: Axes, pair: tuple[tuple[str, Responses], tuple[str, Responses]], what: str) -> None:
-    for number, ((label, curve), colour, line) in enumerate(
-        zip(pair, (MEASURED, LEVELS[2]), ("-", "--"), strict=True)
-    ):
-        axes.plot(curve.frequency_hz, getattr(curve, what), color=colour, linestyle=line, label=label)
+def _compare(axes: "Axes", curves: dict[str, Responses], what: str) -> None:
+    styles = zip(curves.items(), (report.MEASURED, report.LEVELS[2]), ("-", "--"), strict=True)
+    for number, ((label, curve), colour, line) in enumerate(styles):
+        f = curve.frequency_hz
+        axes.plot(f, getattr(curve, what), color=colour, linestyle=line, label=label)
         axes.fill_between(
-            curve.frequency_hz,
+            f,
             0.03 * number,
             0.03 * number + 0.025,
             where=curve.collides.tolist(),
@@ -87,12 +82,4 @@ def _compare(axes: Axes, pair: tuple[tuple[str, Responses], tuple[str, Responses
             color=colour,
             linewidth=0,
         )
-    finish(axes, pair[0][1].frequency_hz, "response of m0 over A0")
-
-
-def _regions(damped: Responses, undamped: Responses, higher: Responses) -> str:
-    shares = [f"{np.mean(each.collides):.0%}" for each in (damped, undamped, higher)]
-    return (
-        f"Colliding at {shares[0]} of the frequencies with damping and 5 µm, {shares[1]} without damping, "
-        f"{shares[2]} at 7 µm."
-    )
+        finish(axes, f, "response of m0 over A0")

@@ -11,7 +11,6 @@ from vibench.sim.study import Study, StudyObservable, frequency_range
 
 AMPLITUDES_M = (1e-6, 5e-6, 10e-6, 50e-6)
 """The paper's four cases, weak to strong (its section 3.1; Figs. 3, 6 and 7)."""
-CASES = ("Case 1", "Case 2", "Case 3", "Case 4")
 LOWEST_HZ = 5.0
 _LONGEST_DAMPING_TIME_S = 0.01
 """More than fifteen times critical in the paper's third mode."""
@@ -19,11 +18,10 @@ _LEAST_GAP_M, _LARGEST_GAP_M = 1e-9, 0.01
 """From a thousandth of the weakest drive to two hundred times the strongest."""
 _PAPER = usual_specimen()
 WITH_EXPONENT: tuple[StudyObservable, ...] = (Observable.RESPONSE, Observable.LYAPUNOV)
-"""What a figure of exponents observes."""
 
 
 class FrequencyGrid(StrEnum):
-    """How closely the frequencies lie; the paper does not say."""
+    """Spacing of the frequencies; the paper does not give it."""
 
     COARSE = "coarse"
     """Every 5 Hz: about what the paper's curves look like."""
@@ -84,7 +82,7 @@ class FigureOptions:
         return frequency_range(LOWEST_HZ, self.similarity_highest_hz, self.grid.step_hz)
 
     def study(self, models: tuple[str, ...], amplitudes_m: tuple[float, ...], **replaced: Any) -> Study:
-        """Ask for models at amplitudes under these options; fields of the study may be replaced."""
+        """Return the study of models at amplitudes under these options; its other fields may be replaced."""
         chosen: dict[str, Any] = {
             "gaps_m": (self.gap_m,),
             "specimen": self._described,
@@ -95,16 +93,16 @@ class FigureOptions:
             "window_s": self.window_s,
             "budget_s": self.budget_s,
         }
-        return Study(models=models, amplitudes_m=amplitudes_m, **{**chosen, **replaced})
+        return Study(models=models, amplitudes_m=amplitudes_m, **(chosen | replaced))
 
     def specimen(self, contact: str = "hertz") -> Specimen:
         """Build the paper's specimen under these options."""
-        own_s = self.damping_time_s if self.damping_ratio is None else None
-        return self._described.specimen(contact, own_s, self.gap_m)
+        damping_time_s = self.damping_time_s if self.damping_ratio is None else None
+        return self._described.specimen(contact, damping_time_s, self.gap_m)
 
     @property
     def only_damping_time_s(self) -> float:
-        """Damping time of a figure that can say no other damping.
+        """Damping time of a figure that has no other damping.
 
         Raises InvalidRequest under a damping ratio.
         """
@@ -122,14 +120,14 @@ class FigureOptions:
 
     @property
     def damping(self) -> str:
-        """Say the damping."""
+        """The damping in words."""
         if self.damping_ratio is None:
             return f"c = {self.damping_time_s:.3g} s · k"
         return f"c_i = 2 · {self.damping_ratio:g} · m_i ω_i"
 
     @property
     def sentence(self) -> str:
-        """Say the options under a figure."""
+        """The options as a sentence under a figure."""
         return (
             f"Options: {self.damping}, gap {1e6 * self.gap_m:g} µm, "
             f"{self.accuracy.value} accuracy, every {self.grid.step_hz:g} Hz, {self.duration_s:g} s from "

@@ -1,14 +1,17 @@
-"""Response curves out of a study, and how they are drawn in every figure of the paper."""
+"""Response curves from a study, and how every figure of the paper draws them."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from vibench.analysis.report import COLLIDING, LINEAR, frequency_axis, magnitude_axis
-from vibench.sim import Harmonic, Specimen, base_transmissibility
+from vibench.analysis import report
+from vibench.sim import Specimen, base_transmissibility
 from vibench.sim.study import StudyResults
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Reals = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -32,32 +35,14 @@ def responses(results: StudyResults, **fixed: float | str) -> Responses:
     """Read one curve of a study; every axis but frequency is fixed, or has one value."""
     only = {axis.name: axis.values[0] for axis in results.axes if len(axis.values) == 1}
     at = {name: value for name, value in {**only, **fixed}.items() if name != "frequency"}
-    impacts = results.values("impacts", **at)
     return Responses(
         frequency_hz=np.asarray(results.study.frequencies_hz),
         response_i=results.values("response_i", **at),
         response_ii=results.values("response_ii", **at),
         relative_i=results.values("relative_i", **at),
         exponent_per_s=results.values("lyapunov", **at),
-        collides=np.asarray(np.nan_to_num(impacts) > 0),
+        collides=np.asarray(np.nan_to_num(results.values("impacts", **at)) > 0),
     )
-
-
-def drive_at(frequency_hz: float, amplitude_m: float) -> Harmonic:
-    """U = A0 sin(omega t), as in the paper."""
-    return Harmonic(frequency_hz, amplitude_m)
-
-
-def shade(axes: Axes, frequency_hz: Reals, flags: Flags, label: str | None = None) -> None:
-    """Shade the frequencies that are flagged, each to halfway to its neighbours."""
-    if not flags.any():
-        return
-    between = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
-    edges = np.concatenate(([frequency_hz[0]], between, [frequency_hz[-1]]))
-    changes = np.flatnonzero(np.diff(np.concatenate(([False], flags, [False])).astype(np.int8)))
-    for number, (first, last) in enumerate(changes.reshape(-1, 2)):
-        named = label if number == 0 else None
-        axes.axvspan(edges[first], edges[last], color=COLLIDING, zorder=0, linewidth=0, label=named)
 
 
 def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
@@ -65,21 +50,38 @@ def linear_transmissibility(specimen: Specimen, frequency_hz: Reals) -> Reals:
     return np.abs(base_transmissibility(specimen, frequency_hz)[:, 0])
 
 
-def draw_linear(axes: Axes, frequency_hz: Reals, specimen: Specimen) -> None:
-    """Draw the response without contact, on a grid of its own that shows its peaks."""
+def stretches(flags: Flags) -> NDArray[np.intp]:
+    """Return first index and end of every run of flagged neighbours, shape (runs, 2)."""
+    changes = np.diff(np.concatenate(([False], flags, [False])).astype(np.int8))
+    return np.flatnonzero(changes).reshape(-1, 2)
+
+
+def shade(axes: "Axes", frequency_hz: Reals, flags: Flags, label: str) -> None:
+    """Shade the frequencies that are flagged, each to halfway to its neighbours."""
+    between = 0.5 * (frequency_hz[1:] + frequency_hz[:-1])
+    edges = np.concatenate(([frequency_hz[0]], between, [frequency_hz[-1]]))
+    for number, (first, end) in enumerate(stretches(flags)):
+        only_once = label if number == 0 else None
+        axes.axvspan(edges[first], edges[end], color=report.COLLIDING, zorder=0, linewidth=0, label=only_once)
+
+
+def draw_linear(axes: "Axes", frequency_hz: Reals, specimen: Specimen) -> None:
+    """Draw the response without contact, on a finer grid that shows its peaks."""
     fine = np.linspace(frequency_hz[0], frequency_hz[-1], 4 * frequency_hz.size)
-    axes.plot(
-        fine,
-        linear_transmissibility(specimen, fine),
-        color=LINEAR,
-        linestyle="--",
-        linewidth=1.0,
-        label="without contact",
-    )
+    linear = linear_transmissibility(specimen, fine)
+    axes.plot(fine, linear, color=report.LINEAR, linestyle="--", linewidth=1.0, label="without contact")
 
 
-def finish(axes: Axes, frequency_hz: Reals, label: str) -> None:
-    """Give a response panel its axes."""
-    frequency_axis(axes, float(max(frequency_hz[0], 10.0)), float(frequency_hz[-1]))
-    magnitude_axis(axes)
+def draw_responses(axes: "Axes", curve: Responses) -> None:
+    """Draw Responses I and II."""
+    f = curve.frequency_hz
+    axes.plot(f, curve.response_i, color=report.MEASURED, label="Response I")
+    axes.plot(f, curve.response_ii, color=report.SIMULATED, linestyle="-.", label="Response II")
+    finish(axes, f, "response of m0 over A0")
+
+
+def finish(axes: "Axes", frequency_hz: Reals, label: str) -> None:
+    """Set the axes of a response panel."""
+    report.frequency_axis(axes, float(max(frequency_hz[0], 10.0)), float(frequency_hz[-1]))
+    report.magnitude_axis(axes)
     axes.set_ylabel(label)

@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.integrate import RK45
 
 from vibench.sim import Harmonic, Specimen
 from vibench.sim.accuracy_benchmark import Law, Place, law_of, numbers_of, rates
 from vibench.sim.kernels import Floats, kernel
 
 APART_M = 1e-11
-"""Distance of the neighbour that tells an exponent; far below any indentation, far above rounding."""
+"""Distance of the neighbour that gives an exponent; far below any indentation, far above rounding."""
 READING_S = 1e-3
 """Time between two readings of that distance."""
 LOST_M = 1.0
@@ -47,41 +48,23 @@ class TextbookMethod:
     """Every step, where no error is stated."""
     relative: float = math.inf
     absolute: float = 1.0
-    """What a component may be off by, in metres and in metres per second alike."""
+    """Allowed error of a component, in metres and in metres per second alike."""
 
 
-def _tableau(
-    nodes: list[float], stages: list[list[float]], result: list[float], error: list[float]
-) -> Tableau:
-    square = np.zeros((len(nodes), len(nodes)))
-    for number, row in enumerate(stages):
-        square[number, : len(row)] = row
-    return Tableau(np.array(nodes, dtype=float), square, np.array(result), np.array(error, dtype=float))
-
-
-_RUNGE_KUTTA = _tableau(
-    [0, 1 / 2, 1 / 2, 1], [[], [1 / 2], [0, 1 / 2], [0, 0, 1]], [1 / 6, 1 / 3, 1 / 3, 1 / 6], [0, 0, 0, 0]
+_RUNGE_KUTTA = Tableau(
+    np.array([0.0, 0.5, 0.5, 1.0]),
+    np.diag([0.5, 0.5, 1.0], -1),
+    np.array([1.0, 2.0, 2.0, 1.0]) / 6.0,
+    np.zeros(4),
 )
-_FIFTH = [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84, 0]
-_FOURTH = [5179 / 57600, 0, 7571 / 16695, 393 / 640, -92097 / 339200, 187 / 2100, 1 / 40]
-_DORMAND_PRINCE = _tableau(
-    [0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1, 1],
-    [
-        [],
-        [1 / 5],
-        [3 / 40, 9 / 40],
-        [44 / 45, -56 / 15, 32 / 9],
-        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
-        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
-        _FIFTH,
-    ],
-    _FIFTH,
-    [fifth - fourth for fifth, fourth in zip(_FIFTH, _FOURTH, strict=True)],
+_FIFTH = np.append(RK45.B, 0.0)
+_DORMAND_PRINCE = Tableau(
+    np.append(RK45.C, 1.0), np.vstack([np.pad(RK45.A, ((0, 0), (0, 2))), _FIFTH]), _FIFTH, RK45.E
 )
 
 
 def runge_kutta(step_s: float) -> TextbookMethod:
-    """Give the classical method of fourth order in steps of fixed length.
+    """Return the classical method of fourth order in steps of fixed length.
 
     Raises ValueError when the step is not positive and finite.
     """
@@ -92,7 +75,7 @@ def runge_kutta(step_s: float) -> TextbookMethod:
 
 
 def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0) -> TextbookMethod:
-    """Give Dormand and Prince's pair, controlled as MATLAB does; the defaults are MATLAB's for a run of 30 s.
+    """Return Dormand and Prince's pair, controlled as MATLAB does; the defaults are MATLAB's for 30 s.
 
     Raises ValueError when a tolerance or the longest step is not positive and finite.
     """
@@ -109,21 +92,9 @@ def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0
 def textbook_state(
     specimen: Specimen, drive: Harmonic, method: TextbookMethod, duration_s: float, initial_state: ArrayLike
 ) -> Floats:
-    """Follow a motion from time zero and give its state at the end, shape (6,); NaN when it is lost.
+    """Follow a motion from time zero and return its state at the end, shape (6,); NaN when it is lost.
 
-    Raises ValueError for rigid stops.
-
-    Parameters
-    ----------
-    specimen, drive
-        Any contact law with a finite force.
-    method
-        How steps are taken.
-    duration_s
-        [s].
-    initial_state
-        x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
-
+    ``initial_state`` is x, y, z, vx, vy, vz, absolute [m, m/s]. Raises ValueError for rigid stops.
     """
     states = np.array(initial_state, dtype=np.float64).reshape(1, 6)
     _marched(states, duration_s, duration_s, *_in_numbers(specimen, drive, method))
@@ -137,26 +108,13 @@ def textbook_exponent(
     duration_s: float = 25.0,
     settle_s: float = 5.0,
 ) -> float:
-    """Give the largest exponent of what a method makes of a motion from rest [1/s]; NaN when it is lost.
+    """Return the largest exponent of what a method makes of a motion from rest [1/s]; NaN when it is lost.
 
-    The mean rate at which a neighbour parts that takes the very same steps. Regular motions have it to
-    about 1 / ``duration_s``.
-
-    Raises ValueError for rigid stops.
-
-    Parameters
-    ----------
-    specimen, drive
-        Any contact law with a finite force.
-    method
-        How steps are taken.
-    duration_s, settle_s
-        What is averaged, and what is left out before it [s].
-
+    The mean rate over ``duration_s``, after ``settle_s``, at which a neighbour parts that takes the very same
+    steps. Regular motions have it to about 1 / ``duration_s``. Raises ValueError for rigid stops.
     """
     states = np.zeros((2, 6))
-    scale = _scales(drive)
-    states[1] = APART_M / math.sqrt(6.0) * scale
+    states[1] = APART_M / math.sqrt(6.0) * _scales(drive)
     return _marched(states, settle_s + duration_s, settle_s, *_in_numbers(specimen, drive, method))
 
 

@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.analysis import InvalidRequest, LogarithmOf
-from vibench.cli.paper.case import AS_CHOSEN, Case, compared_up_to, damping, logarithm, swept_at
-from vibench.cli.paper.claim import Claim, Expectation, Verdict, about, at_least, at_most, judged
-from vibench.cli.paper.document import verdict_text
-from vibench.cli.paper.evidence import Evidence
-from vibench.cli.paper.options import FigureOptions
+from vibench.cli.paper.case import AS_CHOSEN, Case, change, damping
+from vibench.cli.paper.claim import Expectation, Verdict, about, at_least, at_most, claim, judgement
+from vibench.cli.paper.page import verdict_text
+from vibench.cli.paper.reading import Evidence
 
-CASE = Case(AS_CHOSEN, FigureOptions())
+CASE = Case()
 DAMPED, VERY_DAMPED = damping(3e-5), damping(5e-5)
 
 
@@ -21,15 +20,26 @@ def no_studies(study):
     raise AssertionError(f"a synthetic measurement asked for {study}")
 
 
-def claim(measure, *wanted, alternatives=()):
-    return Claim("key", "section 3", "It is so.", "Read off.", wanted, measure, alternatives)
+def made(measure, *wanted, tried=(), **more):
+    return claim("section 3", "Read off.", *wanted, tried=tried, **more)(measure)
 
 
-def judge(values_by_damping, *wanted, alternatives=(DAMPED, VERY_DAMPED)):
-    def measure(_evidence, case):
-        return values_by_damping[case.options.damping_time_s]
+def judge(values_by_damping, *wanted, tried=(DAMPED, VERY_DAMPED)):
+    def measure(reading):
+        """It is so."""
+        return values_by_damping[reading.case.damping_time_s]
 
-    return judged(claim(measure, *wanted, alternatives=alternatives), Evidence(no_studies), CASE)
+    return judgement(made(measure, *wanted, tried=tried), Evidence(no_studies), CASE)
+
+
+def test_a_claim_is_named_by_its_function_and_says_its_docstring():
+    @claim("section 3", "Read off.", at_least("peak", "Hz", 95.0), draws=3)
+    def first_peak(_reading):
+        """The first peak
+        is high.
+        """
+
+    assert (first_peak.key, first_peak.says, first_peak.draws) == ("first-peak", "The first peak is high.", 3)
 
 
 def test_a_number_within_its_bounds_holds_and_no_option_is_tried():
@@ -54,11 +64,8 @@ def test_a_claim_that_no_option_upholds_fails_and_keeps_all_that_was_tried():
 
 def test_a_claim_that_some_starts_uphold_holds_for_a_share_of_them_and_no_option_is_tried():
     last_hz = (310.0, 288.0, 291.0, 330.0)
-    sweep = replace(
-        claim(lambda _, case: (last_hz[case.draw],), about("last", "Hz", 290.0, 5.0), alternatives=(DAMPED,)),
-        draws=4,
-    )
-    found = judged(sweep, Evidence(no_studies), CASE)
+    sweep = made(lambda r: (last_hz[r.case.draw],), about("last", "Hz", 290.0, 5.0), tried=(DAMPED,), draws=4)
+    found = judgement(sweep, Evidence(no_studies), CASE)
     assert found.verdict is Verdict.HOLDS_FOR_SHARE
     (only,) = found.findings
     assert (only.met, only.values, only.spread(0)) == (2, (310.0,), (288.0, 330.0))
@@ -66,11 +73,11 @@ def test_a_claim_that_some_starts_uphold_holds_for_a_share_of_them_and_no_option
 
 
 def test_a_claim_that_every_start_upholds_holds_and_one_that_none_does_is_tried_under_options():
-    def measure(_evidence, case):
-        return (100.0 + case.draw if case.options.damping_time_s == 3e-5 else 10.0,)
+    def measure(reading):
+        return (100.0 + reading.case.draw if reading.case.damping_time_s == 3e-5 else 10.0,)
 
-    both = replace(claim(measure, at_least("exponent", "1/s", 50.0), alternatives=(DAMPED,)), draws=3)
-    found = judged(both, Evidence(no_studies), CASE)
+    both = made(measure, at_least("exponent", "1/s", 50.0), tried=(DAMPED,), draws=3)
+    found = judgement(both, Evidence(no_studies), CASE)
     assert found.verdict is Verdict.HOLDS_UNDER
     assert [len(each.draws) for each in found.findings] == [3, 3]
 
@@ -78,27 +85,27 @@ def test_a_claim_that_every_start_upholds_holds_and_one_that_none_does_is_tried_
 def test_other_starts_are_a_millionth_of_the_gap_from_rest_and_the_same_again():
     assert CASE.start == (0.0,) * 6
     moved = replace(CASE, draw=3)
-    assert 0.0 < max(abs(value) for value in moved.start[:3]) <= 1e-6 * CASE.options.gap_m
+    assert 0.0 < max(abs(value) for value in moved.start[:3]) <= 1e-6 * CASE.gap_m
     assert moved.start == replace(CASE, draw=3).start != replace(CASE, draw=4).start
 
 
 def test_one_number_out_of_bounds_is_enough_to_fail():
     wanted = (about("first", "Hz", 201.0, 1.0), about("second", "Hz", 435.0, 1.0))
-    assert judge({2e-5: (201.5, 435.5)}, *wanted, alternatives=()).verdict is Verdict.HOLDS
-    assert judge({2e-5: (201.5, 437.0)}, *wanted, alternatives=()).verdict is Verdict.FAILS
+    assert judge({2e-5: (201.5, 435.5)}, *wanted, tried=()).verdict is Verdict.HOLDS
+    assert judge({2e-5: (201.5, 437.0)}, *wanted, tried=()).verdict is Verdict.FAILS
 
 
 def test_a_number_that_could_not_be_measured_meets_nothing():
     anything = Expectation("peak", "Hz", -math.inf, math.inf)
-    assert judge({2e-5: (math.nan,)}, anything, alternatives=()).verdict is Verdict.FAILS
+    assert judge({2e-5: (math.nan,)}, anything, tried=()).verdict is Verdict.FAILS
 
 
 @given(low=st.floats(-1e6, 1e6), width=st.floats(0, 1e6), value=st.floats(-2e6, 2e6))
 def test_bounds_belong_to_what_is_wanted(low, width, value):
-    wanted = Expectation("anything", "", low, low + width)
-    assert wanted.is_met_by(low)
-    assert wanted.is_met_by(low + width)
-    assert wanted.is_met_by(value) == (low <= value <= low + width)
+    wanted = made(no_studies, Expectation("anything", "", low, low + width))
+    assert wanted.is_met_by((low,))
+    assert wanted.is_met_by((low + width,))
+    assert wanted.is_met_by((value,)) == (low <= value <= low + width)
 
 
 def test_bounds_that_hold_nothing_are_refused():
@@ -112,13 +119,14 @@ def test_a_measure_must_give_a_number_for_each_expectation():
 
 
 def test_an_option_changes_what_it_names_and_nothing_else():
-    assert DAMPED.of(CASE) == Case(DAMPED.name, FigureOptions(damping_time_s=3e-5))
-    other = logarithm(LogarithmOf.NORMALISED).of(CASE)
-    assert other.options == FigureOptions(logarithm_of=LogarithmOf.NORMALISED)
-    assert compared_up_to(600.0).of(CASE).options == FigureOptions(similarity_highest_hz=600.0)
-    swept = swept_at(4e-6).of(CASE)
-    assert (swept.options, swept.sweep_amplitude_m) == (CASE.options, 4e-6)
-    assert "4 µm" in swept.name
+    assert DAMPED.of(CASE) == replace(CASE, name=DAMPED.name, damping_time_s=3e-5)
+    for alternative, changes in (
+        (change("log", LogarithmOf.NORMALISED), {"logarithm_of": LogarithmOf.NORMALISED}),
+        (change("compared", 600.0), {"similarity_highest_hz": 600.0}),
+        (change("sweep-amplitude", 4e-6), {"sweep_amplitude_m": 4e-6}),
+    ):
+        assert alternative.of(CASE) == replace(CASE, name=alternative.name, **changes)
+    assert "4 µm" in change("sweep-amplitude", 4e-6).name
 
 
 def test_numbers_are_shown_with_their_units():

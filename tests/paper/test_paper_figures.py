@@ -5,7 +5,7 @@ import pytest
 
 from vibench.analysis import InvalidRequest, LogarithmOf
 from vibench.analysis.report import ImageKind
-from vibench.cli.paper.figures import PAPER_FIGURES
+from vibench.cli.paper.figures import paper_figure
 from vibench.cli.paper.options import AMPLITUDES_M, FigureOptions
 from vibench.cli.paper.responses import responses, shade
 from vibench.sim import Accuracy
@@ -30,8 +30,8 @@ def solved():
 
 
 def drawn(solved, number, options=SHORT):
-    figure = PAPER_FIGURES[number]
-    return figure.draw(options, tuple(solved(each) for each in figure.studies(options)))
+    figure = paper_figure(number)
+    return figure.draw(options, *(solved(each) for each in figure.studies(options)))
 
 
 def numbers(table, heading):
@@ -67,7 +67,7 @@ def test_figure_3_has_three_resonances_when_weak_and_two_others_when_strong(solv
 
 
 def test_figure_3_shades_the_frequencies_that_collide_and_no_others(solved):
-    results = solved(PAPER_FIGURES[3].studies(SHORT)[0])
+    results = solved(paper_figure(3).studies(SHORT)[0])
     for amplitude_m, table in zip(AMPLITUDES_M, drawn(solved, 3).tables, strict=True):
         curve = responses(results, amplitude=amplitude_m)
         assert np.array_equal(numbers(table, "collides") > 0, curve.collides)
@@ -85,7 +85,7 @@ def test_shading_reaches_halfway_to_the_neighbours():
             self.spans.append((low, high))
 
     axes = Recorder()
-    shade(axes, np.array([1.0, 2.0, 4.0, 5.0]), np.array([False, True, False, True]))
+    shade(axes, np.array([1.0, 2.0, 4.0, 5.0]), np.array([False, True, False, True]), "collide")
     assert axes.spans == [(1.5, 3.0), (4.5, 5.0)]
 
 

@@ -5,10 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import RK45
 
 from vibench.cli.paper.textbook_methods import (
-    _DORMAND_PRINCE,
     ode45,
     runge_kutta,
     textbook_exponent,
@@ -39,14 +37,6 @@ def test_the_classical_method_is_of_fourth_order():
         for h in (5e-5, 2.5e-5)
     )
     assert coarse / fine == pytest.approx(16.0, rel=0.1)
-
-
-def test_the_pair_has_the_numbers_of_scipy():
-    nodes, stages, result, error = _DORMAND_PRINCE
-    np.testing.assert_allclose(nodes[:6], RK45.C, rtol=1e-15)
-    np.testing.assert_allclose(stages[:6, :5], RK45.A, rtol=1e-15)
-    np.testing.assert_allclose(result[:6], RK45.B, rtol=1e-15)
-    np.testing.assert_allclose(error, -RK45.E, rtol=1e-12, atol=1e-16)
 
 
 def test_ode45_errs_as_its_tolerances_let_it():

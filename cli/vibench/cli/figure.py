@@ -12,6 +12,7 @@ from vibench.sim import Accuracy
 
 from .analyse import complain_about
 from .output import bold, console, leave_output_to_json, print_json
+from .paper.figures import FILES, paper_figure
 from .paper.options import FigureOptions, FrequencyGrid
 from .paths import AsJson, room_for_folder
 from .study import KeptStudies, Workers
@@ -52,20 +53,18 @@ def figure(
     as_json: AsJson = False,
 ) -> None:
     """Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped."""
-    from .paper.figures import PAPER_FIGURES
-
     if as_json:
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
     # Whoever asks for all of them learns before the first what one of them cannot be drawn with.
-    asked = {each: PAPER_FIGURES[each].studies(options) for each in numbers if each in PAPER_FIGURES}
+    asked = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])
     studies = KeptStudies(out / "studies", workers)
 
     def simulated(each: int) -> "Iterator[DrawnFigure]":
-        yield PAPER_FIGURES[each].draw(options, tuple(studies(one) for one in asked[each]))
+        yield paper_figure(each).draw(options, *(studies(one) for one in asked[each]))
 
     written: list[dict[str, object]] = []
     for each in numbers:
@@ -79,11 +78,9 @@ def figure(
 
 
 def _numbers(asked: str) -> tuple[int, ...]:
-    from .paper.figures import PAPER_FIGURES
-
-    known = (*PAPER_FIGURES, *EXPERIMENT)
+    known = (*FILES, *EXPERIMENT)
     if asked == ALL:
-        return tuple(PAPER_FIGURES)
+        return tuple(FILES)
     if asked.isdigit() and int(asked) in known:
         return (int(asked),)
     raise InvalidRequest(f"figure {asked!r} was asked for; the paper has 1 to {known[-1]}, or say all")

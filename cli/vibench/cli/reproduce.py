@@ -17,7 +17,7 @@ from .paths import AsJson, room_for_folder, room_for_page
 from .study import KeptStudies, Workers
 
 if TYPE_CHECKING:
-    from .paper.document import Reproduction
+    from .paper.page import Reproduction
 
 PAGE = "reproduction.md"
 _FORMS = ", ".join(f"{name}={option.example} ({option.about})" for name, option in OPTIONS.items())
@@ -49,12 +49,11 @@ def reproduce(
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
     from vibench.analysis.report import write_page
 
+    from .paper import figure_03_levels
     from .paper.claims import SECTIONS
-    from .paper.damping_score import damping_score_figure
-    from .paper.document import reproduction_document, reproduction_page
-    from .paper.evidence import Evidence, levels_asked
-    from .paper.figure_03_levels import levels_figure
-    from .paper.reproduce import reproduction
+    from .paper.page import reproduction, reproduction_document, reproduction_page
+    from .paper.reading import Evidence, Reading
+    from .paper.settings import score_figure
 
     if as_json:
         leave_output_to_json()
@@ -67,8 +66,8 @@ def reproduce(
     evidence = Evidence(studies)
     found = reproduction(SECTIONS, evidence, case, lambda step: console.print(f"measuring {step}"))
     page.parent.mkdir(parents=True, exist_ok=True)
-    score = damping_score_figure(found.scores)
-    levels = levels_figure(case.options, evidence.study(levels_asked(case)))
+    score = score_figure(found.scores)
+    levels = figure_03_levels.draw(case, evidence.study(Reading(evidence, case).levels()))
     pictures = []
     for drawn in (score, levels):
         image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
@@ -85,7 +84,7 @@ def reproduce(
 
 
 def _tell(found: "Reproduction") -> None:
-    from .paper.document import verdict_text
+    from .paper.page import verdict_text
 
     rows = Table(title="What of the paper holds", title_justify="left")
     rows.add_column("claim")

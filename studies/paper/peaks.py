@@ -9,26 +9,25 @@ from .responses import Reals, linear_transmissibility
 
 LEAST_PROMINENCE = 2.0
 """A peak stands twice above what parts it from a higher one: chaos scatters Response I by some per cent."""
-PAIR = 2
 _FINE_POINTS = 60_000
 """0.01 Hz over the band."""
 
 
 def response_peaks(frequency_hz: Reals, response: Reals, least_prominence: float = LEAST_PROMINENCE) -> Reals:
-    """Frequencies of the peaks of a curve, ascending: places of the grid, shape (peaks,)."""
+    """Return the frequencies of the peaks of a curve, ascending, shape (peaks,)."""
     known = np.isfinite(response)
     found, _ = find_peaks(np.log(response[known]), prominence=np.log(least_prominence))
     return np.asarray(frequency_hz[known][found])
 
 
 def linear_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
-    """Frequencies of the peaks of m0 over the base without contact, to 0.01 Hz, shape (peaks,)."""
+    """Return the frequencies of the peaks of m0 over the base without contact, to 0.01 Hz, shape (peaks,)."""
     fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
     return response_peaks(fine, linear_transmissibility(specimen, fine))
 
 
 def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
-    """Frequencies of the same peaks with m1 held on m2, to 0.01 Hz, shape (peaks,)."""
+    """Return the frequencies of the same peaks with m1 held on m2, to 0.01 Hz, shape (peaks,)."""
     mass, damping, stiffness = bound_matrices(specimen)
     fine = np.linspace(low_hz, high_hz, _FINE_POINTS)
     omega = 2.0 * np.pi * fine[:, None, None]
@@ -39,18 +38,18 @@ def bound_peaks(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
 
 
 def two_highest(frequency_hz: Reals, response: Reals) -> tuple[float, float, float]:
-    """Frequencies of the two highest peaks, ascending, and the next over the second; NaN if there is one."""
+    """Return the two highest peaks, ascending [Hz], and the next over the second; NaN if there is one."""
     found = np.flatnonzero(np.isin(frequency_hz, response_peaks(frequency_hz, response)))
-    if found.size < PAIR:
+    if found.size < 2:
         return np.nan, np.nan, np.nan
     ranked = found[np.argsort(-response[found])]
-    first, second = np.sort(frequency_hz[ranked[:PAIR]])
-    following = response[ranked[PAIR]] / response[ranked[PAIR - 1]] if found.size > PAIR else 0.0
+    first, second = np.sort(frequency_hz[ranked[:2]])
+    following = response[ranked[2]] / response[ranked[1]] if found.size > 2 else 0.0
     return float(first), float(second), float(following)
 
 
 def nearest(found: Reals, wanted_hz: tuple[float, ...]) -> tuple[float, ...]:
-    """Give the peak nearest to each wanted frequency; NaN where there is none at all."""
+    """Return the peak nearest to each wanted frequency; NaN where there is none at all."""
     if found.size == 0:
         return tuple(np.nan for _ in wanted_hz)
     return tuple(float(found[np.argmin(np.abs(found - wanted))]) for wanted in wanted_hz)

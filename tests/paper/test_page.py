@@ -7,54 +7,46 @@ import pytest
 
 from tests.reading_reports import Page
 from vibench.analysis.report import ReportTable, write_page
-from vibench.cli.paper.case import AS_CHOSEN, SCORED_S, Case, damping
-from vibench.cli.paper.claim import Claim, Verdict, at_least, judged
+from vibench.cli.paper.case import SCORED_S, Case, damping
+from vibench.cli.paper.claim import Verdict, at_least, claim, judgement
 from vibench.cli.paper.claims import CLAIMS, SECTIONS
-from vibench.cli.paper.damping_score import damping_score_figure
-from vibench.cli.paper.document import (
-    HEAD,
-    Reproduction,
-    reproduction_document,
-    reproduction_page,
-    wanted_text,
-)
-from vibench.cli.paper.evidence import Evidence
-from vibench.cli.paper.options import FigureOptions
-from vibench.cli.paper.score import DampingScore
+from vibench.cli.paper.page import HEAD, Reproduction, reproduction_document, reproduction_page, wanted_text
+from vibench.cli.paper.reading import Evidence
+from vibench.cli.paper.settings import DampingScore, score_figure, score_table
 
 PAGE = Path(__file__).parents[2] / "docs" / "reproduction.md"
-CASE = Case(AS_CHOSEN, FigureOptions())
+NO_STUDIES = Evidence(lambda study: pytest.fail(f"asked for {study}"))
+WANTED = at_least("exponent", "1/s", 100.0)
 
 
-def judgement(key, value_by_damping):
-    claim = Claim(
-        key,
-        "section 3",
-        f"It is so with {key}.",
-        "Read off.",
-        (at_least("exponent", "1/s", 100.0),),
-        lambda _, case: (value_by_damping[case.options.damping_time_s],),
-        (damping(3e-5),),
+def judged(key, measure, **more):
+    measure.__name__, measure.__doc__ = key, f"It is so with {key}."
+    made = claim("section 3", "Read off.", WANTED, tried=(damping(3e-5),), **more)(measure)
+    return judgement(made, NO_STUDIES, Case())
+
+
+def by_damping(key, value_by_damping):
+    return judged(key, lambda reading: (value_by_damping[reading.case.damping_time_s],))
+
+
+def scored(*held_and_failed):
+    return tuple(
+        DampingScore(damping_s, held, failed, -1.5, 120.0)
+        for damping_s, (held, failed) in zip((2e-5, 3e-5), held_and_failed, strict=False)
     )
-    return judged(claim, Evidence(lambda study: pytest.fail(f"asked for {study}")), CASE)
 
 
 @pytest.fixture
 def found():
     judgements = (
-        judgement("first", {2e-5: 120.0}),
-        judgement("second", {2e-5: 50.0, 3e-5: 130.0}),
-        judgement("third", {2e-5: 50.0, 3e-5: 60.0}),
+        by_damping("first", {2e-5: 120.0}),
+        by_damping("second", {2e-5: 50.0, 3e-5: 130.0}),
+        by_damping("third", {2e-5: 50.0, 3e-5: 60.0}),
     )
+    scores = scored((("first",), ("second", "third")), (("first", "second"), ("third",)))
+    regions = ReportTable("Regions", ("A0", "colliding"), (("1 µm", "nowhere"),), "Frequencies.")
     return Reproduction(
-        sections={"Synthetic": judgements},
-        scores=(
-            DampingScore(2e-5, ("first",), ("second", "third"), -1.5, 120.0),
-            DampingScore(3e-5, ("first", "second"), ("third",), -2.5, 90.0),
-        ),
-        tables=(ReportTable("Regions", ("A0", "colliding"), (("1 µm", "nowhere"),), "Frequencies."),),
-        options="Defaults: these.",
-        made_with="Computed by nobody.",
+        {"Synthetic": judgements}, scores, (score_table(scores), regions), "Defaults: these.", "By nobody."
     )
 
 
@@ -94,14 +86,13 @@ def test_what_differs_from_the_paper_is_said_first_with_the_option_that_would_ma
 def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
     """A sweep downwards held for most starts, and the page said that it does not hold."""
 
-    def measure(_, case):
-        return (130.0 if case.options.damping_time_s == 3e-5 and case.draw != 2 else 50.0,)
+    def measure(reading):
+        return (130.0 if reading.case.damping_time_s == 3e-5 and reading.case.draw != 2 else 50.0,)
 
-    wanted = (at_least("exponent", "1/s", 100.0),)
-    claim = Claim("chance", "section 3", "It is so.", "Read off.", wanted, measure, (damping(3e-5),), draws=4)
-    found = judged(claim, Evidence(lambda study: pytest.fail(f"asked for {study}")), CASE)
-    scores = (DampingScore(2e-5, (), ("chance",), -1.5, 120.0),)
-    page = reproduction_document(Reproduction({"Synthetic": (found,)}, scores, (), "Defaults: these.", ""))
+    found = judged("chance", measure, draws=4)
+    page = reproduction_document(
+        Reproduction({"Synthetic": (found,)}, scored(((), ("chance",))), (), "Defaults: these.", "")
+    )
     except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
     assert f"None of 1 options tried would make us meet{except_it}." in page
     assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
@@ -117,7 +108,7 @@ def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not
 
 
 def test_the_report_begins_with_the_count_and_has_a_card_for_each_section(found, tmp_path):
-    score, levels = damping_score_figure(found.scores), damping_score_figure(found.scores)
+    score, levels = score_figure(found.scores), score_figure(found.scores)
     path = write_page(reproduction_page(found, levels, score), tmp_path / "report.html")
     page = Page(path.read_text(encoding="utf-8"))
     assert page.headings == ["claims on", "result", "agreement", "what to look at"]
@@ -141,12 +132,12 @@ def test_the_page_in_docs_has_the_claims_columns_and_bounds_of_this_code():
     kept = rows(page)
     assert list(kept) == [claim.key for claim in CLAIMS]
     assert page.count(HEAD) == len(SECTIONS)
-    for claim in CLAIMS:
-        row = kept[claim.key]
-        assert row.startswith(f"| **{claim.key}**: {claim.says} | {claim.place} |")
-        assert f"| {wanted_text(claim)} |" in row
-        assert all(f"{each.name}: ".replace("|", "&#124;") in row for each in claim.wanted)
-        assert f"- **{claim.key}**: {claim.measured_by}" in page
+    for each in CLAIMS:
+        row = kept[each.key]
+        assert row.startswith(f"| **{each.key}**: {each.says} | {each.place} |")
+        assert f"| {wanted_text(each)} |" in row
+        assert all(f"{wanted.name}: ".replace("|", "&#124;") in row for wanted in each.wanted)
+        assert f"- **{each.key}**: {each.measured_by}" in page
 
 
 def test_the_page_in_docs_scores_the_dampings_of_this_code_and_shows_its_figures():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.cli.paper.curve_peaks import (
+from vibench.cli.paper.peaks import (
     bound_peaks,
     linear_peaks,
     nearest,

@@ -1,0 +1,82 @@
+"""Numbers behind docs/paper.md: ``python benchmarks/paper_tables.py``, minutes.
+
+Where linear motion reaches the gap; exponents at 5 um around two resonances; what textbook methods do to
+the energy of an impact and to the exponent at 260 Hz. Options are those of `vibench reproduce`.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from vibench.cli.paper.case import ALIKE, BY_ODE45, SCORED_S, Case, damping
+from vibench.cli.paper.reading import MODERATE_M, Evidence, Reading
+from vibench.cli.paper.textbook_methods import ode45, runge_kutta, textbook_exponent, textbook_state
+from vibench.sim import Accuracy, Harmonic, base_transmissibility
+from vibench.sim.study import solve_study
+
+SHOWN_HZ = (90.0, 95.0, 100.0, 105.0, 250.0, 260.0, 270.0, 280.0)
+NEAR_HZ, SECOND_HZ = np.arange(80.0, 110.0, 0.01), np.arange(230.0, 310.0, 0.01)
+SPEEDS = (0.03, 0.1, 0.3)
+"""Of approach in the impacts at these drives, about [m/s]."""
+METHODS = (ode45(), *(runge_kutta(each) for each in (2e-5, 1e-5, 5e-6)))
+SHORT_M, LONG_S = 1e-5, 1e-3
+"""A gap that is soon crossed, and a time after which any impact is over."""
+PHASES = 50
+"""Of a step in which a contact begins."""
+
+
+def main():
+    """Print the tables as they stand in the page."""
+    case = Case(accuracy=Accuracy.QUICK)
+    evidence = Evidence(solve_study)
+    head = "damping", "|x / U| near 95 Hz", "A0 at which p reaches the gap there [um]", "at 5 um between [Hz]"
+    show(head, (reach(each.of(case)) for each in (*map(damping, SCORED_S), ALIKE)))
+    settings = (damping(1e-5).of(case), case, ALIKE.of(case), BY_ODE45.of(case))
+    levels = [Reading(evidence, each).level(MODERATE_M) for each in settings]
+    columns = [dict(zip(each.frequency_hz, each.exponent_per_s, strict=True)) for each in levels]
+    rows = ((f"{f:g}", *(f"{each[f]:.0f}" for each in columns)) for f in SHOWN_HZ)
+    show(("frequency [Hz]", *(each.name for each in settings)), rows)
+    exact = ("exact flight, resolved contact", "1, 1, 1", f"{columns[1][260.0]:.0f}")
+    show(("method", "energy kept", "exponent [1/s]"), (exact, *(textbook(case, each) for each in METHODS)))
+
+
+def show(headings, rows):
+    """Print a table in Markdown."""
+    print(f"| {' | '.join(headings)} |\n|{'---|' * len(headings)}")
+    for row in rows:
+        print(f"| {' | '.join(row)} |", flush=True)
+    print()
+
+
+def reach(case):
+    """When m1 first reaches its stops at the first resonance, and between which frequencies at 5 um."""
+    specimen = case.specimen()
+    x, _, _, p = np.abs(base_transmissibility(specimen, NEAR_HZ)).T
+    over = SECOND_HZ[np.abs(base_transmissibility(specimen, SECOND_HZ)[:, 3]) * MODERATE_M > case.gap_m]
+    ends = f"{over[0]:.1f} to {over[-1]:.1f}" if over.size else "nowhere"
+    return case.name, f"{x.max():.3g}", f"{1e6 * case.gap_m / p.max():.3g}", ends
+
+
+def textbook(case, method):
+    """Energy of impacts, and exponent at 260 Hz and 5 um, of a method."""
+    specimen, settle_s = case.specimen(), case.window_s
+    kept = ", ".join(f"{energy_kept(specimen, method, each):.3g}" for each in SPEEDS)
+    drive = Harmonic(260.0, MODERATE_M)
+    found = textbook_exponent(specimen, drive, method, case.duration_s - settle_s, settle_s)
+    return method.name, kept, f"{found:.0f}"
+
+
+def energy_kept(specimen, method, speed):
+    """Energy of m1 and m2 after an impact that nothing else takes part in, over that before."""
+    free = replace(specimen, stiffnesses=(1e-9,) * 3, dampings=(0.0,) * 3, lower_gap_m=np.inf, gap_m=SHORT_M)
+    step_s = min(method.longest_s, SHORT_M / speed)
+    kept = []
+    for share in np.linspace(0.0, 1.0, PHASES, endpoint=False):
+        before = [0.0, SHORT_M - share * step_s * speed, 0.0, 0.0, speed, 0.0]
+        after = textbook_state(free, Harmonic(100.0, 0.0), method, LONG_S, before)
+        kept.append(((after[4] - after[5]) / speed) ** 2)
+    return np.mean(kept)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""Fig. 6: the continuous model n = 5 at the four amplitudes, with branches of harmonic balance."""
+
+from typing import TYPE_CHECKING
+
+from vibench.analysis.dynamics import BranchMethod, BranchRequest, diagram_of
+from vibench.analysis.report import TERMINAL, DrawnFigure, draw_line
+from vibench.sim.study import Study, StudyResults
+
+from .figure_03_levels import four_levels
+from .options import AMPLITUDES_M, FigureOptions
+from .responses import Responses
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_MODEL = "power:5"
+_PLACES = 60
+"""Frequencies at which every first-order solution is found in closed form: each begins a branch."""
+
+
+def studies(options: FigureOptions) -> tuple[Study, ...]:
+    """Study n = 5 at the paper's four amplitudes."""
+    return (options.study((_MODEL,), AMPLITUDES_M),)
+
+
+def draw(options: FigureOptions, results: StudyResults) -> DrawnFigure:
+    """Draw integration over the branches of harmonic balance, with the folds at which they jump."""
+
+    def background(axes: "Axes", curve: Responses, amplitude_m: float) -> None:
+        found = diagram_of(
+            BranchRequest(
+                model=_MODEL,
+                damping_time_s=options.only_damping_time_s,
+                gap_m=options.gap_m,
+                method=BranchMethod.FIRST_ORDER,
+                amplitude_m=amplitude_m,
+                start=float(curve.frequency_hz[0]),
+                stop=float(curve.frequency_hz[-1]),
+                places=_PLACES,
+            )
+        )
+        for line in found.lines:
+            draw_line(axes, line, line.frequency_hz, line.response_ii[:, 0])
+        folds_hz = [each.frequency_hz for line in found.lines for each in line.events if each.kind == "fold"]
+        for number, at_hz in enumerate(folds_hz):
+            label = "fold: a jump" if number == 0 else None
+            axes.axvline(at_hz, color=TERMINAL, linestyle=":", linewidth=0.8, label=label)
+
+    return four_levels(
+        "figure_6",
+        "Figure 6: Responses I and II of the continuous model, n = 5",
+        "Blue: branches of the paper's first-order balance, unstable ones dashed; dotted: where they fold. "
+        + options.sentence,
+        results,
+        background,
+    )

@@ -1,0 +1,255 @@
+"""The page on what of the paper holds, as Markdown and as a report, made from judgements."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.analysis.report import Agreement, Card, DrawnFigure, Fold, Page, ReportTable
+from vibench.sim import wilson_share
+from vibench.sim.study import PACKAGES, software
+
+from .case import Case
+from .claim import Claim, Expectation, Finding, Judgement, Verdict, judgement
+from .reading import Evidence
+from .settings import DampingScore, claims_by_setting, score_table, scores
+
+_HEADINGS = ("claim", "where", "measured", "wanted", "verdict")
+HEAD = f"| {' | '.join(_HEADINGS)} |"
+_METHOD = """\
+Every claim of Gong et al. (2025) that has a number or a direction, measured on our simulation of
+their specimen, with what we want to see and the verdict. Chaotic motion is a draw: another run of
+it differs by some per cent, and the bounds are wide enough for that. Where it is chance which
+motion chaos ends in, or when, a claim is measured from several starts, a millionth of the gap
+apart, and the spread of each number stands behind it. The paper gives hardly any
+tolerances: the bounds are ours, and some were settled after a first look at the numbers. Where a
+claim does not hold, options are tried one by one, in the order listed, until one upholds it.
+The experiment of Figs. 12 to 14 is repeated on the virtual rig by `vibench demo`."""
+COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """Everything that the page is made of."""
+
+    sections: Mapping[str, tuple[Judgement, ...]]
+    """By heading, in order."""
+    scores: tuple[DampingScore, ...]
+    tables: tuple[ReportTable, ...]
+    """After the claims."""
+    options: str
+    """The defaults, as a sentence."""
+    made_with: str
+    """Versions that computed it, and how long that took."""
+
+    @property
+    def judgements(self) -> tuple[Judgement, ...]:
+        """Of all sections."""
+        return tuple(each for section in self.sections.values() for each in section)
+
+    def count(self, verdict: Verdict) -> int:
+        """Return how many claims have this verdict."""
+        return sum(each.verdict is verdict for each in self.judgements)
+
+    @property
+    def sentence(self) -> str:
+        """The counts in words."""
+        return (
+            f"Of {len(self.judgements)} claims {self.count(Verdict.HOLDS)} hold under the defaults, "
+            f"{self.count(Verdict.HOLDS_FOR_SHARE)} for a share of starts, "
+            f"{self.count(Verdict.HOLDS_UNDER)} under another named option, "
+            f"{self.count(Verdict.FAILS)} under none that was tried."
+        )
+
+
+def reproduction(
+    sections: Mapping[str, tuple[Claim, ...]], evidence: Evidence, case: Case, on_step: Callable[[str], None]
+) -> Reproduction:
+    """Judge every claim under a case, under its alternatives where it fails, by damping and by setting."""
+    judgements = {}
+    for heading, claims in sections.items():
+        found = []
+        for claim in claims:
+            on_step(claim.key)
+            found.append(judgement(claim, evidence, case))
+        judgements[heading] = tuple(found)
+    every = [claim for each in sections.values() for claim in each]
+    on_step("score by damping")
+    by_damping = scores(every, evidence, case)
+    on_step("claims by setting")
+    by_setting = claims_by_setting(every, evidence, case)
+    tables = (score_table(by_damping), by_setting)
+    return Reproduction(judgements, by_damping, tables, case.choices, _made_with(evidence))
+
+
+def _made_with(evidence: Evidence) -> str:
+    """How much was computed, by what; from the studies, however often they were continued."""
+    studies = evidence.studies
+    points = sum(each.study.grid.size for each in studies)
+    minutes = sum(float(np.nansum(each.values("taken"))) for each in studies) / 60.0
+    versions = json.loads(software())
+    named = ", ".join(f"{name} {versions[name]}" for name in PACKAGES)
+    return (
+        f"Computed from {points} simulated points in {len(studies)} studies, "
+        f"{minutes:.0f} minutes of one core, with {named}."
+    )
+
+
+def reproduction_document(found: Reproduction, pictures: Sequence[tuple[str, str]] = ()) -> str:
+    """Write the page as Markdown, with pictures by title and path relative to it."""
+    return "\n".join(_lines(found, pictures)) + "\n"
+
+
+def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator[str]:
+    yield from ("# What of the paper holds", "", f"Made by `{COMMAND}`; not edited by hand.", _METHOD, "")
+    yield from (found.options, found.made_with, "", found.sentence.replace(", ", ",\n"))
+    apart = [each for each in found.judgements if each.verdict is not Verdict.HOLDS]
+    if apart:
+        yield from ("", "Where we differ from the paper:", "")
+    for each in apart:
+        yield f"- **{each.claim.key}**: {each.claim.says} {_difference(each)}"
+    for heading, judgements in found.sections.items():
+        yield from ("", f"## {heading}", "", HEAD, f"|{'---|' * len(_HEADINGS)}")
+        yield from (_row(each) for each in judgements)
+        for each in judgements:
+            if len(each.findings) > 1:
+                yield from ("", f"Tried for **{each.claim.key}**:", "", *(f"- {one}" for one in _tried(each)))
+        yield from ("", "How each was measured:", "")
+        yield from (f"- **{each.claim.key}**: {each.claim.measured_by}" for each in judgements)
+    for table in found.tables:
+        yield from ("", f"## {table.title}", "", table.note, "", _line(table.headings))
+        yield from (f"|{'---|' * len(table.headings)}", *map(_line, table.rows))
+    for title, path in pictures:
+        yield from ("", f"![{title}]({path})")
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(each.replace('|', '&#124;') for each in cells)} |"
+
+
+def _row(judged: Judgement) -> str:
+    key, *cells, verdict = _cells(judged)
+    bold = verdict.replace(Verdict.FAILS, f"**{Verdict.FAILS}**", 1)
+    return _line((f"**{judged.claim.key}**{key.removeprefix(judged.claim.key)}", *cells, bold))
+
+
+def _cells(judged: Judgement) -> tuple[str, ...]:
+    claim = judged.claim
+    measured = _values(claim, judged.findings[0])
+    return f"{claim.key}: {claim.says}", claim.place, measured, wanted_text(claim), verdict_text(judged)
+
+
+def verdict_text(judged: Judgement) -> str:
+    """Return the verdict, with the option that it rests on."""
+    under, first = judged.met_under, judged.findings[0]
+    match judged.verdict:
+        case Verdict.HOLDS_FOR_SHARE:
+            share = wilson_share(first.met, len(first.draws))
+            return (
+                f"{judged.verdict.value}: {first.met} of {len(first.draws)} "
+                f"({100 * share.low:.0f} to {100 * share.high:.0f} %)"
+            )
+        case Verdict.HOLDS_UNDER if under is not None:
+            return f"holds under {under.case.name}"
+        case Verdict.FAILS:
+            return f"{judged.verdict.value}{_except(judged)}"
+        case other:
+            return other.value
+
+
+def wanted_text(claim: Claim) -> str:
+    """Return what a claim wants."""
+    return "; ".join(each.sentence for each in claim.wanted)
+
+
+def _difference(judged: Judgement) -> str:
+    """Return what we find instead, and which option would make us meet."""
+    claim, under = judged.claim, judged.met_under
+    said = [f"We find {_values(claim, judged.findings[0])}; wanted {wanted_text(claim)}."]
+    if under is not None:
+        said.append(f"We meet under {under.case.name}: {_values(claim, under)}.")
+    elif len(judged.findings) > 1:
+        said.append(f"None of {len(judged.findings) - 1} options tried would make us meet{_except(judged)}.")
+    return " ".join([*said, claim.remark]).strip()
+
+
+def _except(judged: Judgement) -> str:
+    """Return the options that uphold a claim from some starts, where none does from every start."""
+    return "".join(
+        f", except {each.case.name} for {each.met} of {len(each.draws)} starts"
+        for each in judged.findings
+        if each.is_met_in_part
+    )
+
+
+def _values(claim: Claim, found: Finding) -> str:
+    return "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.wanted))
+
+
+def _value(wanted: Expectation, found: Finding, number: int) -> str:
+    """One number, and its spread over starts where there are several."""
+    value = f"{wanted.name}: {wanted.shown(found.values[number])}"
+    if len(found.draws) < 2:
+        return value
+    low, high = found.spread(number)
+    return f"{value} ({wanted.shown(low, '')} to {wanted.shown(high)} over {len(found.draws)} starts)"
+
+
+def _tried(judged: Judgement) -> Iterator[str]:
+    for each in judged.findings:
+        in_part = f"holds for {each.met} of {len(each.draws)} starts"
+        mark = in_part if each.is_met_in_part else "holds" if each.is_met else "does not hold"
+        yield f"{each.case.name}: {_values(judged.claim, each)} ({mark})"
+
+
+def reproduction_page(found: Reproduction, levels: DrawnFigure, score: DrawnFigure) -> Page:
+    """Show the judgements as the report of recordings does: one card for each section of claims.
+
+    Parameters
+    ----------
+    levels
+        Responses at every drive level, the first figure.
+    score
+        How many claims hold at each damping.
+
+    """
+    failed = [each.claim.key for each in found.judgements if each.verdict is Verdict.FAILS]
+    missing = f" Those that do not hold: {', '.join(failed)}." if failed else ""
+    return Page(
+        title="What of the paper holds",
+        about="Claims of Gong et al. (2025), measured on our simulation of their specimen.",
+        warnings=(),
+        findings=found.sentence + missing,
+        figure=levels,
+        noun="claims on",
+        cards=tuple(_card(heading, judgements) for heading, judgements in found.sections.items()),
+        further=Fold("Score by damping", figures=(score,)),
+        folds=(Fold("All scores and settings", tables=found.tables),),
+        limits=(" ".join(_METHOD.splitlines()), found.options, found.made_with),
+    )
+
+
+def _card(heading: str, judgements: Sequence[Judgement]) -> Card:
+    verdicts = [each.verdict for each in judgements]
+    apart = [each for each in judgements if each.verdict is not Verdict.HOLDS]
+    tried = [(each.claim.key, text) for each in judgements if len(each.findings) > 1 for text in _tried(each)]
+    how = [(each.claim.key, each.claim.measured_by) for each in judgements]
+    return Card(
+        name=heading,
+        result=f"{verdicts.count(Verdict.HOLDS)} of {len(verdicts)} claims hold under the defaults.",
+        agreement=Agreement.NO if Verdict.FAILS in verdicts else Agreement.OPEN if apart else Agreement.YES,
+        look_at=", ".join(each.claim.key for each in apart),
+        numbers=tuple((f"claims: {each}", str(verdicts.count(each))) for each in Verdict if each in verdicts),
+        folds=(
+            Fold(
+                "Claims, what was tried and how it was measured",
+                tuple(f"{each.claim.key}: {each.claim.says} {_difference(each)}" for each in apart),
+                (
+                    ReportTable("Claims", _HEADINGS, tuple(_cells(each) for each in judgements)),
+                    ReportTable("Tried", ("claim", "option: result"), tuple(tried)),
+                    ReportTable("How each was measured", ("claim", "measured by"), tuple(how)),
+                ),
+            ),
+        ),
+    )

@@ -1,0 +1,102 @@
+"""What claims are measured on: studies, signals and sweeps under one case, each computed once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from vibench.sim import Harmonic, Observable, Specimen
+from vibench.sim.study import Study, StudyResults
+
+from .case import Case, ExponentsBy
+from .options import AMPLITUDES_M, WITH_EXPONENT
+from .responses import Reals, Responses, responses
+from .textbook_methods import ode45, textbook_exponent
+
+PIECE_WISE, CONTINUOUS = "hertz", "power:5"
+WEAK_M, MODERATE_M, HIGHER_M, STRONG_M = AMPLITUDES_M
+SECOND_REGION_HZ = (220.0, 320.0)
+"""Around the second linear resonance, between the two terminal ones."""
+Computed = TypeVar("Computed")
+Values = tuple[float | np.floating[Any], ...]
+"""The numbers of a claim: one for each expectation, NaN where there is none."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Computes what is asked for, and remembers it for the next claim that asks."""
+
+    solve: Callable[[Study], StudyResults]
+    """Answers a study, from its file where there is one; raises rather than give half of it."""
+    _remembered: dict[object, object] = field(default_factory=dict)
+
+    def study(self, study: Study) -> StudyResults:
+        """Answer a study; equal studies are answered once."""
+        return self.remembered(study, lambda: self.solve(study))
+
+    @property
+    def studies(self) -> tuple[StudyResults, ...]:
+        """All that were answered so far."""
+        return tuple(each for each in self._remembered.values() if isinstance(each, StudyResults))
+
+    def remembered(self, key: object, compute: Callable[[], Computed]) -> Computed:
+        """Compute something under a key that names everything that it depends on."""
+        if key not in self._remembered:
+            self._remembered[key] = compute()
+        return self._remembered[key]  # type: ignore[return-value]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The simulation under one case."""
+
+    evidence: Evidence
+    case: Case
+
+    def specimen(self, model: str = PIECE_WISE) -> Specimen:
+        """Return the specimen with a model of the contact."""
+        return self.case.specimen(model)
+
+    def curve(self, amplitude_m: float, model: str = PIECE_WISE, **replaced: Any) -> Responses:
+        """Return a curve at any amplitude; fields of its study may be replaced."""
+        return responses(self.evidence.study(self.case.study((model,), (amplitude_m,), **replaced)))
+
+    def level(self, amplitude_m: float, model: str = PIECE_WISE) -> Responses:
+        """Return a curve at one of the paper's amplitudes."""
+        curve = responses(self.evidence.study(self.levels(model)), amplitude=amplitude_m)
+        return replace(curve, exponent_per_s=self.exponents_of(curve, amplitude_m, model))
+
+    def levels(self, model: str = PIECE_WISE) -> Study:
+        """Return the study at the paper's amplitudes, with exponents of the models that Fig. 10 shows."""
+        shown = model in (PIECE_WISE, CONTINUOUS)
+        return self.case.study(
+            (model,), AMPLITUDES_M, observe=WITH_EXPONENT if shown else (Observable.RESPONSE,)
+        )
+
+    def exponents(self, amplitude_m: float, model: str = PIECE_WISE) -> Reals:
+        """Return the largest exponent over frequency [1/s]."""
+        if model in (PIECE_WISE, CONTINUOUS):
+            return self.level(amplitude_m, model).exponent_per_s
+        return self.exponents_of(self.curve(amplitude_m, model, observe=WITH_EXPONENT), amplitude_m, model)
+
+    def exponents_of(self, curve: Responses, amplitude_m: float, model: str = PIECE_WISE) -> Reals:
+        """Return the exponents of a curve as the case has them; where nothing collides, the exact ones."""
+        if self.case.exponents_by is ExponentsBy.EXACT or np.isnan(curve.exponent_per_s).all():
+            return curve.exponent_per_s
+        specimen, settle_s = self.specimen(model), self.case.window_s
+        kept_s = self.case.duration_s - settle_s
+
+        def follow() -> Reals:
+            points = zip(curve.frequency_hz, curve.collides, curve.exponent_per_s, strict=True)
+            return np.array(
+                [
+                    textbook_exponent(specimen, Harmonic(f, amplitude_m), ode45(), kept_s, settle_s)
+                    if collides or model != PIECE_WISE
+                    else exact
+                    for f, collides, exact in points
+                ]
+            )
+
+        key = ("ode45", specimen, amplitude_m, self.case.frequencies_hz)
+        return self.evidence.remembered(key, follow)
