@@ -99,6 +99,8 @@ def test_the_wheel_holds_types_templates_and_the_files_that_are_shipped(wheel):
             inside = path.relative_to(ROOT).as_posix()
             assert f"vibench/shipped/{inside}" in names
     assert "vibench/shipped/examples/response_and_exponent.py" in names
+    for path in (ROOT / "studies" / "paper").glob("*.py"):
+        assert f"vibench/shipped/studies/paper/{path.name}" in names
 
 
 def test_every_source_file_is_in_the_wheel_under_the_name_by_which_it_is_imported(wheel):
@@ -141,6 +143,8 @@ def test_the_command_works_as_a_module_and_as_a_program(python, users_folder):
     arguments = ("predict", "--model", "linear", "--amplitude", "1e-6", "--frequency", "95", "--json")
     (point,) = json.loads(run(command, *arguments, cwd=users_folder))["points"]
     assert point["relative_i"] > 0
+    run(command, "figure", "1", "--out", "figures", cwd=users_folder)
+    assert (users_folder / "figures" / "figure_1c.png").is_file()
 
 
 @pytest.mark.slow

@@ -25,6 +25,7 @@ _BENT = "The force of n = 5 acts at every p, so that a resonance at which p near
     "Number of peaks of the lowest stable first-order solution, and of Response I.",
     about("analytical", "", 3.0, 0.0),
     about("Response I", "", 3.0, 0.0),
+    tried=DAMPINGS,
 )
 def continuous_weak_three(r: Reading) -> Values:
     """At 1 µm the analytical response and Response I of n = 5 both show three resonances."""

@@ -37,11 +37,13 @@ def examples(
 
 
 def files_of(folder: Path) -> list[Path]:
-    """Give the files of a shipped folder, those of its folders too."""
+    """Return the files of a shipped folder and its folders, without the scripts of `vibench figure`."""
     return sorted(
         path
         for path in folder.rglob("*")
-        if path.is_file() and "__pycache__" not in path.parts and not path.name.startswith(".")
+        if path.is_file()
+        and path.parent.name not in {"__pycache__", "paper"}
+        and not path.name.startswith(".")
     )
 
 
