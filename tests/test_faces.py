@@ -59,6 +59,8 @@ def sources():
                 ".".join(parts[:-1]),
                 path,
             )
+    for path in sorted((ROOT / "studies" / "paper").glob("[!_]*.py")):
+        yield "cli", f"vibench.cli.paper.{path.stem}", "vibench.cli.paper", path
 
 
 MODULES = {name: path for _, name, _, path in sources()}
