@@ -49,8 +49,8 @@ def reproduce(
     """Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped."""
     from vibench.analysis.report import write_page
 
-    from .paper import figure_03_levels
     from .paper.claims import SECTIONS
+    from .paper.figure_03_levels import draw as draw_levels
     from .paper.page import reproduction, reproduction_document, reproduction_page
     from .paper.reading import Evidence, Reading
     from .paper.settings import score_figure
@@ -67,7 +67,7 @@ def reproduce(
     found = reproduction(SECTIONS, evidence, case, lambda step: console.print(f"measuring {step}"))
     page.parent.mkdir(parents=True, exist_ok=True)
     score = score_figure(found.scores)
-    levels = figure_03_levels.draw(case, evidence.study(Reading(evidence, case).levels()))
+    levels = draw_levels(case, evidence.study(Reading(evidence, case).levels()))
     pictures = []
     for drawn in (score, levels):
         image = drawn.save(page.parent / IMAGES, (ImageKind.PNG,))[0]
