@@ -1,5 +1,6 @@
 // The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
 // calls, so that threads may share tables. What is given is checked, and refused with a code.
+#include "cubic.hpp"
 #include "filters.hpp"
 #include "tangent.hpp"
 #include "world.hpp"
@@ -68,8 +69,7 @@ bool is_usable(const Scene &scene) {
 
 bool is_usable(const Record &record) {
   bool has_samples = record.sample_room == 0 || (record.samples != nullptr && is_positive(record.sample_rate));
-  bool has_times = record.impact_room == 0 || record.impact_times != nullptr;
-  return has_samples && has_times && record.samples_kept >= 0 && record.samples_kept <= record.sample_room &&
+  return has_samples && record.samples_kept >= 0 && record.samples_kept <= record.sample_room &&
          record.impacts >= 0 && record.impacts <= record.impact_room && record.steps_left >= 0 &&
          record.steps_left <= MOST_STEPS && is_finite(record.start) && record.watch >= 0 && record.watch < WATCHES;
 }
@@ -173,10 +173,11 @@ constexpr struct {
   int64_t size;
 } STRUCTURES[] = {
     DESCRIBED(Specimen), DESCRIBED(LinearMotion), DESCRIBED(HeldMotion), DESCRIBED(Drive),
-    DESCRIBED(CollisionShapes), DESCRIBED(PowerTerms), DESCRIBED(PowerShapes), DESCRIBED(Scene),
-    DESCRIBED(State), DESCRIBED(Record), DESCRIBED(Tangent), DESCRIBED(Readings),
+    DESCRIBED(CollisionShapes), DESCRIBED(PowerTerms), DESCRIBED(PowerShapes), DESCRIBED(Scene), DESCRIBED(CubicScene),
+    DESCRIBED(State), DESCRIBED(Record), DESCRIBED(Numbers), DESCRIBED(CubicDrive), DESCRIBED(Tangent),
+    DESCRIBED(Readings),
     // Signals, world, hidden motion
-    DESCRIBED(Numbers), DESCRIBED(Interpolation), DESCRIBED(Decimation), DESCRIBED(RecursiveFilter),
+    DESCRIBED(Interpolation), DESCRIBED(Decimation), DESCRIBED(RecursiveFilter),
     DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoopCables),
     DESCRIBED(TrackedStop), DESCRIBED(TrackRecord), DESCRIBED(MotionFilter), DESCRIBED(MotionSmoother),
     DESCRIBED(ContactSearch),
@@ -210,16 +211,12 @@ VIBENCH_API int64_t vibench_prepare(const Scene *scene, Tables *tables) {
 }
 
 // Decides whether the motion in `state` starts on a stop, and fills the rest of `state`.
-VIBENCH_API int64_t vibench_start(const Tables *tables, State *state, double tolerance) {
+VIBENCH_API int64_t vibench_start(const Body *tables, State *state, double tolerance) {
   if (tables == nullptr || state == nullptr || !is_tolerance(tolerance)) return REFUSED;
   Motion<double> motion = motion_of(*state);
-  Record record{};
-  Outcome outcome = with_stops(motion, *tables, tolerance, record, [](auto &run) {
-    run.place_on_its_side();
-    return REACHED_END;
-  });
+  place_on_its_side(motion, tolerance, *tables);
   keep(*state, motion);
-  return outcome;
+  return REACHED_END;
 }
 
 // Advances `state` to the instant `until` [s], and fills `record`; an `Outcome`.
@@ -258,14 +255,11 @@ VIBENCH_API double vibench_reach(const Tables *tables, const State *state) {
   return PhasorSum<PHASORS>(phasors, tables->flight.path, tables->flight).reach;
 }
 
-// ---- Signals, the world of the virtual rig, and hidden motion: functions of one structure
+// ---- Bases that are cubics on intervals
 
 namespace {
 
-constexpr int64_t LAST_STEP = int64_t(1) << 60;  // of a world
-constexpr int64_t MOST_SMALL_STEPS = 100000;
-constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
-constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
+constexpr double MOST_PIECES = 1e15;  // of an interval
 
 bool is_lent(const Numbers &numbers) { return numbers.size == 0 || (numbers.size > 0 && numbers.at != nullptr); }
 bool has_size(const Numbers &numbers, int64_t size) { return is_lent(numbers) && numbers.size == size; }
@@ -276,6 +270,57 @@ bool is_table(const Numbers &numbers, int64_t rows, int64_t columns) {
   return has_columns(numbers, columns) && numbers.size / columns == rows;
 }
 bool is_count(int64_t count, int64_t most) { return count >= 0 && count <= most; }
+
+bool is_usable(const CubicScene &scene) {
+  if (!is_usable(scene.specimen) || !is_positive(scene.interval) || !is_positive(scene.fastest)) return false;
+  if (!(scene.interval * scene.fastest < MOST_PIECES)) return false;
+  return scene.specimen.law != POWERS || (scene.power_shapes != nullptr && is_usable(scene.power));
+}
+
+bool is_usable(const CubicDrive &drive, double interval) {
+  int64_t intervals = drive.base.size / CUBIC, kept = drive.impacts.size;
+  return has_columns(drive.base, CUBIC) && is_count(drive.done, intervals) && drive.first_from >= 0.0 &&
+         drive.first_from <= interval && drive.last_to >= 0.0 && drive.last_to <= interval * (2.0 - ALMOST) &&
+         is_lent(drive.impacts) && is_table(drive.motions, kept, 6) && (kept == 0 || kept == intervals);
+}
+
+}  // namespace
+
+// Bytes of the tables of a `Law` for such a base.
+VIBENCH_API int64_t vibench_size_of_cubic_tables(int64_t law) {
+  return sizeof(CubicTables) + (law == POWERS ? sizeof(CubicPowerTables) : 0);
+}
+
+// Fills `tables`, of vibench_size_of_cubic_tables(law) bytes; the shapes of steps must outlive them.
+VIBENCH_API int64_t vibench_prepare_cubics(const CubicScene *scene, CubicTables *tables) {
+  if (scene == nullptr || tables == nullptr || !is_usable(*scene)) return REFUSED;
+  bool has_powers = scene->specimen.law == POWERS;
+  fill_cubic_tables(*tables, has_powers ? reinterpret_cast<CubicPowerTables *>(tables + 1) : nullptr, *scene);
+  return REACHED_END;
+}
+
+// Advances `state` over the intervals of `drive`, and fills `record`, which watches nothing; an `Outcome`.
+VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, CubicDrive *drive, double tolerance,
+                                       Record *record) {
+  if (tables == nullptr || state == nullptr || drive == nullptr || record == nullptr) return REFUSED;
+  if (!is_usable(*state, 0.0, tolerance) || !is_usable(*record) || !is_usable(*drive, tables->interval)) return REFUSED;
+  if (record->watch != WATCH_NOTHING) return REFUSED;
+  Motion<double> motion = motion_of(*state);
+  Outcome outcome = with_cubic_stops(motion, *tables, tolerance, *record, [&](auto &run) {
+    return follow(run, motion, *drive, tables->interval, *record);
+  });
+  keep(*state, motion);
+  return outcome;
+}
+
+// ---- Signals, the world of the virtual rig, and hidden motion: functions of one structure
+
+namespace {
+
+constexpr int64_t LAST_STEP = int64_t(1) << 60;  // of a world
+constexpr int64_t MOST_SMALL_STEPS = 100000;
+constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
+constexpr int STOP_SIZE = sizeof(TrackedStop) / sizeof(double);
 
 bool is_usable(const Interpolation &of) {
   return has_columns(of.samples, of.channels) && has_columns(of.table, INTERPOLATION_TAPS) &&

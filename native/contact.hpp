@@ -54,7 +54,7 @@ INLINE double foreseen_step(double depth, double rate) {
 // Enters a contact from the state of a flight. The first step resolves whichever is faster: the elastic collision
 // (a half-wave in s about 5.1 w_max / v long), or the other springs that press a slow contact (w'' = -(a / 2) w).
 template <class T>
-inline void begin_contact(Contact<T> &c, const T *motion, double side, double tolerance, const Tables &t) {
+inline void begin_contact(Contact<T> &c, const T *motion, double side, double tolerance, const Body &t) {
   const Specimen &s = t.specimen;
   double gap = gap_at(s, side);
   T depth = side * (motion[Y] - motion[Z]) - gap;
@@ -79,11 +79,12 @@ inline void begin_contact(Contact<T> &c, const T *motion, double side, double to
   c.step = step_scale(tolerance) * foreseen_step(w / c.root_scale, r) * smaller(c.pace, pressed);
 }
 
-// k0 U + c0 dU/dt as a polynomial about the middle of a stretch [N].
+// k0 U + c0 dU/dt as a polynomial about the middle of a stretch [N]; one that is a cubic, about its start.
 struct BaseForce {
   double middle, terms[8];
   Phasor drive;  // the drive's phasor at the middle
 
+  explicit BaseForce(const double (&cubic)[4]) : middle(0.0), terms{cubic[0], cubic[1], cubic[2], cubic[3]}, drive{} {}
   BaseForce(const Clock<double> &clock, double middle_s, const Tables &t) : middle(middle_s) {
     drive = drive_phasor(clock, middle, t);
     Phasor term = t.drive.force * drive;
@@ -106,7 +107,7 @@ enum { W, R, CX, CZ, CVX, CVZ, TIME, UNKNOWNS };
 // Gong et al. 2025, eq. 1, in contact and in s: the rates of w, r, x, z, vx, vz and t. The stop's push is formed on
 // the positive side and its sign set once, so that a mirrored motion is mirrored to the last bit.
 template <class T, class Force> struct ContactEquations {
-  const Tables &t;
+  const Body &t;
   const BaseForce &base;
   const Force &force;
   double side, gap;
@@ -190,7 +191,7 @@ template <class T, class Force> struct ContactSteps {
 // on the clock of `base`. `seen(steps, h)` is called with every accepted step before it becomes the point.
 template <class T, class Force, class Seen>
 inline ContactEnd advance_contact(Contact<T> &c, T *motion, T &tau, const T &limit, const BaseForce &base,
-                                  const Force &force, double tolerance, const Tables &t, const Seen &seen) {
+                                  const Force &force, double tolerance, const Body &t, const Seen &seen) {
   double gap = gap_at(t.specimen, c.side), step = c.step, longest = c.pace * step_scale(tolerance);
   if (!(value_of(tau) < value_of(limit))) return ContactEnd::HELD;
   ContactSteps<T, Force> steps{{t, base, force, c.side, gap}, tolerance, {}, {}, {}};

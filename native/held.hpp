@@ -28,7 +28,7 @@ INLINE bool is_resolved(double closed, const Specimen &s) {
 }
 
 // Acceleration with which m1 is pressed on the stop at its side, d2|p|/dt2 if the stop were not [m/s^2].
-template <class T> INLINE T press_on(double side, const T *motion, const Tables &t) {
+template <class T> INLINE T press_on(double side, const T *motion, const Body &t) {
   const Specimen &s = t.specimen;
   T pull = s.k2 * (motion[Z] - motion[X]) + s.c2 * (motion[VZ] - motion[VX]);
   T inner = s.k1 * gap_at(s, side) + s.c1 * (side * (motion[VY] - motion[VZ]));
@@ -36,7 +36,7 @@ template <class T> INLINE T press_on(double side, const T *motion, const Tables 
 }
 
 // Puts m1 exactly on a stop, with `rate` = d|p|/dt [m/s]; the pair keeps its centre and its momentum.
-template <class T> inline void place_on_stop(T *motion, double side, const T &rate, const Tables &t) {
+template <class T> inline void place_on_stop(T *motion, double side, const T &rate, const Body &t) {
   double gap = side * gap_at(t.specimen, side), share = t.pair / t.specimen.m2;
   T before = motion[Y] - motion[Z], relative = motion[VY] - motion[VZ];
   motion[Z] = motion[Z] - share * (gap - before);
@@ -50,7 +50,7 @@ template <class T> inline void place_on_stop(T *motion, double side, const T &ra
 // impacts in the time 2 v / (a (1 - restitution)). Left out are hops that cannot be told from rest, and those whose
 // speeds add up to less than the tolerance times the speed of a fall through the gap.
 template <class T>
-inline bool hold_if_pressed(T *motion, double side, double closed, double tolerance, const Tables &t) {
+inline bool hold_if_pressed(T *motion, double side, double closed, double tolerance, const Body &t) {
   double rate = value_of(motion[VY] - motion[VZ]), press = value_of(press_on(side, motion, t));
   double part = tolerance * (1.0 - t.specimen.restitution);
   double too_low = RESOLVED * closed + part * part * gap_at(t.specimen, side);
@@ -62,7 +62,7 @@ inline bool hold_if_pressed(T *motion, double side, double closed, double tolera
 // Strikes a rigid stop: places stay, and the speed of approach becomes `restitution` times itself (Newton). Returns
 // whether m1 stays on it. The touch was found a hair before the gap had closed; the speed is what it will be when it
 // has, so that a million impacts do not lose a million hairs.
-template <class T> inline bool rebound(T *motion, double side, double closed, double tolerance, const Tables &t) {
+template <class T> inline bool rebound(T *motion, double side, double closed, double tolerance, const Body &t) {
   T approach = side * (motion[VY] - motion[VZ]);
   double hair = gap_at(t.specimen, side) - side * value_of(motion[Y] - motion[Z]);
   T square = approach * approach + 2.0 * hair * press_on(side, motion, t);

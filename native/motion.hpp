@@ -53,6 +53,14 @@ INLINE int64_t steps_of(double length, double grid) {
   return steps >= 0.0 && steps < double(MOST_STEPS) ? 1 + int64_t(steps) : MOST_STEPS;
 }
 
+// Counts an impact, and keeps its time where times are kept; false when no more are allowed.
+INLINE bool keep_impact(Record &record, double time) {
+  if (record.impacts == record.impact_room) return false;
+  if (record.impact_times != nullptr) record.impact_times[record.impacts] = time;
+  record.impacts++;
+  return true;
+}
+
 // Keeps the samples that fall into the next `length` seconds: `place_sample(later, sample)` writes one.
 template <class PlaceSample>
 inline void keep_samples(Record &record, const Clock<double> &clock, double length, const PlaceSample &place_sample) {

@@ -104,10 +104,10 @@ INLINE void add_row(double (&to)[GAUSS], double factor, const double (&row)[GAUS
   for (int i = 0; i < GAUSS; i++) to[i] += factor * row[i];
 }
 
-inline void fill_points(AtPoints &of, int number, double length, const PowerTables &t) {
+inline void fill_points(AtPoints &of, int number, double length, const PowerTables &t, int order = ORDER) {
   of = {};
   double factor = 1.0;
-  for (int m = 0; m < ORDER; m++) {
+  for (int m = 0; m < order; m++) {
     for (int j = 0; j < WIDE; j++) add_row(of.free[j], factor * t.powers[m][j][number], t.heights[m]);
     for (int k = 0; k < GAUSS; k++)
       add_row(of.gain[k], t.struck[m][number] * factor * length, t.shapes->shares[m][k]);
@@ -115,16 +115,16 @@ inline void fill_points(AtPoints &of, int number, double length, const PowerTabl
   }
 }
 
-inline void fill_step(StepNumbers &numbers, double length, const PowerTables &t) {
+inline void fill_step(StepNumbers &numbers, double length, const PowerTables &t, int order = ORDER) {
   numbers = {};
   numbers.length = length;
   double factor = 1.0;
-  for (int m = 0; m < ORDER; m++) {
+  for (int m = 0; m < order; m++) {
     for (int j = 0; j < WIDE && m > 0; j++) add_row(numbers.move[j], factor, t.powers[m][j]);
     for (int k = 0; k < GAUSS; k++) add_row(numbers.feed[k], factor * length * t.shapes->ends[m][k], t.struck[m]);
     factor *= t.fastest * length;
   }
-  fill_points(numbers.p, P, length, t);
+  fill_points(numbers.p, P, length, t, order);
 }
 
 inline void fill_observed(StepNumbers &numbers, double omega, const PowerTables &t) {
@@ -137,27 +137,34 @@ inline void fill_observed(StepNumbers &numbers, double omega, const PowerTables 
   }
 }
 
-inline void fill_power_tables(PowerTables &t, const Scene &scene, const LinearTables &flight, double omega) {
-  t.shapes = scene.power_shapes;
-  t.force = power_force(scene.power);
-  t.fastest = LONGEST_TURN / flight.grid;
-  fill_series(t.powers, t.struck, t.fastest, scene);
+// Steps from `longest` [s] on, each level `ratio` of the one before.
+inline void fill_power_steps(PowerTables &t, const PowerShapes *shapes, const PowerTerms &law, const Specimen &specimen,
+                             const Drive &drive, double fastest, double longest, double ratio) {
+  t.shapes = shapes;
+  t.force = power_force(law);
+  t.fastest = fastest;
+  fill_series(t.powers, t.struck, t.fastest, specimen, drive);
   for (int i = 0; i < GAUSS; i++) {
     t.heights[0][i] = 1.0;
     for (int m = 1; m < ORDER; m++) t.heights[m][i] = t.heights[m - 1][i] * t.shapes->points[i];
   }
-  double length = LONGEST_POWER_TURN / t.fastest;
   for (StepNumbers &level : t.levels) {
-    fill_step(level, length, t);
-    fill_observed(level, omega, t);
-    length *= 0.70710678118654752440;
+    fill_step(level, longest, t);
+    longest *= ratio;
   }
+}
+
+inline void fill_power_tables(PowerTables &t, const Scene &scene, const LinearTables &flight, double omega) {
+  double fastest = LONGEST_TURN / flight.grid;
+  fill_power_steps(t, scene.power_shapes, scene.power, scene.specimen, scene.drive, fastest,
+                   LONGEST_POWER_TURN / fastest, 0.70710678118654752440);
+  for (StepNumbers &level : t.levels) fill_observed(level, omega, t);
 }
 
 // ---- One step
 
 template <class T> struct PowerStep {
-  const Tables &t;
+  const Body &t;
   const PowerTables &of;
   double tolerance;
   Wide<T, WIDE> motion, ahead;  // where it begins and ends
@@ -166,16 +173,39 @@ template <class T> struct PowerStep {
   double sizes[3];              // how large p, x, z have lately been [m]
   double push, push_ahead;      // F at the start and the end [N]
   double last_length = 0.0;     // of the last step [s]; 0 where there is none
+  double fading = FADING;
+
+  // What the motion would do without F: p at the points, and all of it at the end.
+  struct Unforced {
+    Vector<GAUSS> places;
+    Vector<WIDE> end;
+  };
+  Unforced unforced(const StepNumbers &numbers) const {
+    Vector<WIDE> begin = value_of(motion);
+    return {times(numbers.p.free, begin), begin + times(numbers.move, begin)};
+  }
+
+  // From the motion now, without the drive's phasor; and back.
+  void begin_at(const Motion<T> &m) {
+    const T numbers[WIDE] = {m.at[Y] - m.at[Z],   m.at[X],  m.at[Z],           m.at[VY] - m.at[VZ],
+                             m.at[VX], m.at[VZ], constant<T>(0.0), constant<T>(0.0)};
+    motion = gathered(numbers);
+    push = of.force(value_of(numbers[P]));
+    for (int i = 0; i < 3; i++) sizes[i] = m.powers.sizes[i];
+  }
+  void write_to(Motion<T> &m) const {
+    m.at[X] = at(motion, AT_X), m.at[Z] = at(motion, AT_Z), m.at[Y] = m.at[Z] + at(motion, P);
+    m.at[VX] = at(motion, X_RATE), m.at[VZ] = at(motion, Z_RATE), m.at[VY] = m.at[VZ] + at(motion, P_RATE);
+  }
 
   // Tries a step and fills `ahead`; its misfit over what is allowed.
-  double attempt(const StepNumbers &numbers) {
+  double attempt(const StepNumbers &numbers, const Unforced &free) {
     Vector<WIDE> begin = value_of(motion);
     double weight = numbers.length * numbers.length * t.inverse_pair;
-    Vector<WIDE> free = begin + times(numbers.move, begin), now = free;
-    double close = largest_unseen(begin, free) * larger(CLOSE_FORCE * tolerance, CLOSEST_FORCE);
+    double close = largest_unseen(begin, free.end) * larger(CLOSE_FORCE * tolerance, CLOSEST_FORCE);
     Vector<GAUSS> pushes = guessed_force(numbers.length), places;
-    if (!substitute(pushes, places, numbers, begin, weight, close)) return INFINITE;
-    now = free + times(numbers.feed, pushes);
+    if (!substitute(pushes, places, numbers, free.places, weight, close)) return INFINITE;
+    Vector<WIDE> now = free.end + times(numbers.feed, pushes);
     push_ahead = of.force(now[P]);
     double before = total(Vector<GAUSS>::load(of.shapes->at_start) * pushes) - push;
     double after = total(Vector<GAUSS>::load(of.shapes->at_end) * pushes) - push_ahead;
@@ -210,7 +240,7 @@ template <class T> struct PowerStep {
     Vector<WIDE> begin = value_of(motion), end = value_of(ahead);
     constexpr int PLACES[3] = {P, AT_X, AT_Z};
     for (int i = 0; i < 3; i++)
-      sizes[i] = larger(FADING * sizes[i], larger(magnitude(begin[PLACES[i]]), magnitude(end[PLACES[i]])));
+      sizes[i] = larger(fading * sizes[i], larger(magnitude(begin[PLACES[i]]), magnitude(end[PLACES[i]])));
     course = push_ahead * Vector<GAUSS>::load(of.shapes->course[GAUSS]);
     Vector<GAUSS> pushes = value_of(force);
     for (int k = 0; k < GAUSS; k++) course = course + pushes[k] * Vector<GAUSS>::load(of.shapes->course[k]);
@@ -242,9 +272,8 @@ template <class T> struct PowerStep {
   }
 
   // `weight` says how far a newton moves p over the step [m/N], `close` how far is nothing [m].
-  bool substitute(Vector<GAUSS> &pushes, Vector<GAUSS> &places, const StepNumbers &numbers, const Vector<WIDE> &begin,
+  bool substitute(Vector<GAUSS> &pushes, Vector<GAUSS> &places, const StepNumbers &numbers, const Vector<GAUSS> &free,
                   double weight, double close) const {
-    Vector<GAUSS> free = times(numbers.p.free, begin);
     for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
       places = free + times(numbers.p.gain, pushes);
       Vector<GAUSS> fresh = of.force(places), off = fresh - pushes;
@@ -348,14 +377,6 @@ template <class T> class PowerRun {
   PowerRun(Motion<T> &motion, const Tables &tables, double tolerance, Record &record)
       : m(motion), t(tables), of(*tables.power), tolerance(tolerance), record(record), observer{record, tables} {}
 
-  void place_on_its_side() {
-    m.contact = {};
-    m.contact.side = 1.0;  // the law acts at every p
-    m.powers = {};
-    m.powers.sizes[0] = magnitude(value_of(m.at[Y] - m.at[Z]));
-    m.powers.sizes[1] = magnitude(value_of(m.at[X])), m.powers.sizes[2] = magnitude(value_of(m.at[Z]));
-  }
-
   Outcome advance(double until) { return observed(observer, m, t, [&] { return go_on(until); }); }
 
  private:
@@ -386,7 +407,7 @@ template <class T> class PowerRun {
       StepNumbers last;
       if (is_last) fill_step(last, left, of);
       const StepNumbers &numbers = is_last ? last : of.levels[level];
-      double misfit = step.attempt(numbers);
+      double misfit = step.attempt(numbers, step.unforced(numbers));
       if (!(misfit <= 1.0)) {
         level = level_after(level, misfit);
         continue;
@@ -409,32 +430,15 @@ template <class T> class PowerRun {
       set_drive(step);
       if constexpr (is_dual<T>) rescale(step);
     }
-    end(step);
+    step.write_to(m);
     m.powers.level = 1.0 + (level < LEVELS ? level : LEVELS - 1);
     for (int i = 0; i < 3; i++) m.powers.sizes[i] = step.sizes[i];
     return outcome;
   }
 
   void begin(PowerStep<T> &step) const {
-    const T numbers[WIDE] = {m.at[Y] - m.at[Z],   m.at[X],  m.at[Z],           m.at[VY] - m.at[VZ],
-                             m.at[VX], m.at[VZ], constant<T>(0.0), constant<T>(0.0)};
-    step.motion = gathered(numbers);
+    step.begin_at(m);
     set_drive(step);
-    step.push = of.force(value_of(numbers[P]));
-    for (int i = 0; i < 3; i++) step.sizes[i] = m.powers.sizes[i];
-  }
-  void end(const PowerStep<T> &step) {
-    for (int i = 0; i < 6; i++) m.at[i] = number_of(step.motion, i);
-  }
-  static T number_of(const Wide<T, WIDE> &u, int place) {
-    switch (place) {
-      case X: return at(u, AT_X);
-      case Y: return at(u, AT_Z) + at(u, P);
-      case Z: return at(u, AT_Z);
-      case VX: return at(u, X_RATE);
-      case VY: return at(u, Z_RATE) + at(u, P_RATE);
-      default: return at(u, Z_RATE);
-    }
   }
   static void write_motion(double *motion, const Vector<WIDE> &u) {
     motion[X] = u[AT_X], motion[Z] = u[AT_Z], motion[Y] = u[AT_Z] + u[P];
@@ -449,7 +453,7 @@ template <class T> class PowerRun {
 
   // Derivatives are kept in range as those of a motion between stops are.
   void rescale(PowerStep<T> &step) {
-    end(step);
+    step.write_to(m);
     if (!keep_in_range(m)) return;
     double push = step.push, sizes[3] = {step.sizes[0], step.sizes[1], step.sizes[2]};
     Vector<WIDE> values = value_of(step.motion);

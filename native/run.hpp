@@ -19,6 +19,35 @@ struct HertzStops : YieldingStops<HertzForce> {
 struct SpringStops {};  // exact, with modes of their own
 struct HardStops {};    // Newton's restitution, and sticking
 
+// By how much a changed motion touches later: all corrections where the motion switches (saltation, Mueller 1995)
+// follow from this by the rules of derivatives. At a grazing touch no derivative exists; its rate is floored.
+template <class T> inline T later_touch(const T *motion) {
+  T p = motion[Y] - motion[Z];
+  double rate = value_of(motion[VY] - motion[VZ]);
+  return slopes_only(-p) / with_sign_of(larger(magnitude(rate), SLOWEST_TOUCH), rate);
+}
+
+// Decides from the displacements whether a motion that is given starts on a stop.
+template <class T> inline void place_on_its_side(Motion<T> &m, double tolerance, const Body &t) {
+  const Specimen &s = t.specimen;
+  double p = value_of(m.at[Y] - m.at[Z]), x = value_of(m.at[X]), z = value_of(m.at[Z]);
+  double side = with_sign_of(1.0, p);
+  m.contact = {};
+  m.powers = {};
+  if (s.law == POWERS) {
+    m.contact.side = 1.0;  // the law acts at every p
+    m.powers.sizes[0] = magnitude(p), m.powers.sizes[1] = magnitude(x), m.powers.sizes[2] = magnitude(z);
+  } else if (s.law == RIGID) {
+    double closed = closed_gap(magnitude(x) + magnitude(value_of(m.at[Y])) + magnitude(z), s);
+    if (!(gap_at(s, side) - side * p <= closed)) return;
+    T rate = side * (m.at[VY] - m.at[VZ]);
+    place_on_stop(m.at, side, rate, t);
+    if (hold_if_pressed(m.at, side, closed, tolerance, t)) m.contact.side = side;
+  } else if (s.law != NO_STOPS && (p > s.upper_gap || p < -s.lower_gap)) {
+    begin_contact(m.contact, m.at, side, tolerance, t);
+  }
+}
+
 template <class T, class Stops> class Run {
  public:
   Run(Motion<T> &motion, const Tables &tables, const Stops &stops, double tolerance, Record &record)
@@ -26,23 +55,6 @@ template <class T, class Stops> class Run {
 
   // Advances the motion to the instant `until` [s]. What is kept or observed on the way changes nothing of it.
   Outcome advance(double until) { return observed(observer, m, t, [&] { return go_on(until); }); }
-
-  // Decides from the displacements whether a motion that is given starts on a stop.
-  void place_on_its_side() {
-    const Specimen &s = t.specimen;
-    double p = value_of(m.at[Y] - m.at[Z]), side = with_sign_of(1.0, p), gap = gap_at(s, side);
-    m.contact = {};
-    if constexpr (is_same<Stops, HardStops>) {
-      double reach = magnitude(value_of(m.at[X])) + magnitude(value_of(m.at[Y])) + magnitude(value_of(m.at[Z]));
-      double closed = closed_gap(reach, s);
-      if (!(gap - side * p <= closed)) return;
-      T rate = side * (m.at[VY] - m.at[VZ]);
-      place_on_stop(m.at, side, rate, t);
-      if (hold_if_pressed(m.at, side, closed, tolerance, t)) m.contact.side = side;
-    } else if constexpr (!is_same<Stops, WithoutStops>) {
-      if (p > s.upper_gap || p < -s.lower_gap) begin_contact(m.contact, m.at, side, tolerance, t);
-    }
-  }
 
  private:
   Outcome go_on(double until) {
@@ -104,7 +116,7 @@ template <class T, class Stops> class Run {
     land(landed, phasors, length);
     if constexpr (is_dual<T>)
       if (flight.ends == FlightEnd::TOUCHES) {
-        length = length + later_touch();
+        length = length + later_touch(m.at);
         land(landed, phasors, length);
       }
     if (observer.is_on()) observer.see_flight(values, clock_value(), flight.length);
@@ -129,17 +141,8 @@ template <class T, class Stops> class Run {
     place(m.at, landed, t.flight);
   }
 
-  // By how much a changed motion touches later: all corrections where the motion switches (saltation, Mueller 1995)
-  // follow from this by the rules of derivatives. At a grazing touch no derivative exists; its rate is floored.
-  T later_touch() const {
-    T p = m.at[Y] - m.at[Z];
-    double rate = value_of(m.at[VY] - m.at[VZ]);
-    return slopes_only(-p) / with_sign_of(larger(magnitude(rate), SLOWEST_TOUCH), rate);
-  }
-
   Outcome touch(const Complex<T> *landed) {
-    if (record.impacts == record.impact_room) return TOO_MANY_IMPACTS;
-    record.impact_times[record.impacts++] = m.clock.high;
+    if (!keep_impact(record, m.clock.high)) return TOO_MANY_IMPACTS;
     double p = value_of(m.at[Y] - m.at[Z]), rate = value_of(m.at[VY] - m.at[VZ]);
     double side = touched_side(p, rate, t.specimen);
     if constexpr (is_same<Stops, HardStops>) {

@@ -106,6 +106,15 @@ STRUCTURE(PowerShapes,
   double instants[10], instant_weights[10], instant_slopes[10];  // start, points and end, as one polynomial
 )
 
+// A specimen under a base whose displacement is a cubic on each of equal intervals.
+STRUCTURE(CubicScene,
+  Specimen specimen;
+  double interval;             // [s]
+  double fastest;              // rate of the specimen without stops [1/s]
+  PowerTerms power;            // of the law POWERS
+  const PowerShapes *power_shapes;
+)
+
 // What is observed of a stretch of a run; `Record::watch`.
 enum Watch : int64_t {
   WATCH_NOTHING,
@@ -153,6 +162,21 @@ STRUCTURE(Record,
   Phasor line_x, line_p;       // integrals of x and p against exp(-i (omega t + phase)) [m s]
 )
 
+// An array lent for one call. Its size is checked against the others before anything is read or written.
+STRUCTURE(Numbers,
+  double *at;
+  int64_t size;
+)
+
+// A row of intervals, U = c0 + c1 tau + c2 tau^2 + c3 tau^3 on each, and the motion at their ends.
+STRUCTURE(CubicDrive,
+  Numbers base;                // [intervals][4]: c0 ... c3 [m, m/s, m/s^2, m/s^3]
+  double first_from, last_to;  // where the run begins in the first and ends in the last, since their starts [s]
+  int64_t done;                // intervals that have been passed
+  Numbers motions;             // [intervals][6]: x, y, z, vx, vy, vz at the end of each; or of no size
+  Numbers impacts;             // [intervals]: in each; likewise
+)
+
 // Small changes of a motion, carried along with it: the exact derivative of the flow in some directions.
 STRUCTURE(Tangent,
   int64_t changes;             // 1 to 6
@@ -172,12 +196,6 @@ STRUCTURE(Readings,
 )
 
 // ---- Signals
-
-// An array lent for one call. Its size is checked against the others before anything is read or written.
-STRUCTURE(Numbers,
-  double *at;
-  int64_t size;
-)
 
 // Values of band-limited signals between their samples.
 STRUCTURE(Interpolation,

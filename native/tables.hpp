@@ -48,10 +48,14 @@ struct LineTables {
 
 struct PowerTables;
 
-struct Tables {
+// What every run needs to know of a specimen, whatever drives it.
+struct Body {
   Specimen specimen;
   double pair;          // m1 m2 / (m1 + m2), the mass that a collision feels [kg]
-  double inverse0, inverse2, inverse_pair;  // [1/kg]
+  double inverse0, inverse1, inverse2, inverse_pair;  // [1/kg]
+};
+
+struct Tables : Body {
   Drive drive;
   double omega;         // [rad/s]
   LinearTables flight;
@@ -116,9 +120,9 @@ inline void fill_equations(double (&A)[WIDE][WIDE], double (&b)[WIDE], const Spe
 // The Taylor series of exp(A t), in units of 1 / fastest, and of what a unit of force does.
 template <int N>
 inline void fill_series(double (&powers)[N][WIDE][WIDE], double (&struck)[N][WIDE], double fastest,
-                        const Scene &scene) {
+                        const Specimen &specimen, const Drive &drive) {
   double A[WIDE][WIDE], b[WIDE], power[WIDE][WIDE] = {}, factorial = 1.0;
-  fill_equations(A, b, scene.specimen, scene.drive);
+  fill_equations(A, b, specimen, drive);
   for (int i = 0; i < WIDE; i++) power[i][i] = 1.0;
   for (int m = 0; m < N; m++) {
     for (int i = 0; i < WIDE; i++) {
@@ -140,7 +144,7 @@ inline void fill_series(double (&powers)[N][WIDE][WIDE], double (&struck)[N][WID
 inline void fill_collision_tables(CollisionTables &t, const Scene &scene, const LinearTables &flight) {
   t.shapes = scene.collisions;
   t.fastest = LONGEST_TURN / flight.grid;
-  fill_series(t.powers, t.struck, t.fastest, scene);
+  fill_series(t.powers, t.struck, t.fastest, scene.specimen, scene.drive);
   for (int m = 0; m < TERMS; m++)
     for (int j = 0; j < WIDE; j++) t.onto_p[j][m] = t.powers[m][j][P], t.onto_x[j][m] = t.powers[m][j][AT_X];
 }
@@ -161,12 +165,16 @@ inline void fill_line_tables(LineTables &lines, const LinearTables &t, const Spe
   lines.struck_p = (1.0 / s.m2) * lines.path[VZ] - (1.0 / s.m1) * lines.path[VY];
 }
 
+inline void fill_body(Body &t, const Specimen &s) {
+  t.specimen = s;
+  t.pair = s.m1 * s.m2 / (s.m1 + s.m2);
+  t.inverse0 = 1.0 / s.m0, t.inverse1 = 1.0 / s.m1, t.inverse2 = 1.0 / s.m2, t.inverse_pair = 1.0 / t.pair;
+}
+
 inline void fill_tables(Tables &t, const Scene &scene) {
   const Specimen &s = scene.specimen;
-  t.specimen = s;
+  fill_body(t, s);
   t.power = nullptr;
-  t.pair = s.m1 * s.m2 / (s.m1 + s.m2);
-  t.inverse0 = 1.0 / s.m0, t.inverse2 = 1.0 / s.m2, t.inverse_pair = 1.0 / t.pair;
   t.drive = scene.drive;
   t.omega = 2.0 * PI * scene.drive.frequency;
   fill_linear_tables(t.flight, scene.flight, t.omega);

@@ -128,10 +128,8 @@ template <class T> Outcome run_to(Motion<T> &motion, const Tables &tables, doubl
   std::vector<double> times(100000);
   Record record{};
   record.impact_times = times.data(), record.impact_room = int64_t(times.size()), record.steps_left = MOST_STEPS;
-  return with_stops(motion, tables, tolerance, record, [&](auto &run) {
-    run.place_on_its_side();
-    return run.advance(until);
-  });
+  place_on_its_side(motion, tolerance, tables);
+  return with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
 }
 
 // The derivatives of the flow, from duals, against central differences of two runs beside it.

@@ -21,6 +21,11 @@ from ._collision_shapes import (
     TO_DURATION as TO_DURATION,
     collision_shapes as collision_shapes,
 )
+from ._cubic_run import (
+    CubicRun as CubicRun,
+    cubic_tables as cubic_tables,
+    start_on_cubics as start_on_cubics,
+)
 from ._library import (
     FOLDER as FOLDER,
     Engine as Engine,

@@ -53,6 +53,9 @@ class Engine:
         self._declare("vibench_prepare", ctypes.c_int64, _Pointer, _Pointer)
         self._declare("vibench_start", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double)
         number, count = ctypes.c_double, ctypes.c_int64
+        self._declare("vibench_size_of_cubic_tables", count, count)
+        self._declare("vibench_prepare_cubics", count, _Pointer, _Pointer)
+        self._declare("vibench_run_cubics", count, _Pointer, _Pointer, _Pointer, number, _Pointer)
         run = (_Pointer, _Pointer, number, number, _Pointer)
         self._declare("vibench_run", count, *run)
         self._declare("vibench_run_with_tangent", count, *run, _Pointer)
@@ -125,6 +128,15 @@ class Engine:
             raise ValueError(msg)
         return tables
 
+    def prepare_cubics(self, scene: Structure) -> Tables:
+        """Make the tables of a scene whose base is cubics on intervals, as `prepare` does."""
+        size = int(self._library.vibench_size_of_cubic_tables(int(scene["specimen"]["law"])))
+        tables = np.zeros(size // 8, np.float64)
+        if self._library.vibench_prepare_cubics(scene.ctypes.data, tables.ctypes.data) != 0:
+            msg = "This scene is not allowed: numbers must be finite, masses and springs positive."
+            raise ValueError(msg)
+        return tables
+
     def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
         """Decide whether the motion of ``state`` starts on a stop; returns 0, or -1 when refused."""
         return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
@@ -146,6 +158,13 @@ class Engine:
         if tangent is None:
             return int(self._library.vibench_run(*run))
         return int(self._library.vibench_run_with_tangent(*run, tangent.ctypes.data))
+
+    def run_cubics(
+        self, tables: Tables, state: Structure, drive: Structure, tolerance: float, record: Structure
+    ) -> int:
+        """Advance ``state`` over the intervals of ``drive`` and fill ``record``; returns as `run` does."""
+        run = (tables.ctypes.data, state.ctypes.data, drive.ctypes.data, tolerance, record.ctypes.data)
+        return int(self._library.vibench_run_cubics(*run))
 
     def take_readings(
         self,

@@ -62,7 +62,7 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
     """
     scene = engine.new("Scene")
     omega = 2.0 * math.pi * drive.frequency_hz
-    _fill_specimen(scene["specimen"], specimen)
+    fill_specimen(scene["specimen"], specimen)
     _, force = harmonic_motion(specimen, omega, drive.amplitude_m)
     scene["drive"]["frequency"] = drive.frequency_hz
     scene["drive"]["start"] = cmath.exp(1j * drive.phase_rad)
@@ -73,15 +73,20 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
             _fill_rigid(scene["held"], specimen, omega, drive.amplitude_m)
         case LinearGap(stiffness=stop):
             _fill_springs(scene, specimen, stop, omega, drive.amplitude_m)
-        case PowerLaw(reference=reference, terms=terms):
-            power = scene["power"]
-            power["reference"], power["terms"] = reference, len(terms)
-            power["exponents"][: len(terms)] = [exponent for exponent, _ in terms]
-            power["forces"][: len(terms)] = [force for _, force in terms]
-            scene["power_shapes"] = power_structure(engine).ctypes.data
+        case PowerLaw() as law:
+            fill_power(engine, scene, law)
         case Hertz():
             scene["collisions"] = collision_structure(engine).ctypes.data
     return scene
+
+
+def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
+    """Fill what a `Scene` or a `CubicScene` knows of a power law."""
+    power, terms = scene["power"], law.terms
+    power["reference"], power["terms"] = law.reference, len(terms)
+    power["exponents"][: len(terms)] = [exponent for exponent, _ in terms]
+    power["forces"][: len(terms)] = [force for _, force in terms]
+    scene["power_shapes"] = power_structure(engine).ctypes.data
 
 
 def power_structure(engine: Engine) -> Structure:
@@ -125,7 +130,8 @@ def _collision_structure(engine: Engine) -> Structure:
     return solved
 
 
-def _fill_specimen(target: Structure, specimen: Specimen) -> None:
+def fill_specimen(target: Structure, specimen: Specimen) -> None:
+    """Fill a `Specimen` of native/structures.hpp."""
     for name, values in (("m", specimen.masses), ("k", specimen.stiffnesses), ("c", specimen.dampings)):
         for index, value in enumerate(values):
             target[f"{name}{index}"] = value

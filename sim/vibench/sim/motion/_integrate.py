@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import motion
-from ..engine import NativeRun, RunRecord, most_impacts
+from ..engine import CubicRun, NativeRun, RunRecord, most_impacts
 from ..kernels import Floats, Vector
 from ..model import (
     Accuracy,
@@ -108,14 +108,16 @@ def integrate(
     samples = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1
     rate_hz = 1.0 if sample_rate_hz is None else float(sample_rate_hz)
     start = start_motion(initial_state)
-    if not isinstance(drive, Harmonic):
-        # Compiled kernels, which are loaded with their first use.
-        return motion.integrate_cubics(
-            specimen, drive, float(start_time_s), end, accuracy, start, impacts, samples, rate_hz
-        )
-    run = NativeRun(specimen, drive, start, accuracy.tolerance, start_time_s=start_time_s)
     record = RunRecord(impacts, start_s=start_time_s, sample_rate_hz=rate_hz, samples=samples)
-    outcome = run.advance(end, record)
+    run: NativeRun | CubicRun
+    if isinstance(drive, Harmonic):
+        run = NativeRun(specimen, drive, start, accuracy.tolerance, start_time_s=start_time_s)
+        outcome = run.advance(end, record)
+    else:
+        # Through the package: only such drives need scipy's splines.
+        run, outcome = motion.integrate_cubics(
+            specimen, drive, float(start_time_s), end, accuracy, start, record
+        )
     is_whole = outcome is Outcome.REACHED_END
     # A sample that rounding puts at, or a hair beyond, the very end.
     states = record.all_samples(run.motion) if is_whole else record.samples

@@ -9,14 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels import Table, Vector, kernel
+from ..engine import CubicRun, RunRecord, most_impacts
 from ..model import Accuracy, AccuracyWord, Sampled, Specimen, chosen
-from ..stepping import FAILED, IntervalTables, advance_interval, interval_tables, new_state
 from ._base_motion import sampled_motion
-from ._integrate import start_motion
-
-MOTION = 6
-"""x, y, z, vx, vy, vz."""
+from ._integrate import MAX_IMPACT_RATE_HZ, start_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,25 +55,8 @@ def follow_samples(
     accuracy = chosen(Accuracy, accuracy)
     base = sampled_motion(drive)
     pieces = base.pieces[first:last]
-    state = new_state(specimen, start_motion(initial_state), accuracy)
-    states = np.empty((len(pieces) + 1, MOTION))
-    impacts = np.zeros(len(pieces), dtype=np.int64)
-    states[0] = state[:MOTION]
-    tables = interval_tables(specimen, base.interval, accuracy)
-    reached = 1 + _follow(state, pieces, tables, states[1:], impacts)
-    return FollowedMotion(states[:reached], impacts[: reached - 1], len(states))
-
-
-@kernel
-def _follow(
-    state: Vector, pieces: Table, tables: IntervalTables, states: Table, impacts: NDArray[np.int64]
-) -> int:
-    """Advance over all intervals, or up to the one that fails; give how many were finished."""
-    for index in range(len(pieces)):
-        fresh = advance_interval(state, pieces[index], tables)
-        if fresh == FAILED:
-            return index
-        impacts[index] = fresh
-        for place in range(MOTION):
-            states[index, place] = state[place]
-    return len(pieces)
+    run = CubicRun(specimen, base.interval, start_motion(initial_state), accuracy.tolerance)
+    first_state = run.motion
+    record = RunRecord(most_impacts(MAX_IMPACT_RATE_HZ, len(pieces) * base.interval))
+    motions, impacts = run.follow(pieces, record)
+    return FollowedMotion(np.vstack([first_state, motions]), impacts.astype(np.int64), len(pieces) + 1)
