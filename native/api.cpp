@@ -93,28 +93,6 @@ bool is_usable(const Readings &readings) {
 
 bool is_tolerance(double tolerance) { return tolerance > 0.0 && tolerance < 1.0; }
 
-Motion<double> motion_of(const State &state) {
-  Motion<double> motion;
-  __builtin_memcpy(motion.at, state.motion, sizeof motion.at);
-  motion.clock = {state.clock_high, state.clock_low, 0.0};
-  motion.contact = {state.root,       state.rate,       state.side, state.step,
-                    state.root_scale, state.rate_scale, state.pace};
-  motion.powers.level = state.level;
-  __builtin_memcpy(motion.powers.sizes, state.sizes, sizeof state.sizes);
-  for (double &growth : motion.growth) growth = 0.0;
-  return motion;
-}
-
-void keep(State &state, const Motion<double> &motion) {
-  __builtin_memcpy(state.motion, motion.at, sizeof motion.at);
-  state.clock_high = motion.clock.high, state.clock_low = motion.clock.low;
-  const Contact<double> &c = motion.contact;
-  state.root = c.w, state.rate = c.r, state.side = c.side, state.step = c.step;
-  state.root_scale = c.root_scale, state.rate_scale = c.rate_scale, state.pace = c.pace;
-  state.level = motion.powers.level;
-  __builtin_memcpy(state.sizes, motion.powers.sizes, sizeof state.sizes);
-}
-
 // Calls `act` with a run of the motion under the stops of the specimen.
 template <class T, class Act>
 Outcome with_stops(Motion<T> &motion, const Tables &t, double tolerance, Record &record, const Act &act) {
@@ -178,7 +156,7 @@ constexpr struct {
     DESCRIBED(Readings),
     // Signals, world, hidden motion
     DESCRIBED(Interpolation), DESCRIBED(Decimation), DESCRIBED(RecursiveFilter),
-    DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoopCables),
+    DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoadedShaker), DESCRIBED(LoopCables),
     DESCRIBED(TrackedStop), DESCRIBED(TrackRecord), DESCRIBED(MotionFilter), DESCRIBED(MotionSmoother),
     DESCRIBED(ContactSearch),
 };
@@ -349,6 +327,17 @@ bool is_usable(const Sensor &sensor) {
          has_size(sensor.volts, steps) && (sensor.instead.size == 0 || has_size(sensor.instead, steps));
 }
 
+bool is_usable(const LoadedShaker &s) {
+  constexpr int64_t NUMBER = sizeof(double), ENDS = 9;
+  const CubicTables *tables = reinterpret_cast<const CubicTables *>(s.tables.at);
+  if (!is_lent(s.tables) || s.tables.size * NUMBER < int64_t(sizeof(CubicTables))) return false;
+  if (s.tables.size * NUMBER != vibench_size_of_cubic_tables(tables->specimen.law)) return false;
+  int64_t steps = s.drive.size;
+  return is_usable(s.specimen, 0.0, s.tolerance) && is_positive(s.step) && is_lent(s.drive) &&
+         has_size(s.noise, steps) && has_size(s.amplifier_voltage, steps) && has_size(s.base_acceleration, steps) &&
+         has_size(s.m0_velocity, steps) && has_columns(s.ends, ENDS) && s.ends.size / ENDS <= steps;
+}
+
 bool is_usable(const LoopCables &loop) {
   const Controller *c = loop.controller;
   if (c == nullptr || !is_count(c->harmonics, MOST_HARMONICS) || !is_count(c->remembered, MOST_MEMORY)) return false;
@@ -396,6 +385,13 @@ bool is_usable(const ContactSearch &of) {
 
 }  // namespace
 
+// Moves the shaker of a loop, closed, over the rest of a stretch; a `LoopEnd`, or REFUSED.
+VIBENCH_API int64_t vibench_close_loop(LoopCables *loop) {
+  if (loop == nullptr || loop->shaker == nullptr || !is_usable(*loop) || !is_usable(*loop->shaker)) return REFUSED;
+  if (loop->shaker->drive.at != loop->drive.at || loop->shaker->drive.size != loop->drive.size) return REFUSED;
+  return close_loop(*loop);
+}
+
 // Each returns what its function does, or REFUSED.
 #define OF_ONE_STRUCTURE(function, Structure)                                 \
   VIBENCH_API int64_t vibench_##function(Structure *of) {                     \
@@ -405,6 +401,7 @@ OF_ONE_STRUCTURE(interpolate, Interpolation)
 OF_ONE_STRUCTURE(decimate, Decimation)
 OF_ONE_STRUCTURE(filter_signal, FilteredSignal)
 OF_ONE_STRUCTURE(show, Sensor)
+OF_ONE_STRUCTURE(move_shaker, LoadedShaker)
 OF_ONE_STRUCTURE(play_loop, LoopCables)
 OF_ONE_STRUCTURE(hear_loop, LoopCables)
 OF_ONE_STRUCTURE(filter_motion, MotionFilter)

@@ -18,6 +18,28 @@ template <class T> struct Motion {
   double growth[6];  // of each derivative: the logarithm of a factor that was taken out of it
 };
 
+inline Motion<double> motion_of(const State &state) {
+  Motion<double> motion;
+  __builtin_memcpy(motion.at, state.motion, sizeof motion.at);
+  motion.clock = {state.clock_high, state.clock_low, 0.0};
+  motion.contact = {state.root,       state.rate,       state.side, state.step,
+                    state.root_scale, state.rate_scale, state.pace};
+  motion.powers.level = state.level;
+  __builtin_memcpy(motion.powers.sizes, state.sizes, sizeof state.sizes);
+  for (double &growth : motion.growth) growth = 0.0;
+  return motion;
+}
+
+inline void keep(State &state, const Motion<double> &motion) {
+  __builtin_memcpy(state.motion, motion.at, sizeof motion.at);
+  state.clock_high = motion.clock.high, state.clock_low = motion.clock.low;
+  const Contact<double> &c = motion.contact;
+  state.root = c.w, state.rate = c.r, state.side = c.side, state.step = c.step;
+  state.root_scale = c.root_scale, state.rate_scale = c.rate_scale, state.pace = c.pace;
+  state.level = motion.powers.level;
+  __builtin_memcpy(state.sizes, motion.powers.sizes, sizeof state.sizes);
+}
+
 INLINE Motion<double> values_of(const Motion<double> &motion) { return motion; }
 template <int M> inline Motion<double> values_of(const Motion<Dual<double, M>> &motion) {
   const auto &c = motion.contact;

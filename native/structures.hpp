@@ -273,9 +273,33 @@ STRUCTURE(Controller,
   Phasor coefficients[3][21];  // of the last block [V]
 )
 
+// Amplifier, shaker and the specimen on its table: where they are, what moves them, and means over the steps.
+STRUCTURE(LoadedShaker,
+  double base_displacement, base_velocity;  // [m] [m/s]
+  double current;              // of the coil [A]
+  double low_cut, high_cut;    // state of the amplifier's band edges [V]
+  double reaction_before;      // the specimen's force on the base one step earlier [N]
+  State specimen;
+  Numbers tables;              // of the specimen on bases that are cubics over a step
+  double tolerance;            // of its contacts
+  double step;                 // [s]
+  double gain;
+  double low_decay, low_mean, high_decay, high_mean;  // of first-order lags over a step: what is left, and its mean
+  double clip;                 // [V]
+  double current_limit;        // [A]
+  double transition[3][5];     // displacement, velocity, current, voltage, force -> the first three a step later
+  double stroke;               // where the table meets its rubber stops [m]
+  double stop_stiffness, stop_damping;  // [N/m] [N s/m]
+  Numbers drive, noise;        // [steps]: at the amplifier's input and output [V]
+  Numbers amplifier_voltage, base_acceleration, m0_velocity;  // [steps]: results [V] [m/s^2] [m/s]
+  Numbers ends;                // [first steps][9]: base, its velocity, current, x, y, z, vx, vy, vz at their ends
+  int64_t impacts, bumps, limited_steps;  // contacts begun; steps in the rubber stops, and with clipping
+)
+
 // Between the world and a controller: it samples means over its step, and its volts come late.
 STRUCTURE(LoopCables,
   Controller *controller;
+  LoadedShaker *shaker;        // of a loop that is closed through it; its drive is that of the loop
   Sensor base, m0;
   Numbers drive;               // [steps]: volts of everything else at the amplifier, then of all
   Numbers late;                // volts of the next steps, from the one that is played next [latency + one sample]

@@ -1,6 +1,7 @@
 // The analogue world of the virtual rig: what sensors show of a motion, and the cables of a fast control loop.
 #pragma once
 #include "controller.hpp"
+#include "shaker.hpp"
 #include "signal.hpp"
 
 namespace vibench {
@@ -52,6 +53,23 @@ inline int64_t hear_loop(LoopCables &loop) {
   loop.steps_heard += double(loop.stop - loop.begin);
   loop.begin = loop.stop;
   return wants_attention(*loop.controller);
+}
+
+enum class LoopEnd : int64_t { COMPLETE, NEEDS_ATTENTION, MOTION_LOST };
+
+// From sample to sample until the stretch ends, the motion is lost, or the controller wants attention.
+inline int64_t close_loop(LoopCables &loop) {
+  return with_shaker(*loop.shaker, [&](const auto &move) {
+    while (loop.begin < loop.drive.size) {
+      int64_t asked = play_loop(loop) - loop.begin, moved = move(loop.begin, loop.stop);
+      if (moved < asked) {
+        loop.begin += moved;
+        return LoopEnd::MOTION_LOST;
+      }
+      if (hear_loop(loop)) return LoopEnd::NEEDS_ATTENTION;
+    }
+    return LoopEnd::COMPLETE;
+  });
 }
 
 }  // namespace vibench

@@ -18,7 +18,7 @@ import numpy as np
 
 from vibench.sim.engine import native_engine
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.world import World, warm_up
+from vibench.virtual_rig.world import World
 
 MAGIC = b"HL"
 HARMONICS = 16
@@ -368,7 +368,6 @@ def listening():
 @contextmanager
 def on_rig(rig):
     """A virtual rig with a board at its amplifier, and the rig as a host finds it: nothing virtual in it."""
-    warm_up(rig)
     board = HelicBoard(rig.controller.rate_hz, rig.virtual.grid_rate_hz, rig.controller.latency_s)
     virtual = VirtualRig(rig.model_copy(update={"controller": None}))
     virtual.world = World(virtual.rig, virtual.generator, loop=board)

@@ -22,7 +22,8 @@ _ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
 """Of libraries of this system; wheels of others may have been built in the same checkout."""
 REBUILD = "python native/build.py"
 FUNCTIONS = (
-    *("interpolate", "decimate", "filter_signal", "show", "play_loop", "hear_loop"),
+    *("interpolate", "decimate", "filter_signal", "show"),
+    *("move_shaker", "play_loop", "hear_loop", "close_loop"),
     *("filter_motion", "smooth_motion", "follow_contacts"),
 )
 """Of the library, each with one structure."""

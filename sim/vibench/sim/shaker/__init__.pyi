@@ -8,8 +8,6 @@ from ._loaded_shaker import (
     LoadedShaker as LoadedShaker,
     MotionFailed as MotionFailed,
     ShakenMotion as ShakenMotion,
-    ShakerParts as ShakerParts,
-    move_shaker as move_shaker,
 )
 from ._parts import (
     Amplifier as Amplifier,

@@ -15,7 +15,7 @@ from ..controller import controller_of
 from ..daqmx import LOOPBACK, DaqServer, OnDemandPace, Pace, WallPace, catalogue_with, token_for
 from ..generator import AFG1022, Keysight33500B, Panel, Quirks, ScpiSocket, Terminal
 from ..usb import UsbTmcInstrument, plug_in, unplug, usb_service
-from ..world import FULL_BAND_HZ, World, relative_clock_ppm, virtual_section, warm_up
+from ..world import FULL_BAND_HZ, World, relative_clock_ppm, virtual_section
 from ._fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, load_fault_script
 from ._faults import RigFaults
 
@@ -135,7 +135,6 @@ class VirtualRig:
 
     def __enter__(self) -> Self:
         """Switch everything on, or nothing."""
-        warm_up(self.rig)
         with ExitStack() as starting:
             plug_in(self._usb)
             starting.callback(unplug, self._usb)

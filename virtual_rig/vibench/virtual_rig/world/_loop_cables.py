@@ -1,33 +1,33 @@
 """Between the world and a real-time controller: its samples are means over its step, its volts come late."""
 
-from collections.abc import Callable
-from typing import NamedTuple, cast
+from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
-from llvmlite import binding
-from numba import types
 from numpy.typing import NDArray
 
 from vibench.sim.engine import native_engine
-from vibench.sim.kernels import kernel
-from vibench.sim.shaker import ShakenMotion, ShakerParts, move_shaker
+from vibench.sim.shaker import LoadedShaker, ShakenMotion
 
 from ..controller import VirtualController
 from ._sensors import SensorParts
 from ._wiring import Signal
 
 FloatArray = NDArray[np.float64]
-# The shaker is moved by a kernel as yet, so that a kernel goes from sample to sample.
-_play_loop, _hear_loop = (
-    cast("Callable[[int], int]", types.ExternalFunction(f"vibench_{name}", types.int64(types.intp)))
-    for name in ("play_loop", "hear_loop")
-)
+
+
+class _LoopEnd(IntEnum):
+    """How the engine ends a call; `LoopEnd` in native/world.hpp."""
+
+    COMPLETE = 0
+    NEEDS_ATTENTION = 1
+    MOTION_LOST = 2
 
 
 class PlantParts(NamedTuple):
     """Everything between the voltage at the amplifier and the volts of both sensors, over a stretch."""
 
-    shaker: ShakerParts
+    shaker: LoadedShaker
     noise: FloatArray
     """Of the amplifier [V], shape (steps,)."""
     base: SensorParts
@@ -43,7 +43,6 @@ class LoopCables:
     def __init__(self, loop: VirtualController) -> None:
         self._loop = loop
         engine, steps = native_engine(), loop.steps_per_sample
-        binding.load_library_permanently(str(engine.path))
         self._late = np.zeros(loop.latency_steps + steps)
         self._cables = engine.new("LoopCables", late=self._late, steps_per_sample=steps)
 
@@ -63,54 +62,14 @@ class LoopCables:
         cables["first"], cables["begin"] = first, 0
         base = plant.base.showing(motion.base_acceleration, signals[Signal.BASE_ACCELERATION])
         m0 = plant.m0.showing(motion.m0_velocity, signals[Signal.M0_VELOCITY])
-        native_engine().fill(cables, drive=drive, base=base, m0=m0)
-        done, good = 0, True
-        while good and done < drive.size:
+        plant.shaker.prepare(motion, drive, plant.noise)
+        native_engine().fill(cables, shaker=plant.shaker.structure.ctypes.data, drive=drive, base=base, m0=m0)
+        done, end = 0, _LoopEnd.COMPLETE
+        while end is not _LoopEnd.MOTION_LOST and done < drive.size:
             with self._loop.answering() as loop:
                 cables["controller"] = loop.ctypes.data
-                done, good = _closed_loop(
-                    done,
-                    cables.ctypes.data,
-                    plant.shaker,
-                    drive,
-                    plant.noise,
-                    motion.amplifier_voltage,
-                    motion.base_acceleration,
-                    motion.m0_velocity,
-                    motion.ends,
-                )
+                end = _LoopEnd(native_engine().call("close_loop", cables))
+                done = int(cables["begin"])
                 self._loop.attend((first + done) * step_s)
         signals[Signal.AMPLIFIER, :done] = motion.amplifier_voltage[:done]
         return done
-
-
-@kernel
-def _closed_loop(
-    begin: int,
-    cables: int,
-    shaker: ShakerParts,
-    drive: FloatArray,
-    noise: FloatArray,
-    amplifier_voltage: FloatArray,
-    base_acceleration: FloatArray,
-    m0_velocity: FloatArray,
-    ends: FloatArray,
-) -> tuple[int, bool]:
-    """Go from sample to sample until the stretch ends, or the controller asks for attention."""
-    while begin < drive.size:
-        stop = _play_loop(cables)
-        good = move_shaker(
-            drive[begin:stop],
-            noise[begin:stop],
-            shaker,
-            amplifier_voltage[begin:stop],
-            base_acceleration[begin:stop],
-            m0_velocity[begin:stop],
-            ends[begin:stop] if ends.shape[0] else ends,
-        )
-        if good < stop - begin:
-            return begin + good, False
-        begin = stop
-        if _hear_loop(cables):
-            break
-    return begin, True

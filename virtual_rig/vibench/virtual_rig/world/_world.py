@@ -293,7 +293,7 @@ class World:
         try:
             if self._loop is not None and self._loop.is_on:
                 base, m0 = self._accelerometer.parts(first, steps), self.vibrometer.parts(first, steps)
-                plant = PlantParts(self.plant.parts, noise, base, m0)
+                plant = PlantParts(self.plant, noise, base, m0)
                 good = self._loop.move(first, self._grid.step_s, plant, motion, signals)
                 self.plant.account(good, steps)
             else:
