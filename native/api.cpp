@@ -287,6 +287,7 @@ VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, 
   Outcome outcome = with_cubic_stops(motion, *tables, tolerance, *record, [&](auto &run) {
     return follow(run, motion, *drive, tables->interval, *record);
   });
+  record->steps_left = larger<int64_t>(record->steps_left, 0);
   keep(*state, motion);
   return outcome;
 }

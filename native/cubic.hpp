@@ -191,6 +191,7 @@ template <class T, class Stops> class CubicRun {
   Outcome move_on(const CubicForce<double> &force, double length, T &tau) {
     for (int n = 0; n < MOST_PHASES; n++) {
       if (!(value_of(tau) < length)) return REACHED_END;
+      if (record.steps_left-- <= 0) return TOO_LONG;
       Outcome outcome = m.contact.side == 0.0 ? fly(force, length, tau) : stay(force, length, tau);
       if (outcome != REACHED_END) return outcome;
     }
@@ -198,8 +199,7 @@ template <class T, class Stops> class CubicRun {
   }
 
   Outcome pass(const CubicForce<double> &force, double length, bool is_whole) {
-    if (record.steps_left <= 0) return TOO_LONG;
-    record.steps_left--;
+    if (record.steps_left-- <= 0) return TOO_LONG;
     if (record.samples_kept < record.sample_room) keep_samples_of(force, length);
     T tau = constant<T>(0.0);
     Outcome outcome = is_whole && cross(force) ? REACHED_END : resolve(force, length, is_whole, tau);
@@ -212,7 +212,7 @@ template <class T, class Stops> class CubicRun {
     keep_samples(record, {m.clock.high, m.clock.low, 0.0}, length, [&](double later, double *sample) {
       Motion<double> copy = values_of(m);
       Record unseen{};
-      unseen.impact_room = record.impact_room, unseen.steps_left = MOST_STEPS;
+      unseen.impact_room = record.impact_room, unseen.steps_left = record.steps_left;
       double tau = 0.0;
       CubicRun<double, Stops>(copy, t, stops, tolerance, unseen).resolve(force, later, false, tau);
       __builtin_memcpy(sample, copy.at, sizeof copy.at);
@@ -347,7 +347,11 @@ template <class T, class Stops> class CubicRun {
     StepNumbers part;
     BaseNumbers base_of_part;
     Outcome outcome = REACHED_END;
-    for (int64_t left = WHOLE_PIECE; left > 0;) {
+    for (int64_t left = WHOLE_PIECE; left > 0; record.steps_left -= RESOLVED_STEP) {
+      if (record.steps_left <= 0) {
+        outcome = TOO_LONG;
+        break;
+      }
       level = step.level_that_sees(level);
       while (level < LEVELS && (WHOLE_PIECE >> level) > left) level++;
       if (level >= LEVELS) {

@@ -122,32 +122,91 @@ void test_changes_become_orthonormal_and_a_lost_one_is_replaced() {
   expect(worst_of_products(rows, 3, metric) < 1e-12, "a lost row is replaced", 0);
 }
 
-Motion<double> at_rest() { return {}; }
-
-template <class T> Outcome run_to(Motion<T> &motion, const Tables &tables, double until, double tolerance) {
-  std::vector<double> times(100000);
-  Record record{};
-  record.impact_times = times.data(), record.impact_room = int64_t(times.size()), record.steps_left = MOST_STEPS;
-  place_on_its_side(motion, tolerance, tables);
-  return with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
+void test_a_stage_that_ran_away_is_never_an_accepted_step() {
+  for (double size : {1e80, 1e155, 1e200, 1e300, double(INFINITY), double(NAN)})
+    for (int stage = 5; stage < STAGES; stage++) {
+      double stages[STAGES][1] = {};
+      stages[stage][0] = size;
+      StepError error;
+      error.add(stages, 0, 1e-10);
+      double found = error.of_step(1e-6, 2.0);
+      expect(!(found <= 1.0) && step_factor(found) < 1.0, "a stage ran away", size);
+    }
 }
 
+void test_an_impact_keeps_momentum_and_places_and_turns_the_approach(const Body &paper) {
+  for (int n = 0; n < 1000; n++) {
+    Body body = paper;
+    Specimen &s = body.specimen;
+    s.lower_gap = 20e-6, s.upper_gap = 50e-6, s.restitution = n % 5 ? draw(0.01, 1) : 0.0;
+    double side = n % 2 ? 1.0 : -1.0, vz = draw(-1, 1), approach = draw(1e-3, 1);
+    const double begin[6] = {1e-5, 3e-5 + side * gap_at(s, side), 3e-5, draw(-1, 1), vz + side * approach, vz};
+    double at[6], moved = 0;
+    __builtin_memcpy(at, begin, sizeof at);
+    rebound(at, side, closed_gap(1e-4, s), 1e-6, body);
+    for (int i = 0; i < 4; i++) moved = std::fmax(moved, std::fabs(at[i] - begin[i]));
+    expect(moved < 1e-16, "an impact leaves places and m0 alone", moved);
+    double gained = s.m1 * (at[VY] - begin[VY]) + s.m2 * (at[VZ] - begin[VZ]);
+    expect(std::fabs(gained) < 1e-17, "an impact keeps momentum", gained);
+    double off = side * (at[VY] - at[VZ]) + s.restitution * approach;
+    expect(std::fabs(off) < 1e-12, "an impact turns the approach by the restitution", off);
+  }
+}
+
+Motion<double> at_rest() { return {}; }
+
+// A run of `until` seconds, either way, from a motion that is given.
+struct HarmonicRun {
+  const Tables &tables;
+  double until;
+
+  template <class T> Outcome operator()(Motion<T> &motion, double tolerance) const {
+    std::vector<double> times(100000);
+    Record record{};
+    record.impact_times = times.data(), record.impact_room = int64_t(times.size()), record.steps_left = MOST_STEPS;
+    place_on_its_side(motion, tolerance, tables);
+    return with_stops(motion, tables, tolerance, record, [&](auto &run) { return run.advance(until); });
+  }
+};
+
+struct RunOnCubics {
+  const CubicTables &tables;
+  double omega, until;
+
+  template <class T> Outcome operator()(Motion<T> &motion, double tolerance) const {
+    Record record{};
+    record.impact_room = INT64_MAX, record.steps_left = MOST_STEPS;
+    place_on_its_side(motion, tolerance, tables);
+    return with_cubic_stops(motion, tables, tolerance, record, [&](auto &run) {
+      for (int n = 0; n * tables.interval < until; n++) {
+        double h = tables.interval, turn = omega * h, angle = n * turn, u = 20e-6 * std::sin(angle);
+        double v = 20e-6 * omega * std::cos(angle), next = 20e-6 * std::sin(angle + turn);
+        double w = 20e-6 * omega * std::cos(angle + turn), mean = (next - u) / h;
+        const double base[CUBIC] = {u, v, (3 * mean - 2 * v - w) / h, (v + w - 2 * mean) / (h * h)};
+        Outcome outcome = run.advance(base, 0.0, h);
+        if (outcome != REACHED_END) return outcome;
+      }
+      return REACHED_END;
+    });
+  }
+};
+
 // The derivatives of the flow, from duals, against central differences of two runs beside it.
-void test_duals_are_derivatives(const Tables &tables, double until, double tolerance) {
+template <class RunTo> void test_duals_are_derivatives(const RunTo &run_to, double tolerance) {
   const double scale[6] = {1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1};
   constexpr double STEP = 1e-6;
   Motion<double> plain = at_rest();
-  run_to(plain, tables, until, tolerance);
+  run_to(plain, tolerance);
   for (int k = 0; k < 6; k++) {
     Motion<Dual<double, 1>> motion{};
     motion.at[k].slope[0] = scale[k];
-    expect(run_to(motion, tables, until, tolerance) == REACHED_END, "a run of duals reaches its end", k);
+    expect(run_to(motion, tolerance) == REACHED_END, "a run of duals reaches its end", k);
     for (int i = 0; i < 6; i++)
       expect(plain.at[i] == motion.at[i].value, "duals move as plain numbers do", plain.at[i] - motion.at[i].value);
     Motion<double> ahead = at_rest(), behind = at_rest();
     ahead.at[k] = STEP * scale[k], behind.at[k] = -STEP * scale[k];
-    run_to(ahead, tables, until, 1e-10);
-    run_to(behind, tables, until, 1e-10);
+    run_to(ahead, 1e-10);
+    run_to(behind, 1e-10);
     double size = 0, worst = 0;
     for (int i = 0; i < 6; i++) {
       double exact = (ahead.at[i] - behind.at[i]) / (2 * STEP) / scale[i];
@@ -165,6 +224,7 @@ int main(int count, char **names) {
   test_products_keep_what_they_round_off();
   test_a_touch_is_the_one_that_the_careful_search_finds();
   test_changes_become_orthonormal_and_a_lost_one_is_replaced();
+  test_a_stage_that_ran_away_is_never_an_accepted_step();
   for (int n = 1; n < count; n++) {
     Scene scene;
     CollisionShapes shapes;
@@ -181,8 +241,13 @@ int main(int count, char **names) {
     const Tables &tables = *reinterpret_cast<Tables *>(memory.data());
     expect(vibench_prepare(&scene, reinterpret_cast<Tables *>(memory.data())) == REACHED_END, "a scene is accepted", n);
     int before = failures;
-    test_duals_are_derivatives(tables, 0.03, 3e-7);
-    test_duals_are_derivatives(tables, 0.03, 1e-10);
+    test_an_impact_keeps_momentum_and_places_and_turns_the_approach(tables);
+    CubicScene cubic{scene.specimen, 5e-5, LONGEST_TURN / tables.flight.grid, scene.power, &power_shapes};
+    std::vector<double> more(size_t(vibench_size_of_cubic_tables(scene.specimen.law)) / sizeof(double));
+    CubicTables &cubics = *reinterpret_cast<CubicTables *>(more.data());
+    expect(vibench_prepare_cubics(&cubic, &cubics) == REACHED_END, "a scene of cubics is accepted", n);
+    for (double tolerance : {3e-7, 1e-10}) test_duals_are_derivatives(HarmonicRun{tables, 0.03}, tolerance);
+    test_duals_are_derivatives(RunOnCubics{cubics, tables.omega, 0.025}, 1e-8);
     if (failures > before) std::printf("in %s\n", names[n]);
   }
   std::printf(failures > 0 ? "%d checks failed\n" : "all checks passed\n", failures);

@@ -10,13 +10,21 @@ import numpy as np
 from native_calls import calls
 
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine import Engine, EngineError, collision_structure, power_structure, scene_of
+from vibench.sim.engine import (
+    Engine,
+    EngineError,
+    collision_structure,
+    fill_power,
+    fill_specimen,
+    power_structure,
+    scene_of,
+)
 
 STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
 STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
 POINTERS = {
     *("collisions", "power_shapes", "samples", "impact_times"),
-    *("growth", "impacts", "motions", "controller", "at"),
+    *("growth", "impacts", "motions", "controller", "shaker", "at"),
 }
 LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "power:5", "power:3+5+7")
 CODES = {-1, 0, 1, 2, 3, 4}
@@ -86,6 +94,42 @@ def call(engine, draws):
     return engine.take_readings(tables, state, tolerance, record, tangent, readings, last)
 
 
+def call_on_cubics(engine, draws):
+    """Run a scene on cubics of which something may be broken; returns its code."""
+    specimen = gong2025(contact=str(draws.choice(LAWS)))
+    scene = engine.new("CubicScene", interval=draws.choice([1e-5, 3e-4]), fastest=4e3)
+    fill_specimen(scene["specimen"], specimen)
+    fill_power(engine, scene, gong2025(contact="power:3+5+7").contact)
+    base, motions, impacts = 1e-5 * draws.standard_normal((20, 4)), np.zeros((20, 6)), np.zeros(20)
+    base[:, 1:] = draws.choice([0.0, 0.2]), 0.0, 0.0
+    drive = engine.new(
+        "CubicDrive", base=base, motions=motions, impacts=impacts, last_to=float(scene["interval"])
+    )
+    state, record, samples, times = engine.new("State"), engine.new("Record"), np.zeros((9, 6)), np.zeros(4)
+    record["sample_rate"], record["samples"], record["sample_room"] = 2e4, samples.ctypes.data, len(samples)
+    record["impact_times"], record["impact_room"], record["steps_left"] = (
+        times.ctypes.data,
+        len(times),
+        10_000,
+    )
+    sizes = [(view, int(view)) for view in lent_sizes(drive)]
+    tolerance = float(draws.choice([3e-7, 3e-7, *STRANGE]))
+    for structure in draws.choice([0, 1, 2, 3], draws.integers(4)):
+        spoil((scene, drive, state, record)[structure], draws)
+    for view, true in sizes:
+        view[...] = min(int(view), true)
+    record["sample_room"] = min(int(record["sample_room"]), len(samples))
+    record["impact_room"] = min(int(record["impact_room"]), len(times))
+    record["steps_left"] = min(int(record["steps_left"]), 10_000)
+    try:
+        tables = engine.prepare_cubics(scene)
+    except ValueError:
+        return -1
+    if draws.random() < 0.8:
+        engine.start(tables, state, tolerance)
+    return engine.run_cubics(tables, state, drive, tolerance, record)
+
+
 def lent_sizes(structure):
     """Views of the sizes of all arrays that a structure lends."""
     for name in structure.dtype.names:
@@ -101,6 +145,9 @@ def call_spoilt(engine, draws):
         sizes = [(view, int(view)) for view in lent_sizes(structure)]
         for _ in range(draws.integers(3)):
             spoil(structure, draws)
+        if function == "close_loop":
+            sizes += [(view, int(view)) for view in lent_sizes(structure.lent["shaker"])]
+            spoil(structure.lent["shaker"], draws)
         if function.endswith("_loop") and draws.random() < 0.3:
             spoil(structure.lent["controller"], draws)
         for view, true in sizes:
@@ -119,6 +166,7 @@ def main():
     given = options.parse_args()
     engine, draws = Engine(given.library), np.random.default_rng(given.seed)
     codes = [call(engine, draws) for _ in range(given.count)]
+    codes += [call_on_cubics(engine, draws) for _ in range(given.count // 2)]
     codes += [code for _ in range(given.count // 20) for code in call_spoilt(engine, draws)]
     if not set(codes) <= CODES:
         raise EngineError(f"Codes that no outcome has: {set(codes) - CODES}")

@@ -2,6 +2,19 @@
 
 import numpy as np
 
+from vibench.sim import gong2025
+from vibench.sim.engine import cubic_tables, start_on_cubics
+
+LAWS = (
+    "hertz",
+    "hunt_crossley:0.5",
+    "linear_gap",
+    "rigid:0.8",
+    "rigid:0",
+    "linear",
+    "power:5",
+    "power:3+5+7",
+)
 STATES, STEPS, PARAMETERS = 8, 40, 2
 
 
@@ -64,8 +77,33 @@ def calls(engine, draws):
     yield "play_loop", loop, filled
     yield "hear_loop", loop, [*filled, volts]
     yield "play_loop", loop, filled
+    shaker, moved = shaker_of(engine, draws, drive)
+    yield "move_shaker", shaker, moved
+    engine.fill(loop, shaker=shaker.ctypes.data, begin=0)
+    loop.lent["shaker"] = shaker
+    yield "close_loop", loop, [*filled, *moved]
 
     yield from motion_calls(engine, draws, normal)
+
+
+def shaker_of(engine, draws, drive):
+    """A table with a specimen that strikes its stops, or nearly does, and what a stretch fills."""
+    specimen = gong2025(contact=str(draws.choice(LAWS)))
+    tables, state = cubic_tables(engine, specimen, 1e-5), engine.new("State")
+    start_on_cubics(
+        engine, tables, specimen, state, [2e-5, 4.4e-5, 0.0, 0.0, draws.uniform(-0.5, 0.5), 0.0], 3e-7
+    )
+    moved = {name: np.zeros(STEPS) for name in ("amplifier_voltage", "base_acceleration", "m0_velocity")}
+    moved["ends"] = np.zeros((STEPS // 2, 9))
+    lags = {"low_decay": 0.99, "low_mean": 0.995, "high_decay": 0.3, "high_mean": 0.6}
+    limits = {"gain": 3.0, "clip": 2.5, "current_limit": 3.0, "stroke": 1e-5}
+    stops = {"stop_stiffness": 1e5, "stop_damping": 10.0, "tolerance": 3e-7, "step": 1e-5}
+    arrays = {"tables": tables, "drive": drive, "noise": np.zeros(STEPS), **moved}
+    shaker = engine.new("LoadedShaker", specimen=state, **lags, **limits, **stops, **arrays)
+    shaker["transition"] = np.eye(3, 5)
+    shaker["transition"][0, 1], shaker["transition"][1, 4] = 1e-5, 8e-5
+    shaker["transition"][1:, 3] = 0.01, 0.1
+    return shaker, list(moved.values())
 
 
 def motion_calls(engine, draws, normal):

@@ -16,7 +16,6 @@ from ._contact import (
     begin_contact as begin_contact,
     contact_workspace as contact_workspace,
     foreseen_collision as foreseen_collision,
-    gather as gather,
     step_factor as step_factor,
 )
 from ._end import (
@@ -39,10 +38,8 @@ from ._flow import (
     T as T,
     W as W,
     base_force_at as base_force_at,
-    blended_error as blended_error,
     gap_of as gap_of,
     rates_of as rates_of,
-    squared_errors as squared_errors,
     step_error as step_error,
     trial_step as trial_step,
 )

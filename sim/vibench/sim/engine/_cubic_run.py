@@ -83,9 +83,9 @@ class CubicRun:
         return self._run(drive, record)
 
     def follow(self, pieces: Floats, record: RunRecord) -> tuple[Floats, Floats]:
-        """Advance over whole intervals; returns, of those that were passed, motions at their ends and impacts.
+        """Advance over whole intervals, as far as possible.
 
-        The shapes are (passed, 6) and (passed,).
+        Returns motions at the ends of those that were passed, shape (passed, 6), and impacts in each.
         """
         motions, impacts = np.empty((len(pieces), DIRECTIONS)), np.empty(len(pieces))
         drive = self._engine.new("CubicDrive", base=pieces, motions=motions, impacts=impacts)

@@ -1,8 +1,7 @@
 """Free motion between contacts: exact, with proof of the instant at which a stop is touched.
 
-On an interval of a sampled or swept drive a flight is one product with a matrix. A touch is excluded or found
-by a bound on the acceleration of p, never by sampling (docs/decisions/0004-contact-integration.md). Holds for
-every law but power laws, which act at every p.
+A touch is excluded or found by a bound on the acceleration of p, never by sampling
+(docs/decisions/0004-contact-integration.md). Holds for every law but power laws, which act at every p.
 """
 
 import lazy_loader

@@ -1,9 +1,3 @@
-from ._base_force import (
-    FORCE_TERMS as FORCE_TERMS,
-    Cubic as Cubic,
-    base_force as base_force,
-    shifted as shifted,
-)
 from ._detection import (
     LARGEST_BOUND as LARGEST_BOUND,
     LONGEST_TURN as LONGEST_TURN,
@@ -11,17 +5,13 @@ from ._detection import (
     ROUNDING as ROUNDING,
     SERIES_TERMS as SERIES_TERMS,
     TOUCH as TOUCH,
-    derivative_bound as derivative_bound,
     first_contact as first_contact,
     polynomial_at as polynomial_at,
     touched_side as touched_side,
 )
 from ._flight import (
-    CLEAR as CLEAR,
+    FORCE_TERMS as FORCE_TERMS,
     GRID_TURN as GRID_TURN,
-    LIFTS_OFF as LIFTS_OFF,
-    OUT_OF_RANGE as OUT_OF_RANGE,
-    TOUCHES as TOUCHES,
 )
 from ._linear_series import (
     AT_X as AT_X,
@@ -37,8 +27,4 @@ from ._linear_series import (
 )
 from ._observer import (
     series_peak as series_peak,
-)
-from ._series import (
-    fill_flight_series as fill_flight_series,
-    place_on_series as place_on_series,
 )

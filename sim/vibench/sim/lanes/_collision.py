@@ -56,7 +56,7 @@ NEWTON = 3
 HIGHEST = 8
 """Derivative of p that is taken at a touch: a collision is short beside the fastest mode."""
 STRETCH_TURN = 0.3
-"""Longest stretch of a contact, as drive phase [rad]; as in `vibench.sim.stepping`."""
+"""Longest stretch of a contact, as drive phase [rad]; as in native/contact.hpp."""
 FACTORIALS = np.array([float(math.factorial(k)) for k in range(HIGHEST + 1)])
 AWAY = np.array([MIDDLE**k / math.factorial(k) for k in range(HIGHEST + 1)])
 

@@ -2,7 +2,7 @@
 
 While m1 sticks to a stop, m1 and m2 move as one: y = z + side * gap, and the spring and damper between them
 are inside a rigid body. What is left is linear with two displacements, x and z, and one condition: the
-stop can only push. `vibench.sim.sticking` follows the motion and finds where that condition ends.
+stop can only push. The native engine follows the motion and finds where that condition ends.
 
 The motion is one table (kernels copy every array they are handed): a term a row, modes first, the drive last.
 """

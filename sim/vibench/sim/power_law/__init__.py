@@ -1,8 +1,4 @@
-"""Motion under a power law with a sampled or swept drive: a force that acts at every p, with no flight.
-
-Dormand and Prince's order 8(5,3) in time. Harmonic drives take the long steps of `vibench.sim.engine`
-(docs/decisions/0026-power-laws.md).
-"""
+"""The force of a power law in the kernels of `vibench.sim.chain` (docs/decisions/0026-power-laws.md)."""
 
 import lazy_loader
 

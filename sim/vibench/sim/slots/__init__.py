@@ -1,9 +1,4 @@
-"""The memory of one run, slot by slot: the specimen's numbers, the state vector, the record.
-
-`_parameters` turns a `Specimen` into plain numbers and numbers the places of the state vector that every
-kernel advances in place; `_record` is what a run fills on its way (samples, impacts, counts) and its codes
-of ending. Filling a slot never changes a step of the motion.
-"""
+"""A specimen as plain numbers, and the places of the state vector that every kernel advances in place."""
 
 import lazy_loader
 

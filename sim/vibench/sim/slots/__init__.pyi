@@ -1,12 +1,9 @@
 from ._parameters import (
-    CLOSED as CLOSED,
-    LEVEL as LEVEL,
     PACE as PACE,
     RATE as RATE,
     RATE_SCALE as RATE_SCALE,
     ROOT as ROOT,
     ROOT_SCALE as ROOT_SCALE,
-    SCALES as SCALES,
     SIDE as SIDE,
     STATE_SIZE as STATE_SIZE,
     STEP as STEP,
@@ -14,14 +11,4 @@ from ._parameters import (
     PowerTerms as PowerTerms,
     parameters as parameters,
     power_terms as power_terms,
-)
-from ._record import (
-    IMPACTS as IMPACTS,
-    LOST as LOST,
-    NEXT_SAMPLE as NEXT_SAMPLE,
-    REACHED_END as REACHED_END,
-    STUCK as STUCK,
-    TOO_LONG as TOO_LONG,
-    TOO_MANY_IMPACTS as TOO_MANY_IMPACTS,
-    Record as Record,
 )

@@ -10,8 +10,7 @@ from typing import NamedTuple
 from ..model import MOST_TERMS, NoContact, PowerLaw, Specimen
 
 SIDE = 6
-"""0 in flight; +1 or -1 while m1 presses on the stop at positive or negative p, or is held by a rigid one; +1
-under a power law."""
+"""0 in flight; +1 or -1 while m1 presses on the stop at positive or negative p."""
 ROOT, RATE = 7, 8
 """In contact: w, the square root of the penetration [m^0.5], and its rate r = d|p|/dt [m/s]. Under a power
 law p and dp/dt themselves."""
@@ -22,13 +21,7 @@ ROOT_SCALE, RATE_SCALE = 10, 11
 """In contact: how large w and r will become, the measure of their errors."""
 PACE = 12
 """In contact: w over r, as large as they will become: the time scale of the collision, in s [s/m^0.5]."""
-CLOSED = 13
-"""Under rigid stops: how far from one m1 counts as touching it [m], from the rounding of the last flight."""
-SCALES = 14
-"""Under a power law, the first of seven: how large p, dp/dt, x, z, vx, vz have lately been, and time as 1."""
-LEVEL = 21
-"""Under a power law: one more than the level of the next long step; 0 where none was made yet."""
-STATE_SIZE = 22
+STATE_SIZE = 13
 
 
 class Parameters(NamedTuple):

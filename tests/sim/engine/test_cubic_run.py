@@ -1,0 +1,144 @@
+"""A base that is cubics on intervals: against the matrix exponential, under symmetry, cut, and refused."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from scipy.interpolate import CubicSpline
+from scipy.linalg import expm
+
+from vibench.sim import Accuracy, Outcome, gong2025
+from vibench.sim.engine import CubicRun, RunRecord
+from vibench.sim.model import state_matrix
+
+UNITS = np.repeat([1e-4, 0.1], 3)
+LAWS = (
+    *("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "rigid:0.2", "linear"),
+    *("power:5", "power:3+5+7", "power:47"),
+)
+
+
+def sine_pieces(frequency_hz, amplitude_m, duration_s, interval_s):
+    time_s = np.arange(round(duration_s / interval_s) + 1) * interval_s
+    spline = CubicSpline(time_s, amplitude_m * np.sin(2.0 * np.pi * frequency_hz * time_s))
+    return np.ascontiguousarray(spline.c[::-1].T)
+
+
+def carried(specimen, pieces, interval_s, accuracy=Accuracy.STANDARD, start=(0.0,) * 6):
+    run, record = CubicRun(specimen, interval_s, start, accuracy.tolerance), RunRecord(100_000)
+    assert run.advance(np.atleast_2d(pieces), record) is Outcome.REACHED_END
+    return run, record
+
+
+def exact_linear(specimen, motion, base, duration_s):
+    """Flight under a cubic base motion by the exponential of motion and powers of time together."""
+    system, entry = state_matrix(specimen)
+    stiffness, damping = specimen.stiffnesses[0], specimen.dampings[0]
+    force = stiffness * base + damping * np.append(base[1:] * [1.0, 2.0, 3.0], 0.0)
+    joint = np.zeros((10, 10))
+    joint[:6, :6] = system * duration_s
+    joint[:6, 6:] = np.outer(entry, duration_s * duration_s ** np.arange(4) * force)
+    for power in range(1, 4):
+        joint[6 + power, 5 + power] = power
+    return (expm(joint) @ np.concatenate([motion, [1.0, 0.0, 0.0, 0.0]]))[:6]
+
+
+@pytest.mark.parametrize("interval_s", [1e-6, 1e-5, 1.7e-4, 2e-3])
+@pytest.mark.parametrize("contact", ["linear", "hertz", "power:201"])
+def test_without_contact_an_interval_is_exact(interval_s, contact):
+    # Stops of 1 m are never met, and a power law of that reference is nothing.
+    specimen = gong2025(contact=contact, gap_m=1.0)
+    motion = np.array([3e-5, -2e-5, 1e-5, 0.02, -0.05, 0.03])
+    base = np.array([1e-5, 0.01, 5.0 / interval_s**0.5, -1e-6 / interval_s**3])
+    run, record = carried(specimen, base, interval_s, start=motion)
+    assert record.impacts == 0
+    expected = exact_linear(specimen, motion, base, interval_s)
+    for part in (slice(0, 3), slice(3, 6)):
+        error = np.abs(run.motion[part] - expected[part]).max()
+        assert error < 1e-12 * np.abs(expected[part]).max()
+
+
+@pytest.mark.parametrize("contact", LAWS)
+def test_a_motion_does_not_depend_on_where_the_intervals_end(contact):
+    specimen, speed, reached = gong2025(damping_time_s=3e-5, contact=contact), 0.3, []
+    for intervals in (1, 7, 64):
+        length = 2e-3 / intervals
+        pieces = [[speed * length * index, speed, 0.0, 0.0] for index in range(intervals)]
+        reached.append(carried(specimen, pieces, length, Accuracy.REFERENCE))
+    for run, record in reached[1:]:
+        assert record.impacts == reached[0][1].impacts
+        assert np.max(np.abs(run.motion - reached[0][0].motion) / UNITS) < 1e-8
+
+
+@pytest.mark.parametrize("contact", LAWS)
+def test_a_run_cut_between_intervals_is_the_whole_one_to_the_last_bit(contact):
+    specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 40e-6, 0.05, 2e-5)
+    whole, record = carried(specimen, pieces, 2e-5)
+    run, parts = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(100_000)
+    for part in np.array_split(pieces, 37):
+        run.advance(part, parts)
+    np.testing.assert_array_equal(run.motion, whole.motion)
+    np.testing.assert_array_equal(parts.impact_times_s, record.impact_times_s)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    frequency_hz=st.floats(50.0, 600.0),
+    amplitude_m=st.floats(1e-6, 50e-6),
+    damping_time_s=st.floats(0.0, 1e-4),
+    contact=st.sampled_from(LAWS),
+)
+def test_a_mirrored_drive_gives_the_mirrored_motion_to_the_last_bit(
+    frequency_hz, amplitude_m, damping_time_s, contact
+):
+    specimen = gong2025(damping_time_s, contact=contact)
+    pieces = sine_pieces(frequency_hz, amplitude_m, 0.05, 2e-5)
+    (here, record), (there, mirrored) = (carried(specimen, sign * pieces, 2e-5) for sign in (1.0, -1.0))
+    assert record.impacts == mirrored.impacts
+    np.testing.assert_array_equal(here.motion, -there.motion)
+
+
+def test_the_cubic_drive_converges_to_the_sine_with_order_four():
+    specimen = gong2025(damping_time_s=3e-5, contact="linear")
+    motions = []
+    for interval_s in (4e-4, 2e-4, 1e-4, 2.5e-6):
+        run, _ = carried(specimen, sine_pieces(130.0, 20e-6, 0.1, interval_s), interval_s)
+        motions.append(run.motion[:3])
+    errors = [np.abs(motion - motions[-1]).max() for motion in motions[:-1]]
+    assert np.log2(errors[0] / errors[1]) > 3.7
+    assert np.log2(errors[1] / errors[2]) > 3.7
+
+
+@pytest.mark.parametrize("contact", LAWS)
+def test_standard_is_as_far_from_reference_as_it_promises(contact):
+    specimen, pieces = gong2025(contact=contact), sine_pieces(130.0, 20e-6, 0.5, 2e-5)
+    run, _ = carried(specimen, pieces, 2e-5)
+    exact, _ = carried(specimen, pieces, 2e-5, Accuracy.REFERENCE)
+    assert np.max(np.abs(run.motion - exact.motion) / UNITS) < Accuracy.STANDARD.promise
+
+
+def test_a_run_ends_at_the_impact_for_which_there_is_no_room():
+    specimen, pieces = gong2025(), sine_pieces(130.0, 20e-6, 0.2, 2e-5)
+    _, whole = carried(specimen, pieces, 2e-5)
+    run, record = CubicRun(specimen, 2e-5, np.zeros(6), Accuracy.STANDARD.tolerance), RunRecord(5)
+    assert run.advance(pieces, record) is Outcome.TOO_MANY_IMPACTS
+    np.testing.assert_array_equal(record.impact_times_s, whole.impact_times_s[:5])
+    assert run.time_s == pytest.approx(whole.impact_times_s[5], abs=1e-15)
+
+
+@pytest.mark.parametrize("contact", LAWS)
+def test_a_drive_that_is_not_a_number_is_reported_and_does_not_hang(contact):
+    pieces = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    run = CubicRun(gong2025(contact=contact), 1e-5, np.zeros(6), Accuracy.STANDARD.tolerance)
+    motions, impacts = run.follow(pieces, RunRecord(10))
+    assert (len(motions), len(impacts)) == (1, 1)
+    assert run.advance(pieces, RunRecord(10)) is not Outcome.REACHED_END
+
+
+def test_an_interval_without_length_and_ends_outside_of_one_are_refused():
+    with pytest.raises(ValueError, match=r"Interval 0\.0 s is not allowed"):
+        CubicRun(gong2025(), 0.0, np.zeros(6), 1e-7)
+    run = CubicRun(gong2025(), 1e-5, np.zeros(6), 1e-7)
+    with pytest.raises(ValueError, match="their ends must lie within them"):
+        run.advance(np.zeros((3, 4)), RunRecord(10), last_to_s=2e-5)
+    with pytest.raises(ValueError, match="rigid stops stand at"):
+        CubicRun(gong2025(contact="rigid:0.5"), 1e-5, [0.0, 1e-3, 0.0, 0.0, 0.0, 0.0], 1e-7)
