@@ -5,8 +5,7 @@ import time
 import numpy as np
 
 from vibench.sim import Accuracy, Harmonic, LinearSweep, Sampled, gong2025, integrate
-from vibench.sim.kernels import kernel
-from vibench.sim.stepping import advance_interval, interval_tables, new_state
+from vibench.sim.engine import CubicRun, RunRecord
 
 REPEATS = 3
 UNITS = np.repeat([1e-4, 0.1], 3)
@@ -26,22 +25,17 @@ def best(job):
     return min(times), result
 
 
-@kernel
-def carry(state, pieces, tables):
-    """Advance over many intervals as a rig's own kernel would."""
-    impacts = 0
-    for index in range(len(pieces)):
-        impacts += advance_interval(state, pieces[index], tables)
-    return impacts
+def carry(pieces, interval_s):
+    """Advance over many intervals."""
+    CubicRun(gong2025(), interval_s, np.zeros(6), Accuracy.STANDARD.tolerance).advance(pieces, RunRecord(0))
 
 
 def report_first_use():
-    """Compile, or load what is cached."""
+    """Load the engine."""
     start = time.perf_counter()
     integrate(gong2025(), Harmonic(130.0, 20e-6), 0.01)
     integrate(gong2025(), LinearSweep(100.0, 110.0, 0.1, 20e-6), 0.1)
-    carry(new_state(gong2025()), np.zeros((1, 4)), interval_tables(gong2025(), 1e-5))
-    print(f"first use of the kernels: {time.perf_counter() - start:.1f} s")
+    print(f"first use of the engine: {time.perf_counter() - start:.1f} s")
 
 
 def report_runs():
@@ -65,9 +59,8 @@ def report_runs():
 
 def report_intervals():
     """Cost of an interval of a sampled drive."""
-    tables = interval_tables(gong2025(), 1e-5)
     pieces = np.zeros((200_000, 4))
-    taken, _ = best(lambda: carry(new_state(gong2025()), pieces, tables))
+    taken, _ = best(lambda: carry(pieces, 1e-5))
     print(f"interval of 10 us, clear of the stops: {taken / len(pieces) * 1e9:.0f} ns")
     rate = 1e5
     sine = 20e-6 * np.sin(2.0 * np.pi * 130.0 * np.arange(200_001) / rate)

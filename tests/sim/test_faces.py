@@ -20,7 +20,6 @@ FACES = (
     "vibench.sim.branches",
     "vibench.sim.chain",
     "vibench.sim.shaker",
-    "vibench.sim.stepping",
     "vibench.sim.maps",
     "vibench.sim.study",
 )
