@@ -1,5 +1,6 @@
 // The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
 // calls, so that threads may share tables. What is given is checked, and refused with a code.
+#include "chain.hpp"
 #include "cubic.hpp"
 #include "filters.hpp"
 #include "tangent.hpp"
@@ -159,6 +160,7 @@ constexpr struct {
     DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoadedShaker), DESCRIBED(LoopCables),
     DESCRIBED(TrackedStop), DESCRIBED(TrackRecord), DESCRIBED(MotionFilter), DESCRIBED(MotionSmoother),
     DESCRIBED(ContactSearch),
+    DESCRIBED(CellKind), DESCRIBED(CellState), DESCRIBED(ChainMotion),
 };
 constexpr int64_t STRUCTURE_COUNT = sizeof STRUCTURES / sizeof *STRUCTURES;
 
@@ -292,7 +294,7 @@ VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, 
   return outcome;
 }
 
-// ---- Signals, the world of the virtual rig, and hidden motion: functions of one structure
+// ---- Signals, the world of the virtual rig, hidden motion, and chains: functions of one structure
 
 namespace {
 
@@ -384,6 +386,69 @@ bool is_usable(const ContactSearch &of) {
          of.longest > 0 && has_columns(of.contacts, CONTACT_COLUMNS);
 }
 
+constexpr int KIND_SIZE = sizeof(CellKind) / sizeof(double);
+constexpr int CELL_SIZE = sizeof(CellState) / sizeof(double);
+constexpr int64_t MOST_CELLS = 1000000, MOST_WINDOWS = int64_t(1) << 50;
+
+int64_t chain_memory(int64_t cells, int64_t kinds) { return ChainMemory(nullptr, cells, kinds).used; }
+
+bool is_usable(const CellKind &kind, const ChainMotion &chain) {
+  const Specimen &s = kind.specimen;
+  if (!is_usable(s) || s.law == RIGID) return false;
+  if (s.law == HERTZ && chain.collisions == nullptr) return false;
+  if (s.law == POWERS && (chain.power_shapes == nullptr || !is_usable(kind.power))) return false;
+  return is_not_negative(kind.next_stiffness) && is_not_negative(kind.next_damping);
+}
+
+bool has_cells(const ChainMotion &chain) {
+  int64_t cells = chain.kind_of.size, kinds = chain.kinds.size / KIND_SIZE;
+  if (!has_columns(chain.kinds, KIND_SIZE) || !is_lent(chain.kind_of) || cells < 1 || cells > MOST_CELLS || kinds < 1 ||
+      kinds > cells || !is_table(chain.states, cells, CELL_SIZE))
+    return false;
+  for (int64_t k = 0; k < kinds; k++)
+    if (!is_usable(reinterpret_cast<const CellKind *>(chain.kinds.at)[k], chain)) return false;
+  for (int64_t i = 0; i < cells; i++) {
+    const CellState &cell = reinterpret_cast<const CellState *>(chain.states.at)[i];
+    bool has_kind = chain.kind_of.at[i] >= 0.0 && chain.kind_of.at[i] < double(kinds);
+    bool has_side = cell.side == 0.0 || magnitude(cell.side) == 1.0;
+    if (!has_kind || !has_side || !is_not_negative(cell.power_step) || !is_not_negative(cell.size)) return false;
+  }
+  return has_size(chain.memory, chain_memory(cells, kinds));
+}
+
+bool has_windows(const ChainMotion &chain) {
+  if (!is_lent(chain.windows) || chain.windows.size < 1 || !has_size(chain.clashes, chain.windows.size)) return false;
+  for (int64_t level = 0; level < chain.windows.size; level++) {
+    double window = chain.windows.at[level], clash = chain.clashes.at[level];
+    if (!is_positive(window) || !(window * chain.fastest <= LONGEST_WINDOW) || !(clash >= 0.0 && clash < double(MOST_CELLS)))
+      return false;
+  }
+  return is_positive(chain.fastest) && is_count(chain.windows_left, MOST_WINDOWS);
+}
+
+bool is_usable(const ChainMotion &chain) {
+  int64_t cells = chain.kind_of.size;
+  if (!has_cells(chain) || !has_windows(chain) || !is_tolerance(chain.tolerance)) return false;
+  bool has_clock = magnitude(chain.until) < LATEST && magnitude(chain.clock_high) < LATEST && is_finite(chain.clock_low);
+  bool has_drive = is_positive(chain.drive.frequency) && is_finite_phasor(chain.drive.start) &&
+                   is_finite_phasor(chain.drive.force);
+  bool has_pieces = has_columns(chain.pieces, PIECE_TERMS) &&
+                    (chain.pieces.size == 0 || (is_positive(chain.piece_length) && is_finite(chain.piece_start)));
+  bool has_samples = has_columns(chain.samples, 6 * cells) && is_count(chain.samples_kept, chain.samples.size / (6 * cells)) &&
+                     is_finite(chain.start) && (chain.samples.size == 0 || is_positive(chain.sample_rate));
+  bool has_impacts = is_lent(chain.impact_times) && has_size(chain.impact_cells, chain.impact_times.size) &&
+                     is_count(chain.impacts, chain.impact_times.size);
+  return has_clock && has_drive && has_pieces && has_samples && has_impacts && chain.watch >= 0 && chain.watch < WATCHES &&
+         is_table(chain.peaks, cells, 2) && is_table(chain.lines, cells, 2);
+}
+
+// Decides which cells of a chain start on a stop.
+int64_t start_chain(ChainMotion &chain) {
+  ChainRun(chain).start();
+  return REACHED_END;
+}
+int64_t follow_chain(ChainMotion &chain) { return ChainRun(chain).advance(); }
+
 }  // namespace
 
 // Moves the shaker of a loop, closed, over the rest of a stretch; a `LoopEnd`, or REFUSED.
@@ -391,6 +456,11 @@ VIBENCH_API int64_t vibench_close_loop(LoopCables *loop) {
   if (loop == nullptr || loop->shaker == nullptr || !is_usable(*loop) || !is_usable(*loop->shaker)) return REFUSED;
   if (loop->shaker->drive.at != loop->drive.at || loop->shaker->drive.size != loop->drive.size) return REFUSED;
   return close_loop(*loop);
+}
+
+// Numbers of the memory that a chain lends.
+VIBENCH_API int64_t vibench_chain_memory(int64_t cells, int64_t kinds) {
+  return cells > 0 && cells <= MOST_CELLS && kinds > 0 && kinds <= cells ? chain_memory(cells, kinds) : int64_t(REFUSED);
 }
 
 // Each returns what its function does, or REFUSED.
@@ -408,3 +478,5 @@ OF_ONE_STRUCTURE(hear_loop, LoopCables)
 OF_ONE_STRUCTURE(filter_motion, MotionFilter)
 OF_ONE_STRUCTURE(smooth_motion, MotionSmoother)
 OF_ONE_STRUCTURE(follow_contacts, ContactSearch)
+OF_ONE_STRUCTURE(start_chain, ChainMotion)
+OF_ONE_STRUCTURE(follow_chain, ChainMotion)

@@ -144,28 +144,22 @@ template <class T> INLINE Collision<double> values_of(const Collision<T> &c) {
           value_of(c.moments), value_of(c.duration), c.unit,             c.pace,            c.press};
 }
 
-// Carries a motion that has just touched the stop on `side` to the end of its collision; `pace` as in `Contact`. Returns false, with
-// nothing changed, where a few corrections do not suffice: next to no speed, springs as fast as the collision, an
-// instant to stop at in the midst of it, the reference level. Then the steps of contact.hpp resolve it.
+// Finds the collision that begins with c.motion and c.course; `pace` as in `Contact`. Returns false where a few
+// corrections do not suffice: next to no speed, springs as fast as the collision, an instant to stop at in the midst of
+// it, the reference level. Then the steps of contact.hpp resolve it.
 template <class T>
-inline bool collide(Collision<T> &c, T *motion, double side, double pace, const Complex<T> &drive, double longest,
-                    double tolerance, const Tables &tables) {
-  const CollisionTables &t = tables.collision;
-  double gap = gap_at(tables.specimen, side), speed = side * value_of(motion[VY] - motion[VZ]);
+inline bool find_collision(Collision<T> &c, double gap, double pace, double longest, double tolerance,
+                           const Tables &tables) {
+  double speed = value_of(at(c.motion, P_RATE)), fastest = tables.collision.fastest;
   if (tolerance < LEAST_TOLERANCE || !(speed > 0.0)) return false;
   double w = pace * speed;  // the largest
-  double most = smaller(longest, LONGEST_COLLISION / t.fastest);
+  double most = smaller(longest, LONGEST_COLLISION / fastest);
   if (!(LONGEST * w * w < speed * most)) return false;
-  const T begins[WIDE] = {side * (motion[Y] - motion[Z]),   side * motion[X],  side * motion[Z],
-                          side * (motion[VY] - motion[VZ]), side * motion[VX], side * motion[VZ],
-                          side * drive.re,                  side * drive.im};
-  c.motion = gathered(begins);
-  c.course = times(t.onto_p, c.motion);
   Collision<double> values;
   values.motion = value_of(c.motion), values.course = value_of(c.course);
   values.unit = w * w;
   values.pace = values.unit / speed;
-  double press = 2.0 * values.course[2] * t.fastest * t.fastest * values.pace / speed;
+  double press = 2.0 * values.course[2] * fastest * fastest * values.pace / speed;
   if (!(SOFTEST <= press && press <= HARDEST)) return false;
   foresee(values, press, tables);
   if (!correct<double>(values, values.motion[P] - gap, CLOSE * tolerance, tables)) return false;
@@ -174,10 +168,26 @@ inline bool collide(Collision<T> &c, T *motion, double side, double pace, const 
     c.unit = values.unit, c.pace = values.pace, c.press = values.press;
     c.depths = {}, c.depths.value = values.depths;
     c.duration = constant<T>(values.duration);
-    if (!correct<T>(c, begins[P] - gap, 0.0, tables)) return false;
+    return correct<T>(c, at(c.motion, P) - gap, 0.0, tables);
   } else {
     c = values;
+    return true;
   }
+}
+
+// Carries a motion that has just touched the stop on `side` to the end of its collision; false, with nothing changed,
+// where it is not found.
+template <class T>
+inline bool collide(Collision<T> &c, T *motion, double side, double pace, const Complex<T> &drive, double longest,
+                    double tolerance, const Tables &tables) {
+  const CollisionTables &t = tables.collision;
+  double gap = gap_at(tables.specimen, side);
+  const T begins[WIDE] = {side * (motion[Y] - motion[Z]),   side * motion[X],  side * motion[Z],
+                          side * (motion[VY] - motion[VZ]), side * motion[VX], side * motion[VZ],
+                          side * drive.re,                  side * drive.im};
+  c.motion = gathered(begins);
+  c.course = times(t.onto_p, c.motion);
+  if (!find_collision(c, gap, pace, longest, tolerance, tables)) return false;
   move_on(c, t);
   if (!(value_of(at(c.after, P_RATE)) < 0.0)) return false;
   motion[X] = side * at(c.after, AT_X), motion[Z] = side * at(c.after, AT_Z);

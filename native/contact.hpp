@@ -93,6 +93,9 @@ struct BaseForce {
       term = term * Phasor{0.0, t.omega / (k + 1)};
     }
   }
+  BaseForce(double middle_s, const double *series) : middle(middle_s), terms{}, drive{} {
+    __builtin_memcpy(terms, series, sizeof terms);
+  }
   // Summed in pairs: the shortest chain of products that wait for each other.
   template <class T> INLINE T at(const T &tau) const {
     T u = tau - middle, u2 = u * u;

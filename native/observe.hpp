@@ -158,13 +158,18 @@ struct Observer {
     if (wants_lines()) impulse = impulse - (t.pair * jump) * conjugate(drive);
   }
 
-  void see_collision(const Collision<double> &c, double side, const Phasor &drive) {
+  // x and p in a whole collision; `course()` gives the Taylor terms of x without force.
+  template <class Course> void see_shape(const Collision<double> &c, double gap, const Course &course) {
     const CollisionTables &of = t.collision;
-    double gap = gap_at(t.specimen, side);
-    see_x_of(c);
+    see_x_of(c, course);
     double deepest = c.unit * of.shapes->durations[c.press][DEEPER];
     if (gap + deepest * ABOVE_POINTS * largest(c.depths) > record.peak_p)
       record.peak_p = larger(record.peak_p, gap + deepest * top_of(times(of.shapes->about_middle, c.depths)));
+  }
+
+  void see_collision(const Collision<double> &c, double side, const Phasor &drive) {
+    const CollisionTables &of = t.collision;
+    see_shape(c, gap_at(t.specimen, side), [&] { return times(of.onto_x, c.motion); });
     if (!wants_lines()) return;
     Vector<POINTS> angle = (t.omega * c.duration) * Vector<POINTS>::load(of.shapes->heights), q = angle * angle;
     Vector<POINTS> force = (side * c.duration) * Vector<POINTS>::load(of.shapes->weights) * c.force;
@@ -229,12 +234,12 @@ struct Observer {
   }
 
   // x in a whole collision: where it turns, looked for between the points.
-  void see_x_of(const Collision<double> &c) {
+  template <class Course> void see_x_of(const Collision<double> &c, const Course &course_of_x) {
     const CollisionTables &of = t.collision;
     ValueAndRate first{c.motion[AT_X], c.motion[X_RATE]}, last{c.after[AT_X], c.after[X_RATE]};
     record.peak_x = larger(record.peak_x, larger(magnitude(first.value), magnitude(last.value)));
     if (!may_peak(record.peak_x, first, last, c.duration)) return;
-    Vector<TERMS> course = times(of.onto_x, c.motion);
+    Vector<TERMS> course = course_of_x();
     double turn = of.fastest * c.duration, factor = turn;
     Vector<POINTS> turns = turn * Vector<POINTS>::load(of.shapes->heights);
     // A force reaches x by way of m2 and a damper: two integrals later.

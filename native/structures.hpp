@@ -380,4 +380,52 @@ STRUCTURE(ContactSearch,
   Numbers contacts;            // [contacts][7]: the results, as `TrackedContact` orders them
 )
 
+// ---- Chains: specimens whose m0 hang on one another, the first on the base (decision 0011)
+
+// A cell with the link that hangs on its m0; equal ones share it.
+STRUCTURE(CellKind,
+  Specimen specimen;
+  PowerTerms power;            // of the law POWERS
+  double next_stiffness;       // of that link [N/m]; 0 at the free end
+  double next_damping;         // [N s/m]
+)
+
+// Where a cell is.
+STRUCTURE(CellState,
+  double p, x, z, vp, vx, vz;  // p = y - z [m, m/s]
+  double side, root, rate, step, root_scale, rate_scale, pace;  // of a contact under way, as in `State`
+  double power_step;           // the next step under a power law [s]; 0 before the first
+  double size;                 // how large p has lately been there [m]
+)
+
+STRUCTURE(ChainMotion,
+  Numbers kinds;               // [kinds] of `CellKind`
+  Numbers kind_of;             // [cells]
+  Numbers states;              // [cells] of `CellState`
+  double clock_high, clock_low;  // time is their exact sum [s]
+  double until;                // to advance to [s]
+  double tolerance;
+  double fastest;              // largest rate of chain and drive [1/s]
+  Numbers windows;             // [levels]: lengths of windows, long to short [s]
+  Numbers clashes;             // [levels]: cells at most so far apart are not both followed in such a window
+  Drive drive;
+  Numbers pieces;              // [pieces][8]: instead of the drive, the base's force on the first m0 [N] in powers of the
+                               // time since each piece began; or of no size
+  double piece_start, piece_length;  // [s]
+  const CollisionShapes *collisions;
+  const PowerShapes *power_shapes;
+  int64_t windows_left;        // that may still be made
+  double start;                // time of sample 0 [s]
+  double sample_rate;          // [Hz]
+  Numbers samples;             // [samples][cells][6]: x, y, z, vx, vy, vz
+  int64_t samples_kept;
+  Numbers impact_times;        // [impacts], ascending but within a window; a run ends in the window that fills it
+  Numbers impact_cells;        // [impacts]
+  int64_t impacts;
+  int64_t watch;               // one of `Watch`
+  Numbers peaks;               // [cells][2]: largest |x| and |p| [m]
+  Numbers lines;               // [cells][2]: integral of each cell's force against exp(-i (omega t + phase)) [N s]
+  Numbers memory;              // of vibench_chain_memory(cells, kinds)
+)
+
 }  // namespace vibench

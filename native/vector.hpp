@@ -45,6 +45,15 @@ template <int N> INLINE Vector<N> square_root(Vector<N> x) {
 #endif
 }
 
+template <int N> INLINE Vector<N> magnitude(Vector<N> x) {
+#if defined(__clang__)
+  return Vector<N>(__builtin_elementwise_abs(x.lanes));
+#else
+  for (int i = 0; i < N; i++) x.lanes[i] = magnitude(x.lanes[i]);
+  return x;
+#endif
+}
+
 // Sum of all lanes, in halves of halves.
 template <int N> INLINE double total(Vector<N> x) {
   double of[N];

@@ -13,23 +13,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..exponents import BlockedMean, blocked_mean
-from ..kernels import Floats, Table, clock_at
+from ..kernels import Floats, Table
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
 from ..motion import MAX_IMPACT_RATE_HZ
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
-from ._crossing import IMPACTS
-from ._integrate import (
-    check_work,
-    integrate_chain,
-    new_chain_record,
-    new_observations,
-    start_chain,
-    state_of_phasors,
-)
-from ._observer import NOTHING
-from ._run import advance_chain
-from ._tables import ChainTables, chain_tables
+from ._integrate import check_work, integrate_chain, most_chain_impacts
+from ._run import ChainRun
+from ._tables import chain_tables
 
 NEARNESS = 1e-6
 """Distance of the two motions over the size of the first."""
@@ -105,15 +96,22 @@ def chain_lyapunov_exponent(
     settled = integrate_chain(
         chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz
     )
-    pair = _Pair(chain, tables, accuracy, max_impact_rate_hz)
+    most = most_chain_impacts(chain, max_impact_rate_hz, interval_s)
+
+    def advanced(state: Floats, start_s: float) -> tuple[Floats, int, Outcome]:
+        run = ChainRun(chain, drive, tables, accuracy, most_impacts=most)
+        run.place(state, start_s)
+        outcome = run.advance(start_s + interval_s)
+        return run.motion, run.impacts, outcome
+
     first = settled.final_state
     second = _put_near(chain, first, first + np.random.default_rng(seed).normal(size=first.shape), drive)
     growths, impacts, outcome = [], 0, settled.outcome
     for index in range(intervals if outcome is Outcome.REACHED_END else 0):
         start_s = settle_s + index * interval_s
         before = _size(chain, second - first)
-        first, struck, outcome = pair.advance(first, start_s, interval_s)
-        second, _, other = pair.advance(second, start_s, interval_s)
+        first, struck, outcome = advanced(first, start_s)
+        second, _, other = advanced(second, start_s)
         outcome = max(outcome, other)
         if outcome is not Outcome.REACHED_END:
             break
@@ -134,32 +132,6 @@ def chain_lyapunov_exponent(
         final_state=first,
         outcome=outcome,
     )
-
-
-@dataclass(frozen=True)
-class _Pair:
-    """What advances both motions."""
-
-    chain: Chain
-    tables: ChainTables
-    accuracy: Accuracy
-    max_impact_rate_hz: float
-
-    def advance(self, state: Floats, start_s: float, duration_s: float) -> tuple[Floats, int, Outcome]:
-        """Follow one motion for an interval; gives its end, how often it struck, and how the run ended."""
-        cells, phasors = start_chain(self.chain, state, start_s, self.tables, self.accuracy)
-        record = new_chain_record(self.chain, start_s, duration_s, None, self.max_impact_rate_hz)
-        code = advance_chain(
-            cells,
-            phasors,
-            clock_at(start_s),
-            start_s + duration_s,
-            self.tables,
-            self.accuracy.tolerance,
-            record,
-            new_observations(self.chain, NOTHING),
-        )
-        return state_of_phasors(self.chain, phasors, self.tables), int(record.counts[IMPACTS]), Outcome(code)
 
 
 def _put_near(chain: Chain, first: Floats, second: Floats, drive: Harmonic) -> Floats:

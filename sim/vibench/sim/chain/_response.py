@@ -7,25 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels import Complex, Floats, clock_at
+from ..engine import Watch
+from ..kernels import Complex, Floats
 from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
 from ..motion import MAX_IMPACT_RATE_HZ, Response, steady_response, whole_periods
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
-from ._crossing import IMPACTS
-from ._integrate import (
-    check_work,
-    impacts_of,
-    new_chain_record,
-    new_observations,
-    start_chain,
-    start_motion,
-    state_of_phasors,
-)
+from ._integrate import check_work, most_chain_impacts, start_motion
 from ._modes import chain_impulses, chain_state_matrix
-from ._observer import NOTHING, PEAKS, PEAKS_AND_LINES
-from ._run import advance_chain
-from ._tables import ACROSS, PATH, chain_tables
+from ._run import ChainRun
+from ._tables import chain_tables
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,44 +96,36 @@ def chain_response(
     periods = whole_periods(drive, duration_s, window_s)
     tables = chain_tables(chain, drive, accuracy)
     check_work(chain, duration_s, longest_window_s(tables, drive))
-    cells, phasors = start_chain(chain, initial_state, 0.0, tables, accuracy)
-    clock, line_s = clock_at(0.0), periods / drive.frequency_hz
-    record = new_chain_record(chain, 0.0, duration_s, None, max_impact_rate_hz)
-    observations, before, line_start = new_observations(chain, NOTHING), 0, phasors
-    code = int(Outcome.REACHED_END)
+    most = most_chain_impacts(chain, max_impact_rate_hz, duration_s)
+    run = ChainRun(chain, drive, tables, accuracy, most_impacts=most)
+    run.place(start_motion(chain, initial_state), 0.0)
+    line_s = periods / drive.frequency_hz
+    before, line_start, outcome = 0, run.motion, Outcome.REACHED_END
     ends = (duration_s - window_s, duration_s - line_s, duration_s)
-    for mode, until in zip((NOTHING, PEAKS, PEAKS_AND_LINES), ends, strict=True):
-        if code == Outcome.REACHED_END:
-            before = int(record.counts[IMPACTS]) if mode == PEAKS else before
-            line_start = phasors.copy()
-            code = advance_chain(
-                cells,
-                phasors,
-                clock,
-                until,
-                tables,
-                accuracy.tolerance,
-                record,
-                observations._replace(mode=mode),
-            )
-    start = _state_against_drive(line_start, tables.shapes)
-    change = _state_against_drive(phasors, tables.shapes) - start
-    lines = _lines(chain, drive, observations.forces, change, line_s)
-    largest = observations.peaks[[ACROSS, PATH]].T
-    void = 1.0 if code == Outcome.REACHED_END else math.nan
-    impacts = impacts_of(chain, record).cells
+    for watch, until in zip(Watch, ends, strict=True):
+        if outcome is Outcome.REACHED_END:
+            before = run.impacts if watch is Watch.PEAKS else before
+            line_start = run.motion
+            run.watch(watch)
+            outcome = run.advance(until)
+    end = cmath.exp(-1j * (2.0 * math.pi * drive.frequency_hz * duration_s + drive.phase_rad))
+    # Over whole periods the drive's term is where it began.
+    change = (run.motion - line_start) * end
+    lines = _lines(chain, drive, run.forces, _in_order(change), line_s)
+    void = 1.0 if outcome is Outcome.REACHED_END else math.nan
+    impacts = run.impact_cells
     return ChainResponse(
         drive=drive,
         accuracy=accuracy,
         duration_s=duration_s,
         window_s=window_s,
         line_periods=periods,
-        largest_m=void * largest,
+        largest_m=void * run.peaks_m,
         lines_m=void * lines,
         impacts=np.bincount(impacts[before:], minlength=chain.size),
         impacts_before=np.bincount(impacts[:before], minlength=chain.size),
-        final_state=state_of_phasors(chain, phasors, tables),
-        outcome=Outcome(code),
+        final_state=run.motion,
+        outcome=outcome,
     )
 
 
@@ -177,9 +160,9 @@ def _of_one(cell: Specimen, one: Response) -> ChainResponse:
     )
 
 
-def _state_against_drive(phasors: Complex, shapes: Complex) -> Complex:
-    """State times exp(-i (omega t + phase)), shape (6 cells,); the last phasor is the drive."""
-    return np.asarray((phasors @ shapes).real * phasors[-1].conjugate(), dtype=np.complex128)
+def _in_order(motion: Complex) -> Complex:
+    """Displacements of all masses, then their velocities, shape (6 cells,)."""
+    return np.concatenate([motion[:, :MASSES_PER_CELL].ravel(), motion[:, MASSES_PER_CELL:].ravel()])
 
 
 def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line_s: float) -> Complex:

@@ -57,6 +57,8 @@ from ._run import (
 )
 from ._scene import (
     collision_structure as collision_structure,
+    fill_cell as fill_cell,
+    fill_drive as fill_drive,
     fill_power as fill_power,
     fill_specimen as fill_specimen,
     power_structure as power_structure,

@@ -24,7 +24,7 @@ REBUILD = "python native/build.py"
 FUNCTIONS = (
     *("interpolate", "decimate", "filter_signal", "show"),
     *("move_shaker", "play_loop", "hear_loop", "close_loop"),
-    *("filter_motion", "smooth_motion", "follow_contacts"),
+    *("filter_motion", "smooth_motion", "follow_contacts", "start_chain", "follow_chain"),
 )
 """Of the library, each with one structure."""
 Tables = NDArray[np.float64]
@@ -63,6 +63,7 @@ class Engine:
         filled = (_Pointer, _Pointer, _Pointer)
         self._declare("vibench_take_readings", count, _Pointer, _Pointer, number, *filled, count)
         self._declare("vibench_reach", number, _Pointer, _Pointer)
+        self._declare("vibench_chain_memory", count, count, count)
         for name in FUNCTIONS:
             self._declare(f"vibench_{name}", count, _Pointer)
         self._functions = {name: getattr(self._library, f"vibench_{name}") for name in FUNCTIONS}
@@ -99,6 +100,10 @@ class Engine:
         self.fill(structure, **fields)
         return structure
 
+    def rows(self, name: str, count: int) -> Structure:
+        """Make a row of structures, zero everywhere."""
+        return np.zeros(count, self._types[name])
+
     def fill(self, structure: Structure, **fields: object) -> None:
         """Change fields of a structure that `new` made."""
         assert isinstance(structure, _Lending)
@@ -116,6 +121,10 @@ class Engine:
             msg = f"The native engine refuses to {function}: array sizes must agree and numbers be finite."
             raise ValueError(msg)
         return code
+
+    def chain_memory(self, cells: int, kinds: int) -> int:
+        """Return how many numbers of memory a chain lends; ``kinds`` counts cells that differ."""
+        return int(self._library.vibench_chain_memory(cells, kinds))
 
     def prepare(self, scene: Structure) -> Tables:
         """Make the tables of a scene; its shapes of collisions and steps must outlive them.

@@ -63,10 +63,7 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
     scene = engine.new("Scene")
     omega = 2.0 * math.pi * drive.frequency_hz
     fill_specimen(scene["specimen"], specimen)
-    _, force = harmonic_motion(specimen, omega, drive.amplitude_m)
-    scene["drive"]["frequency"] = drive.frequency_hz
-    scene["drive"]["start"] = cmath.exp(1j * drive.phase_rad)
-    scene["drive"]["force"] = force
+    fill_drive(scene["drive"], drive, specimen)
     _fill_free(scene["flight"], specimen, omega, drive.amplitude_m)
     match specimen.contact:
         case RigidStops():
@@ -82,11 +79,28 @@ def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
 
 def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
     """Fill what a `Scene` or a `CubicScene` knows of a power law."""
-    power, terms = scene["power"], law.terms
-    power["reference"], power["terms"] = law.reference, len(terms)
-    power["exponents"][: len(terms)] = [exponent for exponent, _ in terms]
-    power["forces"][: len(terms)] = [force for _, force in terms]
+    _fill_power(scene["power"], law)
     scene["power_shapes"] = power_structure(engine).ctypes.data
+
+
+def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_damping: float) -> None:
+    """Fill a `CellKind`: a cell of a chain and the link behind it [N/m], [N s/m]."""
+    fill_specimen(target["specimen"], cell)
+    match cell.contact:
+        case LinearGap():
+            # In a chain contacts with springs are resolved in steps.
+            target["specimen"]["law"] = YIELDING
+        case PowerLaw() as law:
+            _fill_power(target["power"], law)
+    target["next_stiffness"], target["next_damping"] = next_stiffness, next_damping
+
+
+def fill_drive(target: Structure, drive: Harmonic, first: Specimen) -> None:
+    """Fill a `Drive`: what it does to the m0 that hangs on the base."""
+    _, force = harmonic_motion(first, 2.0 * math.pi * drive.frequency_hz, drive.amplitude_m)
+    target["frequency"] = drive.frequency_hz
+    target["start"] = cmath.exp(1j * drive.phase_rad)
+    target["force"] = force
 
 
 def power_structure(engine: Engine) -> Structure:
@@ -154,6 +168,13 @@ def fill_specimen(target: Structure, specimen: Specimen) -> None:
             target["law"] = POWERS
         case _:
             target["law"] = YIELDING
+
+
+def _fill_power(target: Structure, law: PowerLaw) -> None:
+    count = len(law.terms)
+    target["reference"], target["terms"] = law.reference, count
+    target["exponents"][:count] = [exponent for exponent, _ in law.terms]
+    target["forces"][:count] = [force for _, force in law.terms]
 
 
 def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:

@@ -1,0 +1,755 @@
+// A chain of cells: specimens whose m0 hang on one another (decision 0011). It advances window by window. In a window
+// the motion without contact forces is one Taylor polynomial for each displacement, from eq. 1 of all cells. A cell that
+// may touch is followed in its own time, as a specimen whose m0 is pushed by the known motion of its neighbours. What its
+// force F does to the chain enters at the window's end, by the integrals M_k of F(t) (end - t)^k / k!: with the chain's
+// equations s' = A s + b F it is sum_k A^k b M_k. Costs of a window grow with the number of cells.
+#pragma once
+#include "power_law.hpp"
+
+namespace vibench {
+
+constexpr int MOMENTS = 9;           // in windows of 0.4 rad the next is below 7e-10 of the first
+constexpr int BLOCK = 8;             // cells side by side; a force is heard by fewer cells to either side
+constexpr int NUMBERS = 3;           // displacements of a cell, at places P, AT_X, AT_Z; rates follow
+constexpr int PIECE_TERMS = 8;
+constexpr double LONGEST_WINDOW = 0.5;  // fastest rate times length: what AHEAD terms bear [rad]
+constexpr int MOST_TOUCHES = 1000;   // of a cell in a window, which is a small part of the shortest period
+constexpr int MOST_STRETCHES = 100000;  // flights, contacts and steps of a cell in a window
+constexpr int64_t MOST_CUT = 8;      // cells of a chain whose windows are cut: beyond, a window costs more than steps
+constexpr double SOON = 1e-3;        // a window may as well begin with a touch in this part of it
+constexpr double HAIR = 1e-12;       // a touch in this last part of a window is left to the next
+constexpr double ALMOST = 1e-9;      // part of a piece of the drive that is rounding
+// Errors of steps take energy and do not give it, so that they add up; those of whole collisions do not. Steps may use
+// this part of the tolerance, but need not be finer than the finest.
+constexpr double STEP_CARE = 1e-4, FINEST_STEP = 1e-11;
+// Of steps under a power law, whose windows are short: see power_law.hpp for what they are there.
+constexpr double FINER_FIT = 0.01, CLOSE_PLACE = 1e-3, CLOSEST_PLACE = 1e-15, CELL_FADING = 0.999;
+constexpr double LONGER_STEP = 1.4142135623730951, SHORTER_STEP = 0.5;
+constexpr int MOST_TRIES = 200;      // of a step, each half as long as the one before
+
+// One number of every cell, cell 0 at place 0; a block of zeros before and behind, for neighbours.
+using Row = double *;
+struct Rows {
+  Row of[NUMBERS];
+};
+
+// A cell of its own: numbers that equal cells share.
+struct KindTables {
+  Tables tables;                  // of the specimen on two springs, to the cells before and behind
+  double struck[MOMENTS][WIDE];   // as `CollisionTables::struck`
+  PowerForce power;
+  double link[2][2];              // stiffness and damping, before and behind
+};
+
+struct CellMotion {
+  double at[2 * NUMBERS];         // P, AT_X, AT_Z, and their rates
+  Contact<double> contact;
+  double power_step, size;
+  double moments[MOMENTS];        // M_k: of the force so far, at the end of what is being crossed
+};
+
+// Where the arrays of a run lie in the memory that is lent; all begin as zeros.
+struct ChainMemory {
+  int64_t cells, kinds, padded;
+  double *base;
+  int64_t used = 0;
+  Row inverse0, inverse2, inverse_pair, k0, k1, k2, c0, c1, c2, link;
+  Rows terms[AHEAD];              // Taylor terms in the window
+  Rows end[2], sampled[2], heard[3];  // at its end and at a sample, displacements and rates; of the forces alone
+  Row bounds[2];                  // of the accelerations of p and x in the window
+  CellMotion *now, *begun;        // of the cells that are followed
+  int64_t *busy;                  // which they are, ascending
+  KindTables *tables;
+
+  ChainMemory(double *memory, int64_t cell_count, int64_t kind_count)
+      : cells(cell_count), kinds(kind_count), padded((cell_count + BLOCK - 1) / BLOCK * BLOCK), base(memory) {
+    Row *single[] = {&inverse0, &inverse2, &inverse_pair, &k0, &k1, &k2, &c0, &c1, &c2, &link, &bounds[0], &bounds[1]};
+    Rows *triple[] = {&end[0], &end[1], &sampled[0], &sampled[1], &heard[0], &heard[1], &heard[2]};
+    for (Row *each : single) *each = row();
+    for (Rows &each : terms) rows(each);
+    for (Rows *each : triple) rows(*each);
+    now = reinterpret_cast<CellMotion *>(take(cells * int64_t(sizeof(CellMotion) / sizeof(double))));
+    begun = reinterpret_cast<CellMotion *>(take(cells * int64_t(sizeof(CellMotion) / sizeof(double))));
+    busy = reinterpret_cast<int64_t *>(take(cells));
+    tables = reinterpret_cast<KindTables *>(take(kinds * int64_t(sizeof(KindTables) / sizeof(double))));
+  }
+
+ private:
+  double *take(int64_t count) {
+    double *at = base == nullptr ? nullptr : base + used;
+    used += count;
+    return at;
+  }
+  Row row() {
+    double *at = take(padded + 2 * BLOCK);
+    return at == nullptr ? nullptr : at + BLOCK;
+  }
+  void rows(Rows &each) {
+    for (Row &one : each.of) one = row();
+  }
+};
+
+// ---- One cell
+
+// The polynomial about a later instant.
+inline void shift(double *series, double by) {
+  for (int low = 0; low + 1 < AHEAD; low++)
+    for (int k = AHEAD - 2; k >= low; k--) series[k] += by * series[k + 1];
+}
+
+// Lets time pass without a force: the integrals grow by those below them.
+inline void age(double *moments, double by) {
+  for (int k = MOMENTS - 1; k > 0; k--) {
+    double share = 1.0;
+    for (int back = 1; back <= k; back++) {
+      share *= by / back;
+      moments[k] += share * moments[k - back];
+    }
+  }
+}
+
+// Taylor terms of p, x and z of one cell without its force, from its motion now and the push of its neighbours on m0.
+struct CellCourse {
+  double of[NUMBERS][AHEAD];
+
+  CellCourse(const double *at, const double *push, const Tables &t) {
+    const Specimen &s = t.specimen;
+    double (&p)[AHEAD] = of[P], (&x)[AHEAD] = of[AT_X], (&z)[AHEAD] = of[AT_Z];
+    for (int n = 0; n < NUMBERS; n++) of[n][0] = at[n], of[n][1] = at[n + NUMBERS];
+    for (int k = 0; k + 2 < AHEAD; k++) {
+      double next = k + 1, share = 1.0 / ((k + 1.0) * (k + 2.0));
+      double pull = s.k2 * (z[k] - x[k]) + s.c2 * next * (z[k + 1] - x[k + 1]);
+      double press = s.k1 * p[k] + s.c1 * next * p[k + 1];
+      p[k + 2] = share * (pull * t.inverse2 - press * t.inverse_pair);
+      x[k + 2] = share * t.inverse0 * (pull + push[k] - s.k0 * x[k] - s.c0 * next * x[k + 1]);
+      z[k + 2] = share * t.inverse2 * (press - pull);
+    }
+  }
+  void place(double *at, double later) const {
+    for (int n = 0; n < NUMBERS; n++) {
+      ValueAndRate there = polynomial_at(of[n], later);
+      at[n] = there.value, at[n + NUMBERS] = there.rate;
+    }
+  }
+  double *operator[](int number) { return of[number]; }
+  const double *operator[](int number) const { return of[number]; }
+};
+
+// Largest magnitude over a flight, looked at closely only where its bounds let it beat `best`.
+inline double course_peak(double best, const double *series, double length) {
+  double ends = larger(magnitude(series[0]), magnitude(polynomial_at(series, length).value));
+  if (ends + derivative_bound(series, length, 2) * length * length / 8.0 <= best) return best;
+  return series_peak(best, series, 0.0, length);
+}
+
+// Carries a cell that has just touched its stop to the end of its Hertz collision; returns whether it is found.
+inline bool collide_cell(Collision<double> &c, CellMotion &cell, const CellCourse &course, double longest,
+                         double tolerance, const KindTables &kind) {
+  const CollisionTables &t = kind.tables.collision;
+  double side = cell.contact.side, gap = gap_at(kind.tables.specimen, side), factor = side;
+  c.motion = c.after = Vector<WIDE>(0.0);
+  for (int n = 0; n < 2 * NUMBERS; n++) c.motion.set(n, side * cell.at[n]);
+  for (int m = 0; m < TERMS; m++) {
+    c.course.set(m, factor * course[P][m]);
+    factor /= t.fastest;
+  }
+  if (!find_collision(c, gap, cell.contact.pace, longest, tolerance, kind.tables)) return false;
+  double after[2 * NUMBERS];
+  course.place(after, c.duration);
+  for (int n = 0; n < 2 * NUMBERS; n++) c.after.set(n, side * after[n]);
+  double turn = 1.0;
+  for (int m = 0; m < TERMS; m++) {
+    c.after = c.after + (turn * c.duration * c.moments[m]) * Vector<WIDE>::load(t.struck[m]);
+    turn *= t.fastest * c.duration;
+  }
+  if (!(c.after[P_RATE] < 0.0)) return false;
+  for (int n = 0; n < 2 * NUMBERS; n++) cell.at[n] = side * c.after[n];
+  cell.at[P] = side * gap;
+  cell.contact.side = 0.0;
+  return true;
+}
+
+// A step under a power law: its force at Gauss's points, found by substitution as in power_law.hpp.
+struct CellStep {
+  const KindTables &kind;
+  const PowerShapes &shapes;
+  const CellCourse &course;       // without force, from the start on
+  double length;
+  Vector<GAUSS> force, places;
+  double after[2 * NUMBERS];
+
+  // Tries it; its misfit over what is allowed.
+  double attempt(const CellMotion &cell, double tolerance) {
+    double gain[GAUSS][GAUSS] = {};
+    add_shares(P, [&](double factor, int m) {
+      for (int k = 0; k < GAUSS; k++) add_row(gain[k], factor, shapes.shares[m][k]);
+    });
+    Vector<GAUSS> free = course_at(P);
+    double weight = length * length * kind.tables.inverse_pair;
+    double size = larger(larger(cell.size, magnitude(cell.at[P])), largest(magnitude(free))) + NOTHING_MOVES;
+    double close = size * larger(CLOSE_PLACE * tolerance, CLOSEST_PLACE), first = kind.power(cell.at[P]);
+    if (!settle(free, gain, weight, close, first)) return INFINITE;
+    course.place(after, length);
+    for (int n = 0; n < 2 * NUMBERS; n++)
+      add_shares(n, [&](double factor, int m) { after[n] += factor * total(Vector<GAUSS>::load(shapes.ends[m]) * force); });
+    double before = total(Vector<GAUSS>::load(shapes.at_start) * force) - first;
+    double behind = total(Vector<GAUSS>::load(shapes.at_end) * force) - kind.power(after[P]);
+    return weight * larger(magnitude(before), magnitude(behind)) / (FINER_FIT * FIT * tolerance * size);
+  }
+
+  // Largest magnitude of a displacement; it turns at most once between two points.
+  double peak(double best, int number, const CellMotion &cell) const {
+    ValueAndRate last{after[number], after[number + NUMBERS]}, first{cell.at[number], cell.at[number + NUMBERS]};
+    best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
+    if (!may_peak(best, first, last, length)) return best;
+    Vector<GAUSS> value = pushed_at(number), rate = pushed_at(number + NUMBERS);
+    double passed = 0.0;
+    for (int i = 0; i < GAUSS; i++) {
+      ValueAndRate next{value[i], rate[i]};
+      best = cubic_peak(best, first, next, length * (shapes.points[i] - passed));
+      passed = shapes.points[i], first = next;
+    }
+    return cubic_peak(best, first, last, length * (1.0 - passed));
+  }
+
+ private:
+  // Calls add(factor, m) with what an integral of the force against (t - s)^m adds to a number of the motion.
+  template <class Add> void add_shares(int number, const Add &add) const {
+    double factor = length;
+    for (int m = 0; m < MOMENTS; m++) {
+      add(factor * kind.struck[m][number], m);
+      factor *= kind.tables.collision.fastest * length;
+    }
+  }
+  Vector<GAUSS> course_at(int number) const {
+    double at[GAUSS];
+    for (int i = 0; i < GAUSS; i++) {
+      ValueAndRate there = polynomial_at(course[number % NUMBERS], length * shapes.points[i]);
+      at[i] = number < NUMBERS ? there.value : there.rate;
+    }
+    return Vector<GAUSS>::load(at);
+  }
+  Vector<GAUSS> pushed_at(int number) const {
+    Vector<GAUSS> sum = course_at(number);
+    add_shares(number, [&](double factor, int m) { sum = sum + factor * times(shapes.shares[m], force); });
+    return sum;
+  }
+  bool settle(const Vector<GAUSS> &free, const double (&gain)[GAUSS][GAUSS], double weight, double close, double first) {
+    force = Vector<GAUSS>(first);
+    for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
+      places = free + times(gain, force);
+      Vector<GAUSS> fresh = kind.power(places);
+      double change = weight * largest(magnitude(fresh - force));
+      bool is_number = is_finite(total(fresh));
+      force = fresh;
+      if (!is_number) return false;
+      if (change <= close) return true;
+    }
+    return false;
+  }
+};
+
+// ---- A run
+
+class ChainRun {
+ public:
+  explicit ChainRun(ChainMotion &motion)
+      : m(motion), at(motion.memory.at, motion.kind_of.size, motion.kinds.size / KIND_SIZE),
+        states(reinterpret_cast<CellState *>(motion.states.at)), clock{motion.clock_high, motion.clock_low, 0.0} {
+    __builtin_memset(motion.memory.at, 0, size_t(at.used) * sizeof(double));
+    for (int64_t k = 0; k < at.kinds; k++) fill_kind(at.tables[k], kind(k));
+    for (int64_t i = 0; i < at.cells; i++) {
+      const CellKind &of = kind(kind_of(i));
+      const Specimen &s = of.specimen;
+      at.inverse0[i] = 1.0 / s.m0, at.inverse2[i] = 1.0 / s.m2, at.inverse_pair[i] = 1.0 / s.m1 + 1.0 / s.m2;
+      at.k0[i] = s.k0, at.k1[i] = s.k1, at.k2[i] = s.k2, at.c0[i] = s.c0, at.c1[i] = s.c1, at.c2[i] = s.c2;
+      const CellState &c = states[i];
+      const double begins[] = {c.p, c.x, c.z, c.vp, c.vx, c.vz};
+      for (int n = 0; n < NUMBERS; n++) at.terms[0].of[n][i] = begins[n], at.terms[1].of[n][i] = begins[n + NUMBERS];
+      at.now[i] = {{}, {c.root, c.rate, c.side, c.step, c.root_scale, c.rate_scale, c.pace}, c.power_step, c.size, {}};
+    }
+  }
+
+  // Decides which cells start on a stop.
+  void start() {
+    for (int64_t i = 0; i < at.cells; i++) {
+      const Tables &t = at.tables[kind_of(i)].tables;
+      gather(at.now[i], i);
+      double p = at.now[i].at[P];
+      at.now[i].contact = {}, at.now[i].power_step = at.now[i].size = 0.0;
+      if (t.specimen.law == POWERS) at.now[i].contact.side = 1.0;  // the law acts at every p
+      else if (p > t.specimen.upper_gap || p < -t.specimen.lower_gap) touch(at.now[i], with_sign_of(1.0, p), t);
+    }
+    keep();
+  }
+
+  Outcome advance() {
+    Outcome outcome = REACHED_END;
+    while (outcome == REACHED_END) {
+      double left = time_until(clock, m.until);
+      if (!(left > 0.0)) break;
+      outcome = m.windows_left-- > 0 ? cross_window(left) : TOO_LONG;
+    }
+    keep();
+    return outcome;
+  }
+
+ private:
+  static constexpr int64_t KIND_SIZE = sizeof(CellKind) / sizeof(double);
+  enum class Purpose { MOTION, SAMPLE };
+
+  ChainMotion &m;
+  ChainMemory at;
+  CellState *states;
+  Clock<double> clock;
+  double push[AHEAD];             // of the base on the first m0 in this window [N]
+  int64_t followed = 0;           // cells that are followed by themselves
+  double full_length = 0.0;       // of the window, as it was begun [s]
+  double cut = 0.0;               // where it is to end, so that a collision is whole in the next [s]; 0: nowhere
+
+  const CellKind &kind(int64_t k) const { return reinterpret_cast<const CellKind *>(m.kinds.at)[k]; }
+  int64_t kind_of(int64_t cell) const { return int64_t(m.kind_of.at[cell]); }
+  bool watches() const { return m.watch != WATCH_NOTHING; }
+  double step_tolerance() const { return smaller(m.tolerance, larger(STEP_CARE * m.tolerance, FINEST_STEP)); }
+
+  void fill_kind(KindTables &k, const CellKind &of) const {
+    Scene alone{};
+    Specimen &s = alone.specimen;
+    s = of.specimen;
+    k.link[0][0] = s.k0, k.link[0][1] = s.c0, k.link[1][0] = of.next_stiffness, k.link[1][1] = of.next_damping;
+    s.k0 += of.next_stiffness, s.c0 += of.next_damping;
+    Tables &t = k.tables;
+    t.specimen = s;
+    t.pair = s.m1 * s.m2 / (s.m1 + s.m2);
+    t.inverse0 = 1.0 / s.m0, t.inverse2 = 1.0 / s.m2, t.inverse_pair = 1.0 / t.pair;
+    t.collision.fastest = m.fastest, t.collision.shapes = m.collisions;
+    double powers[MOMENTS][WIDE][WIDE];
+    fill_series(powers, k.struck, m.fastest, alone);
+    __builtin_memcpy(t.collision.struck, k.struck, sizeof t.collision.struck);
+    if (s.law == POWERS) k.power = power_force(of.power);
+  }
+
+  void keep() {
+    for (int64_t i = 0; i < at.cells; i++) {
+      gather(at.now[i], i);
+      const CellMotion &c = at.now[i];
+      states[i] = {c.at[P],        c.at[AT_X],     c.at[AT_Z],   c.at[P_RATE],         c.at[X_RATE],
+                   c.at[Z_RATE],   c.contact.side, c.contact.w,  c.contact.r,          c.contact.step,
+                   c.contact.root_scale, c.contact.rate_scale, c.contact.pace, c.power_step, c.size};
+    }
+    m.clock_high = clock.high, m.clock_low = clock.low;
+  }
+  void gather(CellMotion &c, int64_t i) const {
+    for (int n = 0; n < NUMBERS; n++) c.at[n] = at.terms[0].of[n][i], c.at[n + NUMBERS] = at.terms[1].of[n][i];
+  }
+
+  // ---- The chain without forces
+
+  // Gong et al. 2025, eq. 1, of the cells from `first` to `last` (whole blocks): out = share * accelerations, from
+  // displacements q and next * rates v, and from the base's push on the first m0.
+  void accelerate(const Rows &q, const Rows &v, double next, double base, double share, const Rows &out, int64_t first,
+                  int64_t last) {
+    using Cells = Vector<BLOCK>;
+    Row p = q.of[P], x = q.of[AT_X], z = q.of[AT_Z], vp = v.of[P], vx = v.of[AT_X], vz = v.of[AT_Z];
+    auto load = [](const double *from) { return Cells::load(from); };
+    for (int64_t i = first; i <= last; i += BLOCK) {
+      Cells stretch = load(x + i) - load(x + i - 1), rate = next * (load(vx + i) - load(vx + i - 1));
+      (load(at.k0 + i) * stretch + load(at.c0 + i) * rate).store(at.link + i);
+    }
+    if (first == 0) at.link[0] -= base;
+    for (int64_t i = first; i < last; i += BLOCK) {
+      Cells pull = load(at.k2 + i) * (load(z + i) - load(x + i)) + load(at.c2 + i) * (next * (load(vz + i) - load(vx + i)));
+      Cells press = load(at.k1 + i) * load(p + i) + load(at.c1 + i) * (next * load(vp + i));
+      Cells over2 = share * load(at.inverse2 + i);
+      (pull * over2 - press * (share * load(at.inverse_pair + i))).store(out.of[P] + i);
+      ((pull - load(at.link + i) + load(at.link + i + 1)) * (share * load(at.inverse0 + i))).store(out.of[AT_X] + i);
+      ((press - pull) * over2).store(out.of[AT_Z] + i);
+    }
+  }
+
+  void expand() {
+    for (int k = 0; k + 2 < AHEAD; k++)
+      accelerate(at.terms[k], at.terms[k + 1], k + 1.0, push[k], 1.0 / ((k + 1.0) * (k + 2.0)), at.terms[k + 2], 0,
+                 at.padded);
+  }
+
+  // Displacements and rates later in the window, as if no force acted in it.
+  void place(Rows (&there)[2], double later) const {
+    using Cells = Vector<BLOCK>;
+    for (int n = 0; n < NUMBERS; n++)
+      for (int64_t i = 0; i < at.padded; i += BLOCK) {
+        Cells value = Cells::load(at.terms[AHEAD - 1].of[n] + i), rate = (AHEAD - 1.0) * value;
+        for (int k = AHEAD - 2; k > 0; k--) {
+          Cells term = Cells::load(at.terms[k].of[n] + i);
+          value = value * later + term, rate = rate * later + double(k) * term;
+        }
+        (value * later + Cells::load(at.terms[0].of[n] + i)).store(there[0].of[n] + i);
+        rate.store(there[1].of[n] + i);
+      }
+  }
+
+  // Adds sum_k A^k b M_k of the cells that are followed, summed as Horner does. A state (q, v) becomes (v, acceleration).
+  void add_forces(Rows (&there)[2], const CellMotion *cells) {
+    if (followed == 0) return;
+    int64_t first = larger(int64_t(0), (at.busy[0] / BLOCK - 1) * BLOCK);
+    int64_t last = smaller(at.padded, (at.busy[followed - 1] / BLOCK + 2) * BLOCK);
+    for (Rows &each : at.heard)
+      for (Row row : each.of) __builtin_memset(row + first - BLOCK, 0, size_t(last - first + 2 * BLOCK) * sizeof(double));
+    int q = 0, v = 1, next = 2;
+    for (int k = MOMENTS - 1; k >= 0; k--) {
+      accelerate(at.heard[q], at.heard[v], 1.0, 0.0, 1.0, at.heard[next], first, last);
+      for (int64_t n = 0; n < followed; n++) {
+        int64_t i = at.busy[n];
+        at.heard[next].of[P][i] -= at.inverse_pair[i] * cells[i].moments[k];
+        at.heard[next].of[AT_Z][i] += at.inverse2[i] * cells[i].moments[k];
+      }
+      int free = q;
+      q = v, v = next, next = free;
+    }
+    for (int n = 0; n < NUMBERS; n++)
+      for (int64_t i = first; i < last; i += BLOCK) {
+        (Vector<BLOCK>::load(there[0].of[n] + i) + Vector<BLOCK>::load(at.heard[q].of[n] + i)).store(there[0].of[n] + i);
+        (Vector<BLOCK>::load(there[1].of[n] + i) + Vector<BLOCK>::load(at.heard[v].of[n] + i)).store(there[1].of[n] + i);
+      }
+  }
+
+  // Writes the base's push as a polynomial in the time from now on; returns how long it holds [s].
+  double place_push() {
+    for (double &term : push) term = 0.0;
+    int64_t pieces = m.pieces.size / PIECE_TERMS;
+    if (pieces == 0) {
+      Phasor term = m.drive.force * drive_later(0.0);
+      for (int k = 0; k < AHEAD; k++) {
+        push[k] = term.re;
+        term = term * Phasor{0.0, 2.0 * PI * m.drive.frequency / (k + 1)};
+      }
+      return INFINITE;
+    }
+    double passed = -time_until(clock, m.piece_start);
+    int64_t index = int64_t(smaller(double(pieces - 1), larger(0.0, passed / m.piece_length)));
+    double left = time_until(clock, m.piece_start + double(index + 1) * m.piece_length);
+    if (left <= ALMOST * m.piece_length && index + 1 < pieces) index++, left += m.piece_length;
+    __builtin_memcpy(push, m.pieces.at + index * PIECE_TERMS, PIECE_TERMS * sizeof(double));
+    shift(push, m.piece_length - left);
+    return index + 1 < pieces ? left : INFINITE;
+  }
+  Phasor drive_later(double later) const {
+    return turned_by(angle_at(clock.high, clock.low, later, m.drive.frequency)) * m.drive.start;
+  }
+
+  // ---- A window
+
+  Outcome cross_window(double left) {
+    double longest = smaller(left, place_push());
+    expand();
+    for (int level = 0; level < m.windows.size; level++) {
+      full_length = smaller(longest, m.windows.at[level]);
+      place(at.end, full_length);
+      if (!find_busy()) return NOT_FINITE;
+      if (!neighbours_clash(int64_t(m.clashes.at[level]))) break;
+    }
+    for (int64_t n = 0; n < followed; n++) {
+      CellMotion &begun = at.begun[at.busy[n]];
+      gather(begun = at.now[at.busy[n]], at.busy[n]);
+      for (double &moment : begun.moments) moment = 0.0;
+    }
+    int64_t impacts = m.impacts;
+    double length = full_length;
+    Outcome outcome = cross_cells(length);
+    while (cut > 0.0) {
+      length = cut, m.impacts = impacts;
+      place(at.end, length);
+      outcome = cross_cells(length);
+    }
+    if (watches()) see_window(length);
+    keep_samples(length);
+    add_forces(at.end, at.now);
+    for (int order = 0; order < 2; order++) {
+      Rows swapped = at.terms[order];
+      at.terms[order] = at.end[order], at.end[order] = swapped;
+    }
+    if (length >= left) clock = {m.until, 0.0, 0.0};
+    else vibench::advance(clock, length);
+    return outcome;
+  }
+
+  // Lists the cells that press, or whose touch in this window is not excluded; false where nothing can be said.
+  bool find_busy() {
+    using Cells = Vector<BLOCK>;
+    for (int what = P; what <= (watches() ? AT_X : P); what++)
+      for (int64_t i = 0; i < at.padded; i += BLOCK) {
+        Cells bound(0.0);
+        for (int k = AHEAD - 1; k > 1; k--)
+          bound = bound * full_length + (k * (k - 1.0)) * magnitude(Cells::load(at.terms[k].of[what] + i));
+        bound.store(at.bounds[what] + i);
+      }
+    followed = 0;
+    for (int64_t i = 0; i < at.cells; i++) {
+      const Specimen &s = at.tables[kind_of(i)].tables.specimen;
+      if (!(at.bounds[P][i] < LARGEST_BOUND)) return false;
+      double margin = at.bounds[P][i] * full_length * full_length / 8.0;
+      double low = margin - s.lower_gap, high = s.upper_gap - margin, p = at.terms[0].of[P][i], end = at.end[0].of[P][i];
+      bool is_clear = low < p && p < high && low < end && end < high;
+      if (at.now[i].contact.side != 0.0 || s.law == POWERS || !is_clear) at.busy[followed++] = i;
+    }
+    return true;
+  }
+  bool neighbours_clash(int64_t distance) const {
+    for (int64_t n = 1; n < followed; n++)
+      if (at.busy[n] - at.busy[n - 1] <= distance) return true;
+    return false;
+  }
+
+  Outcome cross_cells(double length) {
+    Outcome worst = REACHED_END;
+    cut = 0.0;
+    for (int64_t n = 0; n < followed && cut == 0.0; n++) {
+      int64_t i = at.busy[n];
+      at.now[i] = at.begun[i];
+      worst = larger(worst, cross(at.now[i], i, 0.0, length, Purpose::MOTION));
+    }
+    return worst;
+  }
+
+  // Looks for larger motions of the cells without a force, and adds the forces of the others to their lines.
+  void see_window(double length) {
+    Phasor end = conjugate(drive_later(length));
+    for (int64_t i = 0, n = 0; i < at.cells; i++) {
+      if (n < followed && at.busy[n] == i) {
+        n++;
+        if (m.watch != WATCH_PEAKS_AND_LINES) continue;
+        Phasor sum{0.0, 0.0};
+        for (int k = MOMENTS - 1; k >= 0; k--)
+          sum = sum * Phasor{0.0, 2.0 * PI * m.drive.frequency} + Phasor{at.now[i].moments[k], 0.0};
+        sum = sum * end;
+        m.lines.at[2 * i] += sum.re, m.lines.at[2 * i + 1] += sum.im;
+        continue;
+      }
+      for (int what = P; what <= AT_X; what++) {
+        double &best = m.peaks.at[2 * i + (what == P)];
+        double ends = larger(magnitude(at.terms[0].of[what][i]), magnitude(at.end[0].of[what][i]));
+        if (ends + at.bounds[what][i] * length * length / 8.0 <= best) continue;
+        double series[AHEAD];
+        for (int k = 0; k < AHEAD; k++) series[k] = at.terms[k].of[what][i];
+        best = series_peak(best, series, 0.0, length);
+      }
+    }
+  }
+
+  // Samples come from a second run of the cells that are followed, which lands on each.
+  void keep_samples(double length) {
+    double reached = 0.0;
+    int64_t room = m.samples.size / (6 * at.cells);
+    for (; m.samples_kept < room; m.samples_kept++) {
+      double later = time_until(clock, m.start + double(m.samples_kept) / m.sample_rate);
+      if (later > length) return;
+      place(at.sampled, later);
+      for (int64_t n = 0; n < followed; n++)
+        if (later > reached) cross(at.begun[at.busy[n]], at.busy[n], reached, later, Purpose::SAMPLE);
+      add_forces(at.sampled, at.begun);
+      reached = larger(reached, later);
+      double *sample = m.samples.at + 6 * at.cells * m.samples_kept;
+      for (int64_t i = 0; i < at.cells; i++, sample += 6)
+        for (int order = 0; order < 2; order++) {
+          double z = at.sampled[order].of[AT_Z][i];
+          sample[X + 3 * order] = at.sampled[order].of[AT_X][i], sample[Z + 3 * order] = z;
+          sample[Y + 3 * order] = at.sampled[order].of[P][i] + z;
+        }
+    }
+  }
+
+  // ---- A cell in a window
+
+  // The push of the neighbours on m0 of a cell, as if no force acted in the window.
+  void place_neighbours(double *force, int64_t i) const {
+    const auto &link = at.tables[kind_of(i)].link;
+    for (int k = 0; k < AHEAD; k++) {
+      force[k] = i == 0 ? push[k] : 0.0;
+      for (int side = 0; side < 2; side++) {
+        int64_t neighbour = i + 2 * side - 1;
+        double rate = k + 1 < AHEAD ? (k + 1) * at.terms[k + 1].of[AT_X][neighbour] : 0.0;
+        force[k] += link[side][0] * at.terms[k].of[AT_X][neighbour] + link[side][1] * rate;
+      }
+    }
+  }
+
+  // Follows a cell from one time in the window to another. With a cut its rest is not worth following.
+  Outcome cross(CellMotion &c, int64_t i, double from, double until, Purpose purpose) {
+    const KindTables &kind = at.tables[kind_of(i)];
+    const Tables &t = kind.tables;
+    const Specimen &s = t.specimen;
+    double force[AHEAD], tau = from, shifted = 0.0;
+    place_neighbours(force, i);
+    age(c.moments, until - from);
+    Record seen{};
+    seen.watch = purpose == Purpose::MOTION && watches() ? WATCH_PEAKS : WATCH_NOTHING;
+    seen.peak_x = m.peaks.at[2 * i], seen.peak_p = m.peaks.at[2 * i + 1];
+    Observer observer{seen, t};
+    Outcome outcome = REACHED_END;
+    int touches = 0, stretches = 0;
+    while (tau < until && outcome == REACHED_END) {
+      if (++stretches > MOST_STRETCHES) return STALLED;
+      if (tau > shifted) shift(force, tau - shifted), shifted = tau;
+      double left = until - tau;
+      if (s.law != POWERS && c.contact.side != 0.0 && (s.law != HERTZ || c.contact.w != 0.0)) {
+        outcome = press(c, force, tau, until, t, observer);
+        continue;
+      }
+      CellCourse course(c.at, force, t);
+      if (s.law == POWERS) {
+        double lasted = power_step(c, course, left, kind, observer);
+        if (!(lasted > 0.0)) return NOT_FINITE;
+        tau = lasted < left ? tau + lasted : until;
+        continue;
+      }
+      if (c.contact.side != 0.0) {
+        Collision<double> collision;
+        double side = c.contact.side;
+        if (!collide_cell(collision, c, course, left, m.tolerance, kind)) {
+          outcome = press(c, force, tau, until, t, observer);
+          continue;
+        }
+        if (observer.is_on())
+          observer.see_shape(collision, gap_at(s, side), [&] {
+            Vector<TERMS> terms;
+            double factor = side;
+            for (int k = 0; k < TERMS; k++, factor /= m.fastest) terms.set(k, factor * course[AT_X][k]);
+            return terms;
+          });
+        tau += collision.duration;
+        add_impulse(c, side, collision.duration, until - tau, TERMS, [&](int k) { return collision.moments[k]; });
+        continue;
+      }
+      Room room{s.lower_gap, s.upper_gap, derivative_bound(course[P], left, 2), 0.0};
+      for (int n = 0; n < NUMBERS; n++) room.reach += magnitude(c.at[n]) + left * magnitude(c.at[n + NUMBERS]);
+      if (!(room.bound < LARGEST_BOUND)) return NOT_FINITE;
+      double touches_at = first_contact(course[P], left, room), length = touches_at == NEVER ? left : touches_at;
+      if (observer.is_on()) {
+        seen.peak_x = course_peak(seen.peak_x, course[AT_X], length);
+        if (seen.peak_p < larger(s.lower_gap, s.upper_gap)) seen.peak_p = course_peak(seen.peak_p, course[P], length);
+      }
+      course.place(c.at, length);
+      if (touches_at == NEVER) break;
+      tau += touches_at;
+      if (++touches > MOST_TOUCHES) return TOO_MANY_IMPACTS;
+      touch(c, touched_side(c.at[P], c.at[P_RATE], s), t);
+      c.contact.w = 0.0;  // the touch was found a hair before or after the gap closed
+      if (purpose == Purpose::MOTION) {
+        if (ends_too_late(c, tau, until, s)) {
+          cut = tau;
+          return REACHED_END;
+        }
+        if (m.impacts == m.impact_times.size) outcome = TOO_MANY_IMPACTS;
+        else m.impact_cells.at[m.impacts] = double(i), m.impact_times.at[m.impacts++] = clock.high + tau;
+      }
+      if (until - tau <= HAIR * until) break;
+    }
+    if (observer.is_on()) m.peaks.at[2 * i] = seen.peak_x, m.peaks.at[2 * i + 1] = seen.peak_p;
+    return outcome;
+  }
+
+  // Whether the collision that begins would be whole in a window of its own, but not in this one.
+  bool ends_too_late(const CellMotion &c, double tau, double until, const Specimen &s) const {
+    if (s.law != HERTZ || at.cells > MOST_CUT || m.tolerance < LEAST_TOLERANCE || !(SOON * until < tau && tau < until * (1.0 - HAIR))) return false;
+    double lasts = LONGEST * c.contact.pace * c.contact.pace * c.contact.r;
+    return until - tau <= lasts && lasts < full_length;
+  }
+
+  static void write(double *motion, const CellMotion &c) {
+    for (int order = 0; order < 2; order++) {
+      const double *from = c.at + NUMBERS * order;
+      motion[X + 3 * order] = from[AT_X], motion[Z + 3 * order] = from[AT_Z];
+      motion[Y + 3 * order] = from[P] + from[AT_Z];
+    }
+  }
+  void touch(CellMotion &c, double side, const Tables &t) const {
+    double motion[6];
+    write(motion, c);
+    begin_contact(c.contact, motion, side, step_tolerance(), t);
+  }
+
+  // Adds a force whose integral against (1 - s)^k over its `length` is moment(k), and which ended `ago`.
+  template <class Moment>
+  void add_impulse(CellMotion &c, double side, double length, double ago, int count, const Moment &moment) const {
+    double added[MOMENTS] = {}, factor = side * length;
+    for (int k = 0; k < count; k++) {
+      added[k] = factor * moment(k);
+      factor *= length / (k + 1);
+    }
+    age(added, ago);
+    for (int k = 0; k < MOMENTS; k++) c.moments[k] += added[k];
+  }
+
+  Outcome press(CellMotion &c, const double *force, double &tau, double until, const Tables &t, Observer &observer) const {
+    const Specimen &s = t.specimen;
+    auto with = [&](const auto &law) { return press_on(c, law, force, tau, until, t, observer); };
+    if (s.law == HERTZ) return with(HertzForce{s.contact_stiffness});
+    return with(YieldingForce{s.linear_stiffness, s.contact_stiffness, s.loss});
+  }
+  template <class Force>
+  Outcome press_on(CellMotion &c, const Force &law, const double *force, double &tau, double until, const Tables &t,
+                   Observer &observer) const {
+    double series[AHEAD], motion[6], side = c.contact.side, limit = until - tau, reached = 0.0;
+    __builtin_memcpy(series, force, sizeof series);
+    shift(series, 0.5 * limit);
+    BaseForce base(0.5 * limit, series);
+    write(motion, c);
+    auto seen = [&](const auto &steps, double h) {
+      if (observer.is_on()) observer.see_step(steps, h, c.contact);
+      add_step(c, steps, h, limit);
+    };
+    ContactEnd end = advance_contact(c.contact, motion, reached, limit, base, law, step_tolerance(), t, seen);
+    for (int order = 0; order < 2; order++)
+      c.at[AT_X + NUMBERS * order] = motion[X + 3 * order], c.at[AT_Z + NUMBERS * order] = motion[Z + 3 * order];
+    c.at[P] = side * (gap_at(t.specimen, side) + c.contact.w * c.contact.w);
+    c.at[P_RATE] = side * c.contact.r;
+    tau = end == ContactEnd::HELD ? until : tau + reached;
+    if (end == ContactEnd::LOST) return NOT_FINITE;
+    return end == ContactEnd::STALLED ? STALLED : REACHED_END;
+  }
+
+  // The step's own quadrature of the force against (limit - t)^k / k!, with dt = w ds, by the stages of the method.
+  template <class Steps> static void add_step(CellMotion &c, const Steps &steps, double h, double limit) {
+    for (int j = 0; j < STAGES; j++) {
+      if (END_WEIGHTS[j] == 0.0) continue;
+      double w = steps.stages[j][TIME], r = 2.0 * steps.stages[j][W], passed = 0.0;
+      for (int i = 0; i < j; i++) passed += STAGE_WEIGHTS[j][i] * steps.stages[i][TIME];
+      double left = limit - (steps.point[TIME] + h * passed);
+      double share = steps.rates.side * h * END_WEIGHTS[j] * w * steps.rates.force(w, r);
+      for (int k = 0; k < MOMENTS; k++) {
+        c.moments[k] += share;
+        share *= left / (k + 1);
+      }
+    }
+  }
+
+  // One step under a power law; returns its length, or zero where none could be made.
+  double power_step(CellMotion &c, const CellCourse &course, double left, const KindTables &kind, Observer &observer) const {
+    const Tables &t = kind.tables;
+    double wish = c.power_step > 0.0 ? c.power_step : full_length, length = smaller(wish, left), misfit = INFINITE;
+    double p = c.at[P], outward = larger(p >= 0.0 ? c.at[P_RATE] : -c.at[P_RATE], 0.0);
+    CellStep step{kind, *m.power_shapes, course, 0.0, {}, {}, {}};
+    for (int n = 0; n < MOST_TRIES && !(misfit <= 1.0); n++) {
+      if (n > 0) length *= SHORTER_STEP;
+      while (length * kind.power.stiffest_rate(magnitude(p) + outward * length, 0.0, t.inverse_pair) > WALL_TURN)
+        length *= SHORTER_STEP;
+      step.length = length;
+      misfit = step.attempt(c, m.tolerance);
+    }
+    if (!(misfit <= 1.0)) return 0.0;
+    bool is_fine = misfit < TRY_LONGER;
+    if (length < left || is_fine) c.power_step = length * (is_fine ? LONGER_STEP : 1.0);
+    if (observer.is_on()) {
+      observer.record.peak_x = step.peak(observer.record.peak_x, AT_X, c);
+      observer.record.peak_p = step.peak(observer.record.peak_p, P, c);
+    }
+    add_impulse(c, 1.0, length, left - length, MOMENTS, [&](int k) {
+      return total(Vector<GAUSS>::load(m.power_shapes->ends[k]) * step.force);
+    });
+    for (int n = 0; n < 2 * NUMBERS; n++) c.at[n] = step.after[n];
+    c.size = larger(magnitude(c.at[P]), CELL_FADING * c.size);
+    return length;
+  }
+};
+
+}  // namespace vibench
