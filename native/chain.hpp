@@ -13,9 +13,10 @@ constexpr int BLOCK = 8;             // cells side by side; a force is heard by 
 constexpr int NUMBERS = 3;           // displacements of a cell, at places P, AT_X, AT_Z; rates follow
 constexpr int PIECE_TERMS = 8;
 constexpr double LONGEST_WINDOW = 0.5;  // fastest rate times length: what AHEAD terms bear [rad]
+constexpr double IDLE_WINDOWS = 2.0;  // length of a window in which nothing happens, over the longest of the others
 constexpr int MOST_TOUCHES = 1000;   // of a cell in a window, which is a small part of the shortest period
 constexpr int MOST_STRETCHES = 100000;  // flights, contacts and steps of a cell in a window
-constexpr int64_t MOST_CUT = 8;      // cells of a chain whose windows are cut: beyond, a window costs more than steps
+constexpr int64_t MOST_CUT = 16;      // cells of a chain whose windows are cut: beyond, a window costs more than steps
 constexpr double SOON = 1e-3;        // a window may as well begin with a touch in this part of it
 constexpr double HAIR = 1e-12;       // a touch in this last part of a window is left to the next
 constexpr double ALMOST = 1e-9;      // part of a piece of the drive that is rounding
@@ -39,6 +40,8 @@ struct KindTables {
   double struck[MOMENTS][WIDE];   // as `CollisionTables::struck`
   PowerForce power;
   double link[2][2];              // stiffness and damping, before and behind
+  double gain_length;             // [s]: of a step for which
+  double gain[GAUSS][GAUSS];      // a force at one of Gauss's points adds so much to p at the others [m/N]
 };
 
 struct CellMotion {
@@ -53,7 +56,7 @@ struct ChainMemory {
   int64_t cells, kinds, padded;
   double *base;
   int64_t used = 0;
-  Row inverse0, inverse2, inverse_pair, k0, k1, k2, c0, c1, c2, link;
+  Row inverse0, inverse2, inverse_pair, k0, k1, k2, c0, c1, c2;
   Rows terms[AHEAD];              // Taylor terms in the window
   Rows end[2], sampled[2], heard[3];  // at its end and at a sample, displacements and rates; of the forces alone
   Row bounds[2];                  // of the accelerations of p and x in the window
@@ -63,7 +66,7 @@ struct ChainMemory {
 
   ChainMemory(double *memory, int64_t cell_count, int64_t kind_count)
       : cells(cell_count), kinds(kind_count), padded((cell_count + BLOCK - 1) / BLOCK * BLOCK), base(memory) {
-    Row *single[] = {&inverse0, &inverse2, &inverse_pair, &k0, &k1, &k2, &c0, &c1, &c2, &link, &bounds[0], &bounds[1]};
+    Row *single[] = {&inverse0, &inverse2, &inverse_pair, &k0, &k1, &k2, &c0, &c1, &c2, &bounds[0], &bounds[1]};
     Rows *triple[] = {&end[0], &end[1], &sampled[0], &sampled[1], &heard[0], &heard[1], &heard[2]};
     for (Row *each : single) *each = row();
     for (Rows &each : terms) rows(each);
@@ -99,13 +102,10 @@ inline void shift(double *series, double by) {
 
 // Lets time pass without a force: the integrals grow by those below them.
 inline void age(double *moments, double by) {
-  for (int k = MOMENTS - 1; k > 0; k--) {
-    double share = 1.0;
-    for (int back = 1; back <= k; back++) {
-      share *= by / back;
-      moments[k] += share * moments[k - back];
-    }
-  }
+  double shares[MOMENTS] = {1.0};  // by^k / k!
+  for (int k = 1; k < MOMENTS; k++) shares[k] = shares[k - 1] * by * (1.0 / k);
+  for (int k = MOMENTS - 1; k > 0; k--)
+    for (int back = 1; back <= k; back++) moments[k] += shares[back] * moments[k - back];
 }
 
 // Taylor terms of p, x and z of one cell without its force, from its motion now and the push of its neighbours on m0.
@@ -171,45 +171,46 @@ inline bool collide_cell(Collision<double> &c, CellMotion &cell, const CellCours
 
 // A step under a power law: its force at Gauss's points, found by substitution as in power_law.hpp.
 struct CellStep {
-  const KindTables &kind;
+  KindTables &kind;
   const PowerShapes &shapes;
   const CellCourse &course;       // without force, from the start on
   double length;
   Vector<GAUSS> force, places;
+  double moments[MOMENTS];        // integrals of the force against (1 - s)^m over the step
   double after[2 * NUMBERS];
 
   // Tries it; its misfit over what is allowed.
   double attempt(const CellMotion &cell, double tolerance) {
-    double gain[GAUSS][GAUSS] = {};
-    add_shares(P, [&](double factor, int m) {
-      for (int k = 0; k < GAUSS; k++) add_row(gain[k], factor, shapes.shares[m][k]);
-    });
+    if (length != kind.gain_length) {
+      kind.gain_length = length;
+      for (auto &row : kind.gain)
+        for (double &each : row) each = 0.0;
+      add_shares(P, [&](double factor, int m) {
+        for (int k = 0; k < GAUSS; k++) add_row(kind.gain[k], factor, shapes.shares[m][k]);
+      });
+    }
     Vector<GAUSS> free = course_at(P);
     double weight = length * length * kind.tables.inverse_pair;
     double size = larger(larger(cell.size, magnitude(cell.at[P])), largest(magnitude(free))) + NOTHING_MOVES;
     double close = size * larger(CLOSE_PLACE * tolerance, CLOSEST_PLACE), first = kind.power(cell.at[P]);
-    if (!settle(free, gain, weight, close, first)) return INFINITE;
+    if (!settle(free, weight, close, first)) return INFINITE;
+    for (int m = 0; m < MOMENTS; m++) moments[m] = total(Vector<GAUSS>::load(shapes.ends[m]) * force);
     course.place(after, length);
-    for (int n = 0; n < 2 * NUMBERS; n++)
-      add_shares(n, [&](double factor, int m) { after[n] += factor * total(Vector<GAUSS>::load(shapes.ends[m]) * force); });
+    for (int n = 0; n < 2 * NUMBERS; n++) add_shares(n, [&](double factor, int m) { after[n] += factor * moments[m]; });
     double before = total(Vector<GAUSS>::load(shapes.at_start) * force) - first;
     double behind = total(Vector<GAUSS>::load(shapes.at_end) * force) - kind.power(after[P]);
     return weight * larger(magnitude(before), magnitude(behind)) / (FINER_FIT * FIT * tolerance * size);
   }
 
-  // Largest magnitude of a displacement; it turns at most once between two points.
+  // Largest magnitude of a displacement.
   double peak(double best, int number, const CellMotion &cell) const {
-    ValueAndRate last{after[number], after[number + NUMBERS]}, first{cell.at[number], cell.at[number + NUMBERS]};
+    ValueAndRate first{cell.at[number], cell.at[number + NUMBERS]}, last{after[number], after[number + NUMBERS]};
     best = larger(best, larger(magnitude(first.value), magnitude(last.value)));
     if (!may_peak(best, first, last, length)) return best;
-    Vector<GAUSS> value = pushed_at(number), rate = pushed_at(number + NUMBERS);
-    double passed = 0.0;
-    for (int i = 0; i < GAUSS; i++) {
-      ValueAndRate next{value[i], rate[i]};
-      best = cubic_peak(best, first, next, length * (shapes.points[i] - passed));
-      passed = shapes.points[i], first = next;
-    }
-    return cubic_peak(best, first, last, length * (1.0 - passed));
+    StepCourse all{{first.value}, {first.rate}, length, shapes};
+    pushed_at(number).store(all.value + 1), pushed_at(number + NUMBERS).store(all.rate + 1);
+    all.value[INSTANTS - 1] = last.value, all.rate[INSTANTS - 1] = last.rate;
+    return all.peak(best);
   }
 
  private:
@@ -222,22 +223,23 @@ struct CellStep {
     }
   }
   Vector<GAUSS> course_at(int number) const {
-    double at[GAUSS];
-    for (int i = 0; i < GAUSS; i++) {
-      ValueAndRate there = polynomial_at(course[number % NUMBERS], length * shapes.points[i]);
-      at[i] = number < NUMBERS ? there.value : there.rate;
-    }
-    return Vector<GAUSS>::load(at);
+    const double *series = course[number % NUMBERS];
+    Vector<GAUSS> times = length * Vector<GAUSS>::load(shapes.points), sum(0.0);
+    if (number < NUMBERS)
+      for (int k = AHEAD - 1; k >= 0; k--) sum = sum * times + series[k];
+    else
+      for (int k = AHEAD - 1; k > 0; k--) sum = sum * times + k * series[k];
+    return sum;
   }
   Vector<GAUSS> pushed_at(int number) const {
     Vector<GAUSS> sum = course_at(number);
     add_shares(number, [&](double factor, int m) { sum = sum + factor * times(shapes.shares[m], force); });
     return sum;
   }
-  bool settle(const Vector<GAUSS> &free, const double (&gain)[GAUSS][GAUSS], double weight, double close, double first) {
+  bool settle(const Vector<GAUSS> &free, double weight, double close, double first) {
     force = Vector<GAUSS>(first);
     for (int n = 0; n < MOST_SUBSTITUTIONS; n++) {
-      places = free + times(gain, force);
+      places = free + times(kind.gain, force);
       Vector<GAUSS> fresh = kind.power(places);
       double change = weight * largest(magnitude(fresh - force));
       bool is_number = is_finite(total(fresh));
@@ -350,20 +352,27 @@ class ChainRun {
   void accelerate(const Rows &q, const Rows &v, double next, double base, double share, const Rows &out, int64_t first,
                   int64_t last) {
     using Cells = Vector<BLOCK>;
-    Row p = q.of[P], x = q.of[AT_X], z = q.of[AT_Z], vp = v.of[P], vx = v.of[AT_X], vz = v.of[AT_Z];
     auto load = [](const double *from) { return Cells::load(from); };
-    for (int64_t i = first; i <= last; i += BLOCK) {
-      Cells stretch = load(x + i) - load(x + i - 1), rate = next * (load(vx + i) - load(vx + i - 1));
-      (load(at.k0 + i) * stretch + load(at.c0 + i) * rate).store(at.link + i);
-    }
-    if (first == 0) at.link[0] -= base;
+    Cells x = load(q.of[AT_X] + first - BLOCK), vx = load(v.of[AT_X] + first - BLOCK);
+    // The pull of the links before the cells of a block, after the block before; shifted in registers, for a load
+    // across two stores waits for both.
+    auto links_of = [&](int64_t i) {
+      Cells x_before = x, vx_before = vx;
+      x = load(q.of[AT_X] + i), vx = load(v.of[AT_X] + i);
+      return load(at.k0 + i) * (x - lanes_before(x_before, x)) +
+             (next * load(at.c0 + i)) * (vx - lanes_before(vx_before, vx));
+    };
+    Cells links = links_of(first);
+    if (first == 0) links.set(0, links[0] - base);
     for (int64_t i = first; i < last; i += BLOCK) {
-      Cells pull = load(at.k2 + i) * (load(z + i) - load(x + i)) + load(at.c2 + i) * (next * (load(vz + i) - load(vx + i)));
-      Cells press = load(at.k1 + i) * load(p + i) + load(at.c1 + i) * (next * load(vp + i));
-      Cells over2 = share * load(at.inverse2 + i);
+      Cells z = load(q.of[AT_Z] + i), vz = load(v.of[AT_Z] + i);
+      Cells pull = load(at.k2 + i) * (z - x) + (next * load(at.c2 + i)) * (vz - vx);
+      Cells press = load(at.k1 + i) * load(q.of[P] + i) + (next * load(at.c1 + i)) * load(v.of[P] + i);
+      Cells over2 = share * load(at.inverse2 + i), behind = links_of(i + BLOCK);
       (pull * over2 - press * (share * load(at.inverse_pair + i))).store(out.of[P] + i);
-      ((pull - load(at.link + i) + load(at.link + i + 1)) * (share * load(at.inverse0 + i))).store(out.of[AT_X] + i);
+      ((pull - links + lanes_behind(links, behind)) * (share * load(at.inverse0 + i))).store(out.of[AT_X] + i);
       ((press - pull) * over2).store(out.of[AT_Z] + i);
+      links = behind;
     }
   }
 
@@ -442,11 +451,12 @@ class ChainRun {
   Outcome cross_window(double left) {
     double longest = smaller(left, place_push());
     expand();
-    for (int level = 0; level < m.windows.size; level++) {
-      full_length = smaller(longest, m.windows.at[level]);
+    // After a window in which no cell was followed a longer one is tried, unless extremes are looked for.
+    for (int level = followed == 0 && !watches() ? -1 : 0; level < m.windows.size; level++) {
+      full_length = smaller(longest, level < 0 ? IDLE_WINDOWS * m.windows.at[0] : m.windows.at[level]);
       place(at.end, full_length);
       if (!find_busy()) return NOT_FINITE;
-      if (!neighbours_clash(int64_t(m.clashes.at[level]))) break;
+      if (level < 0 ? followed == 0 : !neighbours_clash(int64_t(m.clashes.at[level]))) break;
     }
     for (int64_t n = 0; n < followed; n++) {
       CellMotion &begun = at.begun[at.busy[n]];
@@ -575,7 +585,7 @@ class ChainRun {
 
   // Follows a cell from one time in the window to another. With a cut its rest is not worth following.
   Outcome cross(CellMotion &c, int64_t i, double from, double until, Purpose purpose) {
-    const KindTables &kind = at.tables[kind_of(i)];
+    KindTables &kind = at.tables[kind_of(i)];
     const Tables &t = kind.tables;
     const Specimen &s = t.specimen;
     double force[AHEAD], tau = from, shifted = 0.0;
@@ -674,7 +684,7 @@ class ChainRun {
     double added[MOMENTS] = {}, factor = side * length;
     for (int k = 0; k < count; k++) {
       added[k] = factor * moment(k);
-      factor *= length / (k + 1);
+      factor *= length * (1.0 / (k + 1));
     }
     age(added, ago);
     for (int k = 0; k < MOMENTS; k++) c.moments[k] += added[k];
@@ -718,17 +728,17 @@ class ChainRun {
       double share = steps.rates.side * h * END_WEIGHTS[j] * w * steps.rates.force(w, r);
       for (int k = 0; k < MOMENTS; k++) {
         c.moments[k] += share;
-        share *= left / (k + 1);
+        share *= left * (1.0 / (k + 1));
       }
     }
   }
 
   // One step under a power law; returns its length, or zero where none could be made.
-  double power_step(CellMotion &c, const CellCourse &course, double left, const KindTables &kind, Observer &observer) const {
+  double power_step(CellMotion &c, const CellCourse &course, double left, KindTables &kind, Observer &observer) const {
     const Tables &t = kind.tables;
     double wish = c.power_step > 0.0 ? c.power_step : full_length, length = smaller(wish, left), misfit = INFINITE;
     double p = c.at[P], outward = larger(p >= 0.0 ? c.at[P_RATE] : -c.at[P_RATE], 0.0);
-    CellStep step{kind, *m.power_shapes, course, 0.0, {}, {}, {}};
+    CellStep step{kind, *m.power_shapes, course, 0.0, {}, {}, {}, {}};
     for (int n = 0; n < MOST_TRIES && !(misfit <= 1.0); n++) {
       if (n > 0) length *= SHORTER_STEP;
       while (length * kind.power.stiffest_rate(magnitude(p) + outward * length, 0.0, t.inverse_pair) > WALL_TURN)
@@ -743,9 +753,7 @@ class ChainRun {
       observer.record.peak_x = step.peak(observer.record.peak_x, AT_X, c);
       observer.record.peak_p = step.peak(observer.record.peak_p, P, c);
     }
-    add_impulse(c, 1.0, length, left - length, MOMENTS, [&](int k) {
-      return total(Vector<GAUSS>::load(m.power_shapes->ends[k]) * step.force);
-    });
+    add_impulse(c, 1.0, length, left - length, MOMENTS, [&](int k) { return step.moments[k]; });
     for (int n = 0; n < 2 * NUMBERS; n++) c.at[n] = step.after[n];
     c.size = larger(magnitude(c.at[P]), CELL_FADING * c.size);
     return length;

@@ -54,6 +54,14 @@ template <int N> INLINE Vector<N> magnitude(Vector<N> x) {
 #endif
 }
 
+// The eight lanes from one before `to`, which follows `from`; and those from one behind `from`.
+INLINE Vector<8> lanes_before(Vector<8> from, Vector<8> to) {
+  return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 7, 8, 9, 10, 11, 12, 13, 14));
+}
+INLINE Vector<8> lanes_behind(Vector<8> from, Vector<8> to) {
+  return Vector<8>(__builtin_shufflevector(from.lanes, to.lanes, 1, 2, 3, 4, 5, 6, 7, 8));
+}
+
 // Sum of all lanes, in halves of halves.
 template <int N> INLINE double total(Vector<N> x) {
   double of[N];
