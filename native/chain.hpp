@@ -19,7 +19,7 @@ constexpr int MOST_STRETCHES = 100000;  // flights, contacts and steps of a cell
 constexpr int64_t MOST_CUT = 16;      // cells of a chain whose windows are cut: beyond, a window costs more than steps
 constexpr double SOON = 1e-3;        // a window may as well begin with a touch in this part of it
 constexpr double HAIR = 1e-12;       // a touch in this last part of a window is left to the next
-constexpr double ALMOST = 1e-9;      // part of a piece of the drive that is rounding
+constexpr double ROUNDED_PIECE = 1e-9;  // part of a piece of the drive that is rounding
 // Errors of steps take energy and do not give it, so that they add up; those of whole collisions do not. Steps may use
 // this part of the tolerance, but need not be finer than the finest.
 constexpr double STEP_CARE = 1e-4, FINEST_STEP = 1e-11;
@@ -315,18 +315,14 @@ class ChainRun {
   double step_tolerance() const { return smaller(m.tolerance, larger(STEP_CARE * m.tolerance, FINEST_STEP)); }
 
   void fill_kind(KindTables &k, const CellKind &of) const {
-    Scene alone{};
-    Specimen &s = alone.specimen;
-    s = of.specimen;
+    Specimen s = of.specimen;
     k.link[0][0] = s.k0, k.link[0][1] = s.c0, k.link[1][0] = of.next_stiffness, k.link[1][1] = of.next_damping;
     s.k0 += of.next_stiffness, s.c0 += of.next_damping;
     Tables &t = k.tables;
-    t.specimen = s;
-    t.pair = s.m1 * s.m2 / (s.m1 + s.m2);
-    t.inverse0 = 1.0 / s.m0, t.inverse2 = 1.0 / s.m2, t.inverse_pair = 1.0 / t.pair;
+    fill_body(t, s);
     t.collision.fastest = m.fastest, t.collision.shapes = m.collisions;
     double powers[MOMENTS][WIDE][WIDE];
-    fill_series(powers, k.struck, m.fastest, alone);
+    fill_series(powers, k.struck, m.fastest, s, Drive{});
     __builtin_memcpy(t.collision.struck, k.struck, sizeof t.collision.struck);
     if (s.law == POWERS) k.power = power_force(of.power);
   }
@@ -437,7 +433,7 @@ class ChainRun {
     double passed = -time_until(clock, m.piece_start);
     int64_t index = int64_t(smaller(double(pieces - 1), larger(0.0, passed / m.piece_length)));
     double left = time_until(clock, m.piece_start + double(index + 1) * m.piece_length);
-    if (left <= ALMOST * m.piece_length && index + 1 < pieces) index++, left += m.piece_length;
+    if (left <= ROUNDED_PIECE * m.piece_length && index + 1 < pieces) index++, left += m.piece_length;
     __builtin_memcpy(push, m.pieces.at + index * PIECE_TERMS, PIECE_TERMS * sizeof(double));
     shift(push, m.piece_length - left);
     return index + 1 < pieces ? left : INFINITE;
