@@ -134,7 +134,7 @@ class GeneratorModel:
 class ArbitraryCodes:
     """One period as the generator's memory holds it: free of DC, over the full range of codes.
 
-    The terminal plays ``achieved * amplitude_vpp / 2``, where the panel is set to
+    The terminal plays ``(2 * codes / top_code - 1)`` times half of what the panel is set to, which is
     ``amplitude_vpp * panel_factor``.
     """
 
@@ -144,11 +144,6 @@ class ArbitraryCodes:
     """The code of plus half of the amplitude on the panel; 0 is that of minus half."""
     panel_factor: float
     """Largest magnitude that is left: 1 for a waveform that is free of DC and reaches 1."""
-
-    @property
-    def achieved(self) -> Samples:
-        """Values that the codes stand for, on the scale of the values as given."""
-        return self.panel_factor * (2 * self.codes / self.top_code - 1.0)
 
 
 def arbitrary_codes(waveform: Samples, model: GeneratorModel) -> ArbitraryCodes:
