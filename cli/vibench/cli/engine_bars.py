@@ -17,8 +17,6 @@ from vibench.acquisition.engine import (
     RowStatus,
     RunStatus,
 )
-from vibench.acquisition.stopping import DRIVES_ON, Cause
-from vibench.stop_files import SWITCH_OFF
 
 from .output import console, errors, words
 from .progress_bars import shown
@@ -135,6 +133,5 @@ class Watching:
             while not self._ending.wait(INTERVAL_S):
                 bars.draw(self._ask())
             bars.draw(self._ask())
-        if (request := self._engine.switch.request) is not None and request.cause is not Cause.FAULT:
-            silence = SWITCH_OFF if DRIVES_ON else "The output is off"
-            errors.print(f"stopped: {request.reason}. {silence}.")
+        if stopped := self._engine.stop_sentence:
+            errors.print(f"stopped: {stopped}")

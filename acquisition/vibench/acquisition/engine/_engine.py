@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from vibench.stop_files import SWITCH_OFF
+
 from ..bench import Bench
 from ..campaign import (
     CampaignEvent,
@@ -23,7 +25,7 @@ from ..check import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..plan import Campaign, OnChange
 from ..rig import Confirm, Rig
-from ..stopping import StopSwitch, stop_on_signal
+from ..stopping import DRIVES_ON, Cause, StopSwitch, stop_on_signal
 from ._campaign_request import CampaignRequest
 from ._live_twin import TwinProcess, TwinSwitch
 from ._published_state import PublishedState
@@ -76,6 +78,14 @@ class Engine:
         """The open bench; others may look at its rig, where the state says that there is one."""
         assert self._reconnecting is not None, f"no bench is open while {self.published.state}"
         return self._reconnecting.bench
+
+    @property
+    def stop_sentence(self) -> str:
+        """Who stopped what ran, and whether the output is off; empty where nobody did."""
+        request = self.switch.request
+        if request is None or request.cause is Cause.FAULT:
+            return ""
+        return f"{request.reason}. {SWITCH_OFF if DRIVES_ON else 'The output is off'}."
 
     @property
     def played_faults(self) -> tuple[str, ...]:
