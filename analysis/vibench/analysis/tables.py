@@ -56,7 +56,7 @@ class Table:
 
 
 def table(name: str, **columns: ArrayLike) -> Table:
-    """Build a table; ``frequency_hz`` becomes ``"frequency_hz"``: names carry the unit as in the code."""
+    """Build the table ``name`` of ``columns``; their names carry the unit as in the code."""
     return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
 
 

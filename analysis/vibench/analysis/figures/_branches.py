@@ -93,7 +93,7 @@ def branches_figure(
 
 
 def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
-    """Draw one branch: stable stretches solid, unstable ones dashed."""
+    """Draw a branch, ``size`` over ``place``, into ``axes``: stable parts solid, unstable ones dashed."""
     colour = PREDICTED if line.periods == 1 else LEVELS[1 + (line.periods - 2) % (len(LEVELS) - 1)]
     period = "" if line.periods == 1 else f", period {line.periods}"
     for is_stable, piece in line.pieces():

@@ -85,14 +85,14 @@ def plain_label(name: str) -> str:
 
 
 def new_figure(height_in: float) -> Figure:
-    """Begin a figure of the common width, with a layout that lets nothing overlap."""
+    """Begin a figure of the common width, ``height_in`` inches high; its layout lets nothing overlap."""
     figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
 def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None:
-    """Put one legend over the whole figure, outside of every axis: it never covers data."""
+    """Put one legend of all ``axes`` in ``columns`` over the ``figure``, where it never covers data."""
     found = {
         label: handle
         for each in axes
@@ -102,7 +102,7 @@ def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 3) -> None
 
 
 def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
-    """Scale an axis logarithmically, with marks that read 20, 50, 100; a narrow band stays linear."""
+    """Scale frequencies of ``axes`` logarithmically, marked at 20, 50, 100; a narrow band stays linear."""
     axes.set_xlim(low_hz * (1 - _EDGE), high_hz * (1 + _EDGE))
     if high_hz < _LINEAR_BELOW * low_hz:
         return
@@ -116,7 +116,7 @@ def frequency_axis(axes: Axes, low_hz: float, high_hz: float) -> None:
 
 
 def magnitude_axis(axes: Axes) -> None:
-    """Scale the vertical axis logarithmically, with marks that read 0.1, 1, 10; a narrow range has more."""
+    """Scale magnitudes of ``axes`` logarithmically, marked at 0.1, 1, 10; a narrow range has more."""
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter(FuncFormatter(_plain))
     axes.yaxis.set_minor_formatter(_Between(minor_thresholds=_FEW_DECADES))
