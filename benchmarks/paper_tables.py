@@ -29,7 +29,7 @@ def main():
     """Print the tables as they stand in the page."""
     case = Case(accuracy=Accuracy.QUICK)
     evidence = Evidence(solve_study)
-    head = "damping", "|x / U| near 95 Hz", "A0 at which p reaches the gap there [um]", "at 5 um between [Hz]"
+    head = "damping", "peak near 95 Hz", "A0 at which p reaches the gap there [um]", "at 5 um between [Hz]"
     show(head, (reach(each.of(case)) for each in (*map(damping, SCORED_S), ALIKE)))
     settings = (damping(1e-5).of(case), case, ALIKE.of(case), BY_ODE45.of(case))
     levels = [Reading(evidence, each).level(MODERATE_M) for each in settings]

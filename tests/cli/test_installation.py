@@ -71,6 +71,11 @@ def test_every_example_has_a_name_of_its_own(vibench_here, tmp_path):
         assert len(names) == len(set(names)), line
 
 
+def test_the_studies_that_are_listed_are_those_that_the_command_takes(vibench_here, tmp_path):
+    listed = json.loads(vibench_here("examples", "--json", cwd=tmp_path).stdout)["studies"]
+    assert {Path(each).suffix for each in listed} == {".toml"}
+
+
 def test_a_disk_without_room_is_one_sentence(vibench_here, tmp_path):
     resource = pytest.importorskip("resource", reason="bounds on files are POSIX")
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
