@@ -214,7 +214,7 @@ template <class T, class Stops> class CubicRun {
       Record unseen{};
       unseen.impact_room = record.impact_room, unseen.steps_left = record.steps_left;
       double tau = 0.0;
-      CubicRun<double, Stops>(copy, t, stops, tolerance, unseen).resolve(force, later, false, tau);
+      if (later > 0.0) CubicRun<double, Stops>(copy, t, stops, tolerance, unseen).resolve(force, later, false, tau);
       __builtin_memcpy(sample, copy.at, sizeof copy.at);
     });
   }
