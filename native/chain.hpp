@@ -447,8 +447,8 @@ class ChainRun {
   Outcome cross_window(double left) {
     double longest = smaller(left, place_push());
     expand();
-    // After a window in which no cell was followed a longer one is tried, unless extremes are looked for.
-    for (int level = followed == 0 && !watches() ? -1 : 0; level < m.windows.size; level++) {
+    // After a window in which no cell was followed a longer one is tried.
+    for (int level = followed == 0 ? -1 : 0; level < m.windows.size; level++) {
       full_length = smaller(longest, level < 0 ? IDLE_WINDOWS * m.windows.at[0] : m.windows.at[level]);
       place(at.end, full_length);
       if (!find_busy()) return NOT_FINITE;
@@ -537,7 +537,8 @@ class ChainRun {
         if (ends + at.bounds[what][i] * length * length / 8.0 <= best) continue;
         double series[AHEAD];
         for (int k = 0; k < AHEAD; k++) series[k] = at.terms[k].of[what][i];
-        best = series_peak(best, series, 0.0, length);
+        // In two parts: a window in which nothing happens is twice as long.
+        best = series_peak(series_peak(best, series, 0.0, 0.5 * length), series, 0.5 * length, length);
       }
     }
   }

@@ -49,7 +49,7 @@ def test_the_short_window_lets_even_neighbours_press_together_within_the_toleran
     between = markov_between(chain)
     assert np.all(cross_answers(between, tables.windows[-1])[1:] <= allowed)
     for window, clash in zip(tables.windows, tables.clash, strict=True):
-        assert np.all(cross_answers(between, window)[1 + clash :] <= allowed)
+        assert np.all(cross_answers(between, window)[1 + int(clash) :] <= allowed)
     assert np.all(np.diff(tables.windows) < 0.0)
 
 

@@ -150,6 +150,14 @@ def call_spoilt(engine, draws):
             spoil(structure.lent["shaker"], draws)
         if function.endswith("_loop") and draws.random() < 0.3:
             spoil(structure.lent["controller"], draws)
+        if function.endswith("_chain"):
+            if draws.random() < 0.3:
+                lent = structure.lent[
+                    draws.choice(["kinds", "kind_of", "states", "windows", "clashes", "pieces"])
+                ]
+                if lent.size:
+                    lent.flat[draws.integers(lent.size)] = draws.choice(STRANGE)
+            structure["windows_left"] = min(int(structure["windows_left"]), 1000)
         for view, true in sizes:
             view[...] = min(int(view), true)
         try:

@@ -1,9 +1,18 @@
 """A call of every function of the native engine that takes one structure, with random numbers."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from vibench.sim import gong2025
-from vibench.sim.engine import cubic_tables, start_on_cubics
+from vibench.sim import Harmonic, gong2025
+from vibench.sim.engine import (
+    collision_structure,
+    cubic_tables,
+    fill_cell,
+    fill_drive,
+    power_structure,
+    start_on_cubics,
+)
 
 LAWS = (
     "hertz",
@@ -84,6 +93,7 @@ def calls(engine, draws):
     yield "close_loop", loop, [*filled, *moved]
 
     yield from motion_calls(engine, draws, normal)
+    yield from chain_calls(engine, normal)
 
 
 def shaker_of(engine, draws, drive):
@@ -167,6 +177,46 @@ def motion_calls(engine, draws, normal):
         arrays |= {"small_flow": flying(2e-5 / 7), "stop": stop, "contacts": contacts}
         work = engine.new("ContactSearch", step=2e-5, small_steps=7, longest=50, **arrays)
         yield "follow_contacts", work, [contacts]
+
+
+def chain_calls(engine, normal):
+    """Start and follow a chain in which every law acts, under a sine and under pieces of a force."""
+    laws = ("hertz", "power:3+5", "hunt_crossley:0.5", "linear_gap", "linear", "hertz")
+    cells, kinds = len(laws) + 4, engine.rows("CellKind", len(laws))
+    for kind, law in zip(kinds, laws, strict=True):
+        link = (gong2025().stiffnesses[0], gong2025().dampings[0])
+        fill_cell(kind, replace(gong2025(contact=law), lower_gap_m=30e-6), *link)
+    for pieces in (np.zeros((0, 8)), normal(20, 8) * 2000.0 ** np.arange(8)):
+        states = engine.rows("CellState", cells)
+        for name in ("p", "x", "z"):
+            states[name], states[f"v{name}"] = normal(cells, scale=2e-5), normal(cells, scale=0.1)
+        filled = {
+            "states": states.view(np.float64),
+            "samples": np.zeros((30, cells, 6)),
+            "impact_times": np.zeros(300),
+            "impact_cells": np.zeros(300),
+            "peaks": np.zeros((cells, 2)),
+            "lines": np.zeros((cells, 2)),
+        }
+        numbers = {"until": 0.01, "tolerance": 3e-7, "fastest": 5000.0, "windows_left": 1000, "watch": 2}
+        chain = engine.new(
+            "ChainMotion",
+            kinds=kinds.view(np.float64),
+            kind_of=np.arange(cells) % len(laws) * 1.0,
+            windows=np.array([8e-5, 4e-5]),
+            clashes=np.array([1.0, 0.0]),
+            pieces=pieces,
+            piece_length=5e-4,
+            collisions=collision_structure(engine).ctypes.data,
+            power_shapes=power_structure(engine).ctypes.data,
+            sample_rate=2e3,
+            memory=np.zeros(engine.chain_memory(cells, len(laws))),
+            **numbers,
+            **filled,
+        )
+        fill_drive(chain["drive"], Harmonic(220.0, 2e-5), gong2025())
+        yield "start_chain", chain, [filled["states"]]
+        yield "follow_chain", chain, list(filled.values())
 
 
 def flying(step):

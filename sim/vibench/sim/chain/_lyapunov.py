@@ -91,7 +91,7 @@ def chain_lyapunov_exponent(
         )
         raise ValueError(msg)
     tables = chain_tables(chain, drive, accuracy)
-    # Two motions; one cell goes by windows here, too.
+    # Two motions.
     check_work(chain, 2.0 * intervals * interval_s, longest_window_s(tables, drive))
     settled = integrate_chain(
         chain, drive, settle_s, accuracy, initial_state, max_impact_rate_hz=max_impact_rate_hz
@@ -99,6 +99,17 @@ def chain_lyapunov_exponent(
     most = most_chain_impacts(chain, max_impact_rate_hz, interval_s)
 
     def advanced(state: Floats, start_s: float) -> tuple[Floats, int, Outcome]:
+        if chain.size == 1:
+            alone = integrate_chain(
+                chain,
+                drive,
+                interval_s,
+                accuracy,
+                state,
+                start_time_s=start_s,
+                max_impact_rate_hz=max_impact_rate_hz,
+            )
+            return alone.final_state, alone.impacts.count, alone.outcome
         run = ChainRun(chain, drive, tables, accuracy, most_impacts=most)
         run.place(state, start_s)
         outcome = run.advance(start_s + interval_s)

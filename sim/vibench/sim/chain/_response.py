@@ -14,7 +14,6 @@ from ..motion import MAX_IMPACT_RATE_HZ, Response, steady_response, whole_period
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import check_work, most_chain_impacts, start_motion
-from ._modes import chain_impulses, chain_state_matrix
 from ._run import ChainRun
 from ._tables import chain_tables
 
@@ -168,8 +167,9 @@ def _in_order(motion: Complex) -> Complex:
 def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line_s: float) -> Complex:
     """Components of every motion at the drive frequency, shape (cells, 4), from those of the forces.
 
-    s' = A s + b f - sum B F, multiplied by exp(-i omega t) and integrated by parts over whole periods, is
-    (i omega - A) S = b f - B F - change, with S, f, F the integrals.
+    M q'' + C q' + K q = f - F, multiplied by exp(-i omega t) and integrated by parts over whole periods, is
+    (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of q, with Q, f, F
+    the integrals.
 
     Parameters
     ----------
@@ -184,13 +184,14 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
 
     """
     omega = 2.0 * math.pi * drive.frequency_hz
-    system, entry = chain_state_matrix(chain)
-    first = chain.cells[0]
+    first, masses, damping = chain.cells[0], chain.masses, chain.damping_matrix
     push = (first.stiffnesses[0] + 1j * omega * first.dampings[0]) * -1j * drive.amplitude_m
-    right = entry * push * 0.5 * line_s - chain_impulses(chain) @ forces - change
-    # Velocities in units of omega times displacements: every row and column of like size.
-    units = np.repeat([1.0, omega], MASSES_PER_CELL * chain.size)
-    balanced = 1j * np.eye(len(units)) - system / units[:, None] * units[None, :] / omega
-    moved = np.linalg.solve(balanced, right / units / omega) * units * (2.0 / line_s)
-    by_cell = moved[: MASSES_PER_CELL * chain.size].reshape(chain.size, MASSES_PER_CELL)
+    moved, sped = change[: len(masses)], change[len(masses) :]
+    right = -masses * (sped + 1j * omega * moved) - damping @ moved
+    right[0] += push * 0.5 * line_s
+    right[1::MASSES_PER_CELL] -= forces
+    right[2::MASSES_PER_CELL] += forces
+    stiffness = chain.stiffness_matrix + 1j * omega * damping - omega**2 * np.diag(masses)
+    moved = np.linalg.solve(stiffness, right) * (2.0 / line_s)
+    by_cell = moved.reshape(chain.size, MASSES_PER_CELL)
     return np.column_stack([by_cell, by_cell[:, 1] - by_cell[:, 2]])

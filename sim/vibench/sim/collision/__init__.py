@@ -1,11 +1,6 @@
-"""A whole Hertz collision in one: depths at sixteen Gauss points and the duration, by Newton's method.
+"""Whole Hertz collisions as polynomials of speed and course, fitted for a specimen: what lanes take.
 
-Measured by their own depth and time, collisions differ only by how hard the other springs press: the
-shapes, and how they answer a misfit, are tabulated by that and then corrected
-(docs/decisions/0008-speed-of-contacts.md). Where a few corrections do not suffice (next to no speed,
-springs as fast as the collision, an instant to stop at in the midst of it) nothing is done here, and the
-collision is resolved in steps. Used by chains; lanes take polynomials that are fitted to collisions. Motions
-of one specimen are followed by `vibench.sim.engine`.
+Motions of one specimen and of chains are followed by `vibench.sim.engine`, which finds each collision.
 """
 
 import lazy_loader

@@ -55,6 +55,8 @@ REACH = (0.3, 0.08, 0.015, 0.002, 2e-4, 0.03)
 """By how much each power of a variable adds less than the one before."""
 LEAST = (1e-6, 1e-7, 3e-6, 1e-4, 4e-3, 0.05)
 """Monomials that would add less are left out of each polynomial. Higher moments count less."""
+LEAST_TOLERANCE = 1e-7
+"""Stricter ones ask for more of the duration than sixteen points know."""
 COLLISIONS = 1500
 CHECKED = 200
 SEED = 1

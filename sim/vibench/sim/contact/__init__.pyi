@@ -1,21 +1,13 @@
 from ._contact import (
-    APEX_SECANTS as APEX_SECANTS,
-    DEEPEST as DEEPEST,
     HELD as HELD,
-    LANDING as LANDING,
     LEFT as LEFT,
-    LOGGED as LOGGED,
     MOST_STEPS as MOST_STEPS,
-    NEAR as NEAR,
     NOT_FINITE as NOT_FINITE,
-    RATE_FLOOR as RATE_FLOOR,
     ROOT_FLOOR as ROOT_FLOOR,
-    SLOWEST_TOUCH as SLOWEST_TOUCH,
     STALLED as STALLED,
     advance_contact as advance_contact,
     begin_contact as begin_contact,
     contact_workspace as contact_workspace,
-    foreseen_collision as foreseen_collision,
     step_factor as step_factor,
 )
 from ._end import (
@@ -23,13 +15,11 @@ from ._end import (
     step_to_time as step_to_time,
 )
 from ._flow import (
-    ARGUMENT as ARGUMENT,
     CVX as CVX,
     CVZ as CVZ,
     CX as CX,
     CZ as CZ,
     POINT as POINT,
-    SPARE as SPARE,
     STAGES as STAGES,
     TRIAL as TRIAL,
     WIDTH as WIDTH,
@@ -42,7 +32,4 @@ from ._flow import (
     rates_of as rates_of,
     step_error as step_error,
     trial_step as trial_step,
-)
-from ._observer import (
-    hermite_peak as hermite_peak,
 )

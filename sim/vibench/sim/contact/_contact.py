@@ -41,8 +41,6 @@ MOST_STEPS = 100_000
 """Steps within one call; a contact takes about ten."""
 LANDING = 1e-11
 """An exit is found when |w| is below this part of its scale."""
-APEX_SECANTS = 3
-"""Secant steps to the deepest point: there w is flat, so its own error is the square of theirs."""
 STANDARD_TOLERANCE = 3e-7
 """The tolerance for which steps are foreseen; they scale with its eighth root."""
 DEEP = 1.05
@@ -52,8 +50,6 @@ PRESSED = 0.7
 NEAR = 0.1
 """A hair before the exit, over the last w and the square root of the tolerance: what is left out there, the
 third power of it, is far less than the tolerance."""
-LOGGED, DEEPEST = range(2)
-"""Places of the first row of a cell's log: how many ends of steps are in the rows below; the largest w."""
 
 
 @kernel

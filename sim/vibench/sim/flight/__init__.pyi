@@ -25,6 +25,3 @@ from ._linear_series import (
     P as P,
     linear_series as linear_series,
 )
-from ._observer import (
-    series_peak as series_peak,
-)
