@@ -16,7 +16,9 @@ constexpr double LONGEST_WINDOW = 0.5;  // fastest rate times length: what AHEAD
 constexpr double IDLE_WINDOWS = 2.0;  // length of a window in which nothing happens, over the longest of the others
 constexpr int MOST_TOUCHES = 1000;   // of a cell in a window, which is a small part of the shortest period
 constexpr int MOST_STRETCHES = 100000;  // flights, contacts and steps of a cell in a window
-constexpr int64_t MOST_CUT = 16;      // cells of a chain whose windows are cut: beyond, a window costs more than steps
+// Windows are cut while so many cells are followed at most, and each CELLS_AS_ONE of the chain count as one: beyond, a
+// window costs more than the steps of one contact.
+constexpr int64_t MOST_CUT = 12, CELLS_AS_ONE = 16;
 constexpr double SOON = 1e-3;        // a window may as well begin with a touch in this part of it
 constexpr double HAIR = 1e-12;       // a touch in this last part of a window is left to the next
 constexpr double ROUNDED_PIECE = 1e-9;  // part of a piece of the drive that is rounding
@@ -657,7 +659,8 @@ class ChainRun {
 
   // Whether the collision that begins would be whole in a window of its own, but not in this one.
   bool ends_too_late(const CellMotion &c, double tau, double until, const Specimen &s) const {
-    if (s.law != HERTZ || at.cells > MOST_CUT || m.tolerance < LEAST_TOLERANCE || !(SOON * until < tau && tau < until * (1.0 - HAIR))) return false;
+    if (s.law != HERTZ || m.tolerance < LEAST_TOLERANCE || followed + at.cells / CELLS_AS_ONE > MOST_CUT) return false;
+    if (!(SOON * until < tau && tau < until * (1.0 - HAIR))) return false;
     double lasts = LONGEST * c.contact.pace * c.contact.pace * c.contact.r;
     return until - tau <= lasts && lasts < full_length;
   }

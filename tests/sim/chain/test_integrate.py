@@ -20,9 +20,10 @@ from vibench.sim import (
     integrate,
 )
 from vibench.sim.chain import Chain, chain_of, chain_transmissibility, integrate_chain
+from vibench.sim.chain._run import ChainRun
+from vibench.sim.chain._tables import chain_tables
 
 pytestmark = pytest.mark.timeout(300)
-"""The first run compiles the kernels: half a minute of processor time, more on a busy machine."""
 
 PERIODIC = Harmonic(130.0, 20e-6)
 """One cell strikes about 260 times a second and settles on a stable period."""
@@ -114,6 +115,19 @@ def test_one_cell_settles_on_the_periodic_motion_of_the_specimen(accuracy):
     assert distance(ours.final_state[0], theirs.final_state) < bound
     if accuracy is Accuracy.REFERENCE:
         np.testing.assert_allclose(ours.impacts.times_s, theirs.impacts.times_s, atol=1e-11)
+
+
+@pytest.mark.parametrize("law", ["hertz", "hunt_crossley:0.5", "linear_gap:2e5", "linear", "power:3+5+7"])
+def test_one_cell_by_windows_is_the_specimen_that_the_scalar_engine_follows(law):
+    specimen = gong2025(contact=law)
+    chain, start = chain_of(specimen, 1), 0.8 * lively(1, 8)
+    for level, bound in ((Accuracy.STANDARD, 1e-5), (Accuracy.REFERENCE, 2e-8)):
+        ours = ChainRun(chain, HARD, chain_tables(chain, HARD, level), level, most_impacts=100)
+        ours.place(start, 0.0)
+        assert ours.advance(0.008) is Outcome.REACHED_END
+        theirs = integrate(specimen, HARD, 0.008, Accuracy.REFERENCE, start[0])
+        assert ours.impacts == theirs.impacts.count
+        assert distance(ours.motion[0], theirs.final_state) < bound
 
 
 @pytest.mark.thorough

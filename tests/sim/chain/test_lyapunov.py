@@ -4,12 +4,11 @@ import math
 
 import pytest
 
+from tests.sim.chain.chain_matrices import chain_modal_form
 from vibench.sim import Harmonic, Outcome, gong2025, lyapunov_exponent
 from vibench.sim.chain import chain_lyapunov_exponent, chain_of
-from vibench.sim.chain._modes import chain_modal_form
 
 pytestmark = pytest.mark.timeout(300)
-"""The first run compiles the kernels: half a minute of processor time, more on a busy machine."""
 
 CHAOTIC = Harmonic(260.0, 5e-6)
 

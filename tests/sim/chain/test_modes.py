@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
+from tests.sim.chain.chain_matrices import chain_modal_form, chain_state_matrix
 from vibench.sim import base_transmissibility, gong2025
 from vibench.sim.chain import (
     Chain,
@@ -15,7 +16,6 @@ from vibench.sim.chain import (
     chain_of,
     chain_transmissibility,
 )
-from vibench.sim.chain._modes import chain_modal_form, chain_state_matrix
 
 OVERDAMPED = gong2025(damping_time_s=1e-2)
 UNEVEN = replace(gong2025(), dampings=(0.5, 0.0, 0.9))

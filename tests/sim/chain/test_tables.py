@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from tests.sim.chain.chain_matrices import chain_impulses, chain_state_matrix
 from vibench.sim import Accuracy, Harmonic, gong2025
 from vibench.sim.chain import chain_of
-from vibench.sim.chain._modes import chain_impulses, chain_state_matrix
 from vibench.sim.chain._tables import CROSS_SHARE, chain_tables, cross_answers, markov_between
 
 DRIVE = Harmonic(220.0, 40e-6)

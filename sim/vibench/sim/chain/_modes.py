@@ -1,49 +1,11 @@
-"""A chain without contact, solved exactly: modes, transmissibility, steady motion. SI units.
-
-A state is (displacements, velocities), shape (6 cells,), in the order of `vibench.sim.chain`.
-"""
+"""A chain without contact, solved exactly: its transmissibility. SI units."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels import Complex, Table, Vector
-from ..model import ModalForm, diagonal_form
+from ..kernels import Complex
 from ._chain import MASSES_PER_CELL, Chain
 from ._dispersion import seen_from_outside
-
-
-def chain_state_matrix(chain: Chain) -> tuple[Table, Vector]:
-    """Flight as d/dt s = A s + b f, with f = k0 U + c0 dU/dt of the first cell.
-
-    Returns A, shape (6 cells, 6 cells), and b, shape (6 cells,).
-    """
-    size = MASSES_PER_CELL * chain.size
-    system = np.zeros((2 * size, 2 * size))
-    system[:size, size:] = np.eye(size)
-    system[size:, :size] = -chain.stiffness_matrix / chain.masses[:, None]
-    system[size:, size:] = -chain.damping_matrix / chain.masses[:, None]
-    entry = np.zeros(2 * size)
-    entry[size] = 1.0 / chain.masses[0]
-    return system, entry
-
-
-def chain_impulses(chain: Chain) -> Table:
-    """State just after a unit impulse in each cell, shape (6 cells, cells): m1 and m2 part."""
-    entry = np.zeros((2 * MASSES_PER_CELL * chain.size, chain.size))
-    velocities = MASSES_PER_CELL * chain.size
-    for place, cell in enumerate(chain.cells):
-        first = velocities + MASSES_PER_CELL * place
-        _, m1, m2 = cell.masses
-        entry[first + 1, place], entry[first + 2, place] = 1.0 / m1, -1.0 / m2
-    return entry
-
-
-def chain_modal_form(chain: Chain) -> ModalForm:
-    """Diagonalise the state matrix, for any damping.
-
-    Raises ValueError when two modes coincide (critical damping): then no full set of modes exists.
-    """
-    return diagonal_form(np.diag(chain.masses), chain.stiffness_matrix, chain.damping_matrix)
 
 
 def chain_transmissibility(chain: Chain, frequency_hz: ArrayLike) -> Complex:

@@ -168,8 +168,8 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     """Components of every motion at the drive frequency, shape (cells, 4), from those of the forces.
 
     M q'' + C q' + K q = f - F, multiplied by exp(-i omega t) and integrated by parts over whole periods, is
-    (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of q, with Q, f, F
-    the integrals.
+    (K + i omega C - omega^2 M) Q = f - F - M (change of q' + i omega change of q) - C change of q, with Q,
+    f, F the integrals.
 
     Parameters
     ----------
