@@ -22,10 +22,9 @@ import numpy as np
 
 from vibench.acquisition import load_toml
 from vibench.sim import Accuracy, Given, Harmonic, MotionKind, gong2025, settle_scene, wilson_share
-from vibench.sim.lanes import LaneRun, follow_in_lanes
 from vibench.sim.maps import Map, MapResults, Range, compute_map, estimate_map, map_solver, open_map
 from vibench.sim.scene import settle_scenes
-from vibench.sim.scene._followed_run import FollowedRun, Stretch
+from vibench.sim.scene._followed_run import FollowedRun, Stretch, follow_together
 from vibench.sim.scene._observed_window import follow_strobed
 from vibench.sim.study import ExistingStudy, executor_of, store_of
 
@@ -139,12 +138,9 @@ def random_runs(count: int, rng: np.random.Generator) -> list[FollowedRun]:
     return runs
 
 
-def in_lanes(runs: list[FollowedRun], periods: list[int]) -> list[LaneRun]:
+def in_lanes(runs: list[FollowedRun], periods: list[int]) -> list[Stretch]:
     """Follow motions side by side."""
-    specimen = runs[0].specimen
-    return follow_in_lanes(
-        specimen, STANDARD, [each.drive for each in runs], [each.state for each in runs], periods
-    )
+    return follow_together([each.apart() for each in runs], periods)
 
 
 def one_by_one(runs: list[FollowedRun], periods: list[int], tolerance: float | None = None) -> list[Stretch]:
@@ -210,7 +206,7 @@ def peer(runs: list[FollowedRun]) -> None:
     began_s = time.thread_time()
     in_lanes(many, [count for count in longer for _ in range(LANES)])
     taken = (time.thread_time() - began_s) / (len(many) * PEER_S)
-    found = [each.state for each in in_lanes(runs, periods)]
+    found = [each.states[-1] for each in in_lanes(runs, periods)]
     said = "{:.2f} ms a simulated second, {:.1e} of a gap off"
     print(f"{len(runs)} of them, eight at a time: " + said.format(1e3 * taken, off(found)))
     for tolerance in PEER_TOLERANCES:

@@ -1,5 +1,6 @@
 // The C interface: plain numbers in, plain numbers out. Nothing here throws, allocates, or keeps anything between
 // calls, so that threads may share tables. What is given is checked, and refused with a code.
+#include "batch.hpp"
 #include "chain.hpp"
 #include "cubic.hpp"
 #include "filters.hpp"
@@ -155,6 +156,8 @@ constexpr struct {
     DESCRIBED(CollisionShapes), DESCRIBED(PowerTerms), DESCRIBED(PowerShapes), DESCRIBED(Scene), DESCRIBED(CubicScene),
     DESCRIBED(State), DESCRIBED(Record), DESCRIBED(Numbers), DESCRIBED(CubicDrive), DESCRIBED(Tangent),
     DESCRIBED(Readings),
+    // Batches
+    DESCRIBED(CollisionMonomials), DESCRIBED(CollisionFit), DESCRIBED(BatchMotion), DESCRIBED(Batch),
     // Signals, world, hidden motion
     DESCRIBED(Interpolation), DESCRIBED(Decimation), DESCRIBED(RecursiveFilter),
     DESCRIBED(FilteredSignal), DESCRIBED(Sensor), DESCRIBED(Controller), DESCRIBED(LoadedShaker), DESCRIBED(LoopCables),
@@ -294,10 +297,12 @@ VIBENCH_API int64_t vibench_run_cubics(const CubicTables *tables, State *state, 
   return outcome;
 }
 
-// ---- Signals, the world of the virtual rig, hidden motion, and chains: functions of one structure
+// ---- Batches, signals, the world of the virtual rig, hidden motion, and chains: functions of one structure
 
 namespace {
 
+constexpr int64_t MOST_MOTIONS = int64_t(1) << 32;  // of a batch
+constexpr int64_t MOST_PERIODS = int64_t(1) << 32;  // of a motion of a batch
 constexpr int64_t LAST_STEP = int64_t(1) << 60;  // of a world
 constexpr int64_t MOST_SMALL_STEPS = 100000;
 constexpr int FLOW_SIZE = sizeof(StepFlow) / sizeof(double);
@@ -313,6 +318,40 @@ bool is_usable(const Decimation &of) {
   return is_lent(of.means) && of.reach % 8 == 0 && has_columns(of.table, of.reach) && of.table.size > 0 &&
          is_lent(of.samples) && is_count(of.first, LAST_STEP) &&
          is_positive(of.ratio) && is_finite(of.begin) && magnitude(double(of.origin)) < double(LAST_STEP);
+}
+
+bool is_usable(const CollisionMonomials &of) {
+  return is_table(of.powers, MONOMIALS, VARIABLES) && has_size(of.counts, POLYNOMIALS);
+}
+
+bool is_usable(const CollisionFit &fit) {
+  for (double number : fit.coefficients)
+    if (!is_finite(number)) return false;
+  for (double number : fit.guess)
+    if (!is_finite(number)) return false;
+  for (int k = 0; k < VARIABLES; k++)
+    if (!is_finite(fit.middle[k]) || !is_positive(fit.half[k])) return false;
+  return is_positive(fit.unit);
+}
+
+bool is_usable(const BatchMotion &motion, const Specimen &specimen, double tolerance) {
+  if (motion.tables == nullptr || motion.now == nullptr || motion.sections == nullptr) return false;
+  if (__builtin_memcmp(&motion.tables->specimen, &specimen, sizeof specimen) != 0) return false;
+  if (motion.tables->flight.modes != DRIVEN || motion.now->side != 0.0) return false;
+  for (double number : motion.now->motion)
+    if (!is_finite(number)) return false;
+  return motion.periods > 0 && motion.periods <= MOST_PERIODS && is_usable(*motion.now, 0.0, tolerance);
+}
+
+bool is_usable(const Batch &batch) {
+  if (!is_count(batch.count, MOST_MOTIONS) || batch.motions == nullptr || batch.fit == nullptr) return false;
+  if (!is_usable(*batch.fit) || batch.count == 0) return batch.count == 0;
+  const Tables *first = batch.motions->tables;
+  if (first == nullptr || first->specimen.law != HERTZ) return false;
+  if (!is_finite(first->specimen.lower_gap) || !is_finite(first->specimen.upper_gap)) return false;
+  for (int64_t n = 0; n < batch.count; n++)
+    if (!is_usable(batch.motions[n], first->specimen, batch.tolerance)) return false;
+  return true;
 }
 
 bool is_usable(const RecursiveFilter &filter) {
@@ -468,6 +507,8 @@ VIBENCH_API int64_t vibench_chain_memory(int64_t cells, int64_t kinds) {
   VIBENCH_API int64_t vibench_##function(Structure *of) {                     \
     return of != nullptr && is_usable(*of) ? function(*of) : int64_t(REFUSED); \
   }
+OF_ONE_STRUCTURE(describe_collisions, CollisionMonomials)
+OF_ONE_STRUCTURE(follow_batch, Batch)
 OF_ONE_STRUCTURE(interpolate, Interpolation)
 OF_ONE_STRUCTURE(decimate, Decimation)
 OF_ONE_STRUCTURE(filter_signal, FilteredSignal)

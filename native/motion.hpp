@@ -18,6 +18,7 @@ template <class T> struct Motion {
   double growth[6];  // of each derivative: the logarithm of a factor that was taken out of it
 };
 
+// From and to the C interface.
 inline Motion<double> motion_of(const State &state) {
   Motion<double> motion;
   __builtin_memcpy(motion.at, state.motion, sizeof motion.at);

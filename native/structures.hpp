@@ -11,6 +11,8 @@
 
 namespace vibench {
 
+struct Tables;  // of a run; tables.hpp
+
 constexpr int MOST_POWERS = 6;  // terms of a power law
 
 // Places of a motion: absolute displacements [m] and velocities [m/s] of m0, m1, m2.
@@ -193,6 +195,39 @@ STRUCTURE(Readings,
   int64_t *impacts;            // [room]: in each interval
   double *motions;             // [room][6]: x, y, z, vx, vy, vz at its end
   int64_t room, made;
+)
+
+// ---- Batches: motions of one specimen, eight at a time
+
+// Monomials of the polynomials of `CollisionFit`, for who fits them.
+STRUCTURE(CollisionMonomials,
+  Numbers powers;              // [289][6]: of the variables; those that add most first
+  Numbers counts;              // [6]: how many, from the first on, each polynomial has
+)
+
+// Hertz collisions of one specimen as polynomials (decision 0061).
+STRUCTURE(CollisionFit,
+  double coefficients[652];    // of the duration over u, then of the moments
+  double middle[6], half[6];   // of the variables that were fitted: they are counted from the middle, in these
+  double unit;                 // u times the fifth root of the speed [s (m/s)^(1/5)]
+  double guess[4];             // of that root, a cubic of the speed's fourth root, from the highest power on
+)
+
+// One motion of a batch.
+STRUCTURE(BatchMotion,
+  const Tables *tables;
+  State *now;                  // in flight, at a whole drive period; moved on, but where the motion is lost
+  double *sections;            // [periods][6]: x, y, z, vx, vy, vz once a drive period
+  int64_t periods;             // that it is followed for
+  int64_t impacts;             // contacts that began
+  int64_t outcome;             // REACHED_END; TOO_LONG or STALLED where it is lost: to be followed alone
+)
+
+STRUCTURE(Batch,
+  BatchMotion *motions;        // [count], of one specimen with Hertz's stops and three modes that turn
+  int64_t count;
+  const CollisionFit *fit;     // of that specimen
+  double tolerance;            // relative error of a step in a contact that the polynomials do not hold
 )
 
 // ---- Signals

@@ -122,6 +122,48 @@ void test_changes_become_orthonormal_and_a_lost_one_is_replaced() {
   expect(worst_of_products(rows, 3, metric) < 1e-12, "a lost row is replaced", 0);
 }
 
+void test_lanes_go_their_own_ways_by_masks() {
+  Lanes x, y;
+  for (int n = 0; n < LANES; n++) x.set(n, draw(-1, 1)), y.set(n, draw(-1, 1));
+  x.set(3, NAN);
+  unsigned below = (x < y).bits();
+  Lanes chosen = select(x < y, x, 2.0 * y), sizes = magnitude(y), sum = fused(x, y, 0.5);
+  for (int n = 0; n < LANES; n++) {
+    expect(((below >> n) & 1) == unsigned(x[n] < y[n]), "a mask has the bits of its comparisons", n);
+    expect(chosen[n] == (x[n] < y[n] ? x[n] : 2 * y[n]), "a lane chooses by its own bit", n);
+    expect(sizes[n] == std::fabs(y[n]), "magnitudes", n);
+    expect(n == 3 || std::fabs(sum[n] - (x[n] * y[n] + 0.5)) < 1e-15, "fused products", sum[n]);
+  }
+  expect((Mask::of(0b1010) & ~Mask::of(0b0010)).bits() == 0b1000, "masks are combined bit by bit", 0);
+}
+
+void test_short_series_are_cosine_and_sine() {
+  for (double angle = -1.6; angle < 1.6; angle += 0.01) {
+    LanePhasor turned = turned_by_series<LONG>(angle);
+    expect(std::fabs(turned.re[0] - std::cos(angle)) < 1e-14, "cosine by its series", angle);
+    expect(std::fabs(turned.im[0] - std::sin(angle)) < 1e-14, "sine by its series", angle);
+  }
+}
+
+void test_polynomials_of_collisions_are_sums_of_their_monomials() {
+  static double coefficients[COEFFICIENTS];
+  Lanes variables[VARIABLES], values[POLYNOMIALS];
+  for (double &coefficient : coefficients) coefficient = draw(-1, 1);
+  for (Lanes &variable : variables)
+    for (int n = 0; n < LANES; n++) variable.set(n, draw(-1, 1));
+  evaluate(values, variables, coefficients);
+  for (int lane = 0; lane < LANES; lane++)
+    for (int n = 0; n < POLYNOMIALS; n++) {
+      double sum = 0;
+      for (int k = 0; k < THE_MONOMIALS.counts[n]; k++) {
+        double monomial = coefficients[THE_MONOMIALS.first[n] + k];
+        for (int i = 0; i < VARIABLES; i++) monomial *= std::pow(variables[i][lane], THE_MONOMIALS.of[k].powers[i]);
+        sum += monomial;
+      }
+      expect(std::fabs(values[n][lane] - sum) < 1e-13, "a polynomial is the sum of its monomials", values[n][lane] - sum);
+    }
+}
+
 void test_a_stage_that_ran_away_is_never_an_accepted_step() {
   for (double size : {1e80, 1e155, 1e200, 1e300, double(INFINITY), double(NAN)})
     for (int stage = 5; stage < STAGES; stage++) {
@@ -217,6 +259,38 @@ template <class RunTo> void test_duals_are_derivatives(const RunTo &run_to, doub
   }
 }
 
+// With a fit that holds no collision every contact goes by steps, as those of a run at a strict tolerance do.
+void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
+  constexpr int64_t COUNT = 11, PERIODS = 9;
+  constexpr double TOLERANCE = 9e-8;  // at which no collision is resolved as a whole
+  static CollisionFit fit;
+  for (int k = 0; k < VARIABLES; k++) fit.middle[k] = 1e9, fit.half[k] = 1.0;
+  fit.unit = 1.0;
+  std::vector<State> states(COUNT);
+  std::vector<double> sections(COUNT * PERIODS * 6);
+  std::vector<BatchMotion> motions(COUNT);
+  for (int64_t n = 0; n < COUNT; n++) {
+    states[n] = {};
+    states[n].motion[VX] = 1e-3 * double(n);
+    motions[n] = {&tables, &states[n], &sections[n * PERIODS * 6], 1 + n % PERIODS, 0, 0};
+  }
+  Batch batch{motions.data(), COUNT, &fit, TOLERANCE};
+  expect(vibench_follow_batch(&batch) == REACHED_END, "a batch is accepted", 0);
+  int64_t impacts = 0;
+  for (int64_t n = 0; n < COUNT; n++) {
+    expect(motions[n].outcome == REACHED_END, "a motion of a batch comes to its end", double(n));
+    Motion<double> alone = at_rest();
+    alone.at[VX] = 1e-3 * double(n);
+    HarmonicRun{tables, double(motions[n].periods) / tables.drive.frequency}(alone, TOLERANCE);
+    for (int i = 0; i < 6; i++) {
+      double off = (states[n].motion[i] - alone.at[i]) / (i < 3 ? 1e-4 : 0.1);
+      expect(std::fabs(off) < 1e-8, "a motion of a batch is that of a run", off);
+    }
+    impacts += motions[n].impacts;
+  }
+  expect(impacts > COUNT, "motions of the batch strike their stops", double(impacts));
+}
+
 }  // namespace
 
 int main(int count, char **names) {
@@ -224,6 +298,9 @@ int main(int count, char **names) {
   test_products_keep_what_they_round_off();
   test_a_touch_is_the_one_that_the_careful_search_finds();
   test_changes_become_orthonormal_and_a_lost_one_is_replaced();
+  test_lanes_go_their_own_ways_by_masks();
+  test_short_series_are_cosine_and_sine();
+  test_polynomials_of_collisions_are_sums_of_their_monomials();
   test_a_stage_that_ran_away_is_never_an_accepted_step();
   for (int n = 1; n < count; n++) {
     Scene scene;
@@ -248,6 +325,7 @@ int main(int count, char **names) {
     expect(vibench_prepare_cubics(&cubic, &cubics) == REACHED_END, "a scene of cubics is accepted", n);
     for (double tolerance : {3e-7, 1e-10}) test_duals_are_derivatives(HarmonicRun{tables, 0.03}, tolerance);
     test_duals_are_derivatives(RunOnCubics{cubics, tables.omega, 0.025}, 1e-8);
+    if (scene.specimen.law == HERTZ) test_motions_of_a_batch_are_those_of_runs(tables);
     if (failures > before) std::printf("in %s\n", names[n]);
   }
   std::printf(failures > 0 ? "%d checks failed\n" : "all checks passed\n", failures);

@@ -33,8 +33,67 @@ template <int N> struct Vector {
   friend INLINE Vector operator+(Vector a, Vector b) { return Vector(a.lanes + b.lanes); }
   friend INLINE Vector operator-(Vector a, Vector b) { return Vector(a.lanes - b.lanes); }
   friend INLINE Vector operator*(Vector a, Vector b) { return Vector(a.lanes * b.lanes); }
+  friend INLINE Vector operator/(Vector a, Vector b) { return Vector(a.lanes / b.lanes); }
   friend INLINE Vector operator-(Vector a) { return Vector(-a.lanes); }
 };
+
+// One answer for each of eight lanes.
+struct Mask {
+#if defined(__clang__)
+  typedef bool Flags __attribute__((ext_vector_type(8)));  // kept in a mask register where there are such
+  static INLINE Mask of(unsigned bits) { return {__builtin_bit_cast(Flags, uint8_t(bits))}; }
+  INLINE unsigned bits() const { return __builtin_bit_cast(uint8_t, flags); }
+#else
+  typedef int64_t Flags __attribute__((vector_size(64)));
+  static INLINE Mask of(unsigned bits) {
+    Mask mask;
+    for (int i = 0; i < 8; i++) mask.flags[i] = -int64_t(bits >> i & 1);
+    return mask;
+  }
+  INLINE unsigned bits() const {
+    unsigned bits = 0;
+    for (int i = 0; i < 8; i++) bits |= unsigned(flags[i] & 1) << i;
+    return bits;
+  }
+#endif
+  Flags flags;
+
+  friend INLINE Mask operator&(Mask a, Mask b) { return {a.flags & b.flags}; }
+  friend INLINE Mask operator|(Mask a, Mask b) { return {a.flags | b.flags}; }
+  friend INLINE Mask operator~(Mask a) { return {~a.flags}; }
+};
+
+INLINE Mask operator<(Vector<8> a, Vector<8> b) {
+#if defined(__clang__)
+  return {__builtin_convertvector(a.lanes < b.lanes, Mask::Flags)};
+#else
+  return {a.lanes < b.lanes};
+#endif
+}
+
+// a where the mask is set, else b.
+INLINE Vector<8> select(Mask mask, Vector<8> a, Vector<8> b) {
+#if defined(__clang__)
+  typedef int64_t Whole __attribute__((vector_size(64)));
+  return Vector<8>(__builtin_convertvector(mask.flags, Whole) ? a.lanes : b.lanes);
+#else
+  return Vector<8>(mask.flags ? a.lanes : b.lanes);
+#endif
+}
+
+INLINE Vector<8> magnitude(Vector<8> x) { return select(x < 0.0, -x, x); }
+
+// a b + c, rounded once where the processor can: everywhere but on the x86-64 baseline, whose digits differ.
+INLINE Vector<8> fused(Vector<8> a, Vector<8> b, Vector<8> c) {
+#if !defined(__FMA__) && !defined(__aarch64__)
+  return a * b + c;
+#elif defined(__clang__)
+  return Vector<8>(__builtin_elementwise_fma(a.lanes, b.lanes, c.lanes));
+#else
+  for (int i = 0; i < 8; i++) c.lanes[i] = __builtin_fma(a.lanes[i], b.lanes[i], c.lanes[i]);
+  return c;
+#endif
+}
 
 template <int N> INLINE Vector<N> square_root(Vector<N> x) {
 #if defined(__clang__)

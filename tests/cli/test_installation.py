@@ -17,7 +17,6 @@ from vibench.acquisition.host._extras import EXTRAS
 from vibench.cli.__main__ import COMMANDS
 from vibench.cli.doctor import VARIABLES, libraries
 from vibench.cli.exit_code import ExitCode
-from vibench.sim.lanes import lanes_pay
 
 ROOT = Path(__file__).resolve().parents[2]
 PORTIONS = ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig")
@@ -137,16 +136,6 @@ def test_a_shell_completes_commands_and_their_options(vibench, tmp_path, words, 
     ]
     told = subprocess.run(program, env={**os.environ, **asked}, capture_output=True, text=True, check=False)
     assert completed in told.stdout.split()
-
-
-@pytest.mark.skipif(not lanes_pay(), reason="this processor follows motions one by one")
-def test_what_is_compiled_beforehand_enters_the_lanes(tmp_path):
-    program = (
-        "from vibench.cli.warm import SMALLEST\nfrom vibench.sim.lanes._run import run_lanes\n"
-        "from vibench.sim.maps import solve_map\n"
-        "solve_map(SMALLEST)\nassert run_lanes.signatures"
-    )
-    subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=True)
 
 
 @pytest.mark.thorough

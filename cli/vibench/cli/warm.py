@@ -11,22 +11,17 @@ from pathlib import Path
 from vibench.acquisition import MissingLibrary, need_extra, save_toml
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
 from vibench.sim import Accuracy, Harmonic, gong2025, lyapunov_exponent, steady_response
-from vibench.sim.maps import Map, solve_map
 
 from .output import console
 
 DRIVE = Harmonic(frequency_hz=260.0, amplitude_m=5e-6)
 """m1 strikes both stops: flight, contact and whole collisions are entered."""
-SMALLEST = Map.model_validate({"amplitude_m": {"start": 5e-6, "stop": 20e-6, "points": 2}, "periods": 1000})
-"""Enters the lanes, where the processor has the registers for them: maps, curves and studies share them."""
 
 
 def warm() -> None:
     """Compile the simulation, and the virtual rig where it is installed, before the first use."""
     with told("responses"):
         steady_response(gong2025(), DRIVE, accuracy=Accuracy.QUICK)
-    with told("curves and maps"):
-        solve_map(SMALLEST)
     with told("exponents"):
         lyapunov_exponent(gong2025(), DRIVE, accuracy=Accuracy.QUICK)
     try:

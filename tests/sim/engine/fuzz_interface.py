@@ -19,12 +19,13 @@ from vibench.sim.engine import (
     power_structure,
     scene_of,
 )
+from vibench.sim.engine._collision_fit import collision_fit
 
 STRANGE = [np.nan, np.inf, -np.inf, 0.0, -0.0, -1.0, 1.0, 1e-320, 1e300, -1e300, 1e18, 3.5]
 STRANGE_COUNTS = [-(2**63), -1, 0, 1, 2, 3, 6, 7, 2**31, 2**62]
 POINTERS = {
     *("collisions", "power_shapes", "samples", "impact_times"),
-    *("growth", "impacts", "motions", "controller", "shaker", "at"),
+    *("growth", "impacts", "motions", "controller", "shaker", "at", "tables", "now", "sections", "fit"),
 }
 LAWS = ("hertz", "hunt_crossley:0.5", "linear_gap", "rigid:0.8", "linear", "power:5", "power:3+5+7")
 CODES = {-1, 0, 1, 2, 3, 4}
@@ -76,7 +77,9 @@ def call(engine, draws):
         return -1
     if draws.random() < 0.5:
         engine.start(tables, state, tolerance)
-    kind = draws.integers(3)
+    kind = draws.integers(4)
+    if kind == 3:
+        return follow(engine, tables, state, tolerance, draws)
     if kind == 0:
         return engine.run(tables, state, until, tolerance, record)
     tangent, readings = engine.new("Tangent"), engine.new("Readings")
@@ -128,6 +131,25 @@ def call_on_cubics(engine, draws):
     if draws.random() < 0.8:
         engine.start(tables, state, tolerance)
     return engine.run_cubics(tables, state, drive, tolerance, record)
+
+
+def follow(engine, tables, state, tolerance, draws):
+    """Follow nine motions in a batch of which something may be broken; returns its code."""
+    states, sections, room = [state.copy() for _ in range(9)], np.zeros((9, 3, 6)), 3
+    motions, fit = engine.rows("BatchMotion", 9), collision_fit(engine, gong2025()).copy()
+    motions["tables"], motions["periods"] = tables.ctypes.data, draws.integers(1, room + 1, 9)
+    for motion, own, kept in zip(motions, states, sections, strict=True):
+        motion["now"], motion["sections"] = own.ctypes.data, kept.ctypes.data
+    batch = engine.new("Batch", count=9, tolerance=tolerance)
+    batch["motions"], batch["fit"] = motions.ctypes.data, fit.ctypes.data
+    for _ in range(draws.integers(3)):
+        spoil((batch, fit, motions[4], states[draws.integers(9)])[draws.integers(4)], draws)
+    batch["count"] = min(int(batch["count"]), 9)
+    motions["periods"] = np.minimum(motions["periods"], room)
+    try:
+        return engine.call("follow_batch", batch)
+    except ValueError:
+        return -1
 
 
 def lent_sizes(structure):

@@ -63,6 +63,9 @@ def calls(engine, draws):
         }
         yield "decimate", engine.new("Decimation", reach=24, **place, **arrays), [samples]
 
+    powers, counts = np.zeros((289, 6)), np.zeros(6)
+    yield "describe_collisions", engine.new("CollisionMonomials", powers=powers, counts=counts), [powers]
+
     result = np.zeros(50)
     arrays = {"values": normal(50), "result": result}
     yield "filter_signal", engine.new("FilteredSignal", filter=low_pass(), **arrays), [result]

@@ -18,6 +18,7 @@ from vibench.sim.engine import (
     Watch,
     check_known_answer,
     collision_structure,
+    follow_batch,
     library_path,
     native_engine,
     parse_structures,
@@ -47,6 +48,22 @@ def final_motions(engine):
             run.advance(0.1, record)
             seen = (record.peak_x_m, record.peak_p_m, record.area_x.real, record.area_p.imag)
             yield np.concatenate([run.motion, seen, np.ravel(run.changes)])
+
+
+def test_batches_have_the_same_digits_in_registers_of_every_width(build):
+    families = [each for each in usable_families() if each != "x86_64"]  # which cannot fuse
+    starts = np.random.default_rng(1).uniform(-1.0, 1.0, (24, 6)) * np.repeat([1.5e-5, 0.05], 3)
+    answers = []
+    for engine in [Engine(build.compile_engine(family)) for family in families]:
+        runs = [
+            NativeRun(gong2025(), Harmonic(60.0 + 15.0 * k, 2e-5), start, 3e-7, engine=engine)
+            for k, start in enumerate(starts)
+        ]
+        found = follow_batch(runs, [10 + 5 * k for k in range(24)])
+        assert sum(each.impacts for each in found) > 1000
+        answers.append(np.concatenate([*(each.states for each in found), [run.motion for run in runs]]))
+    for answer in answers[1:]:
+        assert np.array_equal(answer, answers[0])
 
 
 def test_every_family_that_runs_here_gives_the_same_digits(build):

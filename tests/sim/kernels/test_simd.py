@@ -4,17 +4,12 @@ import numpy as np
 import pytest
 
 from vibench.sim.kernels import (
-    below,
-    choose,
     eight,
     eight_of_eight,
     eight_of_sixteen,
     eights,
-    fma,
     kernel,
     largest,
-    magnitude,
-    polynomials,
     root,
     sixteen,
     sixteen_of_sixteen,
@@ -65,42 +60,3 @@ def test_what_is_not_a_number_shows_in_a_sum_and_in_the_largest():
     table = np.zeros((16, 16))
     table[5, 3] = np.nan
     assert np.isnan(reckoned(table, np.ones(16), np.zeros((2, 16)))).all()
-
-
-evaluate = polynomials(((0, 0), (0, 1), (1, 1), (1, 0)), (5, 3))
-"""Of 1, x, y, x y, x x: the first has all of them, the second three."""
-
-
-@kernel
-def by_masks(rows, out):
-    one, other = eight(rows, 0), eight(rows, 1)
-    store(out, 0, choose(below(one, other), -one, 2.0 * other) / magnitude(other))
-    store(out, 1, fma(one, other, 0.5))
-    return below(one, 0.0), below(1.0 - one, other)
-
-
-@kernel
-def evaluated(rows, coefficients, out):
-    evaluate(rows, coefficients, out)
-
-
-def test_lanes_go_their_own_ways_by_masks():
-    rows, out = RANDOM.normal(size=(2, 8)), np.zeros((2, 8))
-    rows[0, 3] = np.nan
-    negative, larger = by_masks(rows, out)
-    one, other = rows
-    bits = 1 << np.arange(8)
-    assert negative == bits[one < 0.0].sum()
-    assert larger == bits[1.0 - one < other].sum()
-    expected = np.where(one < other, -one, 2.0 * other) / np.abs(other)
-    np.testing.assert_allclose(out[0], expected, rtol=1e-15)
-    np.testing.assert_allclose(out[1], one * other + 0.5, rtol=1e-15, atol=1e-16)
-
-
-def test_polynomials_of_eight_points_are_those_of_numpy():
-    rows, coefficients, out = RANDOM.normal(size=(2, 8)), RANDOM.normal(size=8), np.zeros((2, 8))
-    evaluated(rows, coefficients, out)
-    x, y = rows
-    monomials = np.array([np.ones(8), x, y, x * y, x * x])
-    np.testing.assert_allclose(out[0], coefficients[:5] @ monomials, rtol=1e-13, atol=1e-14)
-    np.testing.assert_allclose(out[1], coefficients[5:] @ monomials[:3], rtol=1e-13, atol=1e-14)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Hertz, MotionKind, gong2025, integrate
-from vibench.sim.lanes import lanes_pay
+from vibench.sim.engine import batches_pay
 from vibench.sim.maps import Map, Range, Spacing, estimate_map, map_solver, solve_map
 from vibench.sim.maps._columns import contact_energy_j
 from vibench.sim.scene import Method, settle_in_lanes, settle_scene, settle_scenes, solve_scene
@@ -170,7 +170,7 @@ def test_the_most_that_a_map_takes_grows_with_the_periods_for_which_motions_are_
     assert f"{long.all_s:.2g} s, or {long.most_s:.2g} s if no motion repeats" in long.sentence
 
 
-@pytest.mark.skipif(not lanes_pay(), reason="this processor has no registers for lanes")
+@pytest.mark.skipif(not batches_pay(), reason="this processor has no registers for lanes")
 @pytest.mark.parametrize(
     ("said", "lanes"),
     [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, MotionKind, Rest, Scene, gong2025, solve_scene
-from vibench.sim.lanes import lanes_pay
+from vibench.sim.engine import batches_pay
 from vibench.sim.scene import (
     FixedDuration,
     Given,
@@ -33,7 +33,7 @@ def answers(curve):
     return solve_study(curve, workers=1)
 
 
-@pytest.mark.skipif(not lanes_pay(), reason="the processor has no registers that lanes pay in")
+@pytest.mark.skipif(not batches_pay(), reason="the processor has no registers that lanes pay in")
 @pytest.mark.parametrize(
     ("changed", "in_lanes"),
     [

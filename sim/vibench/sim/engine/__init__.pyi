@@ -1,3 +1,9 @@
+from ._batch import (
+    BatchedMotion as BatchedMotion,
+    batches_pay as batches_pay,
+    follow_batch as follow_batch,
+    is_batchable as is_batchable,
+)
 from ._collision_shapes import (
     ABOUT_MIDDLE as ABOUT_MIDDLE,
     BY_DAMPER as BY_DAMPER,

@@ -25,6 +25,7 @@ FUNCTIONS = (
     *("interpolate", "decimate", "filter_signal", "show"),
     *("move_shaker", "play_loop", "hear_loop", "close_loop"),
     *("filter_motion", "smooth_motion", "follow_contacts", "start_chain", "follow_chain"),
+    *("describe_collisions", "follow_batch"),
 )
 """Of the library, each with one structure."""
 Tables = NDArray[np.float64]

@@ -25,8 +25,6 @@ DIRECTIONS = 6
 """Of a state: the most small changes that can be carried along."""
 INSIDE = 1e-9
 """A start this part of the displacements beyond a rigid stop is taken to be on it: their rounding."""
-IN_CONTACT = ("side", "root", "rate", "step", "root_scale", "rate_scale", "pace")
-"""What a contact that is under way goes on with, as native/structures.hpp declares it."""
 KNOWN_DURATION_S = 0.03
 KNOWN_MOTION = (
     -2.11343791e-05,
@@ -142,8 +140,8 @@ class NativeRun:
 
         Raises ValueError when the engine refuses the specimen, the drive or the start.
         """
-        self._engine = engine = native_engine() if engine is None else engine
-        self._specimen = specimen
+        self.engine = engine = native_engine() if engine is None else engine
+        self.specimen = specimen
         self._tables = engine.prepare(scene_of(engine, specimen, drive))
         self._tangent = engine.new("Tangent")
         self._state = engine.new("State")
@@ -158,17 +156,10 @@ class NativeRun:
         Raises ValueError when the motion is inside a rigid stop.
         """
         self._state["motion"] = motion
-        refuse_inside_a_stop(self._state["motion"], self._specimen)
-        if self._engine.start(self._tables, self._state, self.tolerance) != 0:
+        refuse_inside_a_stop(self._state["motion"], self.specimen)
+        if self.engine.start(self._tables, self._state, self.tolerance) != 0:
             msg = f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1."
             raise ValueError(msg)
-
-    def continue_from(self, state: Floats, time_s: float) -> None:
-        """Be at a motion, shape (6,), at an instant; with a contact under way, shape (13,)."""
-        self._state["motion"] = state[:DIRECTIONS]
-        self._state["clock_high"], self._state["clock_low"] = time_s, 0.0
-        for name, value in zip(IN_CONTACT, state[DIRECTIONS:], strict=False):
-            self._state[name] = value
 
     def apart(self, tolerance: float | None = None) -> Self:
         """Return a copy of the motion; one with another tolerance carries no small changes."""
@@ -201,7 +192,7 @@ class NativeRun:
         Raises ValueError when the engine refuses the instant.
         """
         tangent = self._tangent if self._tangent["changes"] > 0 else None
-        code = self._engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
+        code = self.engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
         if code < 0:
             msg = f"The native engine refuses to advance to {until_s} s: the instant must be finite."
             raise ValueError(msg)
@@ -210,7 +201,7 @@ class NativeRun:
     def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
         """Advance up to reading ``last`` of how the changes grow."""
         return Outcome(
-            self._engine.take_readings(
+            self.engine.take_readings(
                 *(self._tables, self._state, self.tolerance, record.structure),
                 *(self._tangent, readings.structure, last),
             )
@@ -220,6 +211,11 @@ class NativeRun:
     def motion(self) -> Floats:
         """x, y, z, vx, vy, vz now, shape (6,)."""
         return np.array(self._state["motion"])
+
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """Where its tables and its state lie, for a batch; they live as long as the run."""
+        return self._tables.ctypes.data, self._state.ctypes.data
 
     @property
     def time_s(self) -> float:
@@ -240,7 +236,7 @@ class NativeRun:
     @property
     def reach_m(self) -> float:
         """Largest abs(p) from now on, as long as no stop is touched; infinite on a stop."""
-        return self._engine.reach(self._tables, self._state)
+        return self.engine.reach(self._tables, self._state)
 
 
 class GrowthReadings:

@@ -46,7 +46,6 @@ def _fields(
     declaration: str, known: dict[str, StructureType]
 ) -> Iterable[tuple[str, DTypeLike, tuple[int, ...]]]:
     kind, _, names = declaration.partition(" ")
-    number = _NUMBERS.get(kind) or known[kind]
     for name in names.split(","):
         found = _NAME.fullmatch(name.strip())
         if found is None:
@@ -54,4 +53,4 @@ def _fields(
             raise ValueError(msg)
         pointer, word, sizes = found.groups()
         shape = tuple(int(size) for size in re.findall(r"\d+", sizes))
-        yield word, np.uintp if pointer else number, shape
+        yield word, np.uintp if pointer else _NUMBERS.get(kind) or known[kind], shape

@@ -16,23 +16,16 @@ from ._compile import (
     kernel as kernel,
     kernel_without_refcount as kernel_without_refcount,
 )
-from ._polynomials import (
-    polynomials as polynomials,
-)
 from ._row import (
     copy_row as copy_row,
 )
 from ._simd import (
     SimdVector as SimdVector,
-    below as below,
-    choose as choose,
     eight as eight,
     eight_of_eight as eight_of_eight,
     eight_of_sixteen as eight_of_sixteen,
     eights as eights,
-    fma as fma,
     largest as largest,
-    magnitude as magnitude,
     root as root,
     sixteen as sixteen,
     sixteen_of_sixteen as sixteen_of_sixteen,

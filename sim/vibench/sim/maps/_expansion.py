@@ -7,8 +7,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..engine import batches_pay
 from ..kernels import Floats
-from ..lanes import lanes_pay
 from ..model import Outcome
 from ..scene import (
     Given,
@@ -59,7 +59,7 @@ def map_solver(plan: Map) -> Solver:
     registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one.
     """
     is_one_specimen = not any(each in OF_SPECIMEN for each in plan.varied)
-    return settle_in_lanes if is_one_specimen and not plan.chain and lanes_pay() else settle_scene
+    return settle_in_lanes if is_one_specimen and not plan.chain and batches_pay() else settle_scene
 
 
 class MapPoints:

@@ -2,22 +2,29 @@
 
 import math
 import sys
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..engine import DIRECTIONS, MOST_STEPS, NativeRun, RunRecord, Watch, most_impacts
+from ..engine import (
+    DIRECTIONS,
+    MOST_STEPS,
+    BatchedMotion,
+    NativeRun,
+    RunRecord,
+    Watch,
+    follow_batch,
+    most_impacts,
+)
 from ..exponents import energy_metric
 from ..kernels import Floats
 from ..model import Harmonic, Outcome, Specimen
 from ..motion import MAX_IMPACT_RATE_HZ, start_motion, state_scales
 from ._nominal_cost import nominal_cost_s
-
-if TYPE_CHECKING:
-    from ..lanes import LaneRun
 
 
 @dataclass(frozen=True)
@@ -123,26 +130,22 @@ class FollowedRun:
         """No stop is touched now."""
         return self._run.is_in_flight
 
-    def take(self, found: "LaneRun") -> Stretch:
-        """Be where a lane has come to that began here, at a whole drive period."""
-        periods = len(found.states)
-        start_s, frequency_hz = self.time_s, self.drive.frequency_hz
-        self._run.continue_from(found.state, (round(start_s * frequency_hz) + periods) / frequency_hz)
-        length_s = self.time_s - start_s
-        self._cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, found.impacts, 0, 0)
-        samples = Samples(start_s + 1.0 / frequency_hz, frequency_hz, periods)
+    def _batched(self, start_s: float, motion: BatchedMotion) -> Stretch:
+        """Return the stretch from an instant until now, which was followed in a batch."""
+        length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
+        self._cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
         return Stretch(
-            start_s,
-            self.time_s,
-            self.outcome,
-            found.impacts,
-            0.0,
-            0.0,
-            0j,
-            0j,
-            samples,
-            found.states,
-            math.nan,
+            start_s=start_s,
+            end_s=self.time_s,
+            outcome=self.outcome,
+            impacts=motion.impacts,
+            peak_x_m=0.0,
+            peak_p_m=0.0,
+            area_x=0j,
+            area_p=0j,
+            samples=Samples(start_s + 1.0 / frequency_hz, frequency_hz, count),
+            states=motion.states,
+            growth=math.nan,
         )
 
     def follow_tangent(self) -> None:
@@ -216,3 +219,16 @@ class FollowedRun:
         # Strong damping may shrink it below the smallest number.
         energy = max(change @ self._metric @ change, sys.float_info.min)
         return 0.5 * math.log(energy) + float(self._run.growth[0])
+
+
+def follow_together(runs: Sequence[FollowedRun], periods: Sequence[int]) -> list[Stretch | None]:
+    """Follow motions of one specimen in a batch, each for whole drive periods, by their states alone.
+
+    None for one that was lost, which is where it was.
+    """
+    starts_s = [run.time_s for run in runs]
+    found = follow_batch([run._run for run in runs], periods)  # noqa: SLF001 - of the same file
+    return [
+        None if motion is None else run._batched(start_s, motion)  # noqa: SLF001
+        for run, start_s, motion in zip(runs, starts_s, found, strict=True)
+    ]

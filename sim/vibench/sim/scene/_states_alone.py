@@ -11,10 +11,10 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from .. import lanes
+from ..engine import batches_pay, is_batchable
 from ..kernels import Floats
 from ..model import Outcome, Specimen
-from ._followed_run import FollowedRun, Stretch
+from ._followed_run import FollowedRun, Stretch, follow_together
 from ._observed_window import follow_strobed, whole_periods
 from ._pace import Pace, growth_of
 from ._repetition import Growth, Repetition, section_needed, wandered_until
@@ -168,7 +168,7 @@ def lanes_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration
     the same answer twice.
     """
     each_s = duration.duration_s if isinstance(duration, FixedDuration) else AUTOMATIC_S
-    return motions * each_s >= WORTH_A_FIT_S and lanes.lanes_pay()
+    return motions * each_s >= WORTH_A_FIT_S and batches_pay()
 
 
 def in_lanes(asking: Asking[Answer]) -> Answer:
@@ -189,7 +189,7 @@ def follow_all(several: Sequence[Following]) -> None:
     alike = defaultdict[tuple[Specimen, float], list[Following]](list)
     for each in several:
         run = each.alone.run
-        if lanes.lanes_serve(run.specimen, run.tolerance):
+        if is_batchable(run.specimen, run.tolerance):
             alike[run.specimen, run.tolerance].append(each)
     for group in alike.values():
         _follow_rounds(group)
@@ -212,17 +212,10 @@ def _follow_rounds(group: Sequence[Following]) -> None:
 
 def _round(ready: Sequence[tuple[Following, int]]) -> list[Following]:
     """Follow motions in lanes, each for so many drive periods; gives those that are to be followed on."""
-    runs = [each.alone.run for each, _ in ready]
-    found = lanes.follow_in_lanes(
-        runs[0].specimen,
-        runs[0].tolerance,
-        [run.drive for run in runs],
-        [run.state for run in runs],
-        [periods for _, periods in ready],
-    )
+    found = follow_together([each.alone.run for each, _ in ready], [periods for _, periods in ready])
     # One that a lane has lost is where it was, and followed by itself.
     return [
         each
-        for (each, _), lane in zip(ready, found, strict=True)
-        if lane is not None and not each.alone.note(each.alone.run.take(lane))
+        for (each, _), stretch in zip(ready, found, strict=True)
+        if stretch is not None and not each.alone.note(stretch)
     ]

@@ -1,25 +1,30 @@
-"""Eight motions side by side: against one after the other, strict steps, energy, mirror images."""
+"""Motions in a batch: against one after the other, strict steps, energy, mirror images, each other."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from llvmlite.binding import get_host_cpu_features
-from numba import njit
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.lanes import follow_in_lanes, lanes_serve
-from vibench.sim.lanes._flight import march_lanes
-from vibench.sim.lanes._rows import LANES, ROWS, TERMS
+from vibench.sim.engine import NativeRun, RunRecord, follow_batch, is_batchable
 from vibench.sim.model import Hertz, Specimen
 
 STANDARD = Accuracy.STANDARD.tolerance
 SPECIMEN = gong2025()
 
 
+@dataclass(frozen=True, eq=False)
+class Followed:
+    states: np.ndarray
+    impacts: int
+    run: NativeRun
+
+
 def followed(specimen, drives, starts, periods, tolerance=STANDARD):
-    return follow_in_lanes(specimen, tolerance, drives, starts, periods)
+    runs = [NativeRun(specimen, drive, start, tolerance) for drive, start in zip(drives, starts, strict=True)]
+    found = follow_batch(runs, periods)
+    return [Followed(each.states, each.impacts, run) for each, run in zip(found, runs, strict=True)]
 
 
 def random_scenes(count, seed):
@@ -50,10 +55,10 @@ def off(found, states):
     return np.abs((found - states) / scale).max(axis=-1)
 
 
-def test_random_motions_in_lanes_are_as_near_to_strict_steps_as_those_one_by_one():
+def test_random_motions_in_a_batch_are_as_near_to_strict_steps_as_those_one_by_one():
     drives, starts = random_scenes(40, 2026)
     periods = [max(1, math.ceil(0.01 * drive.frequency_hz)) for drive in drives]
-    lanes, alone = [], []
+    beside, alone = [], []
     for drive, start, count, found in zip(
         drives, starts, periods, followed(SPECIMEN, drives, starts, periods), strict=True
     ):
@@ -62,12 +67,12 @@ def test_random_motions_in_lanes_are_as_near_to_strict_steps_as_those_one_by_one
         # A state within a contact is said as that of the flight after it.
         is_free = abs(exact[-1, 1] - exact[-1, 2]) < SPECIMEN.gap_m
         if is_free:
-            lanes.append(off(found.states[-1], exact[-1]))
+            beside.append(off(found.states[-1], exact[-1]))
             alone.append(off(sections(SPECIMEN, drive, start, count, "standard")[0][-1], exact[-1]))
-    assert len(lanes) >= 30
-    assert np.median(lanes) < 1e-7
+    assert len(beside) >= 30
+    assert np.median(beside) < 1e-7
     # Of each other's size where the motion magnifies both alike.
-    assert np.median(np.array(lanes) / np.maximum(alone, 1e-9)) < 10.0
+    assert np.median(np.array(beside) / np.maximum(alone, 1e-9)) < 10.0
 
 
 def test_a_motion_that_repeats_is_followed_to_the_same_states_for_ever():
@@ -79,25 +84,33 @@ def test_a_motion_that_repeats_is_followed_to_the_same_states_for_ever():
     assert off(found.states, alone).max() < 1e-6
 
 
-def test_lanes_that_end_in_contact_hand_over_the_contact():
+def test_a_motion_that_ends_in_contact_goes_on_from_there():
     drives, starts = random_scenes(24, 7)
     drives, starts = [drives[0]] * 64, [starts[0] * (1.0 + 1e-3 * k) for k in range(64)]
-    ends = [each.state for each in followed(SPECIMEN, drives, starts, [12] * 64)]
-    beyond = [abs(state[1] - state[2]) - SPECIMEN.gap_m for state in ends]
-    in_contact = [state[6] != 0.0 for state in ends]
-    assert any(in_contact)
-    for is_in_contact, depth in zip(in_contact, beyond, strict=True):
-        assert (depth > 0.0) == is_in_contact
+    found = followed(SPECIMEN, drives, starts, [12] * 64)
+    assert not all(each.run.is_in_flight for each in found)
+    for each in found:
+        np.testing.assert_array_equal(each.states[-1], each.run.motion)
+        depth = abs(each.run.motion[1] - each.run.motion[2]) - SPECIMEN.gap_m
+        assert (depth > 0.0) != each.run.is_in_flight
+    on_stop = next(each.run for each in found if not each.run.is_in_flight)
+    exact = integrate(SPECIMEN, drives[0], 1.0 / drives[0].frequency_hz, "reference", on_stop.motion)
+    on_stop.advance(13.0 / drives[0].frequency_hz, RunRecord(100))
+    assert off(on_stop.motion, exact.final_state) < 1e-3
 
 
-def test_a_motion_does_not_depend_on_what_is_followed_beside_it():
-    drives, starts = random_scenes(11, 3)
-    periods = [37 + 5 * k for k in range(11)]
+def test_a_motion_is_the_same_alone_among_others_and_in_another_order():
+    drives, starts = random_scenes(20, 3)
+    periods = [1 + 13 * k for k in range(20)]
     together = followed(SPECIMEN, drives, starts, periods)
-    for k in (0, 4, 10):
+    shuffled = np.random.default_rng(1).permutation(20)
+    again = followed(SPECIMEN, *([each[k] for k in shuffled] for each in (drives, starts, periods)))
+    for place, k in enumerate(shuffled):
         (alone,) = followed(SPECIMEN, [drives[k]], [starts[k]], [periods[k]])
-        np.testing.assert_array_equal(alone.states, together[k].states)
-        np.testing.assert_array_equal(alone.state, together[k].state)
+        for each in (alone, again[place]):
+            np.testing.assert_array_equal(each.states, together[k].states)
+            np.testing.assert_array_equal(each.run.motion, together[k].run.motion)
+            assert each.impacts == together[k].impacts
 
 
 def test_energy_stays_through_hundreds_of_collisions_where_nothing_takes_it():
@@ -129,7 +142,7 @@ def test_a_mirrored_start_half_a_period_on_moves_as_the_mirror_image():
 
 
 @pytest.mark.parametrize(
-    ("specimen", "tolerance", "serves"),
+    ("specimen", "tolerance", "follows"),
     [
         (SPECIMEN, STANDARD, True),
         (gong2025(gap_m=(30e-6, 60e-6)), STANDARD, True),
@@ -143,8 +156,8 @@ def test_a_mirrored_start_half_a_period_on_moves_as_the_mirror_image():
         (replace(SPECIMEN, contact=Hertz(1e300)), STANDARD, False),
     ],
 )
-def test_lanes_serve_hertz_stops_and_lightly_damped_modes(specimen: Specimen, tolerance, serves):
-    assert lanes_serve(specimen, tolerance) is serves
+def test_batches_follow_hertz_stops_and_lightly_damped_modes(specimen: Specimen, tolerance, follows):
+    assert is_batchable(specimen, tolerance) is follows
 
 
 def test_stops_at_unequal_gaps_are_each_touched_where_they_are():
@@ -156,21 +169,12 @@ def test_stops_at_unequal_gaps_are_each_touched_where_they_are():
         assert off(found.states[-1], alone[-1]) < 1e-4
 
 
-def test_what_lanes_cannot_follow_is_refused_in_a_sentence():
-    with pytest.raises(ValueError, match="cannot be followed in lanes"):
+def test_a_specimen_that_no_batch_follows_is_refused_in_a_sentence():
+    with pytest.raises(ValueError, match="cannot be followed in a batch"):
         followed(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
 
 
-@pytest.mark.skipif(not get_host_cpu_features().get("avx2"), reason="this processor has no registers to fill")
-def test_eight_lanes_are_marched_by_whole_registers():
-    # Compiled here: of a kernel from the cache there is no listing.
-    march = njit(error_model="numpy")(march_lanes.py_func)
-    march(np.zeros((ROWS, LANES)), 0, 0, 0)
-    (code,) = march.inspect_asm().values()
-    fused = [
-        line.split() for line in code.splitlines() if line.strip().startswith(("vfmadd", "vfnmadd", "vfmsub"))
-    ]
-    assert all(name.endswith("pd") for name, *_ in fused)
-    by_register = [any("mm" in each and "%x" not in each for each in operands) for _, *operands in fused]
-    # A complex product for each term.
-    assert by_register.count(True) >= 2 * TERMS
+def test_what_a_batch_is_not_given_is_refused():
+    run = NativeRun(SPECIMEN, Harmonic(130.0, 2e-5), np.zeros(6), STANDARD)
+    with pytest.raises(ValueError, match="refuses to follow_batch"):
+        follow_batch([run], [0])

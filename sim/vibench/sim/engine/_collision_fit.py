@@ -1,21 +1,21 @@
-"""What a Hertz collision does, as polynomials of a few numbers: its duration and its push. SI units.
+"""Fit of the polynomials by which a batch resolves Hertz collisions (native/collision_fit.hpp). SI units.
 
 In units of the depth and the time u that a collision of its speed would have with nothing else acting, a
 collision depends on the acceleration that all other springs give the pair meanwhile, and on u: through u
 alone it knows the specimen. The acceleration about the middle of a collision, its first four derivatives
 there, and u are the variables; the duration and the moments of the force about the middle are fitted to
-collisions that are solved at sixteen points. In lanes nothing is iterated then.
+collisions that are solved at sixteen points.
 """
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
-from itertools import product
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..engine import (
+from ..model import VY, VZ, Specimen, Y, Z, modal_form
+from ._collision_shapes import (
     DEPTHS,
     DURATION,
     HALF_FORCE,
@@ -26,11 +26,12 @@ from ..engine import (
     SOFTEST,
     SPACING,
     TERMS,
+    Table,
+    Vector,
     collision_shapes,
 )
-from ..flight import P, linear_series
-from ..kernels import Table, Vector
-from ..model import Specimen, modal_form
+from ._library import Engine
+from ._structures import Structure
 
 MIDDLE = 1.47
 """Of a collision, in u."""
@@ -38,9 +39,8 @@ DERIVATIVES = 5
 """Of the acceleration, itself among them."""
 VARIABLES = DERIVATIVES + 1
 MOMENTS = 5
-LENGTH, PUSHES = 0, 1
-"""Places of the polynomials: the duration over u; the first of the moments."""
 POLYNOMIALS = 1 + MOMENTS
+MONOMIALS = 289
 SLOWEST, FASTEST = 0.06, 5.0
 """Speeds that are fitted, over gap times fastest rate."""
 HARDEST_PRESS = 0.24
@@ -51,65 +51,32 @@ PAPER_TURN = 0.053
 """Fastest rate times u, of the paper's specimen in the middle of its speeds."""
 SLOWEST_TURN = 0.15
 """Fastest rate times u, at most: a collision lasts three times as long [rad]."""
-REACH = (0.3, 0.08, 0.015, 0.002, 2e-4, 0.03)
-"""By how much each power of a variable adds less than the one before."""
-LEAST = (1e-6, 1e-7, 3e-6, 1e-4, 4e-3, 0.05)
-"""Monomials that would add less are left out of each polynomial. Higher moments count less."""
-LEAST_TOLERANCE = 1e-7
-"""Stricter ones ask for more of the duration than sixteen points know."""
 COLLISIONS = 1500
 CHECKED = 200
 SEED = 1
 NEWTON_STEPS = 8
+FIT_ERROR = 2e-7
+"""Largest error of a speed after a collision, over the speed before, that a fit may have."""
+GUESS_POINTS = 64
 
 
-def _powers() -> list[tuple[int, ...]]:
-    """Give the powers of all monomials, those that add most first."""
-    ranges = [range(1 + int(math.log(min(LEAST)) / math.log(reach))) for reach in REACH]
-    sizes = {each: math.prod(r**k for r, k in zip(REACH, each, strict=True)) for each in product(*ranges)}
-    return sorted((each for each, size in sizes.items() if size >= min(LEAST)), key=lambda each: -sizes[each])
+_ONE_THREAD = Lock()
 
 
-POWERS = _powers()
-COUNTS = tuple(
-    sum(math.prod(r**k for r, k in zip(REACH, each, strict=True)) >= least for each in POWERS)
-    for least in LEAST
-)
-"""Monomials of each polynomial, from the first on."""
+def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
+    """Return the `CollisionFit` of native/structures.hpp: about a second for each specimen.
 
-
-def _parent(powers: tuple[int, ...]) -> tuple[int, int]:
-    """Say which earlier monomial times which variable a monomial is."""
-    variable = next(i for i, power in enumerate(powers) if power > 0)
-    before = tuple(power - (i == variable) for i, power in enumerate(powers))
-    return POWERS.index(before), variable
-
-
-PRODUCTS = tuple(_parent(powers) for powers in POWERS[1:])
-
-
-@dataclass(frozen=True, eq=False)
-class CollisionFit:
-    """Collisions of one specimen, as polynomials."""
-
-    coefficients: Vector
-    """Of the polynomials, one after the other, shape (sum(COUNTS),)."""
-    middle: Vector
-    """Of the box, shape (VARIABLES,)."""
-    half: Vector
-    """Half its width: variables are counted from the middle, in these."""
-    error: float
-    """Largest error met of the speed after a collision, over the speed before."""
+    None where stops are so soft that the other springs move on meanwhile, or the fit is not close enough.
+    """
+    with _ONE_THREAD:
+        return _collision_fit(engine, specimen)
 
 
 @lru_cache(maxsize=8)
-def fit_collisions(specimen: Specimen) -> CollisionFit | None:
-    """Fit the polynomials to collisions drawn at random from a box; about a second.
-
-    None where stops are so soft that the other springs move on meanwhile: nothing is solved then.
-    """
+def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
+    """Fit to collisions drawn at random from a box."""
     middle, half = _box(specimen)
-    if _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
+    if not np.all(half > 0.0) or _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
         return None
     rng = np.random.default_rng(SEED)
     count = COLLISIONS + CHECKED
@@ -118,23 +85,31 @@ def fit_collisions(specimen: Specimen) -> CollisionFit | None:
     places[:COLLISIONS] = np.sin(0.5 * math.pi * places[:COLLISIONS])
     variables = middle + half * places
     solved = _solve(variables[:, :DERIVATIVES], variables[:, -1], _coupling(specimen))
-    monomials = np.prod(places[:, None, :] ** np.array(POWERS), axis=2)
+    powers, counts = np.zeros((MONOMIALS, VARIABLES)), np.zeros(POLYNOMIALS)
+    engine.call("describe_collisions", engine.new("CollisionMonomials", powers=powers, counts=counts))
+    monomials = np.prod(places[:, None, :] ** powers, axis=2)
     parts, errors = [], []
-    for polynomial, most in enumerate(COUNTS):
-        known, asked = monomials[:, :most], solved[:, polynomial]
-        part = np.linalg.lstsq(known[:COLLISIONS], asked[:COLLISIONS], rcond=None)[0]
+    for most, wanted in zip(counts.astype(int), solved.T, strict=True):
+        known = monomials[:, :most]
+        part = np.linalg.lstsq(known[:COLLISIONS], wanted[:COLLISIONS], rcond=None)[0]
         parts.append(part)
-        errors.append(float(np.abs(known[COLLISIONS:] @ part - asked[COLLISIONS:]).max()))
+        errors.append(float(np.abs(known[COLLISIONS:] @ part - wanted[COLLISIONS:]).max()))
     turn = _fastest(specimen) * variables[:, -1].max()
-    weighed = [error * turn**m / math.factorial(m) for m, error in enumerate(errors[PUSHES:])]
-    return CollisionFit(np.concatenate(parts), middle, half, max(weighed))
+    if not max(error * turn**m / math.factorial(m) for m, error in enumerate(errors[1:])) < FIT_ERROR:
+        return None
+    unit = _time_over_fifth_root(specimen)
+    roots = np.linspace(middle[-1] - half[-1], middle[-1] + half[-1], GUESS_POINTS) / unit
+    fit = engine.new("CollisionFit", unit=unit)
+    fit["coefficients"], fit["middle"], fit["half"] = np.concatenate(parts), middle, half
+    fit["guess"] = np.polyfit(roots ** (-5.0 / 4.0), roots, 3)
+    return fit
 
 
 def _fastest(specimen: Specimen) -> float:
     return float(np.max(np.abs(modal_form(specimen).rates)))
 
 
-def time_over_fifth_root(specimen: Specimen) -> float:
+def _time_over_fifth_root(specimen: Specimen) -> float:
     """Give u times the fifth root of the speed: u = depth / speed, and m v^2 / 2 = 2 k d^(5/2) / 5."""
     m1, m2 = specimen.masses[1:]
     reduced = m1 * m2 / (m1 + m2)
@@ -145,7 +120,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
     """Choose the collisions that are fitted: middle and half width of each variable."""
     unit = min(specimen.gaps_m) * _fastest(specimen)
     shortest, longest = (
-        time_over_fifth_root(specimen) * (part * unit) ** -0.2 for part in (FASTEST, SLOWEST)
+        _time_over_fifth_root(specimen) * (part * unit) ** -0.2 for part in (FASTEST, SLOWEST)
     )
     turn = 0.5 * (shortest + longest) * _fastest(specimen) / PAPER_TURN
     later = [FIRST_DERIVATIVE * turn * (LATER * turn) ** k for k in range(DERIVATIVES - 1)]
@@ -155,8 +130,9 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 def _coupling(specimen: Specimen) -> Vector:
     """Give what the integrals of a force do to p, over what the second one does."""
-    series = linear_series(specimen, 1.0, 0j, np.abs(modal_form(specimen).rates), TERMS)
-    onto_p = series.struck[:, P] * series.fastest ** np.arange(TERMS)
+    modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
+    kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
+    onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
     return np.asarray(onto_p / onto_p[1])
 
 

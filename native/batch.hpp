@@ -1,0 +1,521 @@
+// Eight motions of one specimen side by side in vector registers, by their states alone (decision 0061). A flight is
+// p = Re sum of four turning terms. All lanes march on the grid until all, or all but one, have come near a stop; then
+// these look for their touch, collide by polynomials and depart together, by masks. A lane that has finished takes
+// the next motion. The rules are those of flight.hpp. A motion is the same whatever lies beside it: no number and no
+// decision of a lane depends on another lane, which only makes it wait.
+#pragma once
+#include "collision_fit.hpp"
+#include "motion.hpp"
+
+namespace vibench {
+
+constexpr int LANES = 8;
+constexpr unsigned ALL_LANES = (1u << LANES) - 1;
+constexpr int DRIVEN = 3, FLYING = 4;     // terms of p: three modes, and the drive as the last
+constexpr int ORDERS = 12;                // of a series over a grid step: the next adds 0.25^12 / 12!
+constexpr double FOUR = 4.0;              // grid steps at once where the stops are far
+constexpr int SHORT = 6, LONG = 10;       // terms of cosine and sine for angles up to 0.25 and up to 1 [rad]
+constexpr int WAITING = 1;                // lanes that may still march while the others wait for the next event
+constexpr int TOUCH_CORRECTIONS = 3;      // from a guess of second order; what they leave is checked
+constexpr int ROOT_CORRECTIONS = 3;       // to the fifth root, from a guess within some per cent
+constexpr int HIGHEST = 8;                // derivative of p that is taken at a touch
+constexpr double LONGEST_PART = 0.25;     // of a drive period that a collision may take: as far LONG terms hold
+constexpr int64_t MOST_EVENTS = 10000;    // in a drive period, on average: far beyond any motion of a specimen
+static_assert(HIGHEST < ORDERS && ORDERS <= AHEAD);
+
+using Lanes = Vector<LANES>;
+using LanePhasor = Complex<Lanes>;
+
+struct InverseFactorials {
+  double of[2 * LONG];
+  constexpr InverseFactorials() : of{} {
+    double factorial = 1.0;  // exact: 19! has 53 bits without its factors of two
+    for (int k = 0; k < 2 * LONG; k++) of[k] = 1.0 / factorial, factorial *= k + 1;
+  }
+};
+constexpr InverseFactorials INVERSE_FACTORIALS;
+
+INLINE LanePhasor fused_product(const LanePhasor &x, const LanePhasor &y) {
+  return {fused(x.re, y.re, -(x.im * y.im)), fused(x.re, y.im, x.im * y.re)};
+}
+// sum + Re(x y)
+INLINE Lanes with_real_of_product(Lanes sum, const LanePhasor &x, const LanePhasor &y) {
+  return fused(-x.im, y.im, fused(x.re, y.re, sum));
+}
+INLINE LanePhasor select(Mask mask, const LanePhasor &a, const LanePhasor &b) {
+  return {select(mask, a.re, b.re), select(mask, a.im, b.im)};
+}
+
+// exp(i angle), by N terms of each series.
+template <int N> INLINE LanePhasor turned_by_series(Lanes angle) {
+  Lanes square = angle * angle, cosine = 0.0, sine = 0.0;
+  for (int k = N - 1; k >= 0; k--) {
+    double sign = k % 2 ? -1.0 : 1.0;
+    cosine = fused(cosine, square, sign * INVERSE_FACTORIALS.of[2 * k]);
+    sine = fused(sine, square, sign * INVERSE_FACTORIALS.of[2 * k + 1]);
+  }
+  return {cosine, sine * angle};
+}
+
+// exp(rate time). A mode that turns shrinks little meanwhile.
+template <int N> INLINE LanePhasor grown_by_series(const LanePhasor &rate, Lanes time) {
+  Lanes shrinks = rate.re * time, size = INVERSE_FACTORIALS.of[6];
+  for (int k = 5; k >= 0; k--) size = fused(size, shrinks, INVERSE_FACTORIALS.of[k]);
+  LanePhasor turned = turned_by_series<N>(rate.im * time);
+  return {size * turned.re, size * turned.im};
+}
+
+// Calls `act` with each lane of a mask.
+template <class Act> INLINE void for_each_lane(unsigned lanes, const Act &act) {
+  for (; lanes != 0; lanes &= lanes - 1) act(__builtin_ctz(lanes));
+}
+
+class BatchRun {
+ public:
+  explicit BatchRun(const Batch &batch)
+      : batch(batch), fit(*batch.fit), tables(*batch.motions->tables), lower(tables.specimen.lower_gap),
+        upper(tables.specimen.upper_gap) {}
+
+  void follow();
+
+ private:
+  // States that are due once a drive period wait here, as terms, until eight can be formed together.
+  struct DueStates {
+    LanePhasor term[FLYING];
+    Lanes later;  // how long after its instant each was kept: negative [s]
+  };
+
+  const Batch &batch;
+  const CollisionFit &fit;
+  const Tables &tables;  // of the first motion; the specimen is that of all
+  double lower, upper;   // gaps [m]
+
+  // Of each lane, what its motion comes with.
+  BatchMotion *motion[LANES] = {};
+  LanePhasor rate[FLYING] = {};              // [1/s]
+  LanePhasor one_step[FLYING] = {}, four_steps[FLYING] = {};  // what a term is multiplied with
+  LanePhasor series[ORDERS][FLYING] = {};    // Taylor coefficients of exp(rate t)
+  Lanes square[FLYING] = {}, cube[FLYING] = {};  // of |rate|
+  LanePhasor kick[DRIVEN] = {};              // what a unit impulse over the pair's mass adds to a term
+  LanePhasor drive = {};                     // its term once a drive period
+  Lanes period = {}, frequency = {}, grid = {};
+  Phasor shapes[LANES][FLYING][6] = {};      // motion of a unit of each term
+
+  // And where it is.
+  LanePhasor term[FLYING] = {};              // p = Re of their sum [m]
+  Lanes left = {};                           // time until the next state is due [s]
+  Lanes reach = {}, bound = {}, jerk = {};   // no |p|, |d2p/dt2| or |d3p/dt3| is larger until a stop is touched
+  Lanes low = {}, high = {};                 // between these p must be at both ends of a step for that to be clear
+  Lanes low_four = {}, high_four = {};       // and of four steps
+  Lanes touch = {};                          // time until the stop is touched [s]
+  DueStates due_states[LANES] = {};
+  int waiting[LANES] = {};                   // of them
+  int64_t kept[LANES] = {}, impacts[LANES] = {}, events[LANES] = {};
+
+  int64_t taken = 0;  // motions
+  unsigned moving = 0, careful = 0;  // lanes that march; those that have found four steps too many
+
+  // ---- One lane
+
+  // Whether a motion is over within as many steps as a run may make.
+  static bool is_short_enough(const BatchMotion &next) {
+    const Tables &t = *next.tables;
+    return double(next.periods) < double(MOST_STEPS) * t.flight.grid * t.drive.frequency;
+  }
+
+  void take(int lane, BatchMotion &next) {
+    const LinearTables &flight = next.tables->flight;
+    const Specimen &s = next.tables->specimen;
+    Phasor phasors[PHASORS];
+    start_flight(phasors, next.now->motion, next.tables->drive.start, flight);
+    auto set = [&](LanePhasor &to, const Phasor &value) { to.re.set(lane, value.re), to.im.set(lane, value.im); };
+    for (int j = 0; j < FLYING; j++) {
+      double size = magnitude(flight.rates[j]);
+      set(term[j], phasors[j] * flight.path[j]);
+      set(rate[j], flight.rates[j]);
+      set(one_step[j], {flight.ahead[j][REAL][0], flight.ahead[j][IMAG][0]});
+      set(four_steps[j], {flight.ahead[j][REAL][3], flight.ahead[j][IMAG][3]});
+      for (int k = 0; k < ORDERS; k++) set(series[k][j], {flight.series[j][REAL][k], flight.series[j][IMAG][k]});
+      square[j].set(lane, flight.squares[j]), cube[j].set(lane, flight.squares[j] * size);
+      for (int i = 0; i < 6; i++) shapes[lane][j][i] = quotient(flight.shapes[j][i], flight.path[j]);
+      if (j == DRIVEN) continue;
+      Phasor impulse = (1.0 / s.m2) * flight.rows[j][VZ] - (1.0 / s.m1) * flight.rows[j][VY];
+      set(kick[j], next.tables->pair * (impulse * flight.path[j]));
+    }
+    set(drive, phasors[DRIVEN] * flight.path[DRIVEN]);
+    double once = 1.0 / next.tables->drive.frequency;
+    period.set(lane, once), left.set(lane, once), frequency.set(lane, next.tables->drive.frequency);
+    grid.set(lane, flight.grid);
+    motion[lane] = &next, waiting[lane] = 0, kept[lane] = impacts[lane] = events[lane] = 0;
+  }
+
+  Phasor term_of(int lane, int j) const { return {term[j].re[lane], term[j].im[lane]}; }
+
+  // Keeps the state that is due in a lane in flight; returns whether all that are wanted have been kept.
+  bool keep_due(int lane) {
+    DueStates &due = due_states[lane];
+    int place = waiting[lane]++;
+    for (int j = 0; j < FLYING; j++) {
+      Phasor now = term_of(lane, j);
+      due.term[j].re.set(place, now.re), due.term[j].im.set(place, now.im);
+    }
+    due.later.set(place, left[lane]);
+    left.set(lane, left[lane] + period[lane]);
+    bool is_all = ++kept[lane] == motion[lane]->periods;
+    if (is_all || waiting[lane] == LANES) form_states(lane);
+    return is_all;
+  }
+
+  // Keeps a state that is due in a contact.
+  bool keep_due(int lane, const double (&at)[6]) {
+    form_states(lane);
+    __builtin_memcpy(motion[lane]->sections + 6 * kept[lane], at, sizeof at);
+    left.set(lane, period[lane]);
+    return ++kept[lane] == motion[lane]->periods;
+  }
+
+  // Writes the states of the terms that wait.
+  void form_states(int lane) {
+    const DueStates &due = due_states[lane];
+    double *to = motion[lane]->sections + 6 * (kept[lane] - waiting[lane]);
+    LanePhasor there[FLYING];
+    for (int j = 0; j < FLYING; j++)
+      there[j] = fused_product(due.term[j], grown_by_series<LONG>({rate[j].re[lane], rate[j].im[lane]}, due.later));
+    for (int i = 0; i < 6; i++) {
+      Lanes sum = 0.0;
+      for (int j = 0; j < FLYING; j++) {
+        const Phasor &shape = shapes[lane][j][i];
+        sum = with_real_of_product(sum, there[j], {shape.re, shape.im});
+      }
+      for (int n = 0; n < waiting[lane]; n++) to[6 * n + i] = sum[n];
+    }
+    waiting[lane] = 0;
+  }
+
+  // Ends a motion: in flight, or on a stop.
+  void end(int lane, const Contact<double> &contact) {
+    BatchMotion &of = *motion[lane];
+    Motion<double> last{};
+    __builtin_memcpy(last.at, of.sections + 6 * (of.periods - 1), sizeof last.at);
+    double begun = nearest(of.now->clock_high * frequency[lane]);
+    last.clock.high = (begun + double(of.periods)) / frequency[lane];
+    last.contact = contact;
+    vibench::keep(*of.now, last);
+    of.outcome = REACHED_END, of.impacts = impacts[lane];
+  }
+  void lose(int lane) { motion[lane]->outcome = STALLED, motion[lane]->impacts = impacts[lane]; }
+
+  enum class SlowContact { LEFT, ENDED, LOST };
+
+  // Carries a lane through a contact by steps; what is due meanwhile is kept.
+  SlowContact contact_by_steps(int lane) {
+    const Tables &own = *motion[lane]->tables;
+    double at[6];
+    place_lane(at, lane);
+    Contact<double> contact{};
+    double side = touched_side(at[Y] - at[Z], at[VY] - at[VZ], own.specimen);
+    begin_contact(contact, at, side, batch.tolerance, own);
+    contact.w = 0.0;  // the touch was found a hair before or after the gap closed
+    HertzForce force{own.specimen.contact_stiffness};
+    while (contact.side != 0.0) {
+      // The clock is at zero when the next state is due, where the drive is what it was at the start.
+      Clock<double> clock{-left[lane], 0.0, 0.0};
+      double longest = STRETCH_TURN / own.omega, passed = 0.0;
+      bool is_due = left[lane] <= longest;
+      if (is_due) longest = left[lane];
+      BaseForce base(clock, 0.5 * longest, own);
+      ContactEnd end = advance_contact(contact, at, passed, longest, base, force, batch.tolerance, own,
+                                       [](auto &&...) {});
+      if (end != ContactEnd::LEFT && end != ContactEnd::HELD) return SlowContact::LOST;
+      left.set(lane, left[lane] - passed);
+      if (is_due && end == ContactEnd::HELD && keep_due(lane, at)) {
+        this->end(lane, contact);
+        return SlowContact::ENDED;
+      }
+    }
+    Phasor phasors[PHASORS], now = drive_phasor(Clock<double>{-left[lane], 0.0, 0.0}, 0.0, own);
+    start_flight(phasors, at, now, own.flight);
+    for (int j = 0; j < FLYING; j++) {
+      Phasor of_p = phasors[j] * own.flight.path[j];
+      term[j].re.set(lane, of_p.re), term[j].im.set(lane, of_p.im);
+    }
+    return SlowContact::LEFT;
+  }
+
+  void place_lane(double *at, int lane) const {
+    for (int i = 0; i < 6; i++) {
+      at[i] = 0.0;
+      for (int j = 0; j < FLYING; j++) at[i] += real_of_product(term_of(lane, j), shapes[lane][j][i]);
+    }
+  }
+
+  // ---- Some lanes; each function leaves the others as they are
+
+  unsigned keep_due(unsigned due) {
+    unsigned over = 0;
+    for_each_lane(due, [&](int lane) {
+      if (!keep_due(lane)) return;
+      end(lane, {});
+      over |= 1u << lane;
+    });
+    return over;
+  }
+
+  // From the lanes' terms: what bounds their flights from now on.
+  void bound_flights(unsigned lanes) {
+    Mask of = Mask::of(lanes);
+    Lanes sizes = 0.0, squares = 0.0, cubes = 0.0;
+    for (int j = 0; j < FLYING; j++) {
+      Lanes size = square_root(fused(term[j].re, term[j].re, term[j].im * term[j].im));
+      sizes = sizes + size;
+      squares = fused(size, square[j], squares), cubes = fused(size, cube[j], cubes);
+    }
+    Lanes margin = squares * (grid * grid) * 0.125;
+    reach = select(of, sizes, reach), bound = select(of, squares, bound), jerk = select(of, cubes, jerk);
+    low = select(of, margin - lower, low), high = select(of, upper - margin, high);
+    low_four = select(of, FOUR * FOUR * margin - lower, low_four);
+    high_four = select(of, upper - FOUR * FOUR * margin, high_four);
+  }
+
+  // Marches until `enough` lanes or fewer are still clear of the stops; returns those in which a state is due.
+  unsigned march(int enough) {
+    Mask going = Mask::of(moving), one_by_one = Mask::of(careful);
+    LanePhasor now[FLYING], next[FLYING];
+    for (int j = 0; j < FLYING; j++) now[j] = term[j];
+    Lanes to_go = left, p = sum_of_terms(now);
+    for (;;) {
+      Mask four = (low_four < p) & (p < high_four) & ~one_by_one, clear = going & (low < p) & (p < high);
+      for (int j = 0; j < FLYING; j++) next[j] = fused_product(now[j], select(four, four_steps[j], one_step[j]));
+      Lanes ahead = sum_of_terms(next);
+      clear = clear & (select(four, low_four, low) < ahead) & (ahead < select(four, high_four, high));
+      for (int j = 0; j < FLYING; j++) now[j] = select(clear, next[j], now[j]);
+      p = select(clear, ahead, p);
+      to_go = to_go - select(clear, select(four, FOUR * grid, grid), 0.0);
+      one_by_one = one_by_one | (four & ~clear);
+      going = going & (clear | four);
+      unsigned due = (clear & ~(0.0 < to_go)).bits();
+      if (due != 0 || __builtin_popcount(going.bits()) <= enough) {
+        for (int j = 0; j < FLYING; j++) term[j] = now[j];
+        left = to_go, moving = going.bits(), careful = one_by_one.bits();
+        return due;
+      }
+    }
+  }
+
+  static INLINE Lanes sum_of_terms(const LanePhasor (&of)[FLYING]) {
+    return (of[0].re + of[1].re) + (of[2].re + of[3].re);
+  }
+
+  // p and its derivatives over their factorials.
+  INLINE void fill_course(Lanes (&course)[ORDERS]) const {
+    course[0] = sum_of_terms(term);
+    for (int k = 1; k < ORDERS; k++) {
+      course[k] = 0.0;
+      for (int j = 0; j < FLYING; j++) course[k] = with_real_of_product(course[k], term[j], series[k][j]);
+    }
+  }
+  static INLINE void place_on(const Lanes (&course)[ORDERS], Lanes time, Lanes &p, Lanes &rate) {
+    p = course[ORDERS - 1], rate = 0.0;
+    for (int k = ORDERS - 2; k >= 0; k--) rate = fused(rate, time, p), p = fused(p, time, course[k]);
+  }
+
+  // Finds the first touch of lanes within the next step, as `first_touch` does; returns those that have one.
+  unsigned look_closely(unsigned lanes) {
+    Lanes course[ORDERS];
+    fill_course(course);
+    Mask rises = Lanes(0.0) < course[1];
+    Lanes side = select(rises, 1.0, -1.0), stop = select(rises, upper, lower);
+    Lanes speed = side * course[1], bend = 2.0 * side * course[2], change = bound * grid * LONGEST_TURN;
+    Mask proved = (change < speed) & (change < fused(bend, grid, speed));
+    Lanes closed = fused(reach, ROUNDING, TOUCH * smaller(lower, upper)), p, p_rate;
+    place_on(course, grid, p, p_rate);
+    Mask touches = (stop - side * p) < closed;
+    Lanes gap = stop - side * course[0];
+    Lanes later = 2.0 * gap / (speed + square_root(fused(speed, speed, 2.0 * bend * gap))), step = later;
+    for (int n = 0; n < TOUCH_CORRECTIONS; n++) {
+      later = select(later < grid, later, grid);
+      place_on(course, later, p, p_rate);
+      step = (stop - side * p) / (side * p_rate);
+      later = later + step;
+    }
+    later = select(Lanes(0.0) < later, later, 0.0);
+    later = select(later < grid, later, grid);
+    proved = proved & (~touches | (bound * step * step < closed));
+    Mask at_once = gap < closed;
+    touch = select(at_once, 0.0, later);
+    unsigned touched = lanes & (proved & (touches | at_once)).bits();
+    for_each_lane(lanes & ~proved.bits(), [&](int lane) {
+      double one[AHEAD] = {};
+      for (int k = 0; k < ORDERS; k++) one[k] = course[k][lane];
+      double found = first_contact(one, grid[lane], {lower, upper, bound[lane], reach[lane]});
+      touch.set(lane, found);
+      if (found != NEVER) touched |= 1u << lane;
+    });
+    return touched;
+  }
+
+  // Lets time pass, and puts the drive's term where it is then: its rounding never adds up.
+  void pass(Mask of, Lanes time) {
+    left = left - select(of, time, 0.0);
+    // Half a turn on the angle lies within half a turn: the fourth power of its quarter.
+    LanePhasor turned = turned_by_series<LONG>((0.5 - left * frequency) * (0.5 * PI));
+    LanePhasor half{fused(turned.re, turned.re, -(turned.im * turned.im)), 2.0 * (turned.re * turned.im)};
+    LanePhasor whole{fused(half.im, half.im, -(half.re * half.re)), -2.0 * (half.re * half.im)};
+    term[DRIVEN] = select(of, fused_product(drive, whole), term[DRIVEN]);
+  }
+
+  void fly_to_touch(unsigned lanes) {
+    Mask of = Mask::of(lanes);
+    Lanes later = select(of, touch, 0.0);
+    for (int j = 0; j < DRIVEN; j++)
+      term[j] = select(of, fused_product(term[j], grown_by_series<SHORT>(rate[j], later)), term[j]);
+    pass(of, later);
+  }
+
+  // Flies a grid step; returns the lanes in which a state is due.
+  unsigned fly_step(unsigned lanes) {
+    Mask of = Mask::of(lanes);
+    for (int j = 0; j < FLYING; j++) term[j] = select(of, fused_product(term[j], one_step[j]), term[j]);
+    left = left - select(of, grid, 0.0);
+    return (of & ~(0.0 < left)).bits();
+  }
+
+  // Carries lanes that touch a stop to the end of their collision; returns those that the polynomials do not hold.
+  // `last` lanes stop when their next state is due, also within a collision.
+  unsigned collide(unsigned lanes, unsigned last) {
+    Lanes approach = 0.0;
+    for (int j = 0; j < FLYING; j++) approach = with_real_of_product(approach, term[j], rate[j]);
+    Lanes side = select(Lanes(0.0) < approach, 1.0, -1.0), speed = magnitude(approach);
+    Lanes fourth = square_root(square_root(speed)), root = fit.guess[0];
+    for (int n = 1; n < 4; n++) root = fused(root, fourth, fit.guess[n]);
+    for (int n = 0; n < ROOT_CORRECTIONS; n++) {  // towards speed^(-1/5)
+      Lanes twice = root * root;
+      root = root * fused(-0.2 * (speed * twice), twice * root, 1.2);
+    }
+    Lanes unit = fit.unit * root, variables[VARIABLES], values[POLYNOMIALS];
+    fill_variables(variables, side / speed, unit);
+    Mask inside = Mask::of(lanes) & (Lanes(0.0) < speed);
+    for (int k = 0; k < VARIABLES; k++) {
+      variables[k] = (variables[k] - fit.middle[k]) * (1.0 / fit.half[k]);
+      inside = inside & (magnitude(variables[k]) < 1.0);
+    }
+    evaluate(values, variables, fit.coefficients);
+    Lanes length = unit * values[0];
+    inside = inside & (length * frequency < LONGEST_PART) & ~(Mask::of(last) & (left < length));
+    kick_modes(inside, 0.5 * length, unit, side * speed, values);
+    pass(inside, length);
+    return lanes & ~inside.bits();
+  }
+
+  // The acceleration at the middle of a collision and its derivatives, in units of the collision, and u. `scale` is
+  // side over speed: what the rate of p is multiplied with to be 1.
+  INLINE void fill_variables(Lanes (&variables)[VARIABLES], Lanes scale, Lanes unit) const {
+    for (int k = 0; k < DERIVATIVES; k++) variables[k] = 0.0;
+    variables[DERIVATIVES] = unit;
+    for (int order = 2; order <= HIGHEST; order++) {
+      Lanes value = 0.0;
+      for (int j = 0; j < FLYING; j++) value = with_real_of_product(value, term[j], series[order][j]);
+      scale = scale * unit;
+      value = value * scale * (1.0 / INVERSE_FACTORIALS.of[order]);
+      double away = 1.0;  // COLLISION_MIDDLE^n / n!, for the derivative n orders below
+      for (int k = order - 2; k >= 0; k--) {
+        if (k < DERIVATIVES) variables[k] = fused(value, away, variables[k]);
+        away *= COLLISION_MIDDLE / (order - 1 - k);
+      }
+    }
+  }
+
+  // Lets modes fly half of a collision, take its push about the middle, and fly the other half.
+  INLINE void kick_modes(Mask of, Lanes half, Lanes unit, Lanes push, const Lanes (&values)[POLYNOMIALS]) {
+    for (int j = 0; j < DRIVEN; j++) {
+      LanePhasor by = grown_by_series<SHORT>(rate[j], half), turn{rate[j].re * unit, rate[j].im * unit};
+      LanePhasor sum{(1.0 / (MOMENTS - 1)) * values[MOMENTS], 0.0};
+      for (int m = MOMENTS - 2; m >= 0; m--) {
+        sum = {fused(sum.re, turn.re, fused(-sum.im, turn.im, values[1 + m])),
+               fused(sum.re, turn.im, sum.im * turn.re)};
+        if (m > 1) sum = {(1.0 / m) * sum.re, (1.0 / m) * sum.im};
+      }
+      LanePhasor pushed = fused_product(sum, {push * kick[j].re, push * kick[j].im});
+      LanePhasor middle = fused_product(term[j], by);
+      middle = {middle.re + pushed.re, middle.im + pushed.im};
+      term[j] = select(of, fused_product(middle, by), term[j]);
+    }
+  }
+
+  // Lanes whose first step away from the stop that was just left is surely clear.
+  unsigned leaves_clear(unsigned lanes) const {
+    Lanes rate_of_p = 0.0, half_bend = 0.0;
+    for (int j = 0; j < FLYING; j++) {
+      rate_of_p = with_real_of_product(rate_of_p, term[j], rate[j]);
+      half_bend = with_real_of_product(half_bend, term[j], series[2][j]);
+    }
+    Lanes speed = magnitude(rate_of_p), half = select(Lanes(0.0) < rate_of_p, half_bend, -half_bend);
+    Lanes change = jerk * (grid * grid) * (1.0 / 6.0);
+    Lanes farthest = fused(magnitude(half), grid, speed + change) * grid;
+    Mask clear = (change < fused(half, grid, speed)) & (farthest < lower + upper);
+    return lanes & clear.bits();
+  }
+};
+
+inline void BatchRun::follow() {
+  unsigned alive = 0, over = ALL_LANES;
+  for (;;) {
+    if (over != 0) {
+      alive &= ~over, moving &= ~over, careful &= ~over;
+      for_each_lane(over, [&](int lane) {
+        for (; taken < batch.count && !is_short_enough(batch.motions[taken]); taken++)
+          batch.motions[taken].outcome = TOO_LONG;
+        if (taken == batch.count) return;
+        take(lane, batch.motions[taken++]);
+        alive |= 1u << lane, moving |= 1u << lane;
+      });
+      if (alive == 0) return;
+      bound_flights(over);
+      over = 0;
+    }
+    int enough = alive == ALL_LANES ? WAITING : 0;
+    if (__builtin_popcount(moving) > enough) {
+      over = keep_due(march(enough));
+      if (over != 0 || __builtin_popcount(moving) > enough) continue;
+    }
+    unsigned stopped = alive & ~moving;
+    careful &= ~stopped;
+    for_each_lane(stopped, [&](int lane) {
+      if (++events[lane] <= MOST_EVENTS * motion[lane]->periods && bound[lane] < LARGEST_BOUND) return;
+      lose(lane);
+      over |= 1u << lane;
+    });
+    stopped &= ~over;
+    unsigned touched = look_closely(stopped), clear = stopped & ~touched;
+    over |= keep_due(fly_step(clear));
+    moving |= clear;
+    bound_flights(clear);
+    if (touched == 0) continue;
+    fly_to_touch(touched);
+    unsigned ended = keep_due(touched & ~(0.0 < left).bits()), last = 0;
+    over |= ended, touched &= ~ended;
+    for_each_lane(touched, [&](int lane) {
+      impacts[lane]++;
+      if (kept[lane] + 1 == motion[lane]->periods) last |= 1u << lane;
+    });
+    for_each_lane(collide(touched, last), [&](int lane) {
+      SlowContact ends = contact_by_steps(lane);
+      if (ends == SlowContact::LOST) lose(lane);
+      if (ends != SlowContact::LEFT) over |= 1u << lane;
+    });
+    touched &= ~over;
+    over |= keep_due(touched & ~(0.0 < left).bits());
+    touched &= ~over;
+    bound_flights(touched);
+    unsigned away = leaves_clear(touched);
+    over |= keep_due(fly_step(away));
+    moving |= away;
+  }
+}
+
+inline int64_t follow_batch(const Batch &batch) {
+  if (batch.count > 0) BatchRun(batch).follow();
+  return REACHED_END;
+}
+
+}  // namespace vibench

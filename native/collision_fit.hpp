@@ -1,0 +1,124 @@
+// A Hertz collision as polynomials, for batches: nothing is iterated (decision 0061). In units of the depth and the
+// time u that a collision of its speed would have with nothing else acting, a collision depends on the acceleration
+// that all other springs give the pair meanwhile, and on u. That acceleration about the middle, its first four
+// derivatives, and u are the variables; the duration, and the moments of the force about the middle, are polynomials
+// of them, which `vibench.sim.engine` fits to collisions that it has solved.
+#pragma once
+#include "structures.hpp"
+
+namespace vibench {
+
+constexpr int DERIVATIVES = 5;              // of the acceleration, itself among them
+constexpr int VARIABLES = DERIVATIVES + 1;  // and u
+constexpr int MOMENTS = 5;
+constexpr int POLYNOMIALS = 1 + MOMENTS;    // the duration over u, and the moments
+constexpr double COLLISION_MIDDLE = 1.47;   // of a collision, in u
+constexpr int MONOMIALS = 289;
+constexpr int COEFFICIENTS = sizeof(CollisionFit::coefficients) / sizeof(double);
+
+// By how much each power of a variable adds less than the one before.
+constexpr double ADDS[VARIABLES] = {0.3, 0.08, 0.015, 0.002, 2e-4, 0.03};
+// Monomials that would add less are left out of each polynomial. Higher moments count less.
+constexpr double LEAST_ADDED[POLYNOMIALS] = {1e-6, 1e-7, 3e-6, 1e-4, 4e-3, 0.05};
+
+// An earlier monomial times a variable; the first is 1.
+struct Monomial {
+  int powers[VARIABLES];
+  double adds;
+  int before, variable;
+};
+struct Monomials {
+  Monomial of[MONOMIALS];    // those that add most first
+  int counts[POLYNOMIALS];   // how many, from the first on, each polynomial has
+  int first[POLYNOMIALS];    // place of its first coefficient
+  int count, coefficients;
+};
+
+// Adds the monomials whose powers of the variables before `variable` are those of `partly`, in order of what they add.
+constexpr void add_monomials(Monomials &to, Monomial partly, int variable) {
+  if (variable == VARIABLES) {
+    int place = to.count++;
+    for (; place > 0 && to.of[place - 1].adds < partly.adds; place--) to.of[place] = to.of[place - 1];
+    to.of[place] = partly;
+    return;
+  }
+  for (; partly.adds >= LEAST_ADDED[1]; partly.powers[variable]++, partly.adds *= ADDS[variable])
+    add_monomials(to, partly, variable + 1);
+}
+
+constexpr Monomials make_monomials() {
+  Monomials made{};
+  add_monomials(made, {{}, 1.0, 0, 0}, 0);
+  for (int k = 1; k < made.count; k++) {
+    int before[VARIABLES], variable = 0;
+    while (made.of[k].powers[variable] == 0) variable++;
+    for (int i = 0; i < VARIABLES; i++) before[i] = made.of[k].powers[i] - (i == variable);
+    for (int j = 0; j < k; j++) {
+      bool is_it = true;
+      for (int i = 0; i < VARIABLES; i++) is_it = is_it && made.of[j].powers[i] == before[i];
+      if (is_it) made.of[k].before = j;
+    }
+    made.of[k].variable = variable;
+  }
+  for (int n = 0; n < POLYNOMIALS; n++) {
+    made.first[n] = made.coefficients;
+    while (made.counts[n] < made.count && made.of[made.counts[n]].adds >= LEAST_ADDED[n]) made.counts[n]++;
+    made.coefficients += made.counts[n];
+  }
+  return made;
+}
+
+constexpr Monomials THE_MONOMIALS = make_monomials();
+static_assert(THE_MONOMIALS.count == MONOMIALS && THE_MONOMIALS.coefficients == COEFFICIENTS);
+
+// Tells Python the monomials, to which it fits; returns their number.
+inline int64_t describe_collisions(const CollisionMonomials &to) {
+  for (int k = 0; k < MONOMIALS; k++)
+    for (int i = 0; i < VARIABLES; i++) to.powers.at[k * VARIABLES + i] = THE_MONOMIALS.of[k].powers[i];
+  for (int n = 0; n < POLYNOMIALS; n++) to.counts.at[n] = THE_MONOMIALS.counts[n];
+  return MONOMIALS;
+}
+
+template <class Number, Number... K> struct Sequence {};
+#if defined(__clang__)
+template <int N> using NumbersBelow = __make_integer_seq<Sequence, int, N>;
+#else
+template <int N> using NumbersBelow = Sequence<int, __integer_pack(N)...>;
+#endif
+
+// The polynomials of eight points at once, written out without a loop: each term follows from its number.
+struct PolynomialSums {
+  static constexpr int CHAINS = 4;  // of sums that do not wait for each other
+  const double *coefficients;
+  const Vector<8> *variables;
+  Vector<8> found[MONOMIALS];
+  Vector<8> sums[POLYNOMIALS][CHAINS];
+
+  template <int K, int N> INLINE void add_to() {
+    if constexpr (K < THE_MONOMIALS.counts[N]) {
+      Vector<8> &sum = sums[N][K % CHAINS];
+      sum = fused(coefficients[THE_MONOMIALS.first[N] + K], found[K], sum);
+    }
+  }
+  template <int K> INLINE void add() {
+    constexpr Monomial monomial = THE_MONOMIALS.of[K];
+    if constexpr (K == 0) found[K] = 1.0;
+    else if constexpr (monomial.before == 0) found[K] = variables[monomial.variable];
+    else found[K] = found[monomial.before] * variables[monomial.variable];
+    add_to<K, 0>(), add_to<K, 1>(), add_to<K, 2>(), add_to<K, 3>(), add_to<K, 4>(), add_to<K, 5>();
+  }
+  template <int... K> INLINE void add_all(Sequence<int, K...>) { (add<K>(), ...); }
+};
+
+inline void evaluate(Vector<8> (&values)[POLYNOMIALS], const Vector<8> (&variables)[VARIABLES],
+                     const double (&coefficients)[COEFFICIENTS]) {
+  PolynomialSums of;
+  of.coefficients = coefficients, of.variables = variables;
+  for (auto &chains : of.sums)
+    for (Vector<8> &sum : chains) sum = 0.0;
+  of.add_all(NumbersBelow<MONOMIALS>());
+  for (int n = 0; n < POLYNOMIALS; n++)
+    values[n] = (of.sums[n][0] + of.sums[n][1]) + (of.sums[n][2] + of.sums[n][3]);
+}
+
+}  // namespace vibench
