@@ -79,46 +79,23 @@ inline int64_t describe_collisions(const CollisionMonomials &to) {
   return MONOMIALS;
 }
 
-template <class Number, Number... K> struct Sequence {};
-#if defined(__clang__)
-template <int N> using NumbersBelow = __make_integer_seq<Sequence, int, N>;
-#else
-template <int N> using NumbersBelow = Sequence<int, __integer_pack(N)...>;
-#endif
-
-// The polynomials of eight points at once, written out without a loop: each term follows from its number.
-struct PolynomialSums {
-  static constexpr int CHAINS = 4;  // of sums that do not wait for each other
-  const double *coefficients;
-  const Vector<8> *variables;
-  Vector<8> found[MONOMIALS];
-  Vector<8> sums[POLYNOMIALS][CHAINS];
-
-  template <int K, int N> INLINE void add_to() {
-    if constexpr (K < THE_MONOMIALS.counts[N]) {
-      Vector<8> &sum = sums[N][K % CHAINS];
-      sum = fused(coefficients[THE_MONOMIALS.first[N] + K], found[K], sum);
-    }
-  }
-  template <int K> INLINE void add() {
-    constexpr Monomial monomial = THE_MONOMIALS.of[K];
-    if constexpr (K == 0) found[K] = 1.0;
-    else if constexpr (monomial.before == 0) found[K] = variables[monomial.variable];
-    else found[K] = found[monomial.before] * variables[monomial.variable];
-    add_to<K, 0>(), add_to<K, 1>(), add_to<K, 2>(), add_to<K, 3>(), add_to<K, 4>(), add_to<K, 5>();
-  }
-  template <int... K> INLINE void add_all(Sequence<int, K...>) { (add<K>(), ...); }
-};
-
+// The polynomials of eight points at once. Where the loop is written out every place is a constant, and sums stay in
+// registers; g++, which only tests, keeps the loop and the same order of sums.
 inline void evaluate(Vector<8> (&values)[POLYNOMIALS], const Vector<8> (&variables)[VARIABLES],
                      const double (&coefficients)[COEFFICIENTS]) {
-  PolynomialSums of;
-  of.coefficients = coefficients, of.variables = variables;
-  for (auto &chains : of.sums)
-    for (Vector<8> &sum : chains) sum = 0.0;
-  of.add_all(NumbersBelow<MONOMIALS>());
-  for (int n = 0; n < POLYNOMIALS; n++)
-    values[n] = (of.sums[n][0] + of.sums[n][1]) + (of.sums[n][2] + of.sums[n][3]);
+  constexpr int CHAINS = 4;  // of sums that do not wait for each other
+  Vector<8> found[MONOMIALS], sums[POLYNOMIALS][CHAINS] = {};
+#if defined(__clang__)
+#pragma clang loop unroll(full)
+#endif
+  for (int k = 0; k < MONOMIALS; k++) {
+    const Monomial &monomial = THE_MONOMIALS.of[k];
+    found[k] = k == 0 ? Vector<8>(1.0) : found[monomial.before] * variables[monomial.variable];
+    for (int n = 0; n < POLYNOMIALS; n++)
+      if (k < THE_MONOMIALS.counts[n])
+        sums[n][k % CHAINS] = fused(coefficients[THE_MONOMIALS.first[n] + k], found[k], sums[n][k % CHAINS]);
+  }
+  for (int n = 0; n < POLYNOMIALS; n++) values[n] = (sums[n][0] + sums[n][1]) + (sums[n][2] + sums[n][3]);
 }
 
 }  // namespace vibench

@@ -4,7 +4,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#if defined(__SANITIZE_ADDRESS__)
+#define INLINE inline  // g++ takes minutes to watch every inlined copy
+#else
 #define INLINE inline __attribute__((always_inline))
+#endif
 
 namespace vibench {
 
