@@ -174,7 +174,7 @@ def test_a_specimen_that_no_batch_follows_is_refused_in_a_sentence():
         followed(gong2025(contact="rigid:0.8"), [Harmonic(100.0, 1e-6)], [np.zeros(6)], [1])
 
 
-def test_what_a_batch_is_not_given_is_refused():
+def test_a_motion_without_periods_is_refused():
     run = NativeRun(SPECIMEN, Harmonic(130.0, 2e-5), np.zeros(6), STANDARD)
     with pytest.raises(ValueError, match="refuses to follow_batch"):
         follow_batch([run], [0])
