@@ -8,7 +8,7 @@
 
 namespace vibench {
 
-constexpr int MOMENTS = 9;           // in windows of 0.4 rad the next is below 7e-10 of the first
+constexpr int WINDOW_MOMENTS = 9;           // in windows of 0.4 rad the next is below 7e-10 of the first
 constexpr int BLOCK = 8;             // cells side by side; a force is heard by fewer cells to either side
 constexpr int NUMBERS = 3;           // displacements of a cell, at places P, AT_X, AT_Z; rates follow
 constexpr int PIECE_TERMS = 8;
@@ -39,7 +39,7 @@ struct Rows {
 // A cell of its own: numbers that equal cells share.
 struct KindTables {
   Tables tables;                  // of the specimen on two springs, to the cells before and behind
-  double struck[MOMENTS][WIDE];   // as `CollisionTables::struck`
+  double struck[WINDOW_MOMENTS][WIDE];   // as `CollisionTables::struck`
   PowerForce power;
   double link[2][2];              // stiffness and damping, before and behind
   double gain_length;             // [s]: of a step for which
@@ -50,7 +50,7 @@ struct CellMotion {
   double at[2 * NUMBERS];         // P, AT_X, AT_Z, and their rates
   Contact<double> contact;
   double power_step, size;
-  double moments[MOMENTS];        // M_k: of the force so far, at the end of what is being crossed
+  double moments[WINDOW_MOMENTS];        // M_k: of the force so far, at the end of what is being crossed
 };
 
 // Where the arrays of a run lie in the memory that is lent; all begin as zeros.
@@ -104,9 +104,9 @@ inline void shift(double *series, double by) {
 
 // Lets time pass without a force: the integrals grow by those below them.
 inline void age(double *moments, double by) {
-  double shares[MOMENTS] = {1.0};  // by^k / k!
-  for (int k = 1; k < MOMENTS; k++) shares[k] = shares[k - 1] * by * (1.0 / k);
-  for (int k = MOMENTS - 1; k > 0; k--)
+  double shares[WINDOW_MOMENTS] = {1.0};  // by^k / k!
+  for (int k = 1; k < WINDOW_MOMENTS; k++) shares[k] = shares[k - 1] * by * (1.0 / k);
+  for (int k = WINDOW_MOMENTS - 1; k > 0; k--)
     for (int back = 1; back <= k; back++) moments[k] += shares[back] * moments[k - back];
 }
 
@@ -178,7 +178,7 @@ struct CellStep {
   const CellCourse &course;       // without force, from the start on
   double length;
   Vector<GAUSS> force, places;
-  double moments[MOMENTS];        // integrals of the force against (1 - s)^m over the step
+  double moments[WINDOW_MOMENTS];        // integrals of the force against (1 - s)^m over the step
   double after[2 * NUMBERS];
 
   // Tries it; its misfit over what is allowed.
@@ -196,7 +196,7 @@ struct CellStep {
     double size = larger(larger(cell.size, magnitude(cell.at[P])), largest(magnitude(free))) + NOTHING_MOVES;
     double close = size * larger(CLOSE_PLACE * tolerance, CLOSEST_PLACE), first = kind.power(cell.at[P]);
     if (!settle(free, weight, close, first)) return INFINITE;
-    for (int m = 0; m < MOMENTS; m++) moments[m] = total(Vector<GAUSS>::load(shapes.ends[m]) * force);
+    for (int m = 0; m < WINDOW_MOMENTS; m++) moments[m] = total(Vector<GAUSS>::load(shapes.ends[m]) * force);
     course.place(after, length);
     for (int n = 0; n < 2 * NUMBERS; n++) add_shares(n, [&](double factor, int m) { after[n] += factor * moments[m]; });
     double before = total(Vector<GAUSS>::load(shapes.at_start) * force) - first;
@@ -219,7 +219,7 @@ struct CellStep {
   // Calls add(factor, m) with what an integral of the force against (t - s)^m adds to a number of the motion.
   template <class Add> void add_shares(int number, const Add &add) const {
     double factor = length;
-    for (int m = 0; m < MOMENTS; m++) {
+    for (int m = 0; m < WINDOW_MOMENTS; m++) {
       add(factor * kind.struck[m][number], m);
       factor *= kind.tables.collision.fastest * length;
     }
@@ -323,7 +323,7 @@ class ChainRun {
     Tables &t = k.tables;
     fill_body(t, s);
     t.collision.fastest = m.fastest, t.collision.shapes = m.collisions;
-    double powers[MOMENTS][WIDE][WIDE];
+    double powers[WINDOW_MOMENTS][WIDE][WIDE];
     fill_series(powers, k.struck, m.fastest, s, Drive{});
     __builtin_memcpy(t.collision.struck, k.struck, sizeof t.collision.struck);
     if (s.law == POWERS) k.power = power_force(of.power);
@@ -403,7 +403,7 @@ class ChainRun {
     for (Rows &each : at.heard)
       for (Row row : each.of) __builtin_memset(row + first - BLOCK, 0, size_t(last - first + 2 * BLOCK) * sizeof(double));
     int q = 0, v = 1, next = 2;
-    for (int k = MOMENTS - 1; k >= 0; k--) {
+    for (int k = WINDOW_MOMENTS - 1; k >= 0; k--) {
       accelerate(at.heard[q], at.heard[v], 1.0, 0.0, 1.0, at.heard[next], first, last);
       for (int64_t n = 0; n < followed; n++) {
         int64_t i = at.busy[n];
@@ -527,7 +527,7 @@ class ChainRun {
         n++;
         if (m.watch != WATCH_PEAKS_AND_LINES) continue;
         Phasor sum{0.0, 0.0};
-        for (int k = MOMENTS - 1; k >= 0; k--)
+        for (int k = WINDOW_MOMENTS - 1; k >= 0; k--)
           sum = sum * Phasor{0.0, 2.0 * PI * m.drive.frequency} + Phasor{at.now[i].moments[k], 0.0};
         sum = sum * end;
         m.lines.at[2 * i] += sum.re, m.lines.at[2 * i + 1] += sum.im;
@@ -681,13 +681,13 @@ class ChainRun {
   // Adds a force whose integral against (1 - s)^k over its `length` is moment(k), and which ended `ago`.
   template <class Moment>
   void add_impulse(CellMotion &c, double side, double length, double ago, int count, const Moment &moment) const {
-    double added[MOMENTS] = {}, factor = side * length;
+    double added[WINDOW_MOMENTS] = {}, factor = side * length;
     for (int k = 0; k < count; k++) {
       added[k] = factor * moment(k);
       factor *= length * (1.0 / (k + 1));
     }
     age(added, ago);
-    for (int k = 0; k < MOMENTS; k++) c.moments[k] += added[k];
+    for (int k = 0; k < WINDOW_MOMENTS; k++) c.moments[k] += added[k];
   }
 
   Outcome press(CellMotion &c, const double *force, double &tau, double until, const Tables &t, Observer &observer) const {
@@ -726,7 +726,7 @@ class ChainRun {
       for (int i = 0; i < j; i++) passed += STAGE_WEIGHTS[j][i] * steps.stages[i][TIME];
       double left = limit - (steps.point[TIME] + h * passed);
       double share = steps.rates.side * h * END_WEIGHTS[j] * w * steps.rates.force(w, r);
-      for (int k = 0; k < MOMENTS; k++) {
+      for (int k = 0; k < WINDOW_MOMENTS; k++) {
         c.moments[k] += share;
         share *= left * (1.0 / (k + 1));
       }
@@ -753,7 +753,7 @@ class ChainRun {
       observer.record.peak_x = step.peak(observer.record.peak_x, AT_X, c);
       observer.record.peak_p = step.peak(observer.record.peak_p, P, c);
     }
-    add_impulse(c, 1.0, length, left - length, MOMENTS, [&](int k) { return step.moments[k]; });
+    add_impulse(c, 1.0, length, left - length, WINDOW_MOMENTS, [&](int k) { return step.moments[k]; });
     for (int n = 0; n < 2 * NUMBERS; n++) c.at[n] = step.after[n];
     c.size = larger(magnitude(c.at[P]), CELL_FADING * c.size);
     return length;
