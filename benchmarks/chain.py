@@ -50,14 +50,6 @@ def lively(cells):
     return np.random.default_rng(3).normal(size=(cells, 6)) * np.repeat([2e-5, 0.1], 3)
 
 
-def report_first_use():
-    """Compile, or load what is cached."""
-    start = time.process_time()
-    integrate_chain(chain_of(gong2025(), 1), PERIODIC, 0.01)
-    print(f"first use of the chain's kernels: {time.process_time() - start:.1f} s")
-    integrate(gong2025(), PERIODIC, 0.01)
-
-
 def slope(lengths, costs):
     """Exponent of the power law through the points."""
     return np.polyfit(np.log(lengths), np.log(costs), 1)[0]
@@ -161,7 +153,6 @@ def report_exponents():
 
 
 if __name__ == "__main__":
-    report_first_use()
     report_one_cell()
     report_watching()
     for level in (Accuracy.STANDARD, Accuracy.REFERENCE):

@@ -441,9 +441,8 @@ bool is_usable(const CellKind &kind, const ChainMotion &chain) {
 
 bool has_cells(const ChainMotion &chain) {
   int64_t cells = chain.kind_of.size, kinds = chain.kinds.size / KIND_SIZE;
-  if (!has_columns(chain.kinds, KIND_SIZE) || !is_lent(chain.kind_of) || cells < 1 || cells > MOST_CELLS || kinds < 1 ||
-      kinds > cells || !is_table(chain.states, cells, CELL_SIZE))
-    return false;
+  if (!has_columns(chain.kinds, KIND_SIZE) || !is_lent(chain.kind_of) || cells < 1 || cells > MOST_CELLS) return false;
+  if (kinds < 1 || kinds > cells || !is_table(chain.states, cells, CELL_SIZE)) return false;
   for (int64_t k = 0; k < kinds; k++)
     if (!is_usable(reinterpret_cast<const CellKind *>(chain.kinds.at)[k], chain)) return false;
   for (int64_t i = 0; i < cells; i++) {
@@ -459,8 +458,8 @@ bool has_windows(const ChainMotion &chain) {
   if (!is_lent(chain.windows) || chain.windows.size < 1 || !has_size(chain.clashes, chain.windows.size)) return false;
   for (int64_t level = 0; level < chain.windows.size; level++) {
     double window = chain.windows.at[level], clash = chain.clashes.at[level];
-    if (!is_positive(window) || !(window * chain.fastest <= LONGEST_WINDOW) || !(clash >= 0.0 && clash < double(MOST_CELLS)))
-      return false;
+    if (!is_positive(window) || !(window * chain.fastest <= LONGEST_WINDOW)) return false;
+    if (!(clash >= 0.0 && clash < double(MOST_CELLS))) return false;
   }
   return is_positive(chain.fastest) && is_count(chain.windows_left, MOST_WINDOWS);
 }
@@ -468,17 +467,20 @@ bool has_windows(const ChainMotion &chain) {
 bool is_usable(const ChainMotion &chain) {
   int64_t cells = chain.kind_of.size;
   if (!has_cells(chain) || !has_windows(chain) || !is_tolerance(chain.tolerance)) return false;
-  bool has_clock = magnitude(chain.until) < LATEST && magnitude(chain.clock_high) < LATEST && is_finite(chain.clock_low);
+  bool has_clock = magnitude(chain.until) < LATEST && magnitude(chain.clock_high) < LATEST &&
+                   is_finite(chain.clock_low);
   bool has_drive = is_positive(chain.drive.frequency) && is_finite_phasor(chain.drive.start) &&
                    is_finite_phasor(chain.drive.force);
   bool has_pieces = has_columns(chain.pieces, PIECE_TERMS) &&
                     (chain.pieces.size == 0 || (is_positive(chain.piece_length) && is_finite(chain.piece_start)));
-  bool has_samples = has_columns(chain.samples, 6 * cells) && is_count(chain.samples_kept, chain.samples.size / (6 * cells)) &&
-                     is_finite(chain.start) && (chain.samples.size == 0 || is_positive(chain.sample_rate));
+  bool has_samples = has_columns(chain.samples, 6 * cells) &&
+                     is_count(chain.samples_kept, chain.samples.size / (6 * cells)) && is_finite(chain.start) &&
+                     (chain.samples.size == 0 || is_positive(chain.sample_rate));
   bool has_impacts = is_lent(chain.impact_times) && has_size(chain.impact_cells, chain.impact_times.size) &&
                      is_count(chain.impacts, chain.impact_times.size);
-  return has_clock && has_drive && has_pieces && has_samples && has_impacts && chain.watch >= 0 && chain.watch < WATCHES &&
-         is_table(chain.peaks, cells, 2) && is_table(chain.lines, cells, 2);
+  bool has_watch = chain.watch >= 0 && chain.watch < WATCHES;
+  bool has_sums = is_table(chain.peaks, cells, 2) && is_table(chain.lines, cells, 2);
+  return has_clock && has_drive && has_pieces && has_samples && has_impacts && has_watch && has_sums;
 }
 
 // Decides which cells of a chain start on a stop.
@@ -499,7 +501,8 @@ VIBENCH_API int64_t vibench_close_loop(LoopCables *loop) {
 
 // Numbers of the memory that a chain lends.
 VIBENCH_API int64_t vibench_chain_memory(int64_t cells, int64_t kinds) {
-  return cells > 0 && cells <= MOST_CELLS && kinds > 0 && kinds <= cells ? chain_memory(cells, kinds) : int64_t(REFUSED);
+  bool is_chain = cells > 0 && cells <= MOST_CELLS && kinds > 0 && kinds <= cells;
+  return is_chain ? chain_memory(cells, kinds) : int64_t(REFUSED);
 }
 
 // Each returns what its function does, or REFUSED.

@@ -1,8 +1,8 @@
 // A chain of cells: specimens whose m0 hang on one another (decision 0011). It advances window by window. In a window
-// the motion without contact forces is one Taylor polynomial for each displacement, from eq. 1 of all cells. A cell that
-// may touch is followed in its own time, as a specimen whose m0 is pushed by the known motion of its neighbours. What its
-// force F does to the chain enters at the window's end, by the integrals M_k of F(t) (end - t)^k / k!: with the chain's
-// equations s' = A s + b F it is sum_k A^k b M_k. Costs of a window grow with the number of cells.
+// the motion without contact forces is one Taylor polynomial for each displacement, from eq. 1 of all cells. A cell
+// that may touch is followed in its own time, as a specimen whose m0 is pushed by the known motion of its neighbours.
+// What its force F does to the chain enters at the window's end, by the integrals M_k of F(t) (end - t)^k / k!: with
+// the chain's equations s' = A s + b F it is sum_k A^k b M_k. The cost of a window grows with the number of cells.
 #pragma once
 #include "power_law.hpp"
 
@@ -395,13 +395,14 @@ class ChainRun {
       }
   }
 
-  // Adds sum_k A^k b M_k of the cells that are followed, summed as Horner does. A state (q, v) becomes (v, acceleration).
+  // Adds sum_k A^k b M_k of the cells that are followed, summed as Horner does: (q, v) becomes (v, acceleration).
   void add_forces(Rows (&there)[2], const CellMotion *cells) {
     if (followed == 0) return;
     int64_t first = larger(int64_t(0), (at.busy[0] / BLOCK - 1) * BLOCK);
     int64_t last = smaller(at.padded, (at.busy[followed - 1] / BLOCK + 2) * BLOCK);
     for (Rows &each : at.heard)
-      for (Row row : each.of) __builtin_memset(row + first - BLOCK, 0, size_t(last - first + 2 * BLOCK) * sizeof(double));
+      for (Row row : each.of)
+        __builtin_memset(row + first - BLOCK, 0, size_t(last - first + 2 * BLOCK) * sizeof(double));
     int q = 0, v = 1, next = 2;
     for (int k = WINDOW_MOMENTS - 1; k >= 0; k--) {
       accelerate(at.heard[q], at.heard[v], 1.0, 0.0, 1.0, at.heard[next], first, last);
@@ -413,11 +414,9 @@ class ChainRun {
       int free = q;
       q = v, v = next, next = free;
     }
-    for (int n = 0; n < NUMBERS; n++)
-      for (int64_t i = first; i < last; i += BLOCK) {
-        (Vector<BLOCK>::load(there[0].of[n] + i) + Vector<BLOCK>::load(at.heard[q].of[n] + i)).store(there[0].of[n] + i);
-        (Vector<BLOCK>::load(there[1].of[n] + i) + Vector<BLOCK>::load(at.heard[v].of[n] + i)).store(there[1].of[n] + i);
-      }
+    for (int order = 0; order < 2; order++)
+      for (int n = 0; n < NUMBERS; n++)
+        for (int64_t i = first; i < last; i++) there[order].of[n][i] += at.heard[order == 0 ? q : v].of[n][i];
   }
 
   // Writes the base's push as a polynomial in the time from now on; returns how long it holds [s].
@@ -496,7 +495,8 @@ class ChainRun {
       const Specimen &s = at.tables[kind_of(i)].tables.specimen;
       if (!(at.bounds[P][i] < LARGEST_BOUND)) return false;
       double margin = at.bounds[P][i] * full_length * full_length / 8.0;
-      double low = margin - s.lower_gap, high = s.upper_gap - margin, p = at.terms[0].of[P][i], end = at.end[0].of[P][i];
+      double low = margin - s.lower_gap, high = s.upper_gap - margin;
+      double p = at.terms[0].of[P][i], end = at.end[0].of[P][i];
       bool is_clear = low < p && p < high && low < end && end < high;
       if (at.now[i].contact.side != 0.0 || s.law == POWERS || !is_clear) at.busy[followed++] = i;
     }
@@ -690,7 +690,8 @@ class ChainRun {
     for (int k = 0; k < WINDOW_MOMENTS; k++) c.moments[k] += added[k];
   }
 
-  Outcome press(CellMotion &c, const double *force, double &tau, double until, const Tables &t, Observer &observer) const {
+  Outcome press(CellMotion &c, const double *force, double &tau, double until, const Tables &t,
+                Observer &observer) const {
     const Specimen &s = t.specimen;
     auto with = [&](const auto &law) { return press_on(c, law, force, tau, until, t, observer); };
     if (s.law == HERTZ) return with(HertzForce{s.contact_stiffness});
@@ -734,7 +735,8 @@ class ChainRun {
   }
 
   // One step under a power law; returns its length, or zero where none could be made.
-  double power_step(CellMotion &c, const CellCourse &course, double left, KindTables &kind, Observer &observer) const {
+  double power_step(CellMotion &c, const CellCourse &course, double left, KindTables &kind,
+                    Observer &observer) const {
     const Tables &t = kind.tables;
     double wish = c.power_step > 0.0 ? c.power_step : full_length, length = smaller(wish, left), misfit = INFINITE;
     double p = c.at[P], outward = larger(p >= 0.0 ? c.at[P_RATE] : -c.at[P_RATE], 0.0);

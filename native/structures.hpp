@@ -444,8 +444,8 @@ STRUCTURE(ChainMotion,
   Numbers windows;             // [levels]: lengths of windows, long to short [s]
   Numbers clashes;             // [levels]: cells at most so far apart are not both followed in such a window
   Drive drive;
-  Numbers pieces;              // [pieces][8]: instead of the drive, the base's force on the first m0 [N] in powers of the
-                               // time since each piece began; or of no size
+  Numbers pieces;              // [pieces][8]: instead of the drive, the force of the base on the first m0 [N], in
+                               // powers of the time since each piece began; or of no size
   double piece_start, piece_length;  // [s]
   const CollisionShapes *collisions;
   const PowerShapes *power_shapes;

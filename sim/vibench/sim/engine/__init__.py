@@ -1,4 +1,4 @@
-"""The native engine, compiled from the C++ in native/: motions, their derivatives, filters, the virtual rig.
+"""The native engine, compiled from the C++ in native/: motions, chains, filters, the virtual rig.
 
 `NativeRun` follows one motion of a specimen under a harmonic drive. The library is chosen by processor and
 loaded once; first it must answer a known scene (docs/decisions/0077-native-engine.md). Python prepares what
