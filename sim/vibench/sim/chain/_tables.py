@@ -130,7 +130,7 @@ def cross_answers(between: Table, window: float) -> Vector:
     """
     own = between[1, REACH]
     relative = np.max(_answer_within(between, window) / own, axis=1)
-    return np.maximum(relative[REACH:], relative[REACH::-1])
+    return np.asarray(np.maximum(relative[REACH:], relative[REACH::-1]))
 
 
 def _answer_within(coefficients: Table, window: float) -> Table:
