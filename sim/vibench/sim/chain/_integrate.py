@@ -106,11 +106,11 @@ def integrate_chain(
     check_times(duration_s, start_time_s, sample_rate_hz)
     if chain.size == 1:
         start = None if initial_state is None else start_motion(chain, initial_state)[0]
-        run = integrate(
+        alone = integrate(
             chain.cells[0], drive, duration_s, accuracy, start, sample_rate_hz,
             start_time_s=start_time_s, max_impact_rate_hz=max_impact_rate_hz,
         )  # fmt: skip
-        return _of_one(run)
+        return _of_one(alone)
     motion, tables = start_motion(chain, initial_state), chain_tables(chain, drive, accuracy)
     check_work(chain, duration_s, longest_window_s(tables, drive))
     count = 0 if sample_rate_hz is None else math.floor(duration_s * sample_rate_hz * (1.0 + ROUNDING)) + 1

@@ -109,7 +109,7 @@ def chain_response(
             outcome = run.advance(until)
     end = cmath.exp(-1j * (2.0 * math.pi * drive.frequency_hz * duration_s + drive.phase_rad))
     # Over whole periods the drive's term is where it began.
-    change = (run.motion - line_start) * end
+    change = np.asarray((run.motion - line_start) * end, dtype=np.complex128)
     lines = _lines(chain, drive, run.forces, _in_order(change), line_s)
     void = 1.0 if outcome is Outcome.REACHED_END else math.nan
     impacts = run.impact_cells
@@ -192,6 +192,6 @@ def _lines(chain: Chain, drive: Harmonic, forces: Complex, change: Complex, line
     right[1::MASSES_PER_CELL] -= forces
     right[2::MASSES_PER_CELL] += forces
     stiffness = chain.stiffness_matrix + 1j * omega * damping - omega**2 * np.diag(masses)
-    moved = np.linalg.solve(stiffness, right) * (2.0 / line_s)
-    by_cell = moved.reshape(chain.size, MASSES_PER_CELL)
+    lines = np.linalg.solve(stiffness, right) * (2.0 / line_s)
+    by_cell = lines.reshape(chain.size, MASSES_PER_CELL)
     return np.column_stack([by_cell, by_cell[:, 1] - by_cell[:, 2]])
