@@ -15,9 +15,11 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-from vibench.virtual_rig.generator import AFG1022, ErrorCode, Reply
-from vibench.virtual_rig.generator._scpi_status import Status
-from vibench.virtual_rig.usb import UsbTmcInstrument, plug_in
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.scpi_instrument import Reply
+from vibench.virtual_rig.generator.scpi_status import ErrorCode, Status
+from vibench.virtual_rig.usb.bus import plug_in
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 ADDRESS = re.compile(r"0x0699::0x0353::(\w+)")
 LONGEST = 70

@@ -168,9 +168,10 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
     from PySide6.QtCore import QEventLoop, QTimer  # noqa: PLC0415 - only where there is a window
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
-    from vibench.gui.page import AppContext, Settings  # noqa: PLC0415
-    from vibench.gui.window._page_catalogue import PAGES  # noqa: PLC0415
-    from vibench.gui.window._window import Window  # noqa: PLC0415
+    from vibench.gui.page.app_context import AppContext  # noqa: PLC0415
+    from vibench.gui.page.settings import Settings  # noqa: PLC0415
+    from vibench.gui.window.page_catalogue import PAGES  # noqa: PLC0415
+    from vibench.gui.window.window import Window  # noqa: PLC0415
 
     app = QApplication(["vibench"])
     window = Window(AppContext(Settings(folder.parent / "window.ini")), PAGES)

@@ -38,15 +38,18 @@ from vibench.analysis import (
     analyse_files,
     update_model,
 )
-from vibench.analysis.frequency_response import (
+from vibench.analysis.frequency_response.distortion import scatters_beyond_noise
+from vibench.analysis.frequency_response.periodic import PeriodicSums
+from vibench.analysis.frequency_response.results import (
     FrequencyResponseSettings,
-    PeriodicSums,
     converted_frequency_response,
-    scatters_beyond_noise,
 )
 from vibench.analysis.hidden_motion import Hidden
-from vibench.analysis.model_updating import Assumption, Parameter, UpdatedSpecimen, fit_specimen
-from vibench.analysis.signals import Quantity
+from vibench.analysis.model_updating.parameters import Parameter
+from vibench.analysis.model_updating.specimen_fit import fit_specimen
+from vibench.analysis.model_updating.suspects import Assumption
+from vibench.analysis.model_updating.updated_specimen import UpdatedSpecimen
+from vibench.analysis.signals.quantity import Quantity
 from vibench.sim import Specimen, base_transmissibility, gong2025
 
 Complexes = NDArray[np.complex128]

@@ -34,8 +34,8 @@ from vibench.acquisition import (
     open_recording,
     run_measurement,
 )
-from vibench.acquisition.control import _continuation_controller
-from vibench.acquisition.excitation import BaseLevel
+from vibench.acquisition.control import continuation_controller as _continuation_controller
+from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.plan import BranchContinuation
 from vibench.acquisition.recording import (
     BranchEndNote,
@@ -52,24 +52,17 @@ from vibench.acquisition.rig import (
     shaker_of,
     specimen_of,
 )
-from vibench.analysis.figures._style import MEASURED, SIMULATED, legend_above, new_figure, styled
+from vibench.analysis.figures.style import MEASURED, SIMULATED, legend_above, new_figure, styled
 from vibench.sim import Specimen
-from vibench.sim.feedback import (
-    Begin,
-    LoopTiming,
-    SampledPlant,
-    branch_multipliers,
-    designed_law,
-    impact_branch,
-)
-from vibench.sim.periodic import (
-    Branch,
-    FrequencyPath,
-    balance,
-    balance_branch_within,
-    spring_of,
-    structure_of,
-)
+from vibench.sim.feedback.branch import Begin, branch_multipliers, impact_branch
+from vibench.sim.feedback.law import designed_law
+from vibench.sim.feedback.plant import LoopTiming, SampledPlant
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.branch import Branch
+from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.drive_path import FrequencyPath
+from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
 
 NOISES = (

@@ -27,7 +27,7 @@ from vibench.acquisition.recording import (
 )
 from vibench.analysis import analyse
 from vibench.analysis.live import RESPONSE
-from vibench.analysis.recordings import BASE, DRIVE
+from vibench.analysis.recordings.channels import BASE, DRIVE
 
 RATE_HZ = 51_200
 BLOCK = 1 << 19

@@ -14,8 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from vibench.sim import Accuracy, Harmonic, gong2025, lyapunov_exponent
-from vibench.sim.engine import NativeRun, RunRecord
-from vibench.sim.exponents import Precision
+from vibench.sim.engine.run import NativeRun, RunRecord
+from vibench.sim.exponents.lyapunov import Precision
 
 REPEATS = 5
 COST_S = 10.0

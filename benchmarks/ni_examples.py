@@ -30,7 +30,9 @@ from nidaqmx import GrpcSessionOptions
 
 from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.daqmx import DaqServer, WallPace, catalogue_with
+from vibench.virtual_rig.daqmx.devices import catalogue_with
+from vibench.virtual_rig.daqmx.rig import WallPace
+from vibench.virtual_rig.daqmx.server import DaqServer
 
 PRODUCTS = ("USB-4431", "USB-6211")
 PATIENCE_S = 15.0

@@ -17,9 +17,9 @@ import numpy as np
 
 import vibench.cli.blas_threads  # noqa: F401 - one thread, as for the command, before numpy works
 from vibench.analysis import motion_verdict
-from vibench.analysis.chaos import Points
+from vibench.analysis.chaos.period import Points
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.motion import stroboscopic_section
+from vibench.sim.motion.poincare import stroboscopic_section
 
 DRIVE_HZ = 260.0
 NOISE = 1e-5

@@ -18,16 +18,11 @@ from scipy.linalg import solve_discrete_are
 
 from vibench.acquisition.rig import amplifier_of, load_rig, shaker_of, specimen_of
 from vibench.sim import Harmonic
-from vibench.sim.feedback import (
-    Begin,
-    LawWeights,
-    LoopTiming,
-    SampledPlant,
-    branch_multipliers,
-    designed_law,
-    impact_branch,
-)
-from vibench.sim.periodic import PeriodMap, spring_of
+from vibench.sim.feedback.branch import Begin, branch_multipliers, impact_branch
+from vibench.sim.feedback.law import LawWeights, designed_law
+from vibench.sim.feedback.plant import LoopTiming, SampledPlant
+from vibench.sim.periodic.period_map import PeriodMap
+from vibench.sim.periodic.restoring_force import spring_of
 
 SUBSTEPS = 40
 """Of a sample: contacts are shorter."""

@@ -20,7 +20,8 @@ from scipy.io import loadmat
 
 from vibench.acquisition import load_toml, open_recording
 from vibench.analysis.exchange import ImportMapping, import_recording
-from vibench.analysis.tones import fitted_sine, steady_phase, tracked_orders
+from vibench.analysis.tones.order_tracking import tracked_orders
+from vibench.analysis.tones.sine_fit import fitted_sine, steady_phase
 
 EXCERPTS = Path(__file__).parents[1] / "tests/analysis/exchange/flutter_rig"
 NEAR_HZ, PERIODS = 2.45, 5

@@ -59,7 +59,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import KnobSheet, Rig, save_knob_sheet
-from vibench.acquisition.stopping import heeded_signals, signal_name
+from vibench.acquisition.stopping.stop_on_signal import heeded_signals, signal_name
 from vibench.virtual_rig import VirtualRig
 
 VIBENCH = str(Path(sys.executable).with_name("vibench"))
@@ -433,10 +433,11 @@ def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
     os.environ["QT_QPA_PLATFORM"] = "offscreen"
     from PySide6.QtCore import QTimer  # noqa: PLC0415 - of this subject only
 
-    from vibench.gui.page import AppContext, Settings  # noqa: PLC0415
-    from vibench.gui.window._open_window import application  # noqa: PLC0415
-    from vibench.gui.window._page_catalogue import PAGES  # noqa: PLC0415
-    from vibench.gui.window._window import Window  # noqa: PLC0415
+    from vibench.gui.page.app_context import AppContext  # noqa: PLC0415
+    from vibench.gui.page.settings import Settings  # noqa: PLC0415
+    from vibench.gui.window.open_window import application  # noqa: PLC0415
+    from vibench.gui.window.page_catalogue import PAGES  # noqa: PLC0415
+    from vibench.gui.window.window import Window  # noqa: PLC0415
 
     app = application(["vibench"])
     window = Window(AppContext(Settings(request.folder.with_suffix(".ini"))), PAGES)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement
-from vibench.acquisition.run import Progress
+from vibench.acquisition.run.ending import Progress
 
 ROOT = Path(__file__).resolve().parent.parent
 MINUTE_S = 60.0

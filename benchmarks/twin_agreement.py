@@ -23,7 +23,7 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, WhiteNoise
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import analyse
-from vibench.analysis.results import overlay
+from vibench.analysis.results.campaign_results import overlay
 
 RIG = load_rig(Path(__file__).parents[1] / "hardware_configs" / "virtual_rig.toml")
 DRAWS = 19

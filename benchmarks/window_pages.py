@@ -22,14 +22,15 @@ from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.analysis.simulation import SimulationProgress
-from vibench.analysis.simulation._request import SimulatedPoint
-from vibench.gui.page import AppContext, Settings
-from vibench.gui.pages.compare import ComparePage
-from vibench.gui.pages.files import FilesPage
-from vibench.gui.pages.simulate import SimulatePage
-from vibench.gui.window._event_loop_monitor import EventLoopMonitor
-from vibench.gui.window._open_window import application
+from vibench.analysis.simulation.progress import SimulationProgress
+from vibench.analysis.simulation.request import SimulatedPoint
+from vibench.gui.page.app_context import AppContext
+from vibench.gui.page.settings import Settings
+from vibench.gui.pages.compare.compare_page import ComparePage
+from vibench.gui.pages.files.files_page import FilesPage
+from vibench.gui.pages.simulate.simulate_page import SimulatePage
+from vibench.gui.window.event_loop_monitor import EventLoopMonitor
+from vibench.gui.window.open_window import application
 
 SIZE = (1400, 900)
 SPANS_S = (600.0, 60.0, 6.0, 2.4, 0.6, 0.06)

@@ -18,11 +18,11 @@ ROOT = Path(__file__).resolve().parent.parent
 STARTED = """
 import sys, time
 from pathlib import Path
-from vibench.gui.window._open_window import application
-from vibench.gui.page import AppContext
-from vibench.gui.window._page_catalogue import PAGES
-from vibench.gui.page import Settings
-from vibench.gui.window._window import Window
+from vibench.gui.window.open_window import application
+from vibench.gui.page.app_context import AppContext
+from vibench.gui.window.page_catalogue import PAGES
+from vibench.gui.page.settings import Settings
+from vibench.gui.window.window import Window
 app = application(["vibench"])
 window = Window(AppContext(Settings(Path(sys.argv[1]))), PAGES)
 window.show()

@@ -26,13 +26,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from vibench.sim import Accuracy, PowerLaw
-from vibench.sim.accuracy_benchmark import MOTIONS
-from vibench.sim.accuracy_benchmark._figures import Regime
-from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
-from vibench.sim.accuracy_benchmark._measuring import settled_state
-from vibench.sim.accuracy_benchmark._plain_equations import Place, law_of, numbers_of, rates_at
-from vibench.sim.kernels import Floats
-from vibench.sim.scene._followed_run import FollowedRun
+from vibench.sim.accuracy_benchmark.figures import MOTIONS, Regime
+from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
+from vibench.sim.accuracy_benchmark.measuring import settled_state
+from vibench.sim.accuracy_benchmark.plain_equations import Place, law_of, numbers_of, rates_at
+from vibench.sim.kernels.arrays import Floats
+from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.study import software
 
 PERIODIC_S, CHAOTIC_S = 0.2, 0.03

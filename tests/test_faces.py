@@ -109,7 +109,7 @@ def test_nobody_reaches_past_a_face():
     ("room", "package", "target", "names"),
     [
         ("vibench.analysis.sine", "vibench.analysis", "vibench.sim.flight", ["fly"]),
-        ("vibench.analysis.sine", "vibench.analysis", "vibench.analysis.chaos._verdict", ["motion_verdict"]),
+        ("vibench.analysis.sine", "vibench.analysis", "vibench.analysis.chaos.verdict", ["motion_verdict"]),
         ("vibench.analysis.sine", "vibench.analysis", "vibench.analysis.chaos", ["_verdict"]),
     ],
 )
@@ -166,7 +166,7 @@ def loaded_by(program):
         ("from vibench.virtual_rig import plug_in_remote", {"numba", "nidaqmx"}),
         ("import vibench.cli", {"numpy", "typer"}),
         (
-            "import vibench.gui.window._page_catalogue",
+            "import vibench.gui.window.page_catalogue",
             {"pyvisa", "nidaqmx", "grpc", "scipy.signal", "scipy.stats"},
         ),
     ],

@@ -52,7 +52,7 @@ def windows() -> ModuleType:
     sys.modules["msvcrt"] = runtime
     os.O_BINARY = 0
     place = Path(vibench.sim.__file__).parent / "operating_system" / "_windows.py"
-    spec = importlib.util.spec_from_file_location("vibench.sim.operating_system._windows", place)
+    spec = importlib.util.spec_from_file_location("vibench.sim.operating_system.windows", place)
     module = importlib.util.module_from_spec(spec)
     here, sys.platform = sys.platform, "win32"
     spec.loader.exec_module(module)
@@ -74,7 +74,7 @@ sees_locks = pytest.mark.skipif(
 
 def become_windows() -> None:
     """Put the Windows implementation in the other's place, and take away what Windows lacks."""
-    sys.modules["vibench.sim.operating_system._posix"] = windows()
+    sys.modules["vibench.sim.operating_system.posix"] = windows()
     for name in POSIX_ONLY:
         if hasattr(os, name):
             delattr(os, name)

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from scipy.integrate import RK45
 
 from vibench.sim import Harmonic, Specimen
-from vibench.sim.accuracy_benchmark import Law, Place, law_of, numbers_of, rates
-from vibench.sim.kernels import Floats, kernel
+from vibench.sim.accuracy_benchmark.plain_equations import Law, Place, law_of, numbers_of, rates
+from vibench.sim.kernels.arrays import Floats
+from vibench.sim.kernels.compile import kernel
 
 APART_M = 1e-11
 """Distance of the neighbour that gives an exponent; far below any indentation, far above rounding."""

@@ -25,9 +25,9 @@ from vibench.analysis import (
     transmissibility,
     uncertainty,
 )
-from vibench.analysis.model_updating import FittedValue, Parameter
+from vibench.analysis.model_updating.parameters import FittedValue, Parameter
 from vibench.analysis.tables import Labelled, holds_array, unit_of
-from vibench.analysis.uncertainty import Budget
+from vibench.analysis.uncertainty.budget import Budget
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
 NOT_ROOMS_OF_RESULTS = {"exchange", "figures", "simulation"}

@@ -3,7 +3,7 @@
 import pytest
 import typer
 
-from vibench.analysis.results import AnalysisFailure, CampaignResults, FailedStep
+from vibench.analysis.results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
 from vibench.cli.analyse import complain_about
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import AcquisitionError, open_bench, run_measurement
-from vibench.acquisition.check import check_bench
+from vibench.acquisition.check.admission import check_bench
 from vibench.acquisition.drivers import AFG1022_MODEL, DaqmxDigitizer, FilePlayer
 from vibench.acquisition.errors import BrokenPromise, DataLost
 from vibench.acquisition.instruments import Block, SensorFacts

@@ -13,7 +13,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from vibench.acquisition import shipped_folder
-from vibench.acquisition.host._extras import EXTRAS
+from vibench.acquisition.host.extras import EXTRAS
 from vibench.cli.__main__ import COMMANDS
 from vibench.cli.doctor import VARIABLES, libraries
 from vibench.cli.exit_code import ExitCode

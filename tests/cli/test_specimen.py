@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import Verdict, open_bench, shipped
-from vibench.acquisition.check import bench_report
+from vibench.acquisition.check.bench_report import bench_report
 from vibench.acquisition.rig import load_rig
-from vibench.analysis.recordings import specimen_of
+from vibench.analysis.recordings.facts import specimen_of
 from vibench.sim import FixedDuration, Harmonic, Scene, load_specimen, shipped_specimens, solve_scene
 from vibench.sim.study import Study, open_study
 

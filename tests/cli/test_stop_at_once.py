@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.stopping import Program, announced_programs
+from vibench.acquisition.stopping.program import Program, announced_programs
 
 from .test_stop_all import driving, own_state  # noqa: F401 - a fixture
 

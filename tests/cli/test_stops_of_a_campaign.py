@@ -18,8 +18,8 @@ from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.engine import Engine, EngineClient, EngineError, EngineState, the_engine
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run import _drive_guard as drive_guard
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.run import drive_guard
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 from vibench.cli.exit_code import ExitCode
 
 RIG = (Path(__file__).resolve().parents[2] / "hardware_configs" / "virtual_rig.toml").read_text()

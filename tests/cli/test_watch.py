@@ -26,7 +26,7 @@ from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._announcement import announced
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
-from vibench.acquisition.stopping import Program, announced_programs
+from vibench.acquisition.stopping.program import Program, announced_programs
 
 ROOT = Path(__file__).resolve().parents[2]
 PAUSE, LOOK_S = Event(), 0.01

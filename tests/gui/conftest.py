@@ -8,11 +8,12 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from vibench.gui.page import AppContext, Settings
-from vibench.gui.window._event_loop_monitor import BOUND_S
-from vibench.gui.window._open_window import application
-from vibench.gui.window._page_catalogue import PAGES
-from vibench.gui.window._window import Window
+from vibench.gui.page.app_context import AppContext
+from vibench.gui.page.settings import Settings
+from vibench.gui.window.event_loop_monitor import BOUND_S
+from vibench.gui.window.open_window import application
+from vibench.gui.window.page_catalogue import PAGES
+from vibench.gui.window.window import Window
 
 YARDSTICK_S = 0.0054
 """What `yardstick` takes where the bound was set; a slower processor is given as much more."""

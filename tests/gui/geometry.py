@@ -19,13 +19,15 @@ from PySide6.QtWidgets import (
     QTabWidget,
 )
 
-from vibench.gui.page import AppContext, Settings
-from vibench.gui.widgets import Notice, NoticeKind, Tone
-from vibench.gui.window import StateIndicator
-from vibench.gui.window._open_window import application
-from vibench.gui.window._page_catalogue import PAGES
-from vibench.gui.window._status_line import StatusField
-from vibench.gui.window._window import Window
+from vibench.gui.page.app_context import AppContext
+from vibench.gui.page.settings import Settings
+from vibench.gui.widgets.notice import Notice, NoticeKind
+from vibench.gui.widgets.theme import Tone
+from vibench.gui.window.banner import StateIndicator
+from vibench.gui.window.open_window import application
+from vibench.gui.window.page_catalogue import PAGES
+from vibench.gui.window.status_line import StatusField
+from vibench.gui.window.window import Window
 
 SENTENCE = "Simulating; the first answer waits for the program to be made ready, and says so at length. " * 4
 NAME = "a_recording_whose_name_was_chosen_by_somebody_who_likes_to_say_everything_in_it_" * 2

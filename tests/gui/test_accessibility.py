@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from vibench.gui.widgets import DARK, LIGHT
+from vibench.gui.widgets.theme import DARK, LIGHT
 
 FIELDS = (QLineEdit, QAbstractSpinBox, QComboBox)
 NAMED_BY_TEXT = (QAbstractButton, QLabel)

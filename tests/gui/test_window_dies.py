@@ -21,8 +21,8 @@ from vibench.acquisition.engine import (
     left_alone,
 )
 from vibench.acquisition.recording import RecordingState
-from vibench.gui.page._app_context import USUAL_PATIENCE_S
-from vibench.gui.widgets import RUN
+from vibench.gui.page.app_context import USUAL_PATIENCE_S
+from vibench.gui.widgets.page_names import RUN
 
 ROOT = Path(__file__).resolve().parents[2]
 SILENT_WITHIN_S = {"SIGKILL": 1.0, "SIGSTOP": USUAL_PATIENCE_S + 1.0}

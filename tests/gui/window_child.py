@@ -8,10 +8,11 @@ from PySide6.QtCore import QTimer
 from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState, Supervision
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
-from vibench.gui.page import AppContext, Settings
-from vibench.gui.window._open_window import application
-from vibench.gui.window._page_catalogue import PAGES
-from vibench.gui.window._window import Window
+from vibench.gui.page.app_context import AppContext
+from vibench.gui.page.settings import Settings
+from vibench.gui.window.open_window import application
+from vibench.gui.window.page_catalogue import PAGES
+from vibench.gui.window.window import Window
 
 DWELL = {"kind": "dwell", "amplitude_vpp": 1.5, "frequency_hz": 260, "settle_s": 0.2, "duration_s": 600}
 PLAN = {

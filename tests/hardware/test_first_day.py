@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.bench import Verdict
-from vibench.acquisition.check import check_bench
+from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.check.admission import check_bench
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.rig import KnobSheet, load_rig
 from vibench.analysis import analyse

@@ -12,7 +12,7 @@ QtWidgets = pytest.importorskip("PySide6.QtWidgets", exc_type=ImportError)
 
 @pytest.fixture
 def robot(qtbot):
-    from vibench.gui.page import Shown
+    from vibench.gui.page.page import Shown
 
     from .robot import Robot
 

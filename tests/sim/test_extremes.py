@@ -26,9 +26,9 @@ from vibench.sim import (
     steady_response,
 )
 from vibench.sim.chain import band_frequencies_hz, chain_of
-from vibench.sim.contact import CVX, STAGES, WIDTH, R, W, step_factor
-from vibench.sim.contact._flow import WORK_ROWS, contact_error
-from vibench.sim.scene import wilson_share
+from vibench.sim.contact.contact import step_factor
+from vibench.sim.contact.flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
+from vibench.sim.scene.shares import wilson_share
 
 pytestmark = pytest.mark.timeout(300)
 """A hang is a failure: the first test compiles, the others take milliseconds."""
@@ -304,7 +304,7 @@ def test_numbers_beyond_all_digits_end_with_an_outcome(contact, size):
 
 @pytest.mark.parametrize("contact", [*LAWS, "linear"])
 def test_a_run_ends_in_a_sentence_when_its_steps_are_used_up(contact, monkeypatch):
-    monkeypatch.setattr("vibench.sim.engine._run.MOST_STEPS", 1_000_000)
+    monkeypatch.setattr("vibench.sim.engine.run.MOST_STEPS", 1_000_000)
     specimen = paper(contact)
     assert integrate(specimen, DRIVE, 1.0).outcome is Outcome.REACHED_END
     run = integrate(specimen, DRIVE, 1000.0)

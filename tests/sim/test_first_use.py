@@ -9,7 +9,8 @@ import pytest
 FIRST_USE = """
 import json, sys
 from vibench.sim import Harmonic, gong2025, integrate, lyapunov_exponent, steady_response
-from vibench.sim.scene import FixedDuration, Scene, solve_scene
+from vibench.sim.scene.scene import FixedDuration, Scene
+from vibench.sim.scene.solve import solve_scene
 
 drive, law = Harmonic(130.0, 20e-6), sys.argv[1]
 steady_response(gong2025(contact=law), drive, duration_s=0.2, window_s=0.1)

@@ -23,8 +23,8 @@ from vibench.sim import (
     spring_of,
     steady_response,
 )
-from vibench.sim.accuracy_benchmark._independent_solution import independent_state
-from vibench.sim.model._stops import Stops
+from vibench.sim.accuracy_benchmark.independent_solution import independent_state
+from vibench.sim.model.stops import Stops
 
 DRIVE = Harmonic(130.0, 20e-6)
 STILL = Harmonic(100.0, 0.0)

@@ -11,7 +11,8 @@ from nidaqmx import GrpcSessionOptions, Task
 
 from vibench.acquisition import ConfigurationError
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.daqmx import DaqServer, Pace
+from vibench.virtual_rig.daqmx.rig import Pace
+from vibench.virtual_rig.daqmx.server import DaqServer
 
 OFFSET_V = 0.5
 LOOPED_BACK = {"Dev1/ai0": "Dev1/ao0", "Dev2/ai0": "Dev2/ao0"}

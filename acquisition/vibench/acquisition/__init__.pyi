@@ -1,22 +1,20 @@
-from .bench import (
-    Bench as Bench,
+from .bench.bench import Bench as Bench, open_bench as open_bench
+from .bench.instrument_list import (
+    InstrumentList as InstrumentList,
+    list_instruments as list_instruments,
+    list_rig_instruments as list_rig_instruments,
+)
+from .bench.result import (
     BenchReport as BenchReport,
     CheckResult as CheckResult,
     Finding as Finding,
-    InstrumentList as InstrumentList,
     Verdict as Verdict,
-    list_instruments as list_instruments,
-    list_rig_instruments as list_rig_instruments,
-    open_bench as open_bench,
 )
 from .campaign import (
     run_campaign as run_campaign,
 )
-from .check import (
-    CheckRule as CheckRule,
-    check_bench as check_bench,
-    last_check as last_check,
-)
+from .check.admission import check_bench as check_bench, last_check as last_check
+from .check.rule import CheckRule as CheckRule
 from .errors import (
     AcquisitionError as AcquisitionError,
     CheckFailed as CheckFailed,
@@ -28,25 +26,26 @@ from .errors import (
     MissingLibrary as MissingLibrary,
     RecordingError as RecordingError,
 )
-from .host import (
-    Beside as Beside,
-    ChosenFrom as ChosenFrom,
-    all_shipped as all_shipped,
-    built_site as built_site,
-    documentation_page as documentation_page,
-    follow_parent as follow_parent,
-    json_schema as json_schema,
-    load_toml as load_toml,
-    named as named,
+from .host.beside import Beside as Beside
+from .host.chosen import ChosenFrom as ChosenFrom
+from .host.documentation import built_site as built_site, documentation_page as documentation_page
+from .host.extras import (
     naming_its_extra as naming_its_extra,
     need_extra as need_extra,
     need_space as need_space,
-    printable as printable,
-    save_toml as save_toml,
-    schema_line as schema_line,
+)
+from .host.follow_parent import follow_parent as follow_parent
+from .host.printable import printable as printable, shortened as shortened
+from .host.schema import json_schema as json_schema, schema_line as schema_line
+from .host.shipped import (
+    all_shipped as all_shipped,
+    named as named,
     shipped as shipped,
     shipped_folder as shipped_folder,
-    shortened as shortened,
+)
+from .host.toml_file import (
+    load_toml as load_toml,
+    save_toml as save_toml,
     toml_text as toml_text,
     validated as validated,
 )
@@ -61,11 +60,6 @@ from .plan import (
 from .recording import (
     open_recording as open_recording,
 )
-from .run import (
-    run_measurement as run_measurement,
-)
-from .stopping import (
-    StopLevel as StopLevel,
-    StopSwitch as StopSwitch,
-    stop_on_signal as stop_on_signal,
-)
+from .run.run_measurement import run_measurement as run_measurement
+from .stopping.stop import StopLevel as StopLevel, StopSwitch as StopSwitch
+from .stopping.stop_on_signal import stop_on_signal as stop_on_signal

@@ -1,77 +1,73 @@
-from .chaos import (
-    MotionVerdict as MotionVerdict,
-    Points as Points,
-    motion_verdict as motion_verdict,
-)
-from .comparison import (
-    AnalysisOptions as AnalysisOptions,
+from .chaos.period import Points as Points
+from .chaos.verdict import MotionVerdict as MotionVerdict, motion_verdict as motion_verdict
+from .comparison.curve import (
     Curve as Curve,
     CurveKind as CurveKind,
     CurveOrigin as CurveOrigin,
     curve_difference as curve_difference,
-    curve_peaks as curve_peaks,
-    readings as readings,
 )
+from .comparison.curve_peaks import curve_peaks as curve_peaks, readings as readings
+from .comparison.options import AnalysisOptions as AnalysisOptions
 from .errors import (
     AnalysisError as AnalysisError,
     InvalidRequest as InvalidRequest,
     NotEnoughData as NotEnoughData,
 )
-from .frequency_response import (
-    Estimator as Estimator,
-    FrequencyResponse as FrequencyResponse,
+from .frequency_response.mode import Resonance as Resonance
+from .frequency_response.request import (
     FrequencyResponseRequest as FrequencyResponseRequest,
     MagnitudeScale as MagnitudeScale,
-    Resonance as Resonance,
     quantities_named as quantities_named,
-    resonances as resonances,
-    transmissibility as transmissibility,
 )
-from .model import (
-    DRAWS as DRAWS,
-    FEWEST_DRAWS as FEWEST_DRAWS,
+from .frequency_response.resonance import resonances as resonances
+from .frequency_response.results import Estimator as Estimator, FrequencyResponse as FrequencyResponse
+from .frequency_response.transmissibility import transmissibility as transmissibility
+from .model.difference import CurveDifference as CurveDifference
+from .model.draws import DRAWS as DRAWS
+from .model.ensemble import FEWEST_DRAWS as FEWEST_DRAWS
+from .model.measurement_prediction import (
+    MeasurementPrediction as MeasurementPrediction,
+    predict_measurement as predict_measurement,
+)
+from .model.overlay import Simulation as Simulation
+from .model.prediction import (
     PAPER_RESONANCES_HZ as PAPER_RESONANCES_HZ,
     PAPER_TERMINAL_RESONANCES_HZ as PAPER_TERMINAL_RESONANCES_HZ,
+)
+from .model.similarity import (
     SIMILARITY_THRESHOLD as SIMILARITY_THRESHOLD,
-    CurveDifference as CurveDifference,
     LogarithmOf as LogarithmOf,
-    MeasurementPrediction as MeasurementPrediction,
     Similarity as Similarity,
     SimilarityCurve as SimilarityCurve,
-    Simulation as Simulation,
-    predict_measurement as predict_measurement,
     similarity as similarity,
 )
-from .model_updating import (
-    Parameter as Parameter,
+from .model_updating.parameters import Parameter as Parameter
+from .model_updating.updated_specimen import (
     UpdatedSpecimen as UpdatedSpecimen,
     update_model as update_model,
 )
-from .recordings import (
-    ProgressObserver as ProgressObserver,
-)
-from .results import (
+from .recordings.channels import ProgressObserver as ProgressObserver
+from .results.campaign_results import (
     AnalysisFailure as AnalysisFailure,
     CampaignResults as CampaignResults,
-    ComparedRecording as ComparedRecording,
     FailedStep as FailedStep,
-    analyse as analyse,
     analyse_files as analyse_files,
+    merged_results as merged_results,
+    recordings_in as recordings_in,
+)
+from .results.compared_recording import (
+    ComparedRecording as ComparedRecording,
+    compare_recording as compare_recording,
+    level_of_drive as level_of_drive,
+    recorded_response as recorded_response,
+)
+from .results.measurement_analysis import analyse as analyse
+from .results.spectral_functions import spectral_functions as spectral_functions
+from .results.summary import (
     budget_sentences as budget_sentences,
     budgets_of as budgets_of,
     campaign_summary as campaign_summary,
-    compare_recording as compare_recording,
-    level_of_drive as level_of_drive,
-    merged_results as merged_results,
-    recorded_response as recorded_response,
-    recordings_in as recordings_in,
     result_summary as result_summary,
-    spectral_functions as spectral_functions,
 )
-from .signals import (
-    Window as Window,
-)
-from .uncertainty import (
-    Expected as Expected,
-    expected_uncertainty as expected_uncertainty,
-)
+from .signals.window import Window as Window
+from .uncertainty.expected import Expected as Expected, expected_uncertainty as expected_uncertainty

@@ -14,7 +14,8 @@ import numpy as np
 from vibench.acquisition import follow_parent
 from vibench.analysis import AnalysisError, CampaignResults, analyse_files, merged_results
 from vibench.sim import Accuracy, Harmonic, gong2025, steady_response
-from vibench.sim.shaker import Amplifier, DrivenTable, Shaker, follow_voltage
+from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.sampled_voltage import DrivenTable, follow_voltage
 
 
 class Analyst:

@@ -15,8 +15,8 @@ from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
 from vibench.acquisition.instruments import PlugInKind, plug_in_names
 from vibench.acquisition.recording import KEY_VARIABLE
 from vibench.acquisition.rig import TOKEN_VARIABLE
-from vibench.sim.kernels import advance_clock
-from vibench.sim.operating_system import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_place
+from vibench.sim.kernels.clock import advance_clock
+from vibench.sim.operating_system.state_folder import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_place
 
 from .output import console, print_json
 from .paths import AsJson

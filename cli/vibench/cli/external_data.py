@@ -18,6 +18,6 @@ def external_data(allowed: bool) -> AbstractContextManager[None]:
     """Allow it while inside, if the user said so."""
     if not allowed:
         return nullcontext()
-    from vibench.sim.hdf5_files import external_data_allowed
+    from vibench.sim.hdf5_files.door import external_data_allowed
 
     return external_data_allowed()

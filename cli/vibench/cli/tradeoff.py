@@ -11,16 +11,9 @@ from rich.table import Table
 
 from vibench.analysis import InvalidRequest
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import (
-    LOTTERIES,
-    MOTIONS,
-    TRANSIENTS,
-    AccuracyBenchmark,
-    LotteryFigures,
-    MotionBenchmark,
-    Thoroughness,
-    measure_accuracy,
-)
+from vibench.sim.accuracy_benchmark.figures import MOTIONS, TRANSIENTS, AccuracyBenchmark, MotionBenchmark
+from vibench.sim.accuracy_benchmark.lotteries import LOTTERIES, LotteryFigures
+from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
 
 from .output import console, errors, print_json, print_table, words
 from .paths import AsJson, room_for_folder, room_for_page

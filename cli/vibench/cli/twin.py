@@ -32,7 +32,7 @@ from vibench.analysis.hidden_motion import (
     kept_baseline,
 )
 from vibench.sim import Specimen
-from vibench.sim.operating_system import lower_priority
+from vibench.sim.operating_system.this import lower_priority
 
 from .output import console
 from .specimen_option import SpecimenOption, described

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import load_rig
 
-from .window import display_trouble
+from .window.display import display_trouble
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QLabel
@@ -38,10 +38,10 @@ def main(arguments: list[str] | None = None) -> int:
             sys.stderr.write(f"{error}\n")
             return NO_WINDOW
     starting = _sign_of_life()
-    from .window import open_window  # noqa: PLC0415
+    from .window.open_window import open_window  # noqa: PLC0415
 
     if options.screenshots is not None:
-        from .window import make_screenshots  # noqa: PLC0415
+        from .window.screenshots import make_screenshots  # noqa: PLC0415
 
         return make_screenshots(options.bench, options.screenshots)
     return open_window(options.bench, options.settings, starting)

@@ -1,112 +1,112 @@
-from .exponents import (
+from .exponents.lyapunov import (
     ExponentVerdict as ExponentVerdict,
     LyapunovEstimate as LyapunovEstimate,
-    LyapunovSpectrum as LyapunovSpectrum,
     Precision as Precision,
     lyapunov_exponent as lyapunov_exponent,
+)
+from .exponents.lyapunov_spectrum import (
+    LyapunovSpectrum as LyapunovSpectrum,
     lyapunov_spectrum as lyapunov_spectrum,
 )
-from .model import (
-    CONTACT_LAWS as CONTACT_LAWS,
-    USUAL_SPECIMEN as USUAL_SPECIMEN,
-    Accuracy as Accuracy,
-    AccuracyWord as AccuracyWord,
-    BaseResponse as BaseResponse,
-    ContactLaw as ContactLaw,
-    DampingTime as DampingTime,
+from .model.accuracy import Accuracy as Accuracy, AccuracyWord as AccuracyWord
+from .model.against_stops import BaseResponse as BaseResponse, base_response as base_response
+from .model.contact_law import CONTACT_LAWS as CONTACT_LAWS, ContactLaw as ContactLaw
+from .model.drive import (
     Drive as Drive,
-    Elasticity as Elasticity,
-    FrozenModel as FrozenModel,
     Harmonic as Harmonic,
-    Hertz as Hertz,
-    HuntCrossley as HuntCrossley,
-    LinearGap as LinearGap,
     LinearSweep as LinearSweep,
     LogarithmicSweep as LogarithmicSweep,
-    NoContact as NoContact,
-    Outcome as Outcome,
-    PowerLaw as PowerLaw,
-    RigidStops as RigidStops,
     Sampled as Sampled,
-    Specimen as Specimen,
+)
+from .model.elasticity import Elasticity as Elasticity, hertz_stiffness as hertz_stiffness
+from .model.frozen_model import FrozenModel as FrozenModel
+from .model.hertz import Hertz as Hertz
+from .model.hunt_crossley import HuntCrossley as HuntCrossley
+from .model.linear_gap import LinearGap as LinearGap
+from .model.modes import base_transmissibility as base_transmissibility
+from .model.no_contact import NoContact as NoContact
+from .model.outcome import Outcome as Outcome
+from .model.power_law import PowerLaw as PowerLaw
+from .model.rigid_stops import RigidStops as RigidStops
+from .model.specimen import Specimen as Specimen, bound_matrices as bound_matrices, gong2025 as gong2025
+from .model.specimen_description import (
+    USUAL_SPECIMEN as USUAL_SPECIMEN,
+    DampingTime as DampingTime,
     SpecimenDescription as SpecimenDescription,
     SpecimenTable as SpecimenTable,
     SpecimenWarning as SpecimenWarning,
     UnknownSpecimenError as UnknownSpecimenError,
-    UnreadableTomlError as UnreadableTomlError,
-    base_response as base_response,
-    base_transmissibility as base_transmissibility,
-    bound_matrices as bound_matrices,
-    fault_in_words as fault_in_words,
-    gong2025 as gong2025,
-    hertz_stiffness as hertz_stiffness,
     load_specimen as load_specimen,
     shipped_specimens as shipped_specimens,
-    toml_table as toml_table,
     usual_specimen as usual_specimen,
 )
-from .motion import (
-    FollowedMotion as FollowedMotion,
-    Impacts as Impacts,
-    Response as Response,
-    Trajectory as Trajectory,
-    follow_samples as follow_samples,
-    integrate as integrate,
-    steady_response as steady_response,
+from .model.toml_table import (
+    UnreadableTomlError as UnreadableTomlError,
+    fault_in_words as fault_in_words,
+    toml_table as toml_table,
 )
-from .operating_system import (
-    state_folder as state_folder,
-)
-from .periodic import (
-    AmplitudePath as AmplitudePath,
-    ArcEnd as ArcEnd,
-    ArcSteps as ArcSteps,
-    Balance as Balance,
-    BalanceOptions as BalanceOptions,
+from .motion.integrate import Impacts as Impacts, Trajectory as Trajectory, integrate as integrate
+from .motion.response import Response as Response, steady_response as steady_response
+from .motion.sample_by_sample import FollowedMotion as FollowedMotion, follow_samples as follow_samples
+from .operating_system.state_folder import state_folder as state_folder
+from .periodic.balance_solver import BalanceOptions as BalanceOptions
+from .periodic.branch import (
     BifurcationKind as BifurcationKind,
     Branch as Branch,
     BranchEvent as BranchEvent,
-    DrivePath as DrivePath,
-    FirstOrderState as FirstOrderState,
-    FrequencyPath as FrequencyPath,
-    HarmonicSet as HarmonicSet,
-    LinearStructure as LinearStructure,
-    OrbitShape as OrbitShape,
     Parameter as Parameter,
-    PeriodicOrbit as PeriodicOrbit,
-    PhaseReference as PhaseReference,
-    PowerSpring as PowerSpring,
-    RestoringForce as RestoringForce,
-    ShootingEnd as ShootingEnd,
+)
+from .periodic.condensation import LinearStructure as LinearStructure, structure_of as structure_of
+from .periodic.continuation import ArcEnd as ArcEnd, ArcSteps as ArcSteps
+from .periodic.drive_path import (
+    AmplitudePath as AmplitudePath,
+    DrivePath as DrivePath,
+    FrequencyPath as FrequencyPath,
+)
+from .periodic.first_order_balance import (
+    FirstOrderState as FirstOrderState,
     first_order_states as first_order_states,
+)
+from .periodic.harmonic_balance import Balance as Balance, HarmonicSet as HarmonicSet
+from .periodic.orbit_branch import (
     periodic_branch as periodic_branch,
     periodic_branch_within as periodic_branch_within,
-    periodic_orbit as periodic_orbit,
-    phase_resonance_branch as phase_resonance_branch,
-    spring_of as spring_of,
-    structure_of as structure_of,
 )
-from .scene import (
-    BUDGET_S as BUDGET_S,
-    AutomaticDuration as AutomaticDuration,
+from .periodic.period_map import OrbitShape as OrbitShape
+from .periodic.phase_reference import PhaseReference as PhaseReference
+from .periodic.phase_resonance import phase_resonance_branch as phase_resonance_branch
+from .periodic.restoring_force import (
+    PowerSpring as PowerSpring,
+    RestoringForce as RestoringForce,
+    spring_of as spring_of,
+)
+from .periodic.shooting import (
+    PeriodicOrbit as PeriodicOrbit,
+    ShootingEnd as ShootingEnd,
+    periodic_orbit as periodic_orbit,
+)
+from .scene.measured_cost import measure_cost as measure_cost
+from .scene.plan import ScenePlan as ScenePlan, plan_scene as plan_scene
+from .scene.prediction import (
     Ensemble as Ensemble,
-    EscapeRate as EscapeRate,
-    FixedDuration as FixedDuration,
     FoundMotion as FoundMotion,
-    Given as Given,
     Method as Method,
     MotionKind as MotionKind,
+    ScenePrediction as ScenePrediction,
+    StartMemory as StartMemory,
+)
+from .scene.scene import (
+    BUDGET_S as BUDGET_S,
+    AutomaticDuration as AutomaticDuration,
+    FixedDuration as FixedDuration,
+    Given as Given,
     Observable as Observable,
     Rest as Rest,
     Scene as Scene,
-    ScenePlan as ScenePlan,
-    ScenePrediction as ScenePrediction,
-    Share as Share,
-    StartMemory as StartMemory,
-    measure_cost as measure_cost,
-    plan_scene as plan_scene,
+)
+from .scene.shares import EscapeRate as EscapeRate, Share as Share, wilson_share as wilson_share
+from .scene.solve import (
     settle_scene as settle_scene,
     solve_ensemble as solve_ensemble,
     solve_scene as solve_scene,
-    wilson_share as wilson_share,
 )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import CheckFailed, ConfigurationError, InstrumentError, InstrumentLost, open_bench
-from vibench.acquisition.bench import BenchKind
+from vibench.acquisition.bench.bench import BenchKind
 from vibench.acquisition.drivers import AFG1022X, DaqmxDigitizer
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.instruments import Digitizer, FunctionGenerator
@@ -24,7 +24,8 @@ from vibench.acquisition.rig import (
 )
 from vibench.acquisition.rig._knobs import confirm_by_asking
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.generator import Panel, Quirks
+from vibench.virtual_rig.generator.channel_output import Panel
+from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 ROOT = Path(__file__).parents[3]
 CONFIGS = ROOT / "hardware_configs"

@@ -10,7 +10,7 @@ from vibench.acquisition.campaign import Refresh, _catalogue as catalogue_module
 from vibench.acquisition.campaign._catalogue import CATALOGUE_NAME
 from vibench.acquisition.campaign._catalogue_entry import _band
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, ResonanceTracking, RunState, SineSweep
-from vibench.acquisition.run._run import Run
+from vibench.acquisition.run.run import Run
 
 DWELL = Measurement(
     name="dwell",

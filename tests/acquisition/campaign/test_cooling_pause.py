@@ -20,7 +20,7 @@ from vibench.acquisition.campaign._attempts import LOOK_EVERY_S
 from vibench.acquisition.campaign._journal import journal_path
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, RetryPolicy, RunState
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 REST_S = 12.0
 

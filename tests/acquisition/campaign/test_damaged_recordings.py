@@ -22,7 +22,7 @@ from vibench.acquisition.campaign import (
 from vibench.acquisition.errors import CheckFailed, RecordingError
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
 from vibench.acquisition.recording import RecordingState, SealDepth, SealState
-from vibench.acquisition.stopping import Cause, StopRequest, StopSwitch
+from vibench.acquisition.stopping.stop import Cause, StopRequest, StopSwitch
 
 
 def dwell(name, frequency_hz):

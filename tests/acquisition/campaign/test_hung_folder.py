@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import StopSwitch, run_campaign
 from vibench.acquisition.campaign import PointOutcome, ReconnectingBench, _log
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, RunState
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 DWELL = Dwell(amplitude_vpp=1.0, frequency_hz=260, settle_s=0.1, duration_s=2.0)
 PLAN = Campaign(

@@ -26,7 +26,7 @@ from vibench.acquisition.campaign import (
 from vibench.acquisition.campaign._journal import journal_path
 from vibench.acquisition.errors import DataLost
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, Retryable, RetryPolicy, RunState
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 
 def dwell(name, frequency_hz=260.0):

@@ -19,9 +19,8 @@ from vibench.acquisition import (
     open_recording,
     run_measurement,
 )
-from vibench.acquisition.bench import rig_digest
-from vibench.acquisition.check import require_fresh
-from vibench.acquisition.check._admission import archive_path, keep, why_not
+from vibench.acquisition.bench.result import rig_digest
+from vibench.acquisition.check.admission import archive_path, keep, require_fresh, why_not
 from vibench.acquisition.plan import Dwell, Measurement
 
 NOW = datetime(2026, 5, 4, 12, 0, tzinfo=UTC)

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import BenchReport, InstrumentLost, StopSwitch, Verdict, open_bench
-from vibench.acquisition.bench import Bounds
-from vibench.acquisition.check._bench_report import bench_report
-from vibench.acquisition.check._loop import clock_ratio, fit_sine
+from vibench.acquisition.bench.result import Bounds
+from vibench.acquisition.check.bench_report import bench_report
+from vibench.acquisition.check.loop import clock_ratio, fit_sine
 from vibench.acquisition.errors import CheckStopped, InstrumentError, RunStalled
 from vibench.acquisition.rig import load_rig
-from vibench.acquisition.stopping import Cause, StopRequest
-from vibench.virtual_rig.generator import Panel, Quirks
+from vibench.acquisition.stopping.stop import Cause, StopRequest
+from vibench.virtual_rig.generator.channel_output import Panel
+from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 ROOT = Path(__file__).parents[3]
 

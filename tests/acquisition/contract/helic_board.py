@@ -16,9 +16,9 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from vibench.sim.engine import native_engine
+from vibench.sim.engine.run import native_engine
 from vibench.virtual_rig import VirtualRig
-from vibench.virtual_rig.world import World
+from vibench.virtual_rig.world.world import World
 
 MAGIC = b"HL"
 HARMONICS = 16

@@ -16,12 +16,16 @@ from vibench.acquisition import (
     run_measurement,
 )
 from vibench.acquisition.contract import test_controller as contract
-from vibench.acquisition.excitation import BaseLevel
+from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.instruments import LoopFeedback, LoopProgram, LoopState
 from vibench.acquisition.plan import BranchContinuation, Measurement
 from vibench.acquisition.recording import BranchPointNote, feedback_note
 from vibench.acquisition.rig import confirm_simulated, load_rig, specimen_of
-from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.drive_path import FrequencyPath
+from vibench.sim.periodic.restoring_force import spring_of
 
 from .helic_board import BUSY, on_rig
 from .test_plug_ins import run

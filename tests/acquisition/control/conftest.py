@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from vibench.acquisition.control import feedback_controller
-from vibench.acquisition.control._control_action import ControlAction, PhaseSamples
-from vibench.acquisition.excitation import Tone
+from vibench.acquisition.control.control_action import ControlAction, PhaseSamples
+from vibench.acquisition.control.controllers import feedback_controller
+from vibench.acquisition.excitation.steps import Tone
 from vibench.acquisition.plan import Measurement, RunState, needed_vpp
 from vibench.acquisition.rig import Rig, Role, channels_of
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, LimitExceeded, open_bench, open_recording, run_measurement
-from vibench.acquisition.control._branch_player import LoopLook
-from vibench.acquisition.control._branch_solver import BranchSolver, LoopSetting, Seen, is_new
-from vibench.acquisition.control._branch_stability import stability_note
-from vibench.acquisition.control._fast_loop import fast_loop, require_held
-from vibench.acquisition.excitation import BaseLevel
+from vibench.acquisition.control.branch_player import LoopLook
+from vibench.acquisition.control.branch_solver import BranchSolver, LoopSetting, Seen, is_new
+from vibench.acquisition.control.branch_stability import stability_note
+from vibench.acquisition.control.fast_loop import fast_loop, require_held
+from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.instruments import LoopState
 from vibench.acquisition.plan import BranchContinuation, Measurement, RunState
 from vibench.acquisition.recording import (
@@ -24,15 +24,18 @@ from vibench.acquisition.recording import (
     feedback_note,
 )
 from vibench.acquisition.rig import ControllerConfig, confirm_simulated, load_rig, specimen_of
-from vibench.sim.feedback import (
-    Begin,
+from vibench.sim.feedback.branch import Begin, impact_branch
+from vibench.sim.feedback.stability import (
     OpenLoopMultiplier,
     PerturbedMotion,
     envelope_deviation,
-    impact_branch,
     open_loop_multiplier,
 )
-from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.drive_path import FrequencyPath
+from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
 
 LEVEL_M = 3e-6

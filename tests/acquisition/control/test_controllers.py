@@ -1,7 +1,7 @@
 """Every kind with feedback has a controller, and no other."""
 
-from vibench.acquisition.control import CONTROLLERS
-from vibench.acquisition.excitation import EXCITATION_KINDS
+from vibench.acquisition.control.controllers import CONTROLLERS
+from vibench.acquisition.excitation.kinds import EXCITATION_KINDS
 
 
 def test_the_kinds_with_feedback_are_those_with_a_controller():

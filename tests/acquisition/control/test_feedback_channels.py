@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.acquisition.control._feedback_channels import FeedbackChannels
+from vibench.acquisition.control.feedback_channels import FeedbackChannels
 
 HERTZ, DELAY_S = 31.0, 2e-4
 CHANNELS = FeedbackChannels(0, 1, 2, 1.0, 1.0, 1.0, DELAY_S, 0.0, 0.0, 10_240.0)

@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.acquisition.excitation import BaseLevel, Settling
-from vibench.acquisition.excitation._feedback import JumpSearch
-from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import (
     Direction,
     HeldDwell,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, LimitExceeded
-from vibench.acquisition.excitation import BaseLevel, Settling
+from vibench.acquisition.excitation.feedback import BaseLevel, Settling
 from vibench.acquisition.plan import (
     CHECK_S,
     HeldDwell,
@@ -18,9 +18,9 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import OutputUse, Role
-from vibench.acquisition.run._low_level_check import LowLevelCheck
-from vibench.acquisition.run._run import Run
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.run.low_level_check import LowLevelCheck
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 SETTLING = Settling(longest_wait_s=2, tolerance=0.02)
 # On the loop the base answers as the model does at 160 Hz; m0 stands still.

@@ -3,13 +3,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control._jump_search import (
-    LocatedJump,
-    SettledPoint,
-    is_on_branch,
-    located,
-    side,
-)
+from vibench.acquisition.control.jump_search import LocatedJump, SettledPoint, is_on_branch, located, side
 from vibench.acquisition.recording import JumpSide
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control._level_control import LevelControl, MeasuredLevel, measured_level
-from vibench.acquisition.excitation import BaseLevel
+from vibench.acquisition.control.level_control import LevelControl, MeasuredLevel, measured_level
+from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.recording import Held
 
 CONTROL = LevelControl(BaseLevel(acceleration_m_per_s2=10.0), most_vpp=5.0, least_vpp=2e-3)

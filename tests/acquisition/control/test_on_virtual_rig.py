@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.excitation import BaseLevel, Settling
-from vibench.acquisition.excitation._feedback import JumpSearch
+from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
 from vibench.acquisition.plan import (
     Direction,
     HeldDwell,
@@ -16,7 +15,7 @@ from vibench.acquisition.plan import (
     RunState,
     SettledSine,
 )
-from vibench.acquisition.run._low_level_check import sine_amplitude
+from vibench.acquisition.run.low_level_check import sine_amplitude
 from vibench.sim import Harmonic, PhaseReference, gong2025, integrate, phase_resonance_branch
 
 SAMPLE_RATE_HZ = 10240.0

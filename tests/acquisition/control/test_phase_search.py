@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.control._level_control import MeasuredLevel
-from vibench.acquisition.control._phase_search import PhaseError, PhaseSearch
-from vibench.acquisition.control._resonance_controller import _phase_error
-from vibench.acquisition.control._settling_controller import SettledState
-from vibench.acquisition.control._steadiness import Judgement
-from vibench.acquisition.control._stroboscope import Periods
-from vibench.acquisition.excitation import ResonanceTracking
+from vibench.acquisition.control.level_control import MeasuredLevel
+from vibench.acquisition.control.phase_search import PhaseError, PhaseSearch
+from vibench.acquisition.control.resonance_controller import _phase_error
+from vibench.acquisition.control.settling_controller import SettledState
+from vibench.acquisition.control.steadiness import Judgement
+from vibench.acquisition.control.stroboscope import Periods
+from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
 from vibench.acquisition.recording import Held, Steadiness
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.control._steadiness import in_drives, judged
-from vibench.acquisition.excitation import Settling
+from vibench.acquisition.control.steadiness import in_drives, judged
+from vibench.acquisition.excitation.feedback import Settling
 from vibench.acquisition.recording import Steadiness
 
 RULE = Settling()

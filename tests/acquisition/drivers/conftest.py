@@ -7,9 +7,13 @@ from dataclasses import dataclass, field
 import pytest
 
 from vibench.acquisition.rig import GeneratorConfig
-from vibench.virtual_rig.generator import AFG1022, ErrorCode, Panel, Quirks, Reply
-from vibench.virtual_rig.generator._afg1022_settings import ChannelSettings
-from vibench.virtual_rig.usb import UsbTmcInstrument, plug_in, unplug
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.afg1022_settings import ChannelSettings
+from vibench.virtual_rig.generator.channel_output import Panel
+from vibench.virtual_rig.generator.scpi_instrument import Quirks, Reply
+from vibench.virtual_rig.generator.scpi_status import ErrorCode
+from vibench.virtual_rig.usb.bus import plug_in, unplug
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 _SERIALS = (f"C02{number:04d}" for number in itertools.count(1))
 

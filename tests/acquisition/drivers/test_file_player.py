@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
-from vibench.acquisition.check import check_bench, require_fresh
+from vibench.acquisition.check.admission import check_bench, require_fresh
 from vibench.acquisition.errors import InstrumentLost
 from vibench.acquisition.plan import Dwell, Measurement
 from vibench.acquisition.rig import CalibrationRule

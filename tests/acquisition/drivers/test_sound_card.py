@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, open_recording, run_measurement
-from vibench.acquisition.bench import Verdict
-from vibench.acquisition.check import bench_report
+from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.check.bench_report import bench_report
 from vibench.acquisition.drivers._sound_card import _Card
 from vibench.acquisition.errors import DataLost, InstrumentLost, LimitExceeded
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, StreamedNoise, WhiteNoise
 from vibench.acquisition.rig import CalibrationRule, OutputConfig, confirm_simulated
 from vibench.analysis import analyse
-from vibench.virtual_rig.world import World
+from vibench.virtual_rig.world.world import World
 
 from .portaudio import simulated
 

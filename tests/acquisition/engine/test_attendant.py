@@ -12,7 +12,7 @@ import pytest
 
 from vibench.acquisition.engine import DRIVING, VIEWER_PATIENCE_S, Attendant, EngineClient, EngineState
 from vibench.acquisition.engine._state import hung_patience_s
-from vibench.sim.operating_system import process_start
+from vibench.sim.operating_system.this import process_start
 
 from .conftest import campaign, until, until_state
 

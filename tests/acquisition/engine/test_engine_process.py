@@ -22,7 +22,7 @@ from vibench.acquisition import (
     open_bench,
     open_recording,
 )
-from vibench.acquisition.bench import BenchLock
+from vibench.acquisition.bench.lock import BenchLock
 from vibench.acquisition.engine import (
     DRIVING,
     CampaignRequest,

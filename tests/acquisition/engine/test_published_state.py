@@ -13,7 +13,7 @@ from vibench.acquisition.engine import BenchFacts, Supervision
 from vibench.acquisition.engine._published_state import PublishedState
 from vibench.acquisition.engine._status import ChannelFacts
 from vibench.acquisition.plan import RunState
-from vibench.acquisition.run import Progress
+from vibench.acquisition.run.ending import Progress
 
 from .conftest import campaign
 

@@ -34,8 +34,8 @@ from vibench.acquisition.engine._server import VIEWERS_MOST
 from vibench.acquisition.engine._state import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
-from vibench.acquisition.stopping._kept_stops import engines_folder
-from vibench.sim.operating_system import process_start
+from vibench.acquisition.stopping.kept_stops import engines_folder
+from vibench.sim.operating_system.this import process_start
 from vibench.stop_files import put_down, stop_path
 
 from .conftest import ROOT, campaign, until, until_state, until_there

@@ -7,10 +7,10 @@ import pytest
 from pydantic import ValidationError
 
 from vibench.acquisition import ConfigurationError, load_campaign
-from vibench.acquisition.excitation import AbstractFeedback, BaseLevel, Settling
-from vibench.acquisition.excitation._feedback import JumpSearch
-from vibench.acquisition.excitation._settled_sine import MOST_SETTLED_STEPS
-from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.excitation.feedback import BaseLevel, JumpSearch, Settling
+from vibench.acquisition.excitation.plan import AbstractFeedback
+from vibench.acquisition.excitation.settled_sine import MOST_SETTLED_STEPS
+from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import (
     HUSH_S,
     HeldDwell,

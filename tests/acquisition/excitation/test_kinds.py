@@ -6,35 +6,25 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from vibench.acquisition.excitation import (
-    EXCITATION_KINDS,
-    Approach,
-    BaseLevel,
-    BranchContinuation,
-    Direction,
-    Dwell,
-    Excitation,
-    Family,
-    HeldAcceleration,
-    HeldDwell,
-    HeldNoise,
-    HeldResponse,
-    HeldSweep,
-    LeadIn,
-    OddMultisine,
-    RelativeSetting,
-    ResonanceTracking,
-    RmsSetting,
-    SettledSine,
-    SineSweep,
-    SpectrumPoint,
-    SteppedLevel,
-    SteppedSine,
-    StreamedNoise,
-    WhiteNoise,
-    excitation_text,
-    present_word,
-)
+from vibench.acquisition.excitation.base_level import HeldAcceleration, RelativeSetting, RmsSetting
+from vibench.acquisition.excitation.branch_continuation import BranchContinuation
+from vibench.acquisition.excitation.direction import Approach, Direction
+from vibench.acquisition.excitation.dwell import Dwell
+from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.excitation.held_dwell import HeldDwell
+from vibench.acquisition.excitation.held_noise import HeldNoise, SpectrumPoint
+from vibench.acquisition.excitation.held_response import HeldResponse
+from vibench.acquisition.excitation.held_sweep import HeldSweep
+from vibench.acquisition.excitation.kinds import EXCITATION_KINDS, Excitation, excitation_text, present_word
+from vibench.acquisition.excitation.odd_multisine import OddMultisine
+from vibench.acquisition.excitation.plan import Family, LeadIn
+from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
+from vibench.acquisition.excitation.settled_sine import SettledSine
+from vibench.acquisition.excitation.sine_sweep import SineSweep
+from vibench.acquisition.excitation.stepped_level import SteppedLevel
+from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.excitation.streamed_noise import StreamedNoise
+from vibench.acquisition.excitation.white_noise import WhiteNoise
 from vibench.acquisition.recording import SegmentLabel
 
 BAND = {"band_start_hz": 20, "band_stop_hz": 800}

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.excitation import held_lines
-from vibench.acquisition.excitation._multisine import (
+from vibench.acquisition.excitation.multisine import (
     USUAL_POINTS as MEMORY_POINTS,
     band_lines,
     flat_periods,
+    held_lines,
     hold_droop,
 )
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.instruments import Spacing
 from vibench.acquisition.plan import (
     Direction,

@@ -4,7 +4,7 @@ import pytest
 
 from vibench.acquisition import ConfigurationError, open_bench, run_campaign
 from vibench.acquisition.campaign import ExistingRecordings, list_recordings
-from vibench.acquisition.host import chosen
+from vibench.acquisition.host.chosen import chosen
 
 
 def test_a_member_and_its_word_are_the_same_choice():

@@ -7,7 +7,7 @@ from pydantic import AwareDatetime, Field, PositiveFloat
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.host import FrozenModel, load_toml
+from vibench.acquisition.host.toml_file import FrozenModel, load_toml
 
 
 class Steps(FrozenModel):

@@ -9,8 +9,8 @@ from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
 from vibench.acquisition import ConfigurationError, load_campaign, toml_text
-from vibench.acquisition.excitation import EXCITATION_KINDS
-from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.excitation.kinds import EXCITATION_KINDS
+from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import (
     Campaign,
     Dwell,

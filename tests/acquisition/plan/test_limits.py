@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from scipy.signal import lsim
 
 from vibench.acquisition import LimitExceeded
-from vibench.acquisition.excitation import Waveform
+from vibench.acquisition.excitation.steps import Waveform
 from vibench.acquisition.plan import (
     Dwell,
     Measurement,

@@ -16,7 +16,7 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.plan._limits import limit_checks
 from vibench.acquisition.rig import BaseQuantity, RigModel, amplifier_of, shaker_of, specimen_of
-from vibench.sim.shaker import LoadedShaker
+from vibench.sim.shaker.loaded_shaker import LoadedShaker
 
 RATE_HZ = 51_200.0
 

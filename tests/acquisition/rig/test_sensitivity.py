@@ -6,7 +6,7 @@ import pytest
 
 from vibench.acquisition import shipped
 from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.host import from_toml
+from vibench.acquisition.host.toml_file import from_toml
 from vibench.acquisition.rig import Rig, volts_per_unit
 
 ACCELERATION, VELOCITY = "m s-2", "m s-1"

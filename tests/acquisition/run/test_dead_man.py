@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, StopLevel, open_bench, open_recording, run_campaign
-from vibench.acquisition.bench import Verdict
-from vibench.acquisition.check import bench_report
+from vibench.acquisition.bench.result import Verdict
+from vibench.acquisition.check.bench_report import bench_report
 from vibench.acquisition.plan import CHECK_FREQUENCY_HZ, Campaign, Dwell, Measurement, RunState
 from vibench.acquisition.plan._schedule import CHECK_LISTEN_S, CHECK_SETTLE_S
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import CalibrationRule, OutputUse, confirm_simulated, load_rig
-from vibench.acquisition.run._generator_drive import CHECK_MARGIN_S, GUARD_S
-from vibench.acquisition.run._run import Run
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.run.generator_drive import CHECK_MARGIN_S, GUARD_S
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 DEAD_MAN_S = 0.5
 FREQUENCY_HZ = 263.0

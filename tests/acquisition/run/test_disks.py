@@ -15,8 +15,8 @@ from vibench.acquisition import AcquisitionError, StopLevel, open_bench, open_re
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.recording import RecordingState, _journal, create_recording, part_of, recover
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
-from vibench.acquisition.run._run import Run
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 from .test_stop_matrix import PLAN, SILENT_V, terminal_v, upto
 

@@ -17,23 +17,19 @@ from vibench.acquisition import (
     open_recording,
 )
 from vibench.acquisition.errors import RunStalled
-from vibench.acquisition.host import Beside
+from vibench.acquisition.host.beside import Beside
 from vibench.acquisition.plan import Dwell, Measurement, RunState
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
-from vibench.acquisition.run import DriveGuard, _drive_guard as drive_guard
-from vibench.acquisition.run._run import Run
-from vibench.acquisition.stopping import (
-    DRIVES_ON,
-    MEMORY_RESERVE,
-    Cause,
-    Program,
-    StopRequest,
-    engines_folder,
-    facts_of_this_process,
-    reached,
-)
-from vibench.sim.operating_system import process_start
+from vibench.acquisition.run import drive_guard
+from vibench.acquisition.run.drive_guard import DriveGuard
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.stopping.driving import DRIVES_ON
+from vibench.acquisition.stopping.kept_stops import engines_folder
+from vibench.acquisition.stopping.memory_reserve import MEMORY_RESERVE
+from vibench.acquisition.stopping.program import Program, facts_of_this_process, reached
+from vibench.acquisition.stopping.stop import Cause, StopRequest
+from vibench.sim.operating_system.this import process_start
 from vibench.stop_files import Fate, fate_of, put_down, stop_path, taken_path
 
 PLAN = Measurement(

@@ -21,7 +21,8 @@ from vibench.acquisition.errors import DataLost, InstrumentBusy, SettingRefused
 from vibench.acquisition.plan import Dwell, Measurement, RunState, SineSweep
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
-from vibench.virtual_rig.generator import Panel, Quirks
+from vibench.virtual_rig.generator.channel_output import Panel
+from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 DWELL = Measurement(
     name="run",
@@ -175,7 +176,7 @@ def test_a_laser_dropout_and_an_over_range_are_flagged_and_the_run_goes_on(labor
 
 def test_an_output_relay_that_sticks_is_seen_by_the_bench_check(laboratory, tmp_path):
     from vibench.acquisition import Verdict
-    from vibench.acquisition.check._bench_report import bench_report
+    from vibench.acquisition.check.bench_report import bench_report
 
     virtual, connected = laboratory()
     with bench_on(connected) as bench:

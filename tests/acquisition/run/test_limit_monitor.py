@@ -10,8 +10,8 @@ import pytest
 from vibench.acquisition import Block, LimitExceeded, Overload
 from vibench.acquisition.plan import Dwell, InRunLimits, Measurement, OnChange, OnOverload
 from vibench.acquisition.rig import Role, channels_of
-from vibench.acquisition.run._limit_monitor import LimitMonitor
-from vibench.acquisition.run._run import Run
+from vibench.acquisition.run.limit_monitor import LimitMonitor
+from vibench.acquisition.run.run import Run
 
 RATE_HZ = 51_200.0
 BLOCK = 5120

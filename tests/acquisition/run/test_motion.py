@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.run._limit_monitor import HIGH_PASS_HZ, BaseTracker, SpecimenTracker
+from vibench.acquisition.run.limit_monitor import HIGH_PASS_HZ, BaseTracker, SpecimenTracker
 
 RATE_HZ = 51_200.0
 TIME_S = np.arange(round(3 * RATE_HZ)) / RATE_HZ

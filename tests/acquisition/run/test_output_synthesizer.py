@@ -5,10 +5,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.excitation import Stream, Tone, Waveform
-from vibench.acquisition.excitation._streamed_noise import GaussianBand
+from vibench.acquisition.excitation.steps import Stream, Tone, Waveform
+from vibench.acquisition.excitation.streamed_noise import GaussianBand
 from vibench.acquisition.plan import Phase, RunState
-from vibench.acquisition.run._stream_drive import RELEASE_S, OutputSynthesizer
+from vibench.acquisition.run.stream_drive import RELEASE_S, OutputSynthesizer
 
 RATE_HZ = 5120.0
 NOISE = Stream(GaussianBand(50.0, 600.0, seed=3))

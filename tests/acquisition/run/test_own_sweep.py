@@ -5,9 +5,9 @@ import pytest
 
 from tests.acquisition.run.test_command_time import cycles
 from vibench.acquisition import open_bench, open_recording, run_campaign, run_measurement
-from vibench.acquisition.bench import Verdict
+from vibench.acquisition.bench.result import Verdict
 from vibench.acquisition.campaign import PointOutcome
-from vibench.acquisition.check import check_bench
+from vibench.acquisition.check.admission import check_bench
 from vibench.acquisition.errors import ConfigurationError, LimitExceeded
 from vibench.acquisition.instruments import Spacing
 from vibench.acquisition.plan import (

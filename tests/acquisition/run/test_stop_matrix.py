@@ -30,9 +30,9 @@ from vibench.acquisition import (
 from vibench.acquisition.plan import Dwell, Measurement, RunState, shortest_ramp_s
 from vibench.acquisition.recording import RecordingState, create_recording, recover
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
-from vibench.acquisition.run import BLOCK_S
-from vibench.acquisition.run._run import Run
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.run.acquisition_loop import BLOCK_S
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 RAMP_S = 0.3
 PLAN = Measurement(

@@ -15,9 +15,9 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run._low_level_check import LowLevelCheck
-from vibench.acquisition.run._run import Run
-from vibench.acquisition.stopping import Cause, StopRequest
+from vibench.acquisition.run.low_level_check import LowLevelCheck
+from vibench.acquisition.run.run import Run
+from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 RATE = 5120.0
 AHEAD = 2560

@@ -15,8 +15,8 @@ from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on
 from vibench.acquisition.engine import StopDelivery, programs_to_stop, stop_engine
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._announcement import announced
-from vibench.acquisition.stopping import Program, announced_programs
-from vibench.acquisition.stopping._kept_stops import engines_folder
+from vibench.acquisition.stopping.kept_stops import engines_folder
+from vibench.acquisition.stopping.program import Program, announced_programs
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes and modes as POSIX has them")
 

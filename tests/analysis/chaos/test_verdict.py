@@ -5,10 +5,10 @@ import pytest
 
 from benchmarks.noise_verdicts import noise_points
 from vibench.analysis import AnalysisError, motion_verdict
-from vibench.analysis.chaos import MotionKind, Points
-from vibench.analysis.chaos._period import shortest_period
+from vibench.analysis.chaos.period import Points, shortest_period
+from vibench.analysis.chaos.verdict import MotionKind
 from vibench.sim import Harmonic, gong2025, lyapunov_exponent
-from vibench.sim.motion import stroboscopic_section
+from vibench.sim.motion.poincare import stroboscopic_section
 
 DRIVE_HZ = 260.0
 QUIET = np.array([1e-5, 1e-5])

@@ -12,7 +12,7 @@ from vibench.analysis import (
     Simulation,
     compare_recording,
 )
-from vibench.analysis.results import kept_result
+from vibench.analysis.results.compared_recording import kept_result
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ from vibench.analysis.exchange import (
     import_recording,
     opened_source,
 )
-from vibench.sim.hdf5_files import external_data_allowed
+from vibench.sim.hdf5_files.door import external_data_allowed
 
 RATE_HZ = 8000.0
 SAMPLES = 60_000

@@ -8,7 +8,7 @@ from scipy.io import savemat, wavfile
 from vibench.acquisition import open_recording, validated
 from vibench.analysis import InvalidRequest, analyse
 from vibench.analysis.exchange import ImportMapping, import_recording
-from vibench.analysis.recordings import Verdict
+from vibench.analysis.recordings.checks import Verdict
 
 nptdms = pytest.importorskip("nptdms", reason="pip install vibench[exchange] brings npTDMS")
 pyuff = pytest.importorskip("pyuff", reason="pip install vibench[test] brings pyuff")

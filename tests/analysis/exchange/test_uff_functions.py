@@ -17,8 +17,8 @@ from vibench.analysis.exchange import (
     export_samples,
     opened_source,
 )
-from vibench.analysis.results import spectral_functions
-from vibench.analysis.spectra import spectral_density
+from vibench.analysis.results.spectral_functions import spectral_functions
+from vibench.analysis.spectra.spectra import spectral_density
 from vibench.cli.__main__ import app
 from vibench.sim import gong2025
 

@@ -18,22 +18,16 @@ from vibench.acquisition.plan import (
     WhiteNoise,
 )
 from vibench.analysis import Simulation
-from vibench.analysis.figures import (
-    SIMULATED,
-    STEPPED_FREQUENCIES,
-    bench_levels_figure,
-    dwells_figure,
-    excitation_figure,
-    regions_text,
-    stepped_sine_figure,
-    sweep_figure,
-    transmission_figure,
-    transmission_levels_figure,
-)
-from vibench.analysis.figures._dwells import spectrum_columns
-from vibench.analysis.figures._style import prefixed
-from vibench.analysis.recordings import measurement_checks
-from vibench.analysis.results import result_of
+from vibench.analysis.figures.bench_levels import bench_levels_figure
+from vibench.analysis.figures.dwells import dwells_figure, spectrum_columns
+from vibench.analysis.figures.excitation import excitation_figure
+from vibench.analysis.figures.stepped_sine import STEPPED_FREQUENCIES, stepped_sine_figure
+from vibench.analysis.figures.style import SIMULATED, prefixed
+from vibench.analysis.figures.sweep import regions_text, sweep_figure
+from vibench.analysis.figures.transmission import transmission_figure
+from vibench.analysis.figures.transmission_levels import transmission_levels_figure
+from vibench.analysis.recordings.checks import measurement_checks
+from vibench.analysis.results.campaign_results import result_of
 from vibench.analysis.tables import plus_minus
 
 PNG_HEAD = b"\x89PNG\r\n\x1a\n"

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vibench.analysis.figures import magnitude_axis, new_figure, styled
+from vibench.analysis.figures.style import magnitude_axis, new_figure, styled
 
 
 def _numbers(low, high):

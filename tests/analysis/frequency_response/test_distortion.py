@@ -11,9 +11,8 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import OddMultisine
 from vibench.analysis import analyse
-from vibench.analysis.figures import distortion_figure
-from vibench.analysis.figures._distortion import distortion_caption
-from vibench.analysis.frequency_response import distortion
+from vibench.analysis.figures.distortion import distortion_caption, distortion_figure
+from vibench.analysis.frequency_response.distortion import distortion
 
 REPETITION_HZ, PERIODS, REALISATIONS, SETTLE_S = 4.0, 4, 4, 0.5
 NOISE_M_PER_S = 2e-5

@@ -15,8 +15,8 @@ from vibench.analysis import (
     analyse,
     quantities_named,
 )
-from vibench.analysis.frequency_response._request import longest_segment
-from vibench.analysis.signals import effective_averages, hop_samples, taper
+from vibench.analysis.frequency_response.request import longest_segment
+from vibench.analysis.signals.window import effective_averages, hop_samples, taper
 
 RATE = 6400.0
 

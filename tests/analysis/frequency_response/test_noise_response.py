@@ -7,11 +7,11 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, StreamedNoise
-from vibench.acquisition.run._low_level_check import LowLevelCheck
+from vibench.acquisition.run.low_level_check import LowLevelCheck
 from vibench.analysis import NotEnoughData
-from vibench.analysis.frequency_response import streamed_response
-from vibench.analysis.recordings import RecordedChannels
-from vibench.analysis.signals import phase_half_width
+from vibench.analysis.frequency_response.noise_response import streamed_response
+from vibench.analysis.recordings.channels import RecordedChannels
+from vibench.analysis.signals.confidence import phase_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
@@ -119,7 +119,7 @@ class Short:
         return np.ones(frequency_hz.size)
 
     def stretches(self, label):
-        from vibench.analysis.recordings import Stretch
+        from vibench.analysis.recordings.channels import Stretch
 
         return (Stretch(0, self.samples, {}, False),)
 

@@ -9,14 +9,15 @@ from hypothesis import given, settings, strategies as st
 from scipy import signal
 
 from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, resonances, transmissibility
-from vibench.analysis.frequency_response import (
+from vibench.analysis.frequency_response.periodic import PeriodicSums
+from vibench.analysis.frequency_response.resonance import scattered_resonances
+from vibench.analysis.frequency_response.results import (
     FrequencyResponseSettings,
-    PeriodicSums,
     converted_frequency_response,
 )
-from vibench.analysis.frequency_response._resonance import scattered_resonances
-from vibench.analysis.frequency_response._steady import steady_relative_sd
-from vibench.analysis.signals import Quantity, student_half_width
+from vibench.analysis.frequency_response.steady import steady_relative_sd
+from vibench.analysis.signals.confidence import student_half_width
+from vibench.analysis.signals.quantity import Quantity
 
 
 def curve(frequency_hz, value, relative=1e-4, resolution_hz=0.0, coherence=0.99):

@@ -8,8 +8,8 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.plan import StreamedNoise
 from vibench.analysis import FrequencyResponseRequest, analyse
-from vibench.analysis.frequency_response import streamed_response
-from vibench.analysis.recordings import Stretch
+from vibench.analysis.frequency_response.noise_response import streamed_response
+from vibench.analysis.recordings.channels import Stretch
 
 RATE = 51_200.0
 

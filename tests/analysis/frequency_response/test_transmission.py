@@ -9,7 +9,7 @@ from scipy import signal
 
 from vibench.analysis import Estimator, InvalidRequest, NotEnoughData, transmissibility
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.frequency_response._transmissibility import FrequencyResponseSums
+from vibench.analysis.frequency_response.transmissibility import FrequencyResponseSums
 
 RATE = 1024.0
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vibench.analysis import resonances
-from vibench.analysis.frequency_response import converted_frequency_response
-from vibench.analysis.frequency_response._periodic import PeriodicSums
-from vibench.analysis.signals import Quantity
+from vibench.analysis.frequency_response.periodic import PeriodicSums
+from vibench.analysis.frequency_response.results import converted_frequency_response
+from vibench.analysis.signals.quantity import Quantity
 from vibench.sim import Sampled, gong2025, integrate
 
 RATE = 12_800.0

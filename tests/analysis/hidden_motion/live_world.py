@@ -9,7 +9,7 @@ import numpy as np
 from vibench.acquisition.rig import channels_of
 from vibench.analysis.hidden_motion import LiveTwin
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.world import World
+from vibench.virtual_rig.world.world import World
 
 shaken_world = sys.modules["shaken_world"]
 RATE_HZ = 51_200.0

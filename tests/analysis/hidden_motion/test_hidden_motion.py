@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.figures import hidden_impacts_figure, hidden_motion_figure
+from vibench.analysis.figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
 from vibench.analysis.hidden_motion import Hidden, Numbers, hidden_motion
 from vibench.sim import HuntCrossley, LinearGap, RigidStops, gong2025
 

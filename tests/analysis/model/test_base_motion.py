@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.excitation._stepped_sine import FrequencyGrid
+from vibench.acquisition.excitation.stepped_sine import FrequencyGrid
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine, WhiteNoise
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.model._simulated_channels import (
+from vibench.analysis.model.simulated_channels import (
     advanced,
     lowest_frequency_hz,
     recorded_base_motion,
     shaken,
 )
-from vibench.analysis.recordings._facts import plan_of
+from vibench.analysis.recordings.facts import plan_of
 from vibench.sim import Accuracy, Sampled, gong2025, integrate
 
 RATE = 6400.0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from vibench.analysis.model import Ending, EnsembleCurve, Quantity, escape_rate, z_limit
-from vibench.analysis.model._ensemble import ensemble_curves
+from vibench.analysis.model.ensemble import EnsembleCurve, Quantity, ensemble_curves, z_limit
+from vibench.analysis.model.escape import Ending, escape_rate
 
 FREQUENCY_HZ = np.arange(40.0) + 100.0
 

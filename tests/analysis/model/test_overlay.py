@@ -7,16 +7,10 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.analysis import analyse
-from vibench.analysis.model import (
-    DwellOverlay,
-    NoiseOverlay,
-    SweepOverlay,
-    logarithmic_difference,
-    paper_amplitude_m,
-    predicted,
-)
-from vibench.analysis.model._overlay import equivalent_amplitude
-from vibench.analysis.results import overlay
+from vibench.analysis.model.difference import logarithmic_difference
+from vibench.analysis.model.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude
+from vibench.analysis.model.prediction import paper_amplitude_m, predicted
+from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import base_transmissibility, gong2025
 
 

@@ -11,10 +11,11 @@ from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement, WhiteNoise
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse, result_summary
-from vibench.analysis.figures import dwells_figure
-from vibench.analysis.kinds import Result
-from vibench.analysis.model import Driven, fitted_shaker
-from vibench.analysis.results import overlay
+from vibench.analysis.figures.dwells import dwells_figure
+from vibench.analysis.kinds.analysis_kind import Result
+from vibench.analysis.model.driven_rig import Driven
+from vibench.analysis.model.shaker_fit import fitted_shaker
+from vibench.analysis.results.campaign_results import overlay
 from vibench.sim import gong2025
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")

@@ -6,8 +6,8 @@ import pytest
 
 from vibench.analysis import Simulation, analyse_files, update_model
 from vibench.analysis.hidden_motion import Hidden
-from vibench.analysis.model_updating import Assumption
-from vibench.analysis.model_updating._collision_numbers import tracked_numbers
+from vibench.analysis.model_updating.collision_numbers import tracked_numbers
+from vibench.analysis.model_updating.suspects import Assumption
 from vibench.sim import gong2025
 
 TRUE = gong2025(gap_m=(35e-6, 55e-6))

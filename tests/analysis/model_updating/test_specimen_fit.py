@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from vibench.analysis import Estimator, FrequencyResponse, InvalidRequest, NotEnoughData
-from vibench.analysis.frequency_response import FrequencyResponseSettings
-from vibench.analysis.model_updating import Assumption, Parameter, fit_specimen
-from vibench.analysis.model_updating._lines import as_described
-from vibench.analysis.model_updating._parameters import LINEAR, parameter_value, with_values
-from vibench.analysis.signals import student_half_width
+from vibench.analysis.frequency_response.results import FrequencyResponseSettings
+from vibench.analysis.model_updating.lines import as_described
+from vibench.analysis.model_updating.parameters import LINEAR, Parameter, parameter_value, with_values
+from vibench.analysis.model_updating.specimen_fit import fit_specimen
+from vibench.analysis.model_updating.suspects import Assumption
+from vibench.analysis.signals.confidence import student_half_width
 from vibench.sim import base_transmissibility, gong2025
 
 NOMINAL = gong2025()

@@ -11,7 +11,8 @@ from vibench.acquisition.plan import Dwell, Measurement, SineSweep, WhiteNoise
 from vibench.acquisition.recording import BridgedChannel, Dropout, bridged, found_dropouts
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files
-from vibench.analysis.recordings import Verdict, measurement_checks, recording_facts
+from vibench.analysis.recordings.checks import Verdict, measurement_checks
+from vibench.analysis.recordings.facts import recording_facts
 from vibench.sim import shipped_specimens
 
 RATE_HZ = 51_200.0

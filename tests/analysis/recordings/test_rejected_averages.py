@@ -7,7 +7,7 @@ import pytest
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import REJECTED, EventKind
 from vibench.acquisition.recording._tables import Event
-from vibench.analysis.recordings import RecordedChannels
+from vibench.analysis.recordings.channels import RecordedChannels
 
 
 @pytest.mark.parametrize(

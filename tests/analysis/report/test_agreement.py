@@ -8,7 +8,7 @@ from tests.reading_reports import Page
 from vibench.analysis import CampaignResults
 from vibench.analysis.report import Agreement, write_report
 from vibench.analysis.report._report import agreement_of
-from vibench.analysis.results import AnalysisFailure, FailedStep
+from vibench.analysis.results.campaign_results import AnalysisFailure, FailedStep
 
 GOOD, BAD, OPEN = (
     Of(name=name, compared=compared, agrees=agrees)

@@ -18,8 +18,8 @@ from vibench.analysis import (
     recordings_in,
     result_summary,
 )
-from vibench.analysis.kinds import Result
-from vibench.analysis.recordings import Check, Verdict
+from vibench.analysis.kinds.analysis_kind import Result
+from vibench.analysis.recordings.checks import Check, Verdict
 from vibench.analysis.report import recording_figures, result_figures, write_report
 from vibench.analysis.report._page import LONGEST_CAPTION
 from vibench.analysis.report._report import CHANGE_A_CONCLUSION

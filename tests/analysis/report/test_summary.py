@@ -5,10 +5,10 @@ from types import SimpleNamespace as Of
 import numpy as np
 import pytest
 
-from vibench.analysis.chaos import MotionKind
+from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.report import Agreement
 from vibench.analysis.report._summary import MOST_WORDS, summary
-from vibench.analysis.results import AnalysisFailure, FailedStep
+from vibench.analysis.results.campaign_results import AnalysisFailure, FailedStep
 
 YES, NO, OPEN = Agreement
 

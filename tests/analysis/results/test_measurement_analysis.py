@@ -10,9 +10,12 @@ from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import NotEnoughData, analyse
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.frequency_response import NoiseAnalysis
-from vibench.analysis.recordings import Verdict, measurement_checks
-from vibench.analysis.sine import DwellAnalysis, SteppedSineAnalysis, SweepAnalysis, frequency_check
+from vibench.analysis.frequency_response.noise_response import NoiseAnalysis
+from vibench.analysis.recordings.checks import Verdict, measurement_checks
+from vibench.analysis.sine.drive_frequency import frequency_check
+from vibench.analysis.sine.dwell_analysis import DwellAnalysis
+from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
+from vibench.analysis.sine.sweep_analysis import SweepAnalysis
 from vibench.sim import base_transmissibility, gong2025
 
 RATE = 6400.0

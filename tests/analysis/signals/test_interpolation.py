@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.signals import REACH, interpolated
+from vibench.analysis.signals.interpolation import REACH, interpolated
 
 RNG = np.random.default_rng(5)
 SAMPLES = 3000

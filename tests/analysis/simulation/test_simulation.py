@@ -8,19 +8,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from vibench.analysis.simulation import (
-    Begin,
-    Cancel,
-    Ended,
-    Grown,
-    SimulationProgress,
-    SimulationRequest,
-    cost_sentences,
-    serve,
-)
-from vibench.analysis.simulation._accuracy_cost import MEASURED
-from vibench.analysis.simulation._request import SimulatedPoint, Trouble
-from vibench.analysis.simulation._worker import simulate
+from vibench.analysis.simulation.accuracy_cost import MEASURED, cost_sentences
+from vibench.analysis.simulation.progress import SimulationProgress
+from vibench.analysis.simulation.request import SimulatedPoint, SimulationRequest, Trouble
+from vibench.analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve, simulate
 from vibench.sim import Accuracy, base_transmissibility, gong2025, load_specimen
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vibench.analysis.sine import SweepSums
+from vibench.analysis.sine.sweep import SweepSums
 
 BLOCK = 1 << 19
 

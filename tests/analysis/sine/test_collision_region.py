@@ -11,7 +11,7 @@ from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Measurement, SineSweep
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse_files
-from vibench.analysis.sine import collisions
+from vibench.analysis.sine.collision_region import collisions
 from vibench.sim import LinearSweep, base_transmissibility, gong2025, integrate
 
 RATE = 12_800.0

@@ -5,8 +5,8 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.analysis import analyse
-from vibench.analysis.chaos import MotionKind
-from vibench.analysis.figures import portraits_figure
+from vibench.analysis.chaos.verdict import MotionKind
+from vibench.analysis.figures.portraits import portraits_figure
 
 
 @pytest.fixture(scope="module")

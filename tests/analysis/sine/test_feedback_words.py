@@ -12,15 +12,15 @@ from vibench.acquisition.plan import Measurement, ResonanceTracking, SettledSine
 from vibench.acquisition.recording import Held, JumpNote, JumpSearchEnd, JumpSide, SegmentNote, Steadiness
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, analyse, result_summary
-from vibench.analysis.figures import (
+from vibench.analysis.figures.backbone import backbone_figure
+from vibench.analysis.figures.stepped_sine import (
     STEPPED_FREQUENCIES,
     TRACKED_RESONANCE,
-    backbone_figure,
     stepped_sine_figure,
 )
-from vibench.analysis.kinds import Result
+from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.report import findings, result_figures
-from vibench.analysis.sine import feedback_sentences, noted_jumps
+from vibench.analysis.sine.tracked_resonance import feedback_sentences, noted_jumps
 
 ROOT = Path(__file__).parents[3]
 JUMP = JumpNote(

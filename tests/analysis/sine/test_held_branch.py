@@ -3,7 +3,7 @@
 import numpy as np
 
 from vibench.acquisition.recording import BranchPointNote, BranchStabilityNote, Stability
-from vibench.analysis.sine import branch_sentences, held_branch
+from vibench.analysis.sine.held_branch import branch_sentences, held_branch
 
 HERTZ = 94.0, 95.0, 94.6, 94.2
 

@@ -5,7 +5,8 @@ import pytest
 
 from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.analysis import InvalidRequest
-from vibench.analysis.sine import hysteresis, jumps
+from vibench.analysis.sine.hysteresis import hysteresis
+from vibench.analysis.sine.jumps import jumps
 from vibench.sim import (
     BalanceOptions,
     BifurcationKind,
@@ -16,7 +17,8 @@ from vibench.sim import (
     spring_of,
     structure_of,
 )
-from vibench.sim.periodic import balance, balance_branch_within
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import balance
 
 TIME_S = 0.1 * np.arange(2000)
 FREQUENCY_HZ = 150 + TIME_S

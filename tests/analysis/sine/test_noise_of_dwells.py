@@ -12,9 +12,9 @@ from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Dwell, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
-from vibench.analysis.chaos import MotionKind
+from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.report._result_tables import dwell_table
-from vibench.analysis.uncertainty import Cause
+from vibench.analysis.uncertainty.budget import Cause
 from vibench.sim import base_transmissibility
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")

@@ -12,11 +12,13 @@ from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.acquisition.plan import SineSweep
 from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.recordings import Stretch, Verdict
-from vibench.analysis.signals import Decimator
-from vibench.analysis.sine import SweepSums, collisions, measured_sweep, played_check
-from vibench.analysis.sine._sweep import drive_phase
-from vibench.analysis.tones import tracked_orders
+from vibench.analysis.recordings.channels import Stretch
+from vibench.analysis.recordings.checks import Verdict
+from vibench.analysis.signals.decimation import Decimator
+from vibench.analysis.sine.collision_region import collisions
+from vibench.analysis.sine.sweep import SweepSums, drive_phase
+from vibench.analysis.sine.sweep_analysis import measured_sweep, played_check
+from vibench.analysis.tones.order_tracking import tracked_orders
 
 RATE = 8192.0
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from vibench.acquisition.recording import DwellNote, ResonanceNote, Steadiness
-from vibench.analysis.sine import (
+from vibench.analysis.sine.tracked_resonance import (
     backbone_sentence,
     feedback_sentences,
     lost_levels,

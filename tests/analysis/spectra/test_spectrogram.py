@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis import InvalidRequest, NotEnoughData
-from vibench.analysis.spectra import SpectrogramSums
-from vibench.analysis.spectra._spectrogram import MOST_COLUMNS
+from vibench.analysis.spectra.spectrogram import MOST_COLUMNS, SpectrogramSums
 
 RATE = 4000.0
 

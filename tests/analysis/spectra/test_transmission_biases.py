@@ -5,7 +5,7 @@ import pytest
 from scipy import fft, signal
 
 from vibench.analysis import transmissibility
-from vibench.analysis.spectra import spectral_density
+from vibench.analysis.spectra.spectra import spectral_density
 
 RATE = 1024.0
 SEGMENT = 256

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.tones import ALL_ORDERS, ORDERS, order_turns
+from vibench.analysis.tones.order_tracking import ALL_ORDERS, ORDERS, order_turns
 
 
 @pytest.mark.parametrize(

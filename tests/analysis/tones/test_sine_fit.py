@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.analysis.errors import UnusableData
-from vibench.analysis.tones import fitted_sine
+from vibench.analysis.tones.sine_fit import fitted_sine
 
 RATE = 4096.0
 

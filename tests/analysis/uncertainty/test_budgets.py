@@ -11,12 +11,13 @@ from hypothesis.extra.numpy import arrays
 from vibench.acquisition import open_recording
 from vibench.acquisition.rig import StatedUncertainty, VibrometerConfig
 from vibench.analysis import Simulation, analyse_files, budgets_of, campaign_summary
-from vibench.analysis.model import RESPONSE_I, RESPONSE_II, EnsembleCurve
+from vibench.analysis.model.ensemble import EnsembleCurve
+from vibench.analysis.model.overlay import RESPONSE_I, RESPONSE_II
 from vibench.analysis.report._result_tables import uncertainty_table
-from vibench.analysis.sine import dwell_response
-from vibench.analysis.uncertainty import Cause, dwell_budgets, stated_of, sweep_budgets
-from vibench.analysis.uncertainty._budget import Contribution
-from vibench.analysis.uncertainty._quantities import sd_of_largest
+from vibench.analysis.sine.dwell import dwell_response
+from vibench.analysis.uncertainty.budget import Cause, Contribution
+from vibench.analysis.uncertainty.quantities import dwell_budgets, sd_of_largest, sweep_budgets
+from vibench.analysis.uncertainty.stated import stated_of
 
 DRAWS = 150
 STATED = {

@@ -9,9 +9,9 @@ from vibench.acquisition import open_bench, run_measurement
 from vibench.acquisition.plan import Dwell, HeldDwell, Measurement, SineSweep, WhiteNoise, base_motion
 from vibench.acquisition.rig import Rig, load_rig
 from vibench.analysis import Simulation, analyse_files, budgets_of, expected_uncertainty
-from vibench.analysis.uncertainty import Cause
+from vibench.analysis.uncertainty.budget import Cause
 from vibench.sim import shipped_specimens
-from vibench.sim.shaker import LoadedShaker, MotionFailed
+from vibench.sim.shaker.loaded_shaker import LoadedShaker, MotionFailed
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 NOISE = WhiteNoise(

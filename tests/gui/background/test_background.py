@@ -11,7 +11,7 @@ from time import sleep
 
 import pytest
 
-from vibench.gui.background import Background, LatestRequest
+from vibench.gui.background.background import Background, LatestRequest
 
 
 def test_an_answer_comes_from_another_process(context, qtbot):

@@ -7,12 +7,14 @@ from PySide6.QtWidgets import QAbstractSpinBox, QComboBox
 
 from vibench.acquisition.plan import EXCITATION_KINDS, Measurement, SineSweep
 from vibench.analysis import AnalysisOptions
-from vibench.analysis.simulation import MapRequest, SimulationRequest
-from vibench.gui.forms import Choice, GroupEditor, JudgedForm
-from vibench.gui.pages.queue._sweep_form import SweepForm
-from vibench.gui.pages.simulate._dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
-from vibench.gui.pages.test._test_form import TestForm as FormOfATest
-from vibench.gui.window._settings_dialog import Preferences
+from vibench.analysis.simulation.map_request import MapRequest
+from vibench.analysis.simulation.request import SimulationRequest
+from vibench.gui.forms.editor import Choice
+from vibench.gui.forms.model_form import GroupEditor, JudgedForm
+from vibench.gui.pages.queue.sweep_form import SweepForm
+from vibench.gui.pages.simulate.dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
+from vibench.gui.pages.test.test_form import TestForm as FormOfATest
+from vibench.gui.window.settings_dialog import Preferences
 
 BAD = (
     *("", " ", "abc", "-1", "0", "--5", "1e99", "-1e99", "1e-99", "1e999", "nan", "inf", "-inf", "½", "0x10"),

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLabel
 from vibench.acquisition import load_campaign
 from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
 from vibench.analysis.dynamics import SpecimenChoice
-from vibench.gui.forms import JudgedForm, ModelForm
+from vibench.gui.forms.model_form import JudgedForm, ModelForm
 
 CAMPAIGNS = Path(__file__).resolve().parents[3] / "campaigns"
 MEASUREMENTS = {

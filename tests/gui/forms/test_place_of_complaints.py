@@ -3,9 +3,10 @@
 import pytest
 
 from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpectrumRequest
-from vibench.analysis.simulation import MapRequest, SimulationRequest
-from vibench.gui.forms import JudgedForm
-from vibench.gui.pages.simulate._dynamics_kinds import BRANCHES, CHAIN
+from vibench.analysis.simulation.map_request import MapRequest
+from vibench.analysis.simulation.request import SimulationRequest
+from vibench.gui.forms.model_form import JudgedForm
+from vibench.gui.pages.simulate.dynamics_kinds import BRANCHES, CHAIN
 
 HIDDEN = BRANCHES.hidden | CHAIN.hidden
 GIVEN = {"start": 60.0, "stop": 62.0}

@@ -6,9 +6,9 @@ from PySide6.QtCore import Qt
 
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.plan import Dwell
-from vibench.gui.forms import JudgedForm
-from vibench.gui.forms._editor import ListEditor
-from vibench.gui.forms._quantity_edit import QuantityEdit, parsed_quantity, quantity_text
+from vibench.gui.forms.editor import ListEditor
+from vibench.gui.forms.model_form import JudgedForm
+from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quantity_text
 
 
 @pytest.mark.parametrize(

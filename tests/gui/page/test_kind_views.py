@@ -1,7 +1,7 @@
 """Every kind of excitation has its live pictures."""
 
 from vibench.acquisition.plan import EXCITATION_KINDS, Family
-from vibench.gui.page import KIND_VIEWS, LivePicture
+from vibench.gui.page.kind_views import KIND_VIEWS, LivePicture
 
 
 def test_every_kind_has_its_pictures_and_only_noise_shows_a_whole_band():

@@ -20,13 +20,14 @@ from vibench.acquisition.recording import (
 )
 from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.live import LiveChannel, LiveView
-from vibench.analysis.simulation import SimulationProgress
-from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal
-from vibench.gui.engine_link._live_run import warm_up
-from vibench.gui.pages.queue._draft import with_sweep
-from vibench.gui.widgets import COMPARE, DARK, FILES, LIGHT, QUEUE, RUN, SIMULATE, TEST
-from vibench.gui.window._open_window import load_ahead
-from vibench.gui.window._screenshots import SHOWN, SHOWN_TOO
+from vibench.analysis.simulation.progress import SimulationProgress
+from vibench.analysis.simulation.request import SimulatedPoint, SimulatedSignal
+from vibench.gui.engine_link.live_run import warm_up
+from vibench.gui.pages.queue.draft import with_sweep
+from vibench.gui.widgets.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
+from vibench.gui.widgets.theme import DARK, LIGHT
+from vibench.gui.window.open_window import load_ahead
+from vibench.gui.window.screenshots import SHOWN, SHOWN_TOO
 
 RATE_HZ, LONG_S, STEPS = 51_200.0, 20.0, 200
 LONG_CHANNELS = (

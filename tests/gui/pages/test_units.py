@@ -20,16 +20,17 @@ from vibench.acquisition.engine import ArmedPlan, EngineState, EngineStatus, Sup
 from vibench.acquisition.plan import EXCITATION_KINDS, Dwell, HeldDwell, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.analysis.simulation import SettledMotion
-from vibench.gui.forms import JudgedForm
-from vibench.gui.forms._quantity_edit import QuantityEdit, parsed_quantity, quantity_text
-from vibench.gui.page import AppContext, Settings
-from vibench.gui.pages.test._test_form import TestForm as FormOfATest
-from vibench.gui.pages.test._test_preview import TestPreview as Previewed, preview_test
-from vibench.gui.plots import Plot
-from vibench.gui.widgets import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST, UNITS
-from vibench.gui.widgets._units import CHOICES, fitted_unit
-from vibench.gui.window._settings_dialog import SettingsDialog
+from vibench.analysis.simulation.map_request import SettledMotion
+from vibench.gui.forms.model_form import JudgedForm
+from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quantity_text
+from vibench.gui.page.app_context import AppContext
+from vibench.gui.page.settings import Settings
+from vibench.gui.pages.test.test_form import TestForm as FormOfATest
+from vibench.gui.pages.test.test_preview import TestPreview as Previewed, preview_test
+from vibench.gui.plots.plot import Plot
+from vibench.gui.widgets.page_names import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
+from vibench.gui.widgets.units import CHOICES, UNITS, fitted_unit
+from vibench.gui.window.settings_dialog import SettingsDialog
 
 OLD = re.compile(r"(?:\d|\()\s?(?:µm|m/s²|m/s2|m s-[12]|mm/s)(?![\w/²·])")
 """A number, or the label of an axis, in a unit that was not chosen."""

@@ -5,8 +5,7 @@ from math import log10
 import numpy as np
 import pytest
 
-from vibench.gui.plots import LOG_FREQUENCY, PlotAxis, Scale
-from vibench.gui.plots._axis import AxisItem, logarithmic_ticks, number_text
+from vibench.gui.plots.axis import LOG_FREQUENCY, AxisItem, PlotAxis, Scale, logarithmic_ticks, number_text
 
 
 def test_decades_are_labelled_at_one_two_and_five():

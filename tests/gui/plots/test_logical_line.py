@@ -7,12 +7,12 @@ import sys
 import pytest
 
 WIDTHS = """
-from vibench.gui.window._open_window import application
+from vibench.gui.window.open_window import application
 application([])
-from vibench.gui.plots import TIME, PlotAxis
-from vibench.gui.plots import LineStyle
-from vibench.gui.plots import Plot
-from vibench.gui.widgets import LIGHT
+from vibench.gui.plots.axis import TIME, PlotAxis
+from vibench.gui.plots.line_style import LineStyle
+from vibench.gui.plots.plot import Plot
+from vibench.gui.widgets.theme import LIGHT
 plot = Plot("a plot", TIME, PlotAxis("Height", "m"), LIGHT)
 plot.resize(400, 300)
 plot.setXRange(0, 10, padding=0)

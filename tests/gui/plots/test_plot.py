@@ -7,10 +7,12 @@ from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QColor, QGuiApplication
 from PySide6.QtWidgets import QLabel
 
-from vibench.gui.plots import LIMIT, LOG_FREQUENCY, TIME, LineStyle, Plot, PlotAxis, curve_style
-from vibench.gui.plots._axis import thinned
-from vibench.gui.plots._plot_actions import numbers_of, write_plot
-from vibench.gui.widgets import LIGHT, UNITS
+from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, PlotAxis, thinned
+from vibench.gui.plots.line_style import LIMIT, LineStyle, curve_style
+from vibench.gui.plots.plot import Plot
+from vibench.gui.plots.plot_actions import numbers_of, write_plot
+from vibench.gui.widgets.theme import LIGHT
+from vibench.gui.widgets.units import UNITS
 
 
 @pytest.fixture

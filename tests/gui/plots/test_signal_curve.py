@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from vibench.gui.plots import TIME, Plot, PlotAxis, SignalCurve, curve_style
-from vibench.gui.widgets import LIGHT
+from vibench.gui.plots.axis import TIME, PlotAxis
+from vibench.gui.plots.line_style import curve_style
+from vibench.gui.plots.plot import Plot
+from vibench.gui.plots.signal_curve import SignalCurve
+from vibench.gui.widgets.theme import LIGHT
 
 RATE_HZ = 51200.0
 

@@ -2,8 +2,10 @@
 
 import pytest
 
-from vibench.gui.plots import LOG_FREQUENCY, TIME, Dash, LineStyle, Plot, PlotAxis
-from vibench.gui.widgets import LIGHT
+from vibench.gui.plots.axis import LOG_FREQUENCY, TIME, PlotAxis
+from vibench.gui.plots.line_style import Dash, LineStyle
+from vibench.gui.plots.plot import Plot
+from vibench.gui.widgets.theme import LIGHT
 
 RED = LineStyle(lambda _theme: "#ff0000", filled=1.0)
 LINE = LineStyle(lambda _theme: "#ff0000", Dash.SOLID)

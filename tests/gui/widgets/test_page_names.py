@@ -13,9 +13,9 @@ from PySide6.QtWidgets import (
     QTabWidget,
 )
 
-from vibench.gui.pages.compare import ComparePage
-from vibench.gui.pages.files import FilesPage
-from vibench.gui.pages.simulate import SimulatePage
+from vibench.gui.pages.compare.compare_page import ComparePage
+from vibench.gui.pages.files.files_page import FilesPage
+from vibench.gui.pages.simulate.simulate_page import SimulatePage
 
 PAGES = (FilesPage, ComparePage, SimulatePage)
 MENU_KEYS = "ftvh"

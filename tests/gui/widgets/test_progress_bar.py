@@ -2,8 +2,9 @@
 
 import pytest
 
-from vibench.gui.pages.run._watch_card import WatchCard
-from vibench.gui.widgets import LIGHT, ProgressBar, TimedBar
+from vibench.gui.pages.run.watch_card import WatchCard
+from vibench.gui.widgets.theme import LIGHT
+from vibench.gui.widgets.timed_bar import ProgressBar, TimedBar
 
 WORDS = "ramping up as far as the first tenth, 11:22:33 left"
 

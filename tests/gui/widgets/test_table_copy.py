@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QAbstractItemView, QTableView
 
-from vibench.gui.widgets import ReadTable
+from vibench.gui.widgets.read_table import ReadTable
 
 
 @pytest.fixture

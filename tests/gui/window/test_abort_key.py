@@ -4,7 +4,7 @@ import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QMenu, QVBoxLayout, QWidget
 
-from vibench.gui.window._menus import AbortKey
+from vibench.gui.window.menus import AbortKey
 
 
 @pytest.fixture

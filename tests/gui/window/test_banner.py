@@ -3,9 +3,8 @@
 import pytest
 from PySide6.QtWidgets import QLabel, QPushButton
 
-from vibench.gui.widgets import DARK, LIGHT, Tone
-from vibench.gui.window import StateIndicator
-from vibench.gui.window._banner import Banner
+from vibench.gui.widgets.theme import DARK, LIGHT, Tone
+from vibench.gui.window.banner import Banner, StateIndicator
 
 READABLE = 4.5
 

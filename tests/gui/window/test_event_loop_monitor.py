@@ -4,7 +4,7 @@ from time import thread_time
 
 import pytest
 
-from vibench.gui.window._event_loop_monitor import BOUND_S, EventLoopMonitor
+from vibench.gui.window.event_loop_monitor import BOUND_S, EventLoopMonitor
 
 
 def work_for(duration_s):

@@ -6,8 +6,8 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
 
 from vibench.acquisition import LimitExceeded
-from vibench.gui.widgets import Notice, NoticeKind, notice_of
-from vibench.gui.window._message_strip import MessageStrip
+from vibench.gui.widgets.notice import Notice, NoticeKind, notice_of
+from vibench.gui.window.message_strip import MessageStrip
 
 
 def shown(strip):

@@ -9,9 +9,10 @@ from PySide6.QtWidgets import QApplication, QDialogButtonBox, QLabel, QMenu
 
 from vibench.acquisition import save_toml, shipped
 from vibench.gui.__main__ import NO_WINDOW, _sign_of_life, main
-from vibench.gui.widgets import COMPARE, DARK, FILES, QUEUE, RIG, TEST
-from vibench.gui.window._manual import show_about, show_manual
-from vibench.gui.window._settings_dialog import SettingsDialog
+from vibench.gui.widgets.page_names import COMPARE, FILES, QUEUE, RIG, TEST
+from vibench.gui.widgets.theme import DARK
+from vibench.gui.window.manual import show_about, show_manual
+from vibench.gui.window.settings_dialog import SettingsDialog
 
 
 def dropped(window, *paths):

@@ -3,10 +3,12 @@
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.gui.page import AppContext, Settings
-from vibench.gui.widgets import DARK, RIG, TEST
-from vibench.gui.window._page_catalogue import PAGES
-from vibench.gui.window._window import Window
+from vibench.gui.page.app_context import AppContext
+from vibench.gui.page.settings import Settings
+from vibench.gui.widgets.page_names import RIG, TEST
+from vibench.gui.widgets.theme import DARK
+from vibench.gui.window.page_catalogue import PAGES
+from vibench.gui.window.window import Window
 
 
 def test_every_page_can_be_shown_by_its_key(window, qtbot):

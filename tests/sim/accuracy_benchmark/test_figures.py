@@ -3,8 +3,7 @@
 import pytest
 
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark import LevelFigures, MotionBenchmark
-from vibench.sim.accuracy_benchmark._figures import Motion, Regime
+from vibench.sim.accuracy_benchmark.figures import LevelFigures, Motion, MotionBenchmark, Regime
 
 
 def benchmark(*state_errors, regime=Regime.PERIODIC):

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, integrate
-from vibench.sim.accuracy_benchmark import MOTIONS, Thoroughness
-from vibench.sim.accuracy_benchmark._figures import Motion, Regime
-from vibench.sim.accuracy_benchmark._independent_solution import independent_state, state_error
-from vibench.sim.accuracy_benchmark._measuring import SOLVERS, measured_motion, settled_state
-from vibench.sim.model import modal_form
+from vibench.sim.accuracy_benchmark.figures import MOTIONS, Motion, Regime
+from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
+from vibench.sim.accuracy_benchmark.measuring import SOLVERS, Thoroughness, measured_motion, settled_state
+from vibench.sim.model.modes import modal_form
 
 SHORT = Thoroughness(span_s=0.05, solver_span_s=0.01)
 

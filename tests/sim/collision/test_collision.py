@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025
-from vibench.sim.engine import (
+from vibench.sim.engine.collision_shapes import (
     DEPTHS,
     DURATION,
     HALF_FORCE,
     SOFTEST,
     SPACING,
-    Watch,
     collision_shapes,
 )
-from vibench.sim.scene._followed_run import FollowedRun, Samples
+from vibench.sim.engine.run import Watch
+from vibench.sim.scene.followed_run import FollowedRun, Samples
 
 DRIVE, STILL = Harmonic(130.0, 20e-6), Harmonic(130.0, 0.0)
 STANDARD = Accuracy.STANDARD.tolerance

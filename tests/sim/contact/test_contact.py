@@ -7,16 +7,10 @@ import pytest
 from scipy.special import gamma
 
 from vibench.sim import gong2025
-from vibench.sim.contact import (
-    HELD,
-    LEFT,
-    advance_contact,
-    begin_contact,
-    contact_workspace,
-)
-from vibench.sim.flight import FORCE_TERMS
-from vibench.sim.model import VY, VZ, Y
-from vibench.sim.slots import SIDE, STATE_SIZE, parameters
+from vibench.sim.contact.contact import HELD, LEFT, advance_contact, begin_contact, contact_workspace
+from vibench.sim.flight.flight import FORCE_TERMS
+from vibench.sim.model.state import VY, VZ, Y
+from vibench.sim.slots.parameters import SIDE, STATE_SIZE, parameters
 
 DURATION_CONSTANT = 0.8 * math.sqrt(math.pi) * gamma(0.4) / gamma(0.9)
 LOOSE = {"k0": 0.0, "k1": 0.0, "k2": 0.0, "c0": 0.0, "c1": 0.0, "c2": 0.0, "contact_stiffness": 4.9e9}

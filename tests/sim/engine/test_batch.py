@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.engine import NativeRun, RunRecord, follow_batch, is_batchable
-from vibench.sim.model import Hertz, Specimen
+from vibench.sim.engine.batch import follow_batch, is_batchable
+from vibench.sim.engine.run import NativeRun, RunRecord
+from vibench.sim.model.hertz import Hertz
+from vibench.sim.model.specimen import Specimen
 
 STANDARD = Accuracy.STANDARD.tolerance
 SPECIMEN = gong2025()

@@ -10,22 +10,12 @@ import pytest
 
 from tests.sim.engine.native_calls import calls
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine import (
-    Engine,
-    EngineError,
-    NativeRun,
-    RunRecord,
-    Watch,
-    check_known_answer,
-    collision_structure,
-    follow_batch,
-    library_path,
-    native_engine,
-    parse_structures,
-    power_structure,
-    scene_of,
-    usable_families,
-)
+from vibench.sim.engine.batch import follow_batch
+from vibench.sim.engine.library import Engine, EngineError, library_path
+from vibench.sim.engine.processor import usable_families
+from vibench.sim.engine.run import NativeRun, RunRecord, Watch, check_known_answer, native_engine
+from vibench.sim.engine.scene import collision_structure, power_structure, scene_of
+from vibench.sim.engine.structures import parse_structures
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -90,7 +80,7 @@ def test_the_loaded_engine_is_built_from_the_sources_of_this_checkout(build):
 
 
 def test_an_engine_that_answers_wrongly_is_refused(monkeypatch):
-    monkeypatch.setattr("vibench.sim.engine._run.KNOWN_DURATION_S", 0.0301)
+    monkeypatch.setattr("vibench.sim.engine.run.KNOWN_DURATION_S", 0.0301)
     with pytest.raises(EngineError, match="fails its self-test"):
         check_known_answer(native_engine())
 
@@ -155,7 +145,7 @@ def test_an_instant_that_is_no_number_is_refused():
 def test_an_engine_older_than_its_sources_is_rebuilt_or_refused_with_the_command(tmp_path, monkeypatch):
     older = tmp_path / "engine-x86_64-000000000000.so"
     older.touch()
-    monkeypatch.setattr("vibench.sim.engine._library.FOLDER", tmp_path)
+    monkeypatch.setattr("vibench.sim.engine.library.FOLDER", tmp_path)
     monkeypatch.setattr("importlib.util.find_spec", lambda _name: None)
     with pytest.raises(
         EngineError, match=r"older than its sources: run pip install ziglang && python native/build\.py"
@@ -169,8 +159,8 @@ def test_without_its_sources_an_installed_engine_is_taken_as_it_is(tmp_path, mon
     installed = tmp_path / f"engine-{family}-000000000000{ending}"
     installed.touch()
     (tmp_path / f"engine-{family}-000000000000.another_system").touch()
-    monkeypatch.setattr("vibench.sim.engine._library.FOLDER", tmp_path)
-    monkeypatch.setattr("vibench.sim.engine._library.BUILD", tmp_path / "absent.py")
+    monkeypatch.setattr("vibench.sim.engine.library.FOLDER", tmp_path)
+    monkeypatch.setattr("vibench.sim.engine.library.BUILD", tmp_path / "absent.py")
     assert library_path() == installed
     installed.unlink()
     with pytest.raises(EngineError, match="install vibench again"):

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine import collision_structure, native_engine, power_structure, scene_of
+from vibench.sim.engine.run import native_engine
+from vibench.sim.engine.scene import collision_structure, power_structure, scene_of
 
 ROOT = Path(__file__).resolve().parents[3]
 FUZZ = Path(__file__).parent / "fuzz_interface.py"

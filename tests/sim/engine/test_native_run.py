@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025
-from vibench.sim.engine import NativeRun, RunRecord
+from vibench.sim.engine.run import NativeRun, RunRecord
 
 UNITS = np.repeat([1e-4, 0.1], 3)
 """Of an error: 100 um and 0.1 m/s."""

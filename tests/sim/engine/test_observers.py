@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine import NativeRun, RunRecord, Watch
+from vibench.sim.engine.run import NativeRun, RunRecord, Watch
 
 LAWS = (
     "hertz",

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025, integrate
-from vibench.sim.accuracy_benchmark._independent_solution import STATE_UNITS, independent_state, state_error
-from vibench.sim.engine import Watch
-from vibench.sim.scene._followed_run import FollowedRun, Samples
+from vibench.sim.accuracy_benchmark.independent_solution import STATE_UNITS, independent_state, state_error
+from vibench.sim.engine.run import Watch
+from vibench.sim.scene.followed_run import FollowedRun, Samples
 
 DRIVES = [Harmonic(130.0, 20e-6), Harmonic(260.0, 5e-6), Harmonic(311.0, 40e-6, 0.7)]
 GAPS = [45e-6, (20e-6, 60e-6)]

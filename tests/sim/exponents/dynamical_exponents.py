@@ -21,11 +21,11 @@ from numpy.typing import ArrayLike
 from scipy.integrate._ivp import dop853_coefficients as _dop
 
 from tests.sim.exponents.orthonormal import orthonormal_rows, orthonormalise
-from vibench.sim.contact import step_factor
-from vibench.sim.contact._flow import BLEND, ERROR_3, ERROR_5, STAGES
-from vibench.sim.exponents import blocked_mean
-from vibench.sim.exponents._lyapunov_spectrum import kaplan_yorke
-from vibench.sim.kernels import Floats, Table, Vector
+from vibench.sim.contact.contact import step_factor
+from vibench.sim.contact.flow import BLEND, ERROR_3, ERROR_5, STAGES
+from vibench.sim.exponents.blocking import blocked_mean
+from vibench.sim.exponents.lyapunov_spectrum import kaplan_yorke
+from vibench.sim.kernels.arrays import Floats, Table, Vector
 
 Flow = Callable[[float, Vector, Vector, Vector], None]
 FlowJacobian = Callable[[float, Vector, Vector, Table], None]

@@ -8,7 +8,8 @@ import math
 
 import numpy as np
 
-from vibench.sim.kernels import Table, Vector, kernel_without_refcount
+from vibench.sim.kernels.arrays import Table, Vector
+from vibench.sim.kernels.compile import kernel_without_refcount
 
 PASSES = 2
 LOST = 1e-11

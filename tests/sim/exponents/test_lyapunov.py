@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, LinearGap, Outcome, Specimen, gong2025, lyapunov_exponent
-from vibench.sim.exponents import Precision
-from vibench.sim.exponents._lyapunov import FEWEST_INTERVALS, ExponentVerdict, Source
-from vibench.sim.exponents._settling import FinalMotion
+from vibench.sim.exponents.lyapunov import FEWEST_INTERVALS, ExponentVerdict, Precision, Source
+from vibench.sim.exponents.settling import FinalMotion
 
 CHAOS = Harmonic(260.0, 5e-6)
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent, lyapunov_spectrum
-from vibench.sim.exponents._lyapunov import ExponentVerdict, Source
-from vibench.sim.exponents._lyapunov_spectrum import kaplan_yorke
-from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
-from vibench.sim.model import state_matrix
+from vibench.sim.exponents.lyapunov import ExponentVerdict, Source
+from vibench.sim.exponents.lyapunov_spectrum import kaplan_yorke
+from vibench.sim.exponents.tangent_run import interval_for, run_with_tangent
+from vibench.sim.model.modes import state_matrix
 
 pytestmark = pytest.mark.timeout(300)
 """Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
-from vibench.sim.exponents._lyapunov import ExponentVerdict, Source
-from vibench.sim.exponents._settling import FinalMotion, settling
-from vibench.sim.exponents._tangent_run import Interval, TangentRun
+from vibench.sim.exponents.lyapunov import ExponentVerdict, Source
+from vibench.sim.exponents.settling import FinalMotion, settling
+from vibench.sim.exponents.tangent_run import Interval, TangentRun
 
 COUNT = 400
 CHAOTIC_SECTION = np.random.default_rng(5).standard_normal((COUNT, 6))

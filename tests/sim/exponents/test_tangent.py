@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, integrate
-from vibench.sim.engine import NativeRun, RunRecord
+from vibench.sim.engine.run import NativeRun, RunRecord
 
 DRIVE = Harmonic(130.0, 20e-6)
 DURATION_S = 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from tests.sim.exponents.two_trajectories import two_trajectory_exponent
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
-from vibench.sim.exponents._tangent_run import interval_for, run_with_tangent
+from vibench.sim.exponents.tangent_run import interval_for, run_with_tangent
 
 CHAOS = Harmonic(260.0, 5e-6)
 

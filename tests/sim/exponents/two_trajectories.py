@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vibench.sim import Accuracy, Harmonic, Outcome, Specimen
-from vibench.sim.engine import NativeRun, RunRecord, most_impacts
-from vibench.sim.exponents import BlockedMean, blocked_mean
-from vibench.sim.exponents._lyapunov import intervals_to_skip
-from vibench.sim.exponents._tangent_run import energy_metric, interval_for
-from vibench.sim.kernels import Floats
-from vibench.sim.motion import MAX_IMPACT_RATE_HZ, start_motion
+from vibench.sim.engine.run import NativeRun, RunRecord, most_impacts
+from vibench.sim.exponents.blocking import BlockedMean, blocked_mean
+from vibench.sim.exponents.lyapunov import intervals_to_skip
+from vibench.sim.exponents.tangent_run import energy_metric, interval_for
+from vibench.sim.kernels.arrays import Floats
+from vibench.sim.motion.integrate import MAX_IMPACT_RATE_HZ, start_motion
 
 DISTANCE = 1e-7
 """Of the two motions after each return, over the state's scale: far above the error of a run at reference

@@ -7,24 +7,18 @@ import numpy as np
 import pytest
 
 from vibench.sim import gong2025
-from vibench.sim.feedback import (
-    Begin,
-    LawWeights,
-    LinearLaw,
-    LoopTiming,
-    SampledPlant,
-    branch_hold,
-    branch_multipliers,
-    designed_law,
-    impact_branch,
-    loop_multiplier,
-    loop_transfer,
-    motion_slopes,
-    pd_law,
-)
-from vibench.sim.model import PowerLaw
-from vibench.sim.periodic import FrequencyPath, balance, balance_branch_within, spring_of, structure_of
-from vibench.sim.shaker import Amplifier, LoadedShaker, Shaker
+from vibench.sim.feedback.branch import Begin, branch_hold, branch_multipliers, impact_branch, motion_slopes
+from vibench.sim.feedback.law import LawWeights, LinearLaw, designed_law, pd_law
+from vibench.sim.feedback.loop import loop_multiplier, loop_transfer
+from vibench.sim.feedback.plant import LoopTiming, SampledPlant
+from vibench.sim.model.power_law import PowerLaw
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.drive_path import FrequencyPath
+from vibench.sim.periodic.restoring_force import spring_of
+from vibench.sim.shaker.loaded_shaker import LoadedShaker
+from vibench.sim.shaker.parts import Amplifier, Shaker
 
 RATE_HZ = 10_240.0
 K1 = 2.1e-3 * (2 * np.pi * 100) ** 2

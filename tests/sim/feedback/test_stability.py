@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from vibench.sim.feedback import (
+from vibench.sim.feedback.branch import motion_slopes
+from vibench.sim.feedback.law import designed_law
+from vibench.sim.feedback.stability import (
     OpenLoopMultiplier,
     PerturbedMotion,
-    designed_law,
     envelope_deviation,
-    motion_slopes,
     open_loop_multiplier,
 )
 

@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
-from vibench.sim.flight import NEVER, SERIES_TERMS, first_contact
+from vibench.sim.flight.detection import NEVER, SERIES_TERMS, first_contact
 
 GAP = 45e-6
 LENGTH = 4e-5

@@ -9,7 +9,7 @@ from numba import njit
 from numba.core import ir
 from numba.core.compiler import Compiler
 
-from vibench.sim.kernels._inlining import KernelCompiler
+from vibench.sim.kernels.inlining import KernelCompiler
 
 NAME = re.compile(r'[%@!#$]"[^"]*"|[%@!#$][\w.$-]+')
 BLOCK = re.compile(r"\bB\d+")

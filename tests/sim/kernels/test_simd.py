@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from vibench.sim.kernels import (
+from vibench.sim.kernels.compile import kernel
+from vibench.sim.kernels.simd import (
     eight,
     eight_of_eight,
     eight_of_sixteen,
     eights,
-    kernel,
     largest,
     root,
     sixteen,

@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 
 from vibench.sim.maps._refinement import AUDITED, Seen, plan_refinement
 from vibench.sim.maps._results import Audit, audit_of
-from vibench.sim.scene import Count, Share, shares_of
+from vibench.sim.scene.shares import Count, Share, shares_of
 
 
 def disc(shape, centre, radius):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim.maps import Map, Range, kick_stability, solve_map, uncertainty_exponent
-from vibench.sim.scene import wilson_share
+from vibench.sim.scene.shares import wilson_share
 from vibench.sim.study import InvalidStudy, PointState
 
 # Over the edge between no contact and contact.

@@ -9,11 +9,11 @@ from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 
 from vibench.sim import Hertz, HuntCrossley, LinearGap, NoContact, PowerLaw, RigidStops, gong2025, spring_of
-from vibench.sim.model import CONTACT_LAWS, ContactLaw, model_named
-from vibench.sim.model._linear_gap import fitted_linear_gap
-from vibench.sim.model._power_law import fitted_power_law
-from vibench.sim.power_law import power_force
-from vibench.sim.slots import power_terms
+from vibench.sim.model.contact_law import CONTACT_LAWS, ContactLaw, model_named
+from vibench.sim.model.linear_gap import fitted_linear_gap
+from vibench.sim.model.power_law import fitted_power_law
+from vibench.sim.power_law.flow import power_force
+from vibench.sim.slots.parameters import power_terms
 
 HERTZ = Hertz(4.9e9)
 GAP = 45e-6

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from vibench.sim.operating_system import Place, is_process, place_of, process_start
+from vibench.sim.operating_system.processes import Place, is_process, place_of
+from vibench.sim.operating_system.this import process_start
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="how Linux numbers its starts")
 
@@ -22,7 +23,7 @@ def test_a_start_tells_containers_and_computers_apart():
 
 
 def test_a_sandbox_that_hides_the_start_of_the_computer_hides_no_process(monkeypatch):
-    from vibench.sim.operating_system import _posix
+    from vibench.sim.operating_system import posix as _posix
 
     read = Path.read_text
 

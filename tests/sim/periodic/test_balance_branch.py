@@ -11,14 +11,14 @@ from vibench.sim import (
     spring_of,
     structure_of,
 )
-from vibench.sim.periodic._balance_branch import balance_branch_within
-from vibench.sim.periodic._balance_solver import BalanceOptions, balance
-from vibench.sim.periodic._branch import BifurcationKind
-from vibench.sim.periodic._condensation import LinearStructure
-from vibench.sim.periodic._continuation import ArcEnd, ArcSteps
-from vibench.sim.periodic._drive_path import AmplitudePath, FrequencyPath
-from vibench.sim.periodic._harmonic_balance import BalanceEnd, HarmonicSet
-from vibench.sim.periodic._restoring_force import GapSpring, NoForce
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import BalanceOptions, balance
+from vibench.sim.periodic.branch import BifurcationKind
+from vibench.sim.periodic.condensation import LinearStructure
+from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
+from vibench.sim.periodic.drive_path import AmplitudePath, FrequencyPath
+from vibench.sim.periodic.harmonic_balance import BalanceEnd, HarmonicSet
+from vibench.sim.periodic.restoring_force import GapSpring, NoForce
 
 ONE = np.array([[1.0]])
 ENOUGH, STEPS = BalanceOptions(), ArcSteps()

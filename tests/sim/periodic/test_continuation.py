@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.periodic._continuation import ArcEnd, ArcSteps, trace
+from vibench.sim.periodic.continuation import ArcEnd, ArcSteps, trace
 
 
 class Circle:

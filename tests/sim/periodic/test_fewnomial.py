@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.sim.periodic._first_order_balance import positive_zeros
+from vibench.sim.periodic.first_order_balance import positive_zeros
 
 
 @given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=4))

@@ -14,11 +14,11 @@ from vibench.sim import (
     spring_of,
     structure_of,
 )
-from vibench.sim.periodic._balance_solver import BalanceOptions, Guess, balance
-from vibench.sim.periodic._condensation import LinearStructure
-from vibench.sim.periodic._frequency_time import phasors_of, waveform
-from vibench.sim.periodic._harmonic_balance import BalanceEnd, BalanceProblem, HarmonicSet, harmonics_up_to
-from vibench.sim.periodic._restoring_force import GapSpring, NoForce
+from vibench.sim.periodic.balance_solver import BalanceOptions, Guess, balance
+from vibench.sim.periodic.condensation import LinearStructure
+from vibench.sim.periodic.frequency_time import phasors_of, waveform
+from vibench.sim.periodic.harmonic_balance import BalanceEnd, BalanceProblem, HarmonicSet, harmonics_up_to
+from vibench.sim.periodic.restoring_force import GapSpring, NoForce
 
 FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
 SETTLED_S = 3.0

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, PowerLaw, gong2025, integrate
-from vibench.sim.engine import Watch
-from vibench.sim.scene._followed_run import FollowedRun
+from vibench.sim.engine.run import Watch
+from vibench.sim.scene.followed_run import FollowedRun
 
 DRIVE = Harmonic(130.0, 20e-6)
 SCALES = np.repeat([1e-4, 0.1], 3)

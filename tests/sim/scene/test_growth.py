@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025
-from vibench.sim.scene._followed_run import FollowedRun
+from vibench.sim.scene.followed_run import FollowedRun
 
 SLICE_S, SLICES = 0.25, 8
 LOST_E = 10.0

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, Observable, Scene, gong2025, plan_scene, solve_scene
-from vibench.sim.costs import FEWEST, CostLedger
-from vibench.sim.scene import AutomaticDuration, FixedDuration, learn_cost, measure_cost
+from vibench.sim.costs.ledger import FEWEST, CostLedger
+from vibench.sim.scene.measured_cost import learn_cost, measure_cost
+from vibench.sim.scene.scene import AutomaticDuration, FixedDuration
 
 SCENES = 12
 

@@ -1,7 +1,8 @@
 import pytest
 
 from vibench.sim import Harmonic, Observable, Scene, gong2025, plan_scene
-from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Method
+from vibench.sim.scene.prediction import Method
+from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Given
 
 QUIET, LOUD = Harmonic(200.0, 1e-6), Harmonic(260.0, 5e-6)
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from vibench.sim.scene import MotionKind
-from vibench.sim.scene._repetition import Growth, Repetition, Sharpness, kind_of, repetition, section_needed
+from vibench.sim.scene.prediction import MotionKind
+from vibench.sim.scene.repetition import Growth, Repetition, Sharpness, kind_of, repetition, section_needed
 
 OMEGA = 600.0
 SHARP = Sharpness(tolerance=1e-6, noise=1e-10)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vibench.sim.scene._scatter import bootstrap_of_largest, window_scatter
+from vibench.sim.scene.scatter import bootstrap_of_largest, window_scatter
 
 
 def test_it_is_the_bootstrap_of_the_largest_in_closed_form():

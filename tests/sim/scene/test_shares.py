@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from vibench.sim.scene._shares import Count, escape_rate, shares_of, wilson_share
+from vibench.sim.scene.shares import Count, escape_rate, shares_of, wilson_share
 
 
 @pytest.mark.parametrize(("count", "trials"), [(0, 16), (1, 16), (5, 16), (16, 16), (37, 64)])

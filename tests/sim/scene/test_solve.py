@@ -15,9 +15,10 @@ from vibench.sim import (
     solve_scene,
     steady_response,
 )
-from vibench.sim.model import modal_form
-from vibench.sim.scene import AutomaticDuration, FixedDuration, Given, Method, MotionKind, StartMemory
-from vibench.sim.scene._followed_run import FollowedRun
+from vibench.sim.model.modes import modal_form
+from vibench.sim.scene.followed_run import FollowedRun
+from vibench.sim.scene.prediction import Method, MotionKind, StartMemory
+from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Given
 
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 PERIODIC = [
@@ -258,7 +259,7 @@ def test_what_turns_from_displacement_to_velocity_has_not_grown():
 
 
 def test_a_scene_that_would_take_too_many_steps_ends_in_a_sentence_and_has_no_other_starts(monkeypatch):
-    monkeypatch.setattr("vibench.sim.scene._followed_run.MOST_STEPS", 10_000_000)
+    monkeypatch.setattr("vibench.sim.scene.followed_run.MOST_STEPS", 10_000_000)
     found = solve_scene(Scene(heavy_on_light(), Harmonic(0.02, 1e-5), duration=FixedDuration(100.0, 50.0)))
     assert found.outcome is Outcome.TOO_LONG
     assert "cut its duration" in found.ended

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, Scene, gong2025, solve_scene
-from vibench.sim.scene import FixedDuration, Given, MotionKind
-from vibench.sim.scene._observed_window import Block
-from vibench.sim.scene._scatter import draws_apart
+from vibench.sim.scene.observed_window import Block
+from vibench.sim.scene.prediction import MotionKind
+from vibench.sim.scene.scatter import draws_apart
+from vibench.sim.scene.scene import FixedDuration, Given
 
 RESPONSES = ("response_i", "response_ii", "relative_i", "relative_ii")
 FROM_REST = FixedDuration(0.1, 0.05)

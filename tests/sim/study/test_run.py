@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim import Harmonic, Outcome, Rest, Scene, gong2025, solve_scene
-from vibench.sim.scene import FixedDuration, Given
+from vibench.sim.scene.scene import FixedDuration, Given
 from vibench.sim.study import MemoryStore, PointState, Study, ThreadExecutor, run_study, solve_study
 from vibench.sim.study._columns import CONTINUES, PHASE
 from vibench.sim.study._errors import InvalidStudy

@@ -1,7 +1,7 @@
 from dataclasses import replace
 
 from vibench.sim import Accuracy, Harmonic, Observable, Rest, Scene, gong2025
-from vibench.sim.scene import AutomaticDuration, FixedDuration, Given
+from vibench.sim.scene.scene import AutomaticDuration, FixedDuration, Given
 from vibench.sim.study._expansion import scene_identity
 
 SCENE = Scene(

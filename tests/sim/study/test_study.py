@@ -2,7 +2,7 @@ import pytest
 from pydantic import ValidationError
 
 from vibench.sim import RigidStops, SpecimenWarning, gong2025
-from vibench.sim.scene import Rest
+from vibench.sim.scene.scene import Rest
 from vibench.sim.study import Start, Study
 from vibench.sim.study._axes import FREQUENCY
 from vibench.sim.study._study import GivenStart

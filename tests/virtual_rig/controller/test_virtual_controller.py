@@ -13,8 +13,8 @@ from vibench.acquisition.instruments import (
     LoopRequest,
     LoopState,
 )
-from vibench.sim.engine import native_engine
-from vibench.virtual_rig.controller import VirtualController
+from vibench.sim.engine.run import native_engine
+from vibench.virtual_rig.controller.virtual_controller import VirtualController
 
 RATE_HZ = 10_240.0
 FACTS = LoopFacts(name="simulated", serial="1", rate_hz=RATE_HZ, latency_s=3e-4, limit_v=2.0, watchdog_s=0.5)

@@ -7,7 +7,8 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
 from vibench.acquisition import AcquisitionError
-from vibench.virtual_rig.daqmx import WallPace, _acquisition
+from vibench.virtual_rig.daqmx import acquisition as _acquisition
+from vibench.virtual_rig.daqmx.rig import WallPace
 
 GIANT = 1 << 33
 

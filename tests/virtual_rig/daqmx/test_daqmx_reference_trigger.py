@@ -9,7 +9,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError, DaqReadError
 
 from tests.virtual_rig.conftest import signal
-from vibench.virtual_rig.daqmx import WallPace
+from vibench.virtual_rig.daqmx.rig import WallPace
 
 RATE_HZ, SAMPLES, BEFORE = 10_000.0, 300, 120
 

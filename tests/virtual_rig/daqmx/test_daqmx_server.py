@@ -13,7 +13,7 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError
 
 from vibench.acquisition import ConfigurationError
-from vibench.virtual_rig.daqmx import DaqServer
+from vibench.virtual_rig.daqmx.server import DaqServer
 
 PATIENCE_S = 20.0
 

@@ -8,7 +8,7 @@ from nidaqmx.constants import READ_ALL_AVAILABLE, AcquisitionType
 from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.errors import DaqError, DaqReadError
 
-from vibench.virtual_rig.daqmx import WallPace
+from vibench.virtual_rig.daqmx.rig import WallPace
 
 
 class HandClock:

@@ -4,8 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.generator import AFG1022, Quirks
-from vibench.virtual_rig.generator._afg1022_settings import MODULATIONS
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.afg1022_settings import MODULATIONS
+from vibench.virtual_rig.generator.scpi_instrument import Quirks
 
 PLAIN = Quirks(
     first_identity_after_clear_is_empty=False,

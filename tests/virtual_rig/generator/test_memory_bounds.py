@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.generator import AFG1022, Keysight33500B
-from vibench.virtual_rig.generator._scpi_instrument import LONGEST_REPLY
-from vibench.virtual_rig.usb import UsbTmcInstrument
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.keysight_33500b import Keysight33500B
+from vibench.virtual_rig.generator.scpi_instrument import LONGEST_REPLY
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 
 @pytest.fixture

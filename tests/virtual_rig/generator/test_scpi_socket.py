@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import pyvisa
 
-from vibench.virtual_rig.generator import AFG1022, ScpiSocket
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.scpi_socket import ScpiSocket
 
 
 @pytest.fixture

@@ -1,9 +1,8 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator import ErrorCode
-from vibench.virtual_rig.generator._scpi_status import ScpiError
-from vibench.virtual_rig.generator._scpi_value import (
+from vibench.virtual_rig.generator.scpi_status import ErrorCode, ScpiError
+from vibench.virtual_rig.generator.scpi_value import (
     AMPLITUDE_UNITS,
     FREQUENCY_UNITS,
     as_number,

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator import AFG1022, Panel, Terminal
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.channel_output import Panel
+from vibench.virtual_rig.generator.terminal_voltage import Terminal
 
 INTERVAL_S = 1 / 51_200
 PANEL = Panel()

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, open_bench
-from vibench.acquisition.bench import RigPower
+from vibench.acquisition.bench.rig_power import RigPower
 from vibench.acquisition.campaign import ReconnectingBench
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.recording._disk_room import claim_room
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.rig._fault_script import DISK_FAULTS, FaultScript, PlayedFault
+from vibench.virtual_rig.rig.fault_script import DISK_FAULTS, FaultScript, PlayedFault
 
 ROOT = Path(__file__).parents[3]
 NIGHT = ROOT / "hardware_configs" / "faults" / "night.toml"

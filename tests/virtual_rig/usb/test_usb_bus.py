@@ -11,8 +11,11 @@ import usb.core
 from pyvisa.errors import VisaIOError
 
 from vibench.acquisition import ConfigurationError
-from vibench.virtual_rig.generator import AFG1022, Quirks, Terminal
-from vibench.virtual_rig.usb import UsbTmcInstrument, plug_in, unplug
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.generator.scpi_instrument import Quirks
+from vibench.virtual_rig.generator.terminal_voltage import Terminal
+from vibench.virtual_rig.usb.bus import plug_in, unplug
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 
 def listing(test):
@@ -196,9 +199,9 @@ def test_it_works_although_pyvisa_was_imported_first_without_libusb():
             rm.open_resource(name)
         except ValueError as error:
             print("before:", type(error).__name__)
-        from vibench.virtual_rig.usb import plug_in
-        from vibench.virtual_rig.generator import AFG1022
-        from vibench.virtual_rig.usb import UsbTmcInstrument
+        from vibench.virtual_rig.usb.bus import plug_in
+        from vibench.virtual_rig.generator.afg1022 import AFG1022
+        from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
         plug_in(UsbTmcInstrument(AFG1022(lambda: 0.0)))
         print("after:", rm.open_resource(name).query("*IDN?").split(",")[1])
     """

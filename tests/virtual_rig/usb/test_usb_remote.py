@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import InstrumentLost
-from vibench.virtual_rig.generator import AFG1022
-from vibench.virtual_rig.usb import UsbTmcInstrument, usb_service
-from vibench.virtual_rig.usb._device import Setup
-from vibench.virtual_rig.usb._remote import RemoteUsbDevice
+from vibench.virtual_rig.generator.afg1022 import AFG1022
+from vibench.virtual_rig.usb.device import Setup
+from vibench.virtual_rig.usb.remote import RemoteUsbDevice, usb_service
+from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 
 
 class Rig:
@@ -50,7 +50,7 @@ def test_a_program_in_another_process_needs_one_line(rig):
     program = """
         import sys, warnings
         warnings.simplefilter("ignore")
-        from vibench.virtual_rig.usb import plug_in_remote
+        from vibench.virtual_rig.usb.bus import plug_in_remote
         plug_in_remote(sys.argv[1])
         import numpy as np
         import pyvisa

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.virtual_rig.world._sensors import first_order, resonant, running_filter
+from vibench.virtual_rig.world.sensors import first_order, resonant, running_filter
 
 STEP_S = 1 / 102_400
 

@@ -9,10 +9,10 @@ from vibench.acquisition import ConfigurationError, LimitExceeded, validated
 from vibench.acquisition.plan import Dwell, Measurement, require_within_limits
 from vibench.acquisition.rig import Rig, amplifier_of, highest_carried_hz, load_rig, shaker_of, specimen_of
 from vibench.acquisition.rig._virtual import COARSEST_GRID_RATE_HZ, WATCHED_HZ, level_error
-from vibench.sim.shaker import MOTION_COLUMNS, LoadedShaker
-from vibench.virtual_rig.world import World
-from vibench.virtual_rig.world._sensors import resonant, running_filter
-from vibench.virtual_rig.world._time_grid import TimeGrid
+from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker
+from vibench.virtual_rig.world.sensors import resonant, running_filter
+from vibench.virtual_rig.world.time_grid import TimeGrid
+from vibench.virtual_rig.world.world import World
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 COARSE = TimeGrid(COARSEST_GRID_RATE_HZ)

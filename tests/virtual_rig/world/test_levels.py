@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from vibench.acquisition.rig import BaseQuantity, RigModel, amplifier_of, load_rig, shaker_of, specimen_of
-from vibench.sim.shaker import MOTION_COLUMNS, LoadedShaker
-from vibench.virtual_rig.world._time_grid import USUAL_GRID
+from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker
+from vibench.virtual_rig.world.time_grid import USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 STEP_S = USUAL_GRID.step_s

@@ -7,11 +7,10 @@ import pytest
 
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import load_rig
-from vibench.virtual_rig.world import FULL_BAND_HZ
-from vibench.virtual_rig.world._disturbance import Disturbance, RandomDropouts
-from vibench.virtual_rig.world._noise import PAGE, NoiseStream
-from vibench.virtual_rig.world._sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
-from vibench.virtual_rig.world._time_grid import USUAL_GRID
+from vibench.virtual_rig.world.disturbance import Disturbance, RandomDropouts
+from vibench.virtual_rig.world.noise import PAGE, NoiseStream
+from vibench.virtual_rig.world.sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
+from vibench.virtual_rig.world.time_grid import FULL_BAND_HZ, USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 GRID_RATE_HZ = USUAL_GRID.rate_hz

@@ -10,12 +10,12 @@ from hypothesis import given, settings, strategies as st
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_of
 from vibench.sim import base_transmissibility
-from vibench.sim.shaker import MOTION_COLUMNS
+from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.world import World, relative_clock_ppm
-from vibench.virtual_rig.world._conversion import volts_per_count
-from vibench.virtual_rig.world._decimation import GROUP_DELAY_SAMPLES
-from vibench.virtual_rig.world._time_grid import USUAL_GRID
+from vibench.virtual_rig.world.conversion import volts_per_count
+from vibench.virtual_rig.world.decimation import GROUP_DELAY_SAMPLES
+from vibench.virtual_rig.world.time_grid import USUAL_GRID, relative_clock_ppm
+from vibench.virtual_rig.world.world import World
 
 GRID_RATE_HZ, STEP_S = USUAL_GRID.rate_hz, USUAL_GRID.step_s
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")

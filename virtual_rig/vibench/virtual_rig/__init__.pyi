@@ -1,8 +1,3 @@
-from .rig import (
-    DiskFaults as DiskFaults,
-    VirtualRig as VirtualRig,
-    load_fault_script as load_fault_script,
-)
-from .usb import (
-    plug_in_remote as plug_in_remote,
-)
+from .rig.fault_script import load_fault_script as load_fault_script
+from .rig.virtual_rig import DiskFaults as DiskFaults, VirtualRig as VirtualRig
+from .usb.bus import plug_in_remote as plug_in_remote

@@ -6,7 +6,3 @@ findings and the kept result of a check are values of the bench. Here, and only 
 are switched on: `vibench.virtual_rig` is loaded by name when the configuration asks for it, and must fit the
 protocol `SimulatedRig`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,12 +5,14 @@ from functools import partial
 from pathlib import Path
 from time import monotonic
 
-from ..bench import RunBench
+from ..bench.protocol import RunBench
 from ..errors import AcquisitionError, InstrumentError, RecordingError
 from ..plan import Point, Retryable, RetryPolicy, RunState
 from ..recording import open_recording
-from ..run import BLOCK_S, Outcome, Progress, run_measurement
-from ..stopping import StopSwitch
+from ..run.acquisition_loop import BLOCK_S
+from ..run.ending import Outcome, Progress
+from ..run.run_measurement import run_measurement
+from ..stopping.stop import StopSwitch
 from ._attempt_files import next_attempt
 from ._bench_identity import BenchIdentity
 from ._event import CampaignEvent, CampaignEventKind, CampaignListener

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, Self
 
-from ..bench import RunBench
-from ..host import FrozenModel
+from ..bench.protocol import RunBench
+from ..host.toml_file import FrozenModel
 from ..rig import Rig
 
 

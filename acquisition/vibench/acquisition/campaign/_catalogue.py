@@ -13,7 +13,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from ..errors import RecordingError
-from ..host import chosen
+from ..host.chosen import chosen
 from ..recording import PART_SUFFIX, SUFFIX
 from ._catalogue_entry import CatalogueEntry, place_below, read_entry
 

@@ -4,8 +4,8 @@ import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..control import require_holdable
-from ..excitation import AbstractFeedback
+from ..control.fast_loop import require_holdable
+from ..excitation.plan import AbstractFeedback
 from ..plan import BYTES_PER_SAMPLE, Campaign, measured_s, require_played
 from ..rig import Rig, channels_of
 from ._opening import planned_recordings

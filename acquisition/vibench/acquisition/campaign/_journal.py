@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Self
 
 from ..errors import RecordingError
-from ..host import ClosedOnLeaving
+from ..host.closed_on_leaving import ClosedOnLeaving
 from ..plan import Campaign, Point
 from ..recording import JOURNAL_SUFFIX, closed_on_error
 from ._bench_identity import BenchIdentity

@@ -9,7 +9,8 @@ from pathlib import Path
 from time import monotonic
 
 from ..errors import RecordingError
-from ..host import Beside, ClosedOnLeaving
+from ..host.beside import Beside
+from ..host.closed_on_leaving import ClosedOnLeaving
 from ..plan import measured_s
 from ._event import CampaignEvent, CampaignEventKind
 from ._journal_point import JournalPoint, JournalPointState

@@ -17,7 +17,7 @@ from typing import Protocol
 from pydantic import Field, PositiveFloat, PositiveInt, SecretStr
 
 from ..errors import ConfigurationError
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 from ._event import CampaignEvent, CampaignEventKind, CampaignListener
 
 

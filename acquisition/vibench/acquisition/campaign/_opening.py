@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import assert_never
 
-from ..bench import RunBench
+from ..bench.protocol import RunBench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
 from ..plan import Campaign, Measurement, Point, played_alike, require_within_limits
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
-from ..run import drive_for
-from ..stopping import StopSwitch
+from ..run.drive import drive_for
+from ..stopping.stop import StopSwitch
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity, differences
 from ._journal import Journal, journal_path

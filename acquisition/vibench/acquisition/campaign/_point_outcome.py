@@ -18,7 +18,7 @@ from ..errors import (
 )
 from ..plan import Measurement
 from ..recording import Recording
-from ..run import Progress
+from ..run.ending import Progress
 
 
 class ReasonCode(StrEnum):

@@ -4,12 +4,13 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from ..bench import RunBench
+from ..bench.protocol import RunBench
 from ..errors import RecordingError
-from ..host import chosen
+from ..host.chosen import chosen
 from ..plan import Campaign
 from ..recording import sole_use
-from ..stopping import StopSwitch, stop_on_signal
+from ..stopping.stop import StopSwitch
+from ..stopping.stop_on_signal import stop_on_signal
 from ._attempts import Attempts, CoolingPause, Reopen
 from ._event import CampaignEvent, CampaignListener, ignore_event
 from ._log import LOG_SUFFIX, STATUS_SUFFIX, CampaignLog, StatusLine

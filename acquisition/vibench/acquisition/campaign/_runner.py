@@ -7,8 +7,8 @@ from pathlib import Path
 from ..errors import AcquisitionError, InstrumentLost, RecordingError
 from ..plan import Campaign, Measurement, Point
 from ..recording import open_recording
-from ..run import Progress
-from ..stopping import StopSwitch
+from ..run.ending import Progress
+from ..stopping.stop import StopSwitch
 from ._attempts import Attempts
 from ._event import CampaignEvent, CampaignEventKind, CampaignListener
 from ._journal import Journal

@@ -4,7 +4,3 @@ Findings compare noise, gains, signs, clocks and identities with the configurati
 check, which is kept in the user's state folder; a bench is admitted on a check that is recent, passed and
 of the same configuration. Knows no campaign.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

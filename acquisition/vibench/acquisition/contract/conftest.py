@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import Bench, open_bench
+from vibench.acquisition.bench.bench import Bench, open_bench
 from vibench.acquisition.errors import AcquisitionError, BrokenPromise, ConfigurationError
-from vibench.acquisition.host import all_shipped
+from vibench.acquisition.host.shipped import all_shipped
 from vibench.acquisition.instruments import PlugInKind, Samples, plug_in_names
 from vibench.acquisition.rig import CalibrationRule, Rig, Role, load_rig, sensor_name
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from vibench.acquisition.bench import Bench
+from vibench.acquisition.bench.bench import Bench
 from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v, refused
 from vibench.acquisition.instruments import (
     LoopBlock,

@@ -5,7 +5,3 @@ next: settling, holding a level, stepping on one branch, locating a jump, tracki
 Period by period, from the recorded drive; no real-time loop. It touches no instrument. See
 docs/decisions/0015-feedback.md and docs/feedback.md.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

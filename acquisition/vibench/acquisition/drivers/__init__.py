@@ -8,7 +8,7 @@ cannot tell a simulated instrument from a real one.
 
 import lazy_loader
 
-from ..host import naming_its_extra
+from ..host.extras import naming_its_extra
 
 _found, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 __getattr__ = naming_its_extra(_found, "bench")

@@ -13,7 +13,7 @@ import pyvisa
 from numpy.typing import NDArray
 
 from ..errors import InstrumentError, InstrumentLost, SettingRefused
-from ..host import LOG
+from ..host.log import LOG
 from ._visa_link import Link
 
 Codes = NDArray[np.uint16]

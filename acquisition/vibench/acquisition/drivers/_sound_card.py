@@ -22,7 +22,7 @@ from ..errors import (
     LimitExceeded,
     MissingLibrary,
 )
-from ..host import need_extra
+from ..host.extras import need_extra
 from ..instruments import Block, Identity, IdleOutput, Samples
 from ..rig import Channel, OutputConfig, Rig, channels_of
 from ._overload import overload_ranges

@@ -10,7 +10,7 @@ import pyvisa
 from pyvisa.resources import MessageBasedResource
 
 from ..errors import InstrumentBusy, InstrumentError, InstrumentLost
-from ..host import shipped
+from ..host.shipped import shipped
 
 # A reply later than this is a failure. The slowest known: the read-back of 8192 points.
 TIMEOUT_S = 3.0

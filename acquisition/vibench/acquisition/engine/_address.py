@@ -1,6 +1,6 @@
 """Where an engine can be asked: all that a viewer needs to know of its server."""
 
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 
 
 class EngineAddress(FrozenModel):

@@ -4,19 +4,20 @@ import socket
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from vibench.sim.operating_system import Place, state_folder
+from vibench.sim.operating_system.processes import Place
+from vibench.sim.operating_system.state_folder import state_folder
 from vibench.stop_files import SWITCH_OFF
 
-from ..stopping import (
+from ..stopping.program import (
     AnyProgram,
     Program,
-    StopLevel,
     announced_programs,
     facts_of_this_process,
     programs_of_other_places,
     reached,
     withdraw,
 )
+from ..stopping.stop import StopLevel
 from ._address import EngineAddress
 from ._errors import EngineError, EngineGone
 

@@ -6,8 +6,8 @@ from typing import Annotated
 from pydantic import Field
 
 from ..campaign import AfterFailure, ChangedBench, ExistingRecordings
-from ..check import CheckRule
-from ..host import FrozenModel
+from ..check.rule import CheckRule
+from ..host.toml_file import FrozenModel
 from ..plan import Campaign
 from ._live_twin import TwinSwitch
 from ._state import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, Supervision

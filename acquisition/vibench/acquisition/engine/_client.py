@@ -7,7 +7,8 @@ from threading import Lock
 from typing import TypeVar
 
 from ..campaign import ExistingRecordings
-from ..host import ClosedOnLeaving, chosen
+from ..host.chosen import chosen
+from ..host.closed_on_leaving import ClosedOnLeaving
 from ..plan import Campaign
 from ._address import EngineAddress
 from ._campaign_request import CampaignRequest

@@ -8,7 +8,7 @@ from vibench.stop_files import SWITCH_OFF
 
 from .. import errors
 from ..errors import AcquisitionError
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 from ._address import EngineAddress
 from ._errors import EngineError, EngineGone, EngineSilent
 from ._state import ConnectionRole

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from vibench.stop_files import SWITCH_OFF
 
-from ..bench import Bench
+from ..bench.bench import Bench
 from ..campaign import (
     CampaignEvent,
     CampaignEventKind,
@@ -21,11 +21,13 @@ from ..campaign import (
     require_all_within_limits,
     run_campaign,
 )
-from ..check import check_bench, require_fresh
+from ..check.admission import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..plan import Campaign, OnChange
 from ..rig import Confirm, Rig
-from ..stopping import DRIVES_ON, Cause, StopSwitch, stop_on_signal
+from ..stopping.driving import DRIVES_ON
+from ..stopping.stop import Cause, StopSwitch
+from ..stopping.stop_on_signal import stop_on_signal
 from ._campaign_request import CampaignRequest
 from ._live_twin import TwinProcess, TwinSwitch
 from ._published_state import PublishedState

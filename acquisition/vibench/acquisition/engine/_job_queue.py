@@ -5,7 +5,7 @@ from contextlib import suppress
 from queue import SimpleQueue
 
 from ..errors import AcquisitionError
-from ..stopping import Cause
+from ..stopping.stop import Cause
 from ._engine import Engine
 
 Job = Callable[[], object]

@@ -9,10 +9,10 @@ from time import monotonic
 
 import numpy as np
 
-from ..bench import BenchReport
+from ..bench.result import BenchReport
 from ..campaign import CampaignProgress, PointOutcome, PointResult
 from ..errors import AcquisitionError
-from ..host import Beside
+from ..host.beside import Beside
 from ..instruments import Block
 from ..plan import Campaign, RunState, measured_s
 from ._sample_buffer import SampleBuffer

@@ -7,15 +7,17 @@ from threading import Lock
 from time import monotonic
 from typing import TypeVar
 
-from ..bench import Bench
+from ..bench.bench import Bench
 from ..campaign import planned_recordings
-from ..check import CheckRule, require_on_record
+from ..check.admission import require_on_record
+from ..check.rule import CheckRule
 from ..errors import CheckFailed
 from ..instruments import Knob
 from ..plan import LimitCheck, played_alike, require_within_limits
 from ..rig import Confirm, KnobSheet, Rig
-from ..run import drive_for
-from ..stopping import INTERVAL_S, Cause, StopLevel, StopRequest, StopSwitch
+from ..run.drive import drive_for
+from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
+from ..stopping.watchdog import INTERVAL_S
 from ._campaign_request import CampaignRequest
 from ._engine import Engine
 from ._errors import EngineError

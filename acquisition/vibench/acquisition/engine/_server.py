@@ -17,7 +17,7 @@ from time import monotonic
 from pydantic import ValidationError
 
 from ..errors import AcquisitionError
-from ..stopping import Watchdog
+from ..stopping.watchdog import Watchdog
 from ._address import EngineAddress
 from ._admission import Admission
 from ._announcement import announced

@@ -6,7 +6,8 @@ from contextlib import suppress
 from threading import Event
 from time import monotonic
 
-from ..host import ClosedOnLeaving, chosen
+from ..host.chosen import chosen
+from ..host.closed_on_leaving import ClosedOnLeaving
 from ._address import EngineAddress
 from ._announcement import Announcement, announced_engines
 from ._client import EngineClient

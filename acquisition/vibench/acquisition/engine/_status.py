@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from enum import StrEnum
 
-from ..bench import BenchReport
-from ..host import FrozenModel
+from ..bench.result import BenchReport
+from ..host.toml_file import FrozenModel
 from ..plan import RunState
 from ._state import EngineState, Supervision
 

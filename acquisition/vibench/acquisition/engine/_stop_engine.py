@@ -9,8 +9,10 @@ from time import monotonic
 
 from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, put_down, stop_path
 
-from ..host import chosen
-from ..stopping import Program, StopLevel, engines_folder
+from ..host.chosen import chosen
+from ..stopping.kept_stops import engines_folder
+from ..stopping.program import Program
+from ..stopping.stop import StopLevel
 from ._announcement import Announcement
 from ._client import EngineClient
 from ._errors import EngineError, EngineGone, EngineSilent

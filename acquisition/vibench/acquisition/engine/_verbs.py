@@ -28,9 +28,9 @@ from pydantic import (
     create_model,
 )
 
-from ..host import FrozenModel, validated
+from ..host.toml_file import FrozenModel, validated
 from ..rig import KnobSheet, Rig
-from ..stopping import StopLevel
+from ..stopping.stop import StopLevel
 from ._campaign_request import CampaignRequest
 from ._live_twin import TwinSwitch
 from ._sample_buffer import SampleSlice

@@ -4,7 +4,3 @@ A plan lists its steps (tone, waveform of the generator's memory, stream of an a
 segments that name them in the recording. Amplitudes are settings, peak to peak at the terminal [V]; plans
 with feedback name a level of the base instead. Knows no rig: what a plan does to one is said in `plan`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@
 noise floor, a first 5 mV and the bench check with it, and gives the page that is the record. Who asks is the
 caller's: a terminal, a file of answers, a test. `vibench bench new` does all of it (docs/first-day.md).
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

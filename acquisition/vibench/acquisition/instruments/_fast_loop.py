@@ -9,7 +9,7 @@ from typing import Annotated, Final, Literal, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 
 LOOP_PROTOCOL: Final = 1
 MOST_HARMONICS = 20

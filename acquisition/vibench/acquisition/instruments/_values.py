@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 
 Samples = NDArray[np.float64]
 

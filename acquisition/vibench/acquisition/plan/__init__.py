@@ -13,39 +13,32 @@ docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 11.0
 """
 
-from ..excitation import (
+from ..excitation.branch_continuation import BranchContinuation
+from ..excitation.direction import Approach, Direction
+from ..excitation.dwell import Dwell
+from ..excitation.held_dwell import HeldDwell
+from ..excitation.held_noise import HeldNoise, SpectrumPoint
+from ..excitation.held_response import HeldResponse
+from ..excitation.held_sweep import HeldSweep
+from ..excitation.kinds import (
     EXCITATION_KINDS,
-    AbstractExcitation,
-    Approach,
-    BranchContinuation,
-    Direction,
-    Dwell,
     Excitation,
     ExcitationKind,
-    Family,
-    FrequencySteps,
-    HeldDwell,
-    HeldNoise,
-    HeldResponse,
-    HeldSweep,
-    Hold,
-    LeadIn,
-    OddMultisine,
-    ResonanceTracking,
-    Segment,
-    SettledSine,
-    SignalPreview,
-    SineSweep,
-    SpectrumPoint,
-    Step,
-    SteppedLevel,
-    SteppedSine,
-    StreamedNoise,
-    WhiteNoise,
     excitation_text,
     present_word,
     rows_by_kind,
 )
+from ..excitation.odd_multisine import OddMultisine
+from ..excitation.plan import AbstractExcitation, Family, LeadIn
+from ..excitation.preview import SignalPreview
+from ..excitation.resonance_tracking import ResonanceTracking
+from ..excitation.settled_sine import SettledSine
+from ..excitation.sine_sweep import Hold, SineSweep
+from ..excitation.stepped_level import SteppedLevel
+from ..excitation.stepped_sine import FrequencySteps, SteppedSine
+from ..excitation.steps import Segment, Step
+from ..excitation.streamed_noise import StreamedNoise
+from ..excitation.white_noise import WhiteNoise
 from ._axis import (
     Range,
     RangeSpacing,

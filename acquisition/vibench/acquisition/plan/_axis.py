@@ -6,7 +6,7 @@ from typing import Annotated, Self, TypeAlias
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 
 MOST_VALUES = 10_000
 """On one axis."""

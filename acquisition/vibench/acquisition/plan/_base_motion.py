@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation import Excitation, HeldAcceleration, RelativeSetting, RmsSetting
+from ..excitation.base_level import HeldAcceleration, RelativeSetting, RmsSetting
+from ..excitation.kinds import Excitation
 from ..rig import BaseQuantity, Rig, RigModel
 from ._loads import predicted_loads, terminal_volts
 

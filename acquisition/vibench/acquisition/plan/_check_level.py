@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation import Segment, Tone
+from ..excitation.steps import Segment, Tone
 from ..recording import SegmentLabel
 from ..rig import BaseQuantity, ComplexArray, Rig, RigModel
 from ._measurement import Measurement

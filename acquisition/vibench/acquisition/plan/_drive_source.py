@@ -3,7 +3,7 @@
 from enum import StrEnum
 
 from ..errors import ConfigurationError
-from ..excitation import LoopTone, Play, Stream, Tone, Waveform
+from ..excitation.steps import LoopTone, Play, Stream, Tone, Waveform
 from ..instruments import Sweep
 from ..rig import OutputUse, Rig, generator_driver
 from ._measurement import Measurement

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 
 from ..errors import LimitExceeded
-from ..excitation import AbstractExcitation
+from ..excitation.plan import AbstractExcitation
 from ..rig import (
     LARGEST_LEVEL_ERROR,
     BaseQuantity,

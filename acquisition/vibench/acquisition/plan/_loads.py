@@ -13,7 +13,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation import Excitation, Play, SampleSource, Stream, Tone, Waveform, held_lines
+from ..excitation.kinds import Excitation
+from ..excitation.multisine import held_lines
+from ..excitation.steps import Play, SampleSource, Stream, Tone, Waveform
 from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4

@@ -10,8 +10,8 @@ from typing import Annotated, Self
 
 from pydantic import BeforeValidator, Field, PositiveFloat, PositiveInt, model_validator
 
-from ..excitation import Excitation
-from ..host import FrozenModel
+from ..excitation.kinds import Excitation
+from ..host.toml_file import FrozenModel
 
 _NAME = r"^[A-Za-z0-9][A-Za-z0-9_-]{0,63}$"
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from vibench.sim.branches import least_growth_time_s
 
-from ..excitation import EXCITATION_KINDS, Samples, SignalPreview
+from ..excitation.kinds import EXCITATION_KINDS
+from ..excitation.preview import SignalPreview
+from ..excitation.steps import Samples
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._drive_source import DriveSource, drive_source_of

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from itertools import takewhile
 from math import ceil, cos, pi
 
-from ..excitation import AbstractFeedback, Play, Segment, Step, Tone
+from ..excitation.plan import AbstractFeedback
+from ..excitation.steps import Play, Segment, Step, Tone
 from ..recording import SegmentLabel
 from ._measurement import Measurement
 from ._run_state import RunState

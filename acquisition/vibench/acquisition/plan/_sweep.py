@@ -9,8 +9,11 @@ from typing import Any, Self
 
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
-from ..excitation import MOST_LEAD_INS, Direction, Excitation, LeadIn
-from ..host import FrozenModel, complaints
+from ..excitation.direction import Direction
+from ..excitation.dwell import MOST_LEAD_INS
+from ..excitation.kinds import Excitation
+from ..excitation.plan import LeadIn
+from ..host.toml_file import FrozenModel, complaints
 from ._axis import Values, values_of
 from ._measurement import Measurement, Name, Point
 

@@ -7,7 +7,8 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Protocol
 
-from vibench.sim.operating_system import Buffer, OpenFile, is_locked_alone
+from vibench.sim.operating_system.open_file import Buffer, OpenFile
+from vibench.sim.operating_system.this import is_locked_alone
 
 from ..errors import RecordingError
 

@@ -7,7 +7,7 @@ HDF5 must never meet a full disk: closing a file that cannot be flushed crashes 
 import os
 from pathlib import Path
 
-from vibench.sim.operating_system import allocate, open_to_write
+from vibench.sim.operating_system.this import allocate, open_to_write
 
 from ._disk_trouble import meet_trouble
 

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from math import inf
 from pathlib import Path
 
-from vibench.sim.operating_system import Buffer
+from vibench.sim.operating_system.open_file import Buffer
 
 from ._disk import Disk, PositionedFile
 

@@ -17,10 +17,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from vibench.sim.operating_system import sync_file, sync_folder
+from vibench.sim.operating_system.open_file import sync_file
+from vibench.sim.operating_system.this import sync_folder
 
 from ..errors import RecordingError
-from ..host import LOG
+from ..host.log import LOG
 from . import _layout as layout, _tables as tables
 from ._attributes import encoded, read_attributes, write_attributes
 from ._counts import Counts

@@ -15,7 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from vibench.sim.operating_system import sync_folder
+from vibench.sim.operating_system.this import sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout

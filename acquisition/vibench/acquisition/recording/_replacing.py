@@ -11,7 +11,8 @@ from typing import TypeVar
 
 import h5py
 
-from vibench.sim.operating_system import sync_file, sync_folder
+from vibench.sim.operating_system.open_file import sync_file
+from vibench.sim.operating_system.this import sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout

@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.hdf5_files import walk
+from vibench.sim.hdf5_files.door import walk
 
 from ..errors import RecordingError
 from . import _layout as layout

@@ -16,10 +16,10 @@ from typing import Self
 
 import numpy as np
 
-from vibench.sim.operating_system import Buffer
+from vibench.sim.operating_system.open_file import Buffer
 
 from ..errors import RecordingError
-from ..host import LOG
+from ..host.log import LOG
 from ..instruments import Block, Samples
 from . import _layout as layout
 from ._attributes import encoded

@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, NonNegativeFloat, PositiveFloat, Po
 
 from vibench.sim import SpecimenTable
 
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 from ..instruments import Knob, LoopInput
 from ._output import OutputConfig
 from ._sensitivity import volts_per_unit

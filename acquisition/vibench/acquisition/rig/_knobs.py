@@ -8,7 +8,7 @@ from pathlib import Path
 from pydantic import AwareDatetime, Field
 
 from ..errors import CheckFailed, CheckStopped, ConfigurationError
-from ..host import FrozenModel, load_toml
+from ..host.toml_file import FrozenModel, load_toml
 from ..instruments import Knob
 
 # Long enough for a campaign over a day and a night; whoever comes after may have turned a knob.

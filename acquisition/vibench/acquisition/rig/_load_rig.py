@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from ..errors import ConfigurationError
-from ..host import load_toml, named
+from ..host.shipped import named
+from ..host.toml_file import load_toml
 from ..instruments import PlugInKind, plug_in_names
 from ._configuration import Rig
 

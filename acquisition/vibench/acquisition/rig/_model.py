@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibench.sim import NoContact, Specimen
-from vibench.sim.shaker import SINE_COLUMNS, Amplifier, LinearMotion, Shaker, linear_motion
+from vibench.sim.shaker.linear_motion import SINE_COLUMNS, LinearMotion, linear_motion
+from vibench.sim.shaker.parts import Amplifier, Shaker
 
 from ._configuration import Rig, ShakerConfig
 

@@ -4,7 +4,7 @@ from enum import StrEnum
 
 from pydantic import Field, PositiveFloat
 
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 
 
 class OutputUse(StrEnum):

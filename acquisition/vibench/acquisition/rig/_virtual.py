@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, field_validator
 
-from ..host import FrozenModel
+from ..host.toml_file import FrozenModel
 
 TOKEN_KEY = "vibench-token"  # noqa: S105 - a name, not a password
 """Where a gRPC call carries it."""

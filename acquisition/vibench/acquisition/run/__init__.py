@@ -5,7 +5,3 @@ block is held against the limits of the rig (docs/decisions/0024-limits-while-ru
 recording without a gap. Whatever fails, the drive is silenced and the recording says how it ended. A
 generator and an analogue output are driven alike (`Drive`). It knows one measurement, no campaign.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

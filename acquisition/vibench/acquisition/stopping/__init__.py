@@ -4,7 +4,3 @@
 second insists. A program that drives a bench announces itself in the state folder, where others find it and
 put down stops for it. Knows neither runs nor instruments.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

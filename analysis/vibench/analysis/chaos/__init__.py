@@ -4,7 +4,3 @@ A motion is its points once per drive period, with their noise. It is called cha
 witnesses agree: the 0-1 test (Gottwald & Melbourne 2009), surrogates (Kantz & Schreiber 2004), no closed
 curve, far above the noise; otherwise undecided. The largest exponent from data: Rosenstein et al. 1993.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ A curve is displacement of m0 over displacement of the base, against frequency [
 standard deviation; a transmission, Response I or Response II, measured, simulated or predicted. Peaks,
 readings at markers and differences of curves; how recordings are analysed for it. Nothing is drawn here.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

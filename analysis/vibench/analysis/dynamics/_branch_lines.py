@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vibench.sim import Parameter
 from vibench.sim.branches import FoundBranch, growth_time_s, least_growth_time_s
 
-from ..comparison import Curve, CurveKind, CurveOrigin
-from ..signals import Reals
+from ..comparison.curve import Curve, CurveKind, CurveOrigin
+from ..signals.arrays import Reals
 from ..tables import Labelled, named, plain
 from ._branch_request import BranchMethod, BranchRequest
 

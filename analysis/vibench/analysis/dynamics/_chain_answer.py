@@ -17,7 +17,7 @@ from vibench.sim.chain import (
     chain_transmissibility,
 )
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ..tables import Labelled, named, plain
 from ._chain_request import ChainRequest
 

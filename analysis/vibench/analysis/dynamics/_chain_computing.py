@@ -22,10 +22,11 @@ from vibench.sim.chain import (
 )
 
 from ..errors import InvalidRequest
-from ..frequency_response import transmissibility
-from ..model import recorded_base_motion
-from ..recordings import plan_of, require_intact, require_measured_size
-from ..signals import Reals
+from ..frequency_response.transmissibility import transmissibility
+from ..model.simulated_channels import recorded_base_motion
+from ..recordings.facts import plan_of
+from ..recordings.intact import require_intact, require_measured_size
+from ..signals.arrays import Reals
 from ._chain_answer import ChainAnswer, ChainRun
 from ._chain_request import ChainDrive, ChainRequest
 

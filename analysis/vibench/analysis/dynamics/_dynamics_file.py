@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from vibench.sim.study import software
 
-from ..comparison import Curve
+from ..comparison.curve import Curve
 from ..errors import InvalidRequest
 from ..exchange import new_file
 from ._branch_lines import BranchDiagram, BranchLine, LineEvent

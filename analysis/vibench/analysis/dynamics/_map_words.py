@@ -8,8 +8,8 @@ import numpy as np
 from vibench.sim import MotionKind, SpecimenTable, shipped_specimens, usual_specimen
 from vibench.sim.maps import QUANTITIES, Map, MapMotion, MapResults
 
-from ..comparison import Curve
-from ..signals import Reals
+from ..comparison.curve import Curve
+from ..signals.arrays import Reals
 
 MOTION_CLASSES = (
     ("no impacts", "#eef3f7"),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..errors import NotEnoughData
-from ..signals import Reals
+from ..signals.arrays import Reals
 
 MOST_BINS = 100
 

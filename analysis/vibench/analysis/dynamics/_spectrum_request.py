@@ -9,7 +9,7 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from vibench.sim import Accuracy, LyapunovSpectrum, Parameter, PowerLaw
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ..tables import Labelled, plain
 from ._specimen_choice import SpecimenChoice
 

@@ -7,7 +7,7 @@ from math import isfinite
 from vibench.acquisition.recording import ChannelHeader, RecordedBlock, Recording
 
 from ..errors import InvalidRequest, NotEnoughData
-from ..signals import Reals
+from ..signals.arrays import Reals
 
 BLOCK_SAMPLES = 51_200
 """One chunk of the file: 0.4 MB a channel in memory."""

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, Protocol
 
 from ..errors import InvalidRequest
-from ..recordings import require_intact
+from ..recordings.intact import require_intact
 from ._csv import write_csv_samples
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_path, write_facts

@@ -11,10 +11,10 @@ import h5py
 import numpy as np
 
 from vibench.acquisition.recording import Origin
-from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5, walk
+from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, walk
 
 from ..errors import UnusableData
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._source_channel import SourceChannel, text_of
 from ._time_axis import told_rate_hz
 

@@ -29,7 +29,7 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import InvalidRequest, UnusableData
-from ..signals import Flags, Reals
+from ..signals.arrays import Flags, Reals
 from ._alignment import align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, unobserved
 from ._mapping import ChannelMapping, ImportMapping

@@ -10,7 +10,7 @@ from vibench.acquisition.recording import ROLE_PATTERN, Origin
 from vibench.acquisition.rig import volts_per_unit
 from vibench.sim import FrozenModel, SpecimenTable
 
-from ..recordings import BASE, DRIVE, RESPONSE
+from ..recordings.channels import BASE, DRIVE, RESPONSE
 
 KNOWN_ROLES = {
     DRIVE: ("voltage", "V"),

@@ -19,7 +19,7 @@ from scipy.io.matlab import MatReadError
 from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, opened_hdf5

@@ -13,7 +13,7 @@ import numpy as np
 from vibench.acquisition import shortened
 
 from ..errors import InvalidRequest, UnusableData
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._csv import opened_csv
 from ._excerpt import BLOCK_SAMPLES
 from ._hdf5_source import opened_hdf5

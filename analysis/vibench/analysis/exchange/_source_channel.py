@@ -9,7 +9,7 @@ from math import inf
 
 from vibench.acquisition.recording import Origin
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 
 LEAST_INTERVAL_S = 1e-100
 """Shorter is no time between samples, and its inverse may be no number."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._source_channel import SourceChannel
 from ._time_axis import told_rate_hz
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InvalidRequest
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._source_channel import SECONDS, SourceChannel, rate_bounds
 
 _UNIT = r"(?:[ _]*[\[(]?(?P<unit>[kM]?Hz|[kM]?S/s|s|sec|ms|us|[\u00b5\u03bc]s)[\])]?)?"

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from vibench.acquisition.recording import ChannelHeader, Origin
 
 from ..errors import UnusableData
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._source_channel import SECONDS, SourceChannel, rate_bounds, text_of
 

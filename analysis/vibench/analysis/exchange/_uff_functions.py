@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ..signals import Complexes, Reals
+from ..signals.arrays import Complexes, Reals
 from ._excerpt import Excerpt
 from ._uff import (
     DELIMITER,

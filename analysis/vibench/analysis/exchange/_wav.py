@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from ..errors import InvalidRequest
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._source_channel import SourceChannel
 

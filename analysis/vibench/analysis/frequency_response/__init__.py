@@ -5,7 +5,3 @@ approximation, which tells noise from nonlinear distortion (Pintelon & Schoukens
 2nd ed., section 4.3). Resonances are fitted with frequency, damping and their uncertainties.
 Displacement over displacement unless a view says otherwise. No sweep, dwell or model is known here.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

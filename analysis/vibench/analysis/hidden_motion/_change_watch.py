@@ -18,7 +18,7 @@ from pydantic import ValidationError
 
 from vibench.acquisition.rig import Rig
 from vibench.sim import FrozenModel, Specimen
-from vibench.sim.operating_system import state_folder
+from vibench.sim.operating_system.state_folder import state_folder
 
 from ._parameters import Hidden
 

@@ -5,9 +5,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from vibench.sim.engine import native_engine
+from vibench.sim.engine.run import native_engine
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ..tables import Labelled
 from ._filtering import MotionModel
 from ._prepared_motion import PreparedMotion

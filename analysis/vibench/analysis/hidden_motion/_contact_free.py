@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import NotEnoughData
-from ..signals import Flags, Reals, Samples
+from ..signals.arrays import Flags, Reals, Samples
 from ..tables import Labelled
 from ._filtering import MotionModel, motion_model, run_filter
 from ._latent_force import LatentMotion, latent_motion, latent_start

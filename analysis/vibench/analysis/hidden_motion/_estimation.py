@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._filtering import LOSS_LIMIT, FilterState, MotionModel, motion_model, move_filter
 from ._parameters import Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion

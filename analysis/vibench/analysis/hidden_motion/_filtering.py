@@ -6,9 +6,10 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from vibench.sim import Specimen
-from vibench.sim.engine import Structure, native_engine
+from vibench.sim.engine.run import native_engine
+from vibench.sim.engine.structures import Structure
 
-from ..signals import Flags, Reals
+from ..signals.arrays import Flags, Reals
 from ._prepared_motion import ChannelNoise, PreparedMotion
 from ._tracking_model import STATES, VX, StepTables, TrackedSpecimen, X, step_tables
 

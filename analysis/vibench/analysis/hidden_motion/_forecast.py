@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ..tables import Labelled
 from ._filtering import FilterState, MotionModel, run_filter
 from ._prepared_motion import PreparedMotion

@@ -13,7 +13,7 @@ from typing import ClassVar, TypeGuard
 import numpy as np
 from scipy.stats import t as student
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ..tables import Labelled, plus_minus, unit_of
 from ._estimation import Estimate, estimate
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter

@@ -11,8 +11,10 @@ from vibench.acquisition.recording import Recording
 from vibench.sim import Specimen
 
 from ..errors import InvalidRequest
-from ..recordings import ProgressObserver, Unobserved, require_checked, specimen_of
-from ..signals import Reals, Samples
+from ..recordings.channels import ProgressObserver, Unobserved
+from ..recordings.facts import specimen_of
+from ..recordings.intact import require_checked
+from ..signals.arrays import Reals, Samples
 from ..tables import Labelled
 from ._collisions import Collisions, collisions_of, joined_collisions
 from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion

@@ -4,8 +4,8 @@ import numpy as np
 
 from vibench.acquisition.recording import Recording, ResultArray
 
-from ..recordings import BASE, RESPONSE
-from ..signals import Samples
+from ..recordings.channels import BASE, RESPONSE
+from ..signals.arrays import Samples
 from ._hidden_motion import HiddenMotion
 
 RESULT = "hidden_motion"

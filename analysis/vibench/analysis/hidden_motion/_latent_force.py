@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from ..signals import Flags, Reals
+from ..signals.arrays import Flags, Reals
 from ._filtering import Filtered, FilterState, MotionModel, Smoothed, run_filter, smooth
 from ._prepared_motion import PreparedMotion
 from ._tracking_model import STATES

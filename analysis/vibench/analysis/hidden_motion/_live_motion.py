@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ..tables import Labelled
 from ._forecast import Forecast
 

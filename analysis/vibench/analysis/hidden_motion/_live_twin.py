@@ -14,8 +14,8 @@ from vibench.acquisition.recording import DROPOUTS_TOLD_AFTER_S, bridged, found_
 from vibench.acquisition.rig import Rig, channels_of, specimen_of
 from vibench.sim import Specimen
 
-from ..recordings import BASE, RESPONSE
-from ..signals import Reals
+from ..recordings.channels import BASE, RESPONSE
+from ..signals.arrays import Reals
 from ._change_watch import BLOCK_S, ChangeWatch, KnownNumber, Level
 from ._filtering import LOSS_LIMIT, Filtered, FilterState, MotionModel, motion_model, run_filter
 from ._forecast import LEARNT_S, Forecast, Forecaster

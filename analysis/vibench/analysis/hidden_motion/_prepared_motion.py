@@ -9,8 +9,8 @@ import numpy as np
 from vibench.acquisition.recording import BridgedChannel, Dropout, Recording
 
 from ..errors import NotEnoughData, UnusableData
-from ..recordings import BASE, RESPONSE
-from ..signals import Flags, Reals, Samples
+from ..recordings.channels import BASE, RESPONSE
+from ..signals.arrays import Flags, Reals, Samples
 from ._sensor_correction import HALF_LENGTH, SensorCorrection, ideal_sensors, sensor_correction
 
 _QUIET_BANDS = ((0.36, 0.40), (0.40, 0.44))

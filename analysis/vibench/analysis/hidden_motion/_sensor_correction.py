@@ -9,7 +9,7 @@ import numpy as np
 
 from vibench.acquisition.recording import coupling_cut_hz
 
-from ..signals import Complexes, Reals
+from ..signals.arrays import Complexes, Reals
 
 HALF_LENGTH = 16
 """Samples on either side that a corrected one is made of: a third of a millisecond at 51.2 kS/s."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..signals import Flags
+from ..signals.arrays import Flags
 from ._filtering import (
     LOSS_LIMIT,
     Filtered,

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from vibench.sim import PowerLaw, RigidStops, Specimen
 
 from ..errors import InvalidRequest
-from ..signals import Reals
+from ..signals.arrays import Reals
 
 STATES = 8
 """X, Y, Z and their rates relative to the base, the base's velocity W, the error B of its acceleration, SI.

@@ -4,7 +4,3 @@ A row says how a recording of the kind is analysed, how its simulation is laid o
 comparison shows of it and what its JSON document says. Kinds of one family share most of their row. How
 results are drawn and worded is kept apart, in `report`, because that loads matplotlib.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -18,9 +18,7 @@ of three samples is in every picture. Samples come in volts or channel units; no
 'GOOD'
 """
 
-from ..recordings import (
-    RESPONSE,
-)
+from ..recordings.channels import RESPONSE
 from ._envelope import (
     column_starts,
     envelope,

@@ -7,7 +7,8 @@ import numpy as np
 from scipy import fft
 
 from ..errors import NotEnoughData
-from ..signals import Complexes, Reals, Window, taper
+from ..signals.arrays import Complexes, Reals
+from ..signals.window import Window, taper
 from ._envelope import Samples
 
 _LEAST_SHARE = 0.5

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InvalidRequest
-from ..signals import Reals
+from ..signals.arrays import Reals
 
 Samples = NDArray[np.float32] | NDArray[np.float64]
 

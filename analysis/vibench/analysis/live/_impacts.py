@@ -13,7 +13,7 @@ What is lost is weak: grazing contacts, which change m0's motion less than the n
 
 import numpy as np
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._ring import Values
 
 _SPAN_S = 78e-6

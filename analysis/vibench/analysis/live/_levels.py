@@ -5,7 +5,7 @@ from enum import Enum, auto
 
 import numpy as np
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._ring import Values
 
 OVER_SHARE = 0.95

@@ -13,7 +13,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ._envelope import Samples, envelope
 
 LEGIBLE_COLUMNS = 6.0

@@ -25,8 +25,8 @@ from vibench.acquisition.recording import (
 )
 
 from ..errors import InvalidRequest
-from ..recordings import RESPONSE
-from ..signals import Reals
+from ..recordings.channels import RESPONSE
+from ..signals.arrays import Reals
 from ._envelope import Samples, column_starts, envelope
 from ._outline import outline, period_of, reach_of, widened
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
-from ..signals import Reals
+from ..signals.arrays import Reals
 from ..tables import Labelled
 from ._drive_tone import drive_tone, drive_turns
 from ._ring import RingWindow

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from vibench.acquisition import open_recording
 
-from ..signals import Reals
-from ..spectra import Spectrogram, SpectrogramSums
+from ..signals.arrays import Reals
+from ..spectra.spectrogram import Spectrogram, SpectrogramSums
 
 _PIECE_SAMPLES = 2**18
 _LEAST_SEGMENT_S, _MOST_SEGMENT_S = 5e-3, 0.25

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import fft
 
-from ..signals import Quantity, Reals, converted_signal
+from ..signals.arrays import Reals
+from ..signals.quantity import Quantity, converted_signal
 from ._drive_tone import amplitudes_at, drive_tone
 from ._ring import RingWindow
 

@@ -8,24 +8,18 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from ..errors import InvalidRequest
-from ..frequency_response import (
+from ..frequency_response.results import (
     Estimator,
     FrequencyResponse,
     FrequencyResponseSettings,
     converted_frequency_response,
-    frequency_response_of,
 )
-from ..signals import (
-    DEFAULT_CONFIDENCE,
-    Flags,
-    Quantity,
-    Reals,
-    Window,
-    effective_averages,
-    hop_samples,
-    taper,
-)
-from ..spectra import SpectralAverages
+from ..frequency_response.transmissibility import frequency_response_of
+from ..signals.arrays import Flags, Reals
+from ..signals.confidence import DEFAULT_CONFIDENCE
+from ..signals.quantity import Quantity
+from ..signals.window import Window, effective_averages, hop_samples, taper
+from ..spectra.segment_spectra import SpectralAverages
 from ..tables import Labelled
 from ._ring import Values
 

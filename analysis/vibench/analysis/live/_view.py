@@ -9,9 +9,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frequency_response import FrequencyResponse
-from ..recordings import BASE, DRIVE, RESPONSE
-from ..signals import Reals
+from ..frequency_response.results import FrequencyResponse
+from ..recordings.channels import BASE, DRIVE, RESPONSE
+from ..signals.arrays import Reals
 from ._envelope import Samples, column_starts
 from ._impacts import ImpactCounter
 from ._levels import Level, LevelMeters

@@ -5,7 +5,3 @@ measurement; the difference is in dB, and in standard errors of both. A plan's r
 are predicted before it is played. Similarity of two curves: eqs. 6 and 7 of Gong et al. 2025, whose
 logarithm is a named option. Nothing is fitted here.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ Damping and frequencies come from the weakest noise, the gap of each side from t
 collides. A model that the recordings contradict is refused, and the assumptions that would mend it are
 ranked. Every value has its bounds; what could not be told is said.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

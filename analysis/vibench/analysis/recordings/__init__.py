@@ -4,7 +4,3 @@ The channels are drive, base and response, from a recording or a simulation of i
 Facts are what was measured, with what, and how it ended, with what feedback noted while it ran. Checks
 say what to look at before trusting it. The format: docs/recording-format.md. Nothing is estimated here.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..comparison import Curve, curve_difference
+from ..comparison.curve import Curve, curve_difference
 from ..errors import InvalidRequest
-from ..figures import comparison_figure
-from ..results import CampaignResults, ComparedRecording, kept_result
+from ..figures.comparison import comparison_figure
+from ..results.campaign_results import CampaignResults
+from ..results.compared_recording import ComparedRecording, kept_result
 from ..tables import Table, write_csv
 from ._report import write_report
 

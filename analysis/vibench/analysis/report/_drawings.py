@@ -9,31 +9,39 @@ import numpy as np
 
 from vibench.acquisition.plan import Family, excitation_text, rows_by_kind
 
-from ..figures import (
+from ..figures.backbone import backbone_figure
+from ..figures.bench_levels import bench_levels_figure
+from ..figures.distortion import distortion_figure
+from ..figures.drawn import DrawnFigure
+from ..figures.dwells import dwells_figure
+from ..figures.excitation import excitation_figure
+from ..figures.held_branch import held_branch_figure
+from ..figures.hysteresis import hysteresis_figure
+from ..figures.portraits import portraits_figure
+from ..figures.stepped_sine import (
     STEPPED_FREQUENCIES,
     STEPPED_LEVELS,
     TRACKED_RESONANCE,
-    DrawnFigure,
     SteppedLook,
-    backbone_figure,
-    bench_levels_figure,
-    distortion_figure,
-    dwells_figure,
-    excitation_figure,
-    held_branch_figure,
-    hysteresis_figure,
-    portraits_figure,
     stepped_sine_figure,
-    sweep_figure,
-    sweep_orders_figure,
-    transmission_figure,
-    transmission_levels_figure,
 )
-from ..kinds import AnyResult, DwellResult, NoiseResult, Result, SteppedSineResult, SweepResult
-from ..model import AbstractOverlay
-from ..recordings import AbstractAnalysis
-from ..results import CampaignResults, budgets_of
-from ..sine import tracked_resonances
+from ..figures.sweep import sweep_figure
+from ..figures.sweep_orders import sweep_orders_figure
+from ..figures.transmission import transmission_figure
+from ..figures.transmission_levels import transmission_levels_figure
+from ..kinds.analysis_kind import (
+    AnyResult,
+    DwellResult,
+    NoiseResult,
+    Result,
+    SteppedSineResult,
+    SweepResult,
+)
+from ..model.overlay import AbstractOverlay
+from ..recordings.checks import AbstractAnalysis
+from ..results.campaign_results import CampaignResults
+from ..results.summary import budgets_of
+from ..sine.tracked_resonance import tracked_resonances
 from ..tables import plus_minus
 from ._findings import (
     branch_findings,

@@ -1,6 +1,12 @@
 """Figures that belong to no recording, and the style of all figures for those of your own."""
 
-from ..figures import (
+from ..figures.branches import branches_figure, draw_line
+from ..figures.chain import chain_figure
+from ..figures.contact_forces import contact_forces_figure
+from ..figures.drawn import DrawnFigure
+from ..figures.exponent_spectrum import exponent_spectrum_figure
+from ..figures.maps import map_figure
+from ..figures.style import (
     COLLIDING,
     LEVEL_STYLES,
     LEVELS,
@@ -8,20 +14,13 @@ from ..figures import (
     MEASURED,
     SIMULATED,
     TERMINAL,
-    DrawnFigure,
-    branches_figure,
-    chain_figure,
-    contact_forces_figure,
-    draw_line,
-    exponent_spectrum_figure,
     frequency_axis,
     legend_above,
     magnitude_axis,
-    map_figure,
     new_figure,
     styled,
-    tradeoff_figure,
 )
+from ..figures.tradeoff import tradeoff_figure
 
 __all__ = [
     "COLLIDING",

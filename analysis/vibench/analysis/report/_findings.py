@@ -4,12 +4,17 @@ from collections.abc import Iterator
 
 from vibench.acquisition.plan import EXCITATION_KINDS
 
-from ..chaos import MotionKind
-from ..figures import agreement_text, regions_text, stepped_level_caption, verdict_text
-from ..kinds import DwellResult, NoiseResult, SteppedSineResult, SweepResult
-from ..model import CLOCK_TOLERANCE, PREDICTION_S, WINDOW_S
-from ..results import CampaignResults
-from ..sine import branch_sentences, feedback_sentences
+from ..chaos.verdict import MotionKind
+from ..figures.ensemble_band import agreement_text
+from ..figures.portraits import verdict_text
+from ..figures.stepped_sine import stepped_level_caption
+from ..figures.sweep import regions_text
+from ..kinds.analysis_kind import DwellResult, NoiseResult, SteppedSineResult, SweepResult
+from ..model.draws import CLOCK_TOLERANCE
+from ..model.prediction import PREDICTION_S, WINDOW_S
+from ..results.campaign_results import CampaignResults
+from ..sine.held_branch import branch_sentences
+from ..sine.tracked_resonance import feedback_sentences
 
 
 def noise_findings(result: NoiseResult) -> Iterator[str]:

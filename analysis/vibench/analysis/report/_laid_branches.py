@@ -8,12 +8,16 @@ import numpy as np
 from vibench.sim import Parameter
 from vibench.sim.maps import MapResults
 
-from ..comparison import Curve, CurveKind, CurveOrigin
+from ..comparison.curve import Curve, CurveKind, CurveOrigin
 from ..dynamics import BranchDiagram, RecordedLevel
-from ..figures import DrawnFigure, branches_figure, map_figure
-from ..kinds import ANALYSES, AnyResult
-from ..results import CampaignResults, drive_level
-from ..sine import lost_levels, tracked_resonances
+from ..figures.branches import branches_figure
+from ..figures.drawn import DrawnFigure
+from ..figures.maps import map_figure
+from ..kinds.analyses import ANALYSES
+from ..kinds.analysis_kind import AnyResult
+from ..results.campaign_results import CampaignResults
+from ..results.compared_recording import drive_level
+from ..sine.tracked_resonance import lost_levels, tracked_resonances
 
 
 def laid_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:

@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from datetime import datetime, timedelta
 from typing import Any
 
-from ..recordings import Check, RecordingFacts
+from ..recordings.checks import Check
+from ..recordings.facts import RecordingFacts
 from ._page import ReportTable
 
 

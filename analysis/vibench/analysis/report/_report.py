@@ -8,11 +8,11 @@ from vibench.sim.maps import MapResults
 
 from ..dynamics import BranchDiagram
 from ..errors import NotEnoughData
-from ..figures import hidden_impacts_figure, hidden_motion_figure
+from ..figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
 from ..hidden_motion import HiddenMotion
-from ..kinds import AnyResult
-from ..recordings import Verdict
-from ..results import AnalysisFailure, CampaignResults, FailedStep
+from ..kinds.analysis_kind import AnyResult
+from ..recordings.checks import Verdict
+from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
 from ._drawings import DRAWINGS, figures_together, recording_figures, result_sentence
 from ._findings import limits
 from ._laid_branches import laid_branches, laid_maps

@@ -4,21 +4,16 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ..figures import verdict_text
-from ..frequency_response import Resonance
-from ..kinds import AnyResult, DwellResult, NoiseResult, SweepResult
-from ..model import (
-    PAPER_RESONANCES_HZ,
-    PAPER_TERMINAL_RESONANCES_HZ,
-    RESPONSE_I,
-    RESPONSE_II,
-    DwellOverlay,
-)
-from ..recordings import specimen_of
-from ..results import budgets_of
-from ..sine import Edge
+from ..figures.portraits import verdict_text
+from ..frequency_response.mode import Resonance
+from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult, SweepResult
+from ..model.overlay import RESPONSE_I, RESPONSE_II, DwellOverlay
+from ..model.prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ
+from ..recordings.facts import specimen_of
+from ..results.summary import budgets_of
+from ..sine.collision_region import Edge
 from ..tables import plus_minus
-from ..uncertainty import COVERAGE, Budget, Cause
+from ..uncertainty.budget import COVERAGE, Budget, Cause
 from ._page import ReportTable
 
 _NEAR = 0.08

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from ..figures import verdict_text
-from ..kinds import AnyResult, DwellResult, NoiseResult
-from ..results import CampaignResults, FailedStep
+from ..figures.portraits import verdict_text
+from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult
+from ..results.campaign_results import CampaignResults, FailedStep
 from ._drawings import result_sentence
 from ._page import Agreement
 from ._result_tables import nearest_resonance

@@ -4,7 +4,3 @@ A recording becomes a noise, sweep, dwell or stepped-sine result, with the model
 that cannot be analysed says why and stops no other. A result is also one JSON document, every number
 with its unit in its name and its uncertainty beside it, and the curves of a comparison.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ Arrays are float64 of shape (samples,). Integration and differentiation work in 
 domain; what the missing past and future disturb at the ends is counted and given with the signal.
 Bounds of averaged estimates follow Bendat & Piersol, Random Data. No recording is known here.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

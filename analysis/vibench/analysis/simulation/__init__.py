@@ -4,14 +4,11 @@ One specimen, one drive over frequency, up to two models; answers come piece by 
 their own, which computes one request after another and can be told to stop. Errors and costs of each
 accuracy are those of docs/accuracy.md.
 
->>> from vibench.analysis.simulation import SimulationRequest, cost_sentences
+>>> from vibench.analysis.simulation.request import SimulationRequest
+>>> from vibench.analysis.simulation.accuracy_cost import cost_sentences
 >>> request = SimulationRequest(start_hz=250.0, stop_hz=270.0, step_hz=5.0)
 >>> request.models, request.points
 (('hertz', 'linear'), 10)
 >>> cost_sentences(request, cores=2)[0].partition(":")[0]
 '10 points of 8 s on 2 idle cores'
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ Responses I and II (the paper's), their phase and orders, where the masses colli
 jumps and hysteresis between up and down, the motion once per drive period and the verdict on it,
 what moved to the bands of the bound modes (terminal resonances), and what feedback found (docs/feedback.md).
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,7 +3,3 @@
 Standard uncertainties are combined as the GUM (JCGM 100:2008, 5.1) does; what a hardware configuration does
 not state is named as not stated, and never taken as zero.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

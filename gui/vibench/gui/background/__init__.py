@@ -4,7 +4,3 @@
 question. Functions, arguments and answers must be importable and picklable, and their modules
 free of Qt widgets: every process that calls them imports them.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,7 +5,3 @@ commands; one thread without Qt waits for answers, so that the window never does
 `Attendant` is fed here: an engine that misses it ramps down (docs/engine.md).
 A `LiveView` of the newest samples is kept for each run.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ Labels, units, limits and explanations come from the model's fields; the model i
 what was typed. An editor for each type of value; quantities are typed with units ("45 µm").
 It knows no particular model.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,7 +5,3 @@ signals to the window. `Selection` holds rig, test and campaign as they are bein
 sent yet; `UserActions` carries out what keys, menus and buttons ask for.
 Pages know each other by name only.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ Values are SI; the unit of a label is chosen by its axis. Long signals are drawn
 largest sample of every column of pixels, so that no impact is lost.
 It knows nothing of what is drawn.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ Colour themes and style sheets, buttons, tables to read, hints in empty areas, n
 person, boxes of layouts, page names, and times as they are written on labels. It knows neither pages nor
 engine.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ It makes the pages from the page catalogue, asks the engine link at every tick, 
 state of the rig on every page. Esc and Pause abort from anywhere. The lateness of the event loop
 is measured all the time. `make_screenshots` pictures every page during a measurement.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

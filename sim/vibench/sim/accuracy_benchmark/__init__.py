@@ -6,14 +6,10 @@ processor time over simulated time; errors are measured against a solution that 
 kernels: DOP853 on the paper's equations as a textbook writes them. The result for one machine is
 docs/accuracy.md.
 
->>> from vibench.sim.accuracy_benchmark import MOTIONS
+>>> from vibench.sim.accuracy_benchmark.figures import MOTIONS
 >>> for motion in MOTIONS[:3]:
 ...     print(motion.regime, "-", motion.name)
 no contact - hertz, 260 Hz, 1 µm
 periodic - hertz, 130 Hz, 20 µm
 periodic - linear_gap, 130 Hz, 20 µm
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

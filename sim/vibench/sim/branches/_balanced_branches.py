@@ -3,23 +3,16 @@
 from collections.abc import Iterator
 from functools import partial
 
-from ..model import Harmonic, Specimen
-from ..periodic import (
-    ArcSteps,
-    Balance,
-    BalanceEnd,
-    BalanceOptions,
-    DrivePath,
-    HarmonicSet,
-    OrbitShape,
-    PowerSpring,
-    balance,
-    balance_branch_within,
-    first_order_guesses,
-    orbit_guess,
-    spring_of,
-    structure_of,
-)
+from ..model.drive import Harmonic
+from ..model.specimen import Specimen
+from ..periodic.balance_branch import balance_branch_within, orbit_guess
+from ..periodic.balance_solver import BalanceOptions, balance, first_order_guesses
+from ..periodic.condensation import structure_of
+from ..periodic.continuation import ArcSteps
+from ..periodic.drive_path import DrivePath
+from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet
+from ..periodic.period_map import OrbitShape
+from ..periodic.restoring_force import PowerSpring, spring_of
 from ._branch_search import BranchStart, branches_from
 from ._found_branch import BranchOrigin, FoundBranch
 from ._motion_search import MotionSearch, periodic_motions

@@ -7,9 +7,10 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from ..kernels import Floats
-from ..model import Harmonic, Specimen
-from ..periodic import DrivePath
+from ..kernels.arrays import Floats
+from ..model.drive import Harmonic
+from ..model.specimen import Specimen
+from ..periodic.drive_path import DrivePath
 from ._found_branch import BranchOrigin, FoundBranch, known_among
 from ._motion_search import MotionSearch
 

@@ -6,10 +6,15 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..kernels import Floats
-from ..model import Harmonic, Specimen
-from ..motion import state_scales
-from ..periodic import ArcEnd, Branch, DrivePath, OrbitShape, parameter_value
+from ..kernels.arrays import Floats
+from ..model.drive import Harmonic
+from ..model.specimen import Specimen
+from ..motion.poincare import state_scales
+from ..periodic.branch import Branch
+from ..periodic.branch_following import parameter_value
+from ..periodic.continuation import ArcEnd
+from ..periodic.drive_path import DrivePath
+from ..periodic.period_map import OrbitShape
 
 INTERPOLATED = 0.06
 """A straight line between two points of a branch misses it by less than this part of its length: by as much

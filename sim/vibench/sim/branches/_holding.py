@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..periodic import NEUTRAL
+from ..periodic.branch import NEUTRAL
 
 UPDATES_TO_HOLD = 10.0
 """A loop holds what takes this many of its updates to grow by e: it must see a departure and answer it."""

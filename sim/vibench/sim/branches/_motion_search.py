@@ -5,10 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels import Floats, Vector
-from ..model import Accuracy, Harmonic, Outcome, Specimen, base_transmissibility
-from ..motion import integrate, smallest_period, state_scales
-from ..periodic import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
+from ..kernels.arrays import Floats, Vector
+from ..model.accuracy import Accuracy
+from ..model.drive import Harmonic
+from ..model.modes import base_transmissibility
+from ..model.outcome import Outcome
+from ..model.specimen import Specimen
+from ..motion.integrate import integrate
+from ..motion.poincare import smallest_period, state_scales
+from ..periodic.period_map import OrbitShape, PeriodMap
+from ..periodic.shooting import PeriodicOrbit, ShootingEnd, periodic_orbit
 
 SETTLED = 1e-3
 """A section repeats when it changes by less, over the state's scale: Newton's iteration does the rest."""

@@ -4,21 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..kernels import Vector
-from ..model import Harmonic, Specimen
-from ..motion import state_scales
-from ..periodic import (
-    ArcSteps,
-    BifurcationKind,
-    BranchEvent,
-    DrivePath,
-    OrbitShape,
-    PeriodicOrbit,
-    PeriodMap,
-    ShootingEnd,
-    periodic_branch_within,
-    periodic_orbit,
-)
+from ..kernels.arrays import Vector
+from ..model.drive import Harmonic
+from ..model.specimen import Specimen
+from ..motion.poincare import state_scales
+from ..periodic.branch import BifurcationKind, BranchEvent
+from ..periodic.continuation import ArcSteps
+from ..periodic.drive_path import DrivePath
+from ..periodic.orbit_branch import periodic_branch_within
+from ..periodic.period_map import OrbitShape, PeriodMap
+from ..periodic.shooting import PeriodicOrbit, ShootingEnd, periodic_orbit
 from ._branch_search import BranchStart, branches_from
 from ._found_branch import BranchOrigin, FoundBranch
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Table
-from ..model import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled, Specimen
-from ..motion import sampled_motion
+from ..kernels.arrays import Table
+from ..model.drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled
+from ..model.specimen import Specimen
+from ..motion.base_motion import sampled_motion
 from ._tables import WINDOW_TURN, ChainTables
 
 PIECE_TERMS = 8

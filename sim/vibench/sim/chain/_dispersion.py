@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels import Complex
-from ..model import Specimen
+from ..kernels.arrays import Complex
+from ..model.specimen import Specimen
 from ._chain import MASSES_PER_CELL, Chain
 
 TOUCHING = 1e-9

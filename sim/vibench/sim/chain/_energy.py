@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..exponents import blocked_mean
-from ..kernels import Floats
-from ..model import PowerLaw, Specimen
+from ..exponents.blocking import blocked_mean
+from ..kernels.arrays import Floats
+from ..model.power_law import PowerLaw
+from ..model.specimen import Specimen
 from ._chain import MASSES_PER_CELL, Chain
 
 

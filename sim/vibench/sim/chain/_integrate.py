@@ -6,10 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine import MOST_IMPACTS, SPARE_IMPACTS
-from ..kernels import Floats
-from ..model import Accuracy, AccuracyWord, Drive, Harmonic, Outcome, chosen
-from ..motion import (
+from ..engine.run import MOST_IMPACTS, SPARE_IMPACTS
+from ..kernels.arrays import Floats
+from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.drive import Drive, Harmonic
+from ..model.outcome import Outcome
+from ..model.word import chosen
+from ..motion.integrate import (
     MAX_IMPACT_RATE_HZ,
     ROUNDING,
     Trajectory,

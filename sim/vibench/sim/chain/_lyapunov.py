@@ -12,10 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..exponents import BlockedMean, blocked_mean
-from ..kernels import Floats, Table
-from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, chosen
-from ..motion import MAX_IMPACT_RATE_HZ
+from ..exponents.blocking import BlockedMean, blocked_mean
+from ..kernels.arrays import Floats, Table
+from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.drive import Harmonic
+from ..model.outcome import Outcome
+from ..model.word import chosen
+from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import check_work, integrate_chain, most_chain_impacts

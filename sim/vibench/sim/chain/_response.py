@@ -7,10 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine import Watch
-from ..kernels import Complex, Floats
-from ..model import Accuracy, AccuracyWord, Harmonic, Outcome, Specimen, chosen
-from ..motion import MAX_IMPACT_RATE_HZ, Response, steady_response, whole_periods
+from ..engine.run import Watch
+from ..kernels.arrays import Complex, Floats
+from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.drive import Harmonic
+from ..model.outcome import Outcome
+from ..model.specimen import Specimen
+from ..model.word import chosen
+from ..motion.integrate import MAX_IMPACT_RATE_HZ
+from ..motion.response import Response, steady_response, whole_periods
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import check_work, most_chain_impacts, start_motion

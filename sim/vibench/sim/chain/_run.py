@@ -3,15 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..engine import (
-    Watch,
-    collision_structure,
-    fill_drive,
-    native_engine,
-    power_structure,
-)
-from ..kernels import Complex, Floats
-from ..model import Accuracy, Harmonic, Outcome
+from ..engine.run import Watch, native_engine
+from ..engine.scene import collision_structure, fill_drive, power_structure
+from ..kernels.arrays import Complex, Floats
+from ..model.accuracy import Accuracy
+from ..model.drive import Harmonic
+from ..model.outcome import Outcome
 from ._base_force import Pieces
 from ._chain import Chain
 from ._tables import ChainTables

@@ -5,9 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..engine import Structure, fill_cell, native_engine
-from ..kernels import Table, Vector
-from ..model import Accuracy, Drive, Harmonic
+from ..engine.run import native_engine
+from ..engine.scene import fill_cell
+from ..engine.structures import Structure
+from ..kernels.arrays import Table, Vector
+from ..model.accuracy import Accuracy
+from ..model.drive import Drive, Harmonic
 from ._chain import MASSES_PER_CELL, Chain
 
 WINDOW_TURN = 0.2

@@ -4,7 +4,3 @@ With |p| = gap + w^2 and dt = w ds every rate is a polynomial, so that Dormand a
 keeps its order at onset and exit (docs/decisions/0004-contact-integration.md, 0008-speed-of-contacts.md).
 Unknowns: w [m^0.5], r = d|p|/dt [m/s], x, z, vx, vz, t. Rigid stops and power laws are not here.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

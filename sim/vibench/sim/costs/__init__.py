@@ -4,7 +4,3 @@ A plan counts work in seconds of a machine that nobody has. How long a second of
 what runs of that kind took lately, and how far a plan may be off is their scatter. Machine, versions and
 sources are part of the name under which it is kept: other kernels begin anew.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,7 +8,3 @@ a cubic polynomial on each of equal intervals: sweeps and recordings.
 Signals, filters and the analogue world call it through `native_engine`: `Engine.new` fills a structure of
 native/structures.hpp, `Engine.call` hands it over.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,7 +5,3 @@ exponent, with a standard error that knows of the memory of the motion (docs/dec
 run that comes to rest in a repeating motion gets the exponents of that motion; chaos that died out is
 reported as a transient. `lyapunov_spectrum` gives all six and the Kaplan-Yorke dimension.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,8 +8,10 @@ whether it would be stable without. The harmonic content of the drive is no part
 moves as a sine, the motion held is one of the specimen alone, whatever the law is. SI units.
 
 >>> from vibench.sim import gong2025
->>> from vibench.sim.feedback import LoopTiming, SampledPlant, designed_law, loop_multiplier
->>> from vibench.sim.shaker import Amplifier, Shaker
+>>> from vibench.sim.feedback.plant import LoopTiming, SampledPlant
+>>> from vibench.sim.feedback.law import designed_law
+>>> from vibench.sim.feedback.loop import loop_multiplier
+>>> from vibench.sim.shaker.parts import Amplifier, Shaker
 >>> table = Shaker(
 ...     moving_mass_kg=0.127, suspension_stiffness_n_per_m=9932.0, suspension_damping_ns_per_m=21.51,
 ...     force_constant_n_per_a=6.78, coil_resistance_ohm=2.6, coil_inductance_h=1e-4,
@@ -19,7 +21,3 @@ moves as a sine, the motion held is one of the specimen alone, whatever the law 
 >>> loop_multiplier(plant, law, [0.0] * 102) < 1.0
 True
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

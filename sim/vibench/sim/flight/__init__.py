@@ -3,7 +3,3 @@
 A touch is excluded or found by a bound on the acceleration of p, never by sampling
 (docs/decisions/0004-contact-integration.md). Holds for every law but power laws, which act at every p.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

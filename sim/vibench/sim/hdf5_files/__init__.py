@@ -7,7 +7,7 @@ virtual datasets), and believes what a file says of its sizes. `opened_hdf5` ref
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory
 >>> import h5py
->>> from vibench.sim.hdf5_files import UnsafeHdf5, open_hdf5
+>>> from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5
 >>> with TemporaryDirectory() as folder:
 ...     path = Path(folder) / "foreign.h5"
 ...     with h5py.File(path, "w") as file:
@@ -18,7 +18,3 @@ virtual datasets), and believes what a file says of its sizes. `opened_hdf5` ref
 ...         print(error)
 /copied points into another file (/etc/hosts.h5); read it with --allow-external if you trust this file
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

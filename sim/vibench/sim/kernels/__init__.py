@@ -5,7 +5,3 @@
 of the package. Also: SIMD vectors of eight or sixteen numbers, a clock of two doubles (Dekker 1971), and
 names of array types. Nothing here knows what is simulated.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ..kernels import Floats
-from ..model import Outcome
-from ..motion import state_scales
-from ..scene import Given, MotionKind, Scene, ScenePrediction, Share, settle_scene, wilson_share
+from ..kernels.arrays import Floats
+from ..model.outcome import Outcome
+from ..motion.poincare import state_scales
+from ..scene.prediction import MotionKind, ScenePrediction
+from ..scene.scene import Given, Scene
+from ..scene.shares import Share, wilson_share
+from ..scene.solve import settle_scene
 from ..study import InvalidStudy
 from ._expansion import BASIN_JUMP
 from ._results import MapMotion, MapResults

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Specimen
-from ..scene import MotionKind, ScenePrediction
+from ..model.specimen import Specimen
+from ..scene.prediction import MotionKind, ScenePrediction
 from ..study import COLUMNS, MESSAGE, Cell, Column
 
 KEPT = (

@@ -7,19 +7,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..engine import batches_pay
-from ..kernels import Floats
-from ..model import Outcome
-from ..scene import (
-    Given,
-    MotionKind,
-    Scene,
-    Solved,
-    expected_cost_s,
-    longest_cost_s,
-    settle_in_lanes,
-    settle_scene,
-)
+from ..engine.batch import batches_pay
+from ..kernels.arrays import Floats
+from ..model.outcome import Outcome
+from ..scene.measured_cost import expected_cost_s, longest_cost_s
+from ..scene.prediction import MotionKind
+from ..scene.scene import Given, Scene
+from ..scene.side_by_side import Solved, settle_in_lanes
+from ..scene.solve import settle_scene
 from ..study import (
     NUMBERS,
     Arrays,

@@ -10,17 +10,12 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
 
 from ..branches import random_state
-from ..model import (
-    Accuracy,
-    ContactWord,
-    FrozenModel,
-    Harmonic,
-    Specimen,
-    SpecimenTable,
-    Triple,
-    usual_specimen,
-)
-from ..scene import AutomaticDuration, Given, Observable, Rest, Scene
+from ..model.accuracy import Accuracy
+from ..model.drive import Harmonic
+from ..model.frozen_model import FrozenModel
+from ..model.specimen import Specimen, Triple
+from ..model.specimen_description import ContactWord, SpecimenTable, usual_specimen
+from ..scene.scene import AutomaticDuration, Given, Observable, Rest, Scene
 from ..study import Column, GridPlan, Start, StudyAxis
 from ._columns import SECTION_COLUMNS, columns_with
 from ._quantities import OF_SPECIMEN, QUANTITIES, START, Quantity

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Floats
-from ..scene import UNSURE, Count, MotionKind, Share, shares_of, wilson_share
+from ..kernels.arrays import Floats
+from ..scene.prediction import MotionKind
+from ..scene.shares import UNSURE, Count, Share, shares_of, wilson_share
 from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions
 from ._columns import labels_of, without_impacts
 from ._expansion import BASIN_JUMP, cell_codes, refinement_of

@@ -6,7 +6,3 @@
 answer to the base with m1 free (`_modes`, `_against_stops`) or held by a rigid stop (`_bound_modes`). State
 order: x, y, z, vx, vy, vz [m, m/s], absolute. Knows nothing of steps, kernels' memory or runs.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

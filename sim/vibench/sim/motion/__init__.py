@@ -5,7 +5,3 @@
 the flow over a stretch with its derivative. A run that cannot go on ends with an `Outcome`, not an exception
 (docs/decisions/0004-contact-integration.md).
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

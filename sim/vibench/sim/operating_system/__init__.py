@@ -4,7 +4,3 @@
 system asked for. The Windows one is checked by the type checker for Windows, and run by a test in a Python
 from which everything was taken that Windows lacks; it was not yet run on Windows itself.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -6,7 +6,3 @@ with impacts, along frequency or amplitude, through folds (pseudo-arclength cont
 multipliers of the variational equation, which also tell folds, period doublings and Neimark-Sacker points.
 The spring is a `RestoringForce` of p, the rest a linear structure condensed to p (Krack and Gross 2019).
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

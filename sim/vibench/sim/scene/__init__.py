@@ -5,7 +5,3 @@ whether a closed form suffices and what has to be carried along; `solve_scene` r
 integration error against stricter steps and the scatter of chaotic windows (docs/accuracy.md). The answer,
 `ScenePrediction`, is one flat frozen value. Many scenes at once are the business of `study`.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -8,7 +8,8 @@ under sines in closed form, impacts to first order. SI units.
 
 >>> import numpy as np
 >>> from vibench.sim import gong2025
->>> from vibench.sim.shaker import Amplifier, LoadedShaker, Shaker
+>>> from vibench.sim.shaker.parts import Amplifier, Shaker
+>>> from vibench.sim.shaker.loaded_shaker import LoadedShaker
 >>> table = Shaker(
 ...     moving_mass_kg=0.127, suspension_stiffness_n_per_m=9932.0, suspension_damping_ns_per_m=21.51,
 ...     force_constant_n_per_a=6.78, coil_resistance_ohm=2.6, coil_inductance_h=1e-4,
@@ -20,7 +21,3 @@ under sines in closed form, impacts to first order. SI units.
 >>> shaken.impacts, round(float(np.std(motion.base_acceleration[50_000:])), 1)  # m/s2
 (0, 0.8)
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,8 +4,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..model import Accuracy, AccuracyWord, Outcome, chosen
-from ..scene import Ensemble, EscapeRate, FoundMotion, Method, MotionKind, ScenePrediction, Share, StartMemory
+from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.outcome import Outcome
+from ..model.word import chosen
+from ..scene.prediction import Ensemble, FoundMotion, Method, MotionKind, ScenePrediction, StartMemory
+from ..scene.shares import EscapeRate, Share
 from ._arrays import Arrays
 from ._columns import (
     ENDED,

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 from enum import Enum
 
-from ..model import Outcome
-from ..scene import Method, MotionKind, StartMemory
+from ..model.outcome import Outcome
+from ..scene.prediction import Method, MotionKind, StartMemory
 from ._layout import STATE, STATE_DTYPE, PointState
 
 Cell = float | int | bytes | tuple[float, ...]

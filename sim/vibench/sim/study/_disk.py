@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 from typing import Protocol
 
-from ..operating_system import OpenFile
+from ..operating_system.open_file import OpenFile
 from ._errors import StudyError
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02

@@ -9,17 +9,10 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..scene import (
-    Method,
-    Scene,
-    ScenePrediction,
-    Solved,
-    learn_cost,
-    settle_in_lanes,
-    settle_scenes,
-    solve_in_lanes,
-    solve_scenes,
-)
+from ..scene.measured_cost import learn_cost
+from ..scene.prediction import Method, ScenePrediction
+from ..scene.scene import Scene
+from ..scene.side_by_side import Solved, settle_in_lanes, settle_scenes, solve_in_lanes, solve_scenes
 
 
 @dataclass(frozen=True)

@@ -13,18 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from ..kernels import Floats
-from ..model import Outcome
-from ..scene import (
-    Given,
-    Rest,
-    Scene,
-    Solved,
-    expected_cost_s,
-    lanes_are_worth_it,
-    solve_in_lanes,
-    solve_scene,
-)
+from ..kernels.arrays import Floats
+from ..model.outcome import Outcome
+from ..scene.measured_cost import expected_cost_s
+from ..scene.scene import Given, Rest, Scene
+from ..scene.side_by_side import Solved, solve_in_lanes
+from ..scene.solve import solve_scene
+from ..scene.states_alone import lanes_are_worth_it
 from ._answers import cells_of, cut_text
 from ._arrays import Arrays, PointAnswer
 from ._axes import Grid

@@ -101,7 +101,7 @@ def _offset(dataset: "h5py.Dataset") -> int:
 
 @contextmanager
 def _opened(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
-    from ..hdf5_files import UnsafeHdf5, open_hdf5  # noqa: PLC0415 - h5py, which answers in memory do without
+    from ..hdf5_files.door import UnsafeHdf5, open_hdf5  # noqa: PLC0415 - h5py, which answers in memory do without
 
     if not path.is_file():
         raise StudyError(f"{path} does not exist, or is no file; give the path of a {kind.called}'s file.")

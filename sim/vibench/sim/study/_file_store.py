@@ -21,7 +21,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..operating_system import sync_file, sync_folder
+from ..operating_system.open_file import sync_file
+from ..operating_system.this import sync_folder
 from . import _layout as layout
 from ._arrays import Arrays, PointAnswer, put
 from ._axes import StudyAxis

@@ -3,7 +3,7 @@
 from abc import ABC, abstractmethod
 from typing import ClassVar, Self
 
-from ..model import FrozenModel
+from ..model.frozen_model import FrozenModel
 from ._axes import Grid, StudyAxis, grid_of
 from ._columns import Column
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Floats
+from ..kernels.arrays import Floats
 from ._axes import Grid
 
 SHORTEST_S = 1e-6

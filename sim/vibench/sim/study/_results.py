@@ -8,8 +8,8 @@ from typing import Generic
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Floats
-from ..scene import ScenePrediction
+from ..kernels.arrays import Floats
+from ..scene.prediction import ScenePrediction
 from ._answers import prediction_at
 from ._arrays import Arrays, states
 from ._axes import StudyAxis

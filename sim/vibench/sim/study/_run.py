@@ -9,8 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels import Floats
-from ..scene import Scene, Solved
+from ..kernels.arrays import Floats
+from ..scene.scene import Scene
+from ..scene.side_by_side import Solved
 from ._arrays import Arrays, PointAnswer, is_failed, states
 from ._axes import Grid
 from ._columns import TAKEN

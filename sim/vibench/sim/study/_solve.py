@@ -6,8 +6,8 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
-from ..model import chosen
-from ..scene import solve_scene
+from ..model.word import chosen
+from ..scene.solve import solve_scene
 from ._errors import ClusterLost
 from ._executor import Executor, Solver
 from ._expansion import study_solver

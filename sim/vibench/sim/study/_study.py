@@ -14,15 +14,11 @@ from pydantic import (
     model_validator,
 )
 
-from ..model import (
-    Accuracy,
-    ContactWord,
-    FrozenModel,
-    Harmonic,
-    SpecimenTable,
-    usual_specimen,
-)
-from ..scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
+from ..model.accuracy import Accuracy
+from ..model.drive import Harmonic
+from ..model.frozen_model import FrozenModel
+from ..model.specimen_description import ContactWord, SpecimenTable, usual_specimen
+from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
 from ._axes import FREQUENCY, MODEL, START, StudyAxis
 from ._columns import COLUMNS, Column
 from ._frequency_range import listed

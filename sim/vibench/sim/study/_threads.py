@@ -8,7 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import TypeVar
 
-from ..scene import Scene, Solved, solve_scene
+from ..scene.scene import Scene
+from ..scene.side_by_side import Solved
+from ..scene.solve import solve_scene
 from ._errors import InvalidStudy
 from ._executor import Bundle, Reply, Solver, solve_timed
 

@@ -8,10 +8,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.analysis.simulation import SimulationProgress
-from vibench.analysis.simulation._request import SimulatedPoint
-from vibench.gui.pages.compare import ComparePage
-from vibench.gui.widgets import DARK
+from vibench.analysis.simulation.progress import SimulationProgress
+from vibench.analysis.simulation.request import SimulatedPoint
+from vibench.gui.pages.compare.compare_page import ComparePage
+from vibench.gui.widgets.theme import DARK
 
 
 def mode(source, scale=1.0, low_hz=50.0, high_hz=600.0):

@@ -10,8 +10,8 @@ from PySide6.QtWidgets import QFileDialog
 
 from vibench.acquisition import open_recording
 from vibench.analysis.live import RecordingOverview, kept_levels
-from vibench.gui.pages.files._spectrogram_view import Pictures
-from vibench.gui.widgets import DARK
+from vibench.gui.pages.files.spectrogram_view import Pictures
+from vibench.gui.widgets.theme import DARK
 
 PLACE = Path(__file__).parents[3] / "analysis" / "hidden_motion" / "shaken_world.py"
 

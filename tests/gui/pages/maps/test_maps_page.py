@@ -6,9 +6,10 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
-from vibench.analysis.simulation import MapRequest
-from vibench.gui.pages.maps import MapsPage
-from vibench.gui.widgets import DARK, SIMULATE
+from vibench.analysis.simulation.map_request import MapRequest
+from vibench.gui.pages.maps.maps_page import MapsPage
+from vibench.gui.widgets.page_names import SIMULATE
+from vibench.gui.widgets.theme import DARK
 
 SMALL = {
     "start_hz": 100.0,

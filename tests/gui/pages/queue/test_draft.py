@@ -5,7 +5,7 @@ import pytest
 from vibench.acquisition import ConfigurationError, load_campaign, save_toml, shipped
 from vibench.acquisition.plan import Measurement, Range, SweepAxis
 from vibench.acquisition.rig import load_rig
-from vibench.gui.pages.queue._draft import moved_up, with_measurement, with_sweep, without
+from vibench.gui.pages.queue.draft import moved_up, with_measurement, with_sweep, without
 
 DWELL = Measurement.model_validate(
     {

@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import load_campaign, shipped
-from vibench.gui.pages.queue import QueuePage
+from vibench.gui.pages.queue.queue_page import QueuePage
 
 
 @pytest.fixture

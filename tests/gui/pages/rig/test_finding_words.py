@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.acquisition import Finding, Verdict
-from vibench.gui.pages.rig._rig_page import expected_text, finding_name, measured_text
+from vibench.gui.pages.rig.rig_page import expected_text, finding_name, measured_text
 
 
 def finding(number, unit, value="as the check says", uncertainty=None, advice=""):

@@ -5,8 +5,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QFont
 
 from vibench.acquisition.engine import ArmedPlan, EngineState, EngineStatus, Supervision
-from vibench.gui.pages.run._arm_card import UNREAD
-from vibench.gui.widgets import RUN
+from vibench.gui.pages.run.arm_card import UNREAD
+from vibench.gui.widgets.page_names import RUN
 
 LINES = tuple(
     f"Line {number}: what is played, how loud, and under which limits it is stopped." for number in range(20)

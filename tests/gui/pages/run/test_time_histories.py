@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vibench.analysis.live import LiveChannel, LiveView
-from vibench.gui.pages.run._time_histories import TimeHistoryPlots, channel_axis
-from vibench.gui.widgets import LIGHT
+from vibench.gui.pages.run.time_histories import TimeHistoryPlots, channel_axis
+from vibench.gui.widgets.theme import LIGHT
 
 FOUR = (
     ("drive_voltage", "V"),

@@ -15,9 +15,10 @@ from vibench.analysis.dynamics import (
     SpectrumPoint,
     SpectrumRequest,
 )
-from vibench.gui.pages.simulate import SimulatePage
-from vibench.gui.plots import Dash
-from vibench.gui.widgets import COMPARE, DARK
+from vibench.gui.pages.simulate.simulate_page import SimulatePage
+from vibench.gui.plots.line_style import Dash
+from vibench.gui.widgets.page_names import COMPARE
+from vibench.gui.widgets.theme import DARK
 from vibench.sim import Parameter
 
 

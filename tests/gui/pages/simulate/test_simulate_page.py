@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vibench.analysis.simulation import SimulationRequest
-from vibench.analysis.simulation._accuracy_cost import MEASURED
-from vibench.analysis.simulation._request import SimulatedPoint, SimulatedSignal, Trouble
-from vibench.gui.pages.simulate import SimulatePage
-from vibench.gui.widgets import DARK
+from vibench.analysis.simulation.accuracy_cost import MEASURED
+from vibench.analysis.simulation.request import SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+from vibench.gui.pages.simulate.simulate_page import SimulatePage
+from vibench.gui.widgets.theme import DARK
 from vibench.sim import Accuracy, Ensemble, FoundMotion, MotionKind, Share, StartMemory
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "start_hz": 50.0, "step_hz": 10.0}

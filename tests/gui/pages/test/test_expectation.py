@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from vibench.acquisition.excitation import BaseLevel
+from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.plan import BranchContinuation, Dwell, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.gui.pages import test as test_room
-from vibench.gui.pages.test import _test_preview as preview
-from vibench.gui.pages.test._test_page import summary_text
+from vibench.gui.pages.test import test_preview as preview
+from vibench.gui.pages.test.test_page import summary_text
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
 

@@ -5,7 +5,3 @@ at which rig time passes: when somebody asks for samples, or by the wall clock. 
 played goes through `vibench.virtual_rig.analogue`: it does not know the world behind the sockets. Sources
 of the device table stand in it.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,7 +5,3 @@ its own clock, so that rendering in blocks of any size gives the same samples. R
 driver tkafg1k and public drivers and measurements; not compared with the laboratory's own unit. Knows no
 cable and no world.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -3,7 +3,3 @@
 `VirtualRig` joins the other rooms for a rig's configuration; `RigFaults` is everything that can go wrong
 on demand, a fault script plays it by rig time (docs/faults.md).
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,7 +4,3 @@ Works with unmodified PyUSB and pyvisa-py, without libusb; while this bus is ins
 instead of the machine's own devices. Transfers fail as real ones do (errno). Sources: USB 2.0 chapter
 9.6, USBTMC 1.0, USB488 1.0.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

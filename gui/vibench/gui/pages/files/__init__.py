@@ -4,7 +4,3 @@ A table with state and thumbnail of each recording, its channels over time at an
 spectrogram. Folders and levels are read in another process; `_listing` is loaded there, without
 widgets.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

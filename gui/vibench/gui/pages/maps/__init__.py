@@ -3,7 +3,3 @@
 The map is drawn while it is computed, coarsely first. What is in sight can be computed again, finer; a
 click shows the motion there; levels of recordings lie on the map as lines.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

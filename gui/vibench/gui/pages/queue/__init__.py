@@ -3,7 +3,3 @@
 Every change gives a whole, valid campaign or is refused; duration and size are worked out in
 another process. `_row_words` is loaded there.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

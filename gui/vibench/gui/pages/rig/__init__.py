@@ -3,7 +3,3 @@
 The hardware configuration is chosen, knobs that no instrument reports are confirmed, the bench
 is opened and checked; findings are written with units and prefixes.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

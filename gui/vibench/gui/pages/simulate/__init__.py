@@ -3,7 +3,3 @@
 One process computes for as long as the window lives; what nobody wants any more is dropped.
 Responses, exponents, similarity and motion are drawn while they come in.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

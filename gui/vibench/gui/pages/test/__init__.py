@@ -4,7 +4,3 @@ A form of one measurement, the signal in time and spectrum, predicted loads besi
 the rig, and the predicted response of the specimen. Preview and prediction are worked out in
 another process; `_test_preview` is loaded there, without widgets.
 """
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,53 @@
+"""What could be put on a bench: every instrument that can be seen from here, and why others cannot."""
+
+from dataclasses import dataclass
+
+from .. import drivers
+from ..errors import InstrumentError
+from ..instruments import FoundDevice
+from ..rig import Rig
+from .simulated_rig import simulated_rig
+
+
+@dataclass(frozen=True)
+class InstrumentList:
+    """Everything that was found."""
+
+    visa_resources: tuple[str, ...]
+    """Names for ``generator.resource``; USB numbers may be decimal (1689::851 is an AFG1022)."""
+    daq_devices: tuple[FoundDevice, ...]
+    remarks: tuple[str, ...]
+    """Why a place could not be searched."""
+
+
+def list_instruments(visa_library: str = "@py", server: str | None = None) -> InstrumentList:
+    """Search VISA and DAQmx; a place that cannot be searched becomes a remark.
+
+    Parameters
+    ----------
+    visa_library
+        ``"@py"`` for pyvisa-py, empty for the system's VISA.
+    server
+        Address of a DAQmx device server, ``"host:port"``; None: the driver on this computer.
+
+    """
+    remarks: list[str] = []
+    resources: tuple[str, ...] = ()
+    devices: tuple[FoundDevice, ...] = ()
+    try:
+        resources = drivers.list_visa_resources(visa_library)
+    except InstrumentError as error:
+        remarks.append(str(error))
+    try:
+        devices = drivers.list_daqmx_devices(server)
+    except InstrumentError as error:
+        remarks.append(str(error))
+    return InstrumentList(resources, devices, tuple(remarks))
+
+
+def list_rig_instruments(rig: Rig) -> InstrumentList:
+    """Search where a rig's instruments are; those of a virtual rig are switched on for it."""
+    if rig.virtual is None:
+        return list_instruments(rig.generator.visa_library, rig.daq.server)
+    with simulated_rig(rig) as virtual:
+        return list_instruments(rig.generator.visa_library, virtual.daq_address)

@@ -1,0 +1,294 @@
+"""Whether this bench may be armed: only on a check that is recent, passed, and of the same configuration.
+
+The last check of each rig is kept in the user's state folder, one JSON file a rig; what has changed since is
+said in decibels (gains) and ppm (clock).
+"""
+
+import hashlib
+import os
+import re
+import tempfile
+from collections.abc import Callable
+from datetime import UTC, datetime
+from math import inf, log10
+from pathlib import Path
+from typing import assert_never
+
+from pydantic import ValidationError
+
+from vibench.sim.operating_system.state_folder import state_folder
+
+from ..bench.bench import Bench, BenchKind
+from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, judged, rig_digest
+from ..errors import CheckFailed, RecordingError
+from ..rig import Rig
+from ..stopping.stop import StopSwitch
+from .bench_report import bench_report
+from .loop import DRIVE_LEFT, LASTING, Lasting
+from .rule import CheckRule
+
+FOLDER = "bench_checks"
+_HASH_DIGITS = 8
+
+
+def archive_path(rig_name: str, *, passed: bool = False) -> Path:
+    """Name the file of a rig's last check: its name as far as files allow it, and a hash of the whole of it.
+
+    ``passed``: of the last that did not fail.
+    """
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", rig_name).strip("_")[:48]
+    digest = hashlib.sha256(rig_name.encode()).hexdigest()[:_HASH_DIGITS]
+    return state_folder() / FOLDER / f"{plain}-{digest}{'.passed' if passed else ''}.json"
+
+
+def last_check(rig_name: str) -> CheckResult | None:
+    """Give the last check of a rig; None when there is none, or none that this version can read.
+
+    Parameters
+    ----------
+    rig_name
+        As the hardware configuration says it.
+
+    """
+    return _read(archive_path(rig_name))
+
+
+def last_passed(rig: Rig) -> CheckResult | None:
+    """Give the last check of a rig, as it is configured now, that did not fail; None when there is none."""
+    for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
+        if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
+            return each
+    return None
+
+
+def _read(path: Path) -> CheckResult | None:
+    try:
+        return CheckResult.model_validate_json(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, ValidationError):
+        return None
+
+
+def keep(result: CheckResult) -> Path:
+    """Keep a result in the place of the last one; whoever reads meanwhile finds one of the two, whole.
+
+    Raises RecordingError when the state folder cannot be written.
+    """
+    if result.verdict is not Verdict.FAIL:
+        _write(result, passed=True)
+    return _write(result, passed=False)
+
+
+def _write(result: CheckResult, *, passed: bool) -> Path:
+    try:
+        path = archive_path(result.rig, passed=passed)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor, name = tempfile.mkstemp(prefix=path.name, suffix=".tmp", dir=path.parent)
+        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+            file.write(result.model_dump_json(indent=2))
+        Path(name).replace(path)
+    except OSError as error:
+        raise RecordingError(
+            f"The result of the bench check cannot be kept in {error.filename} ({error.strerror}). The bench "
+            "is as it was; make its folder writable, or name another one in VIBENCH_STATE_DIR"
+        ) from error
+    return path
+
+
+DRIFT_DB = Bounds(0.5, 3.0)
+"""Of a gain, from one check to the next on an unchanged configuration."""
+CLOCK_PPM = Bounds(20.0, inf)
+"""Of the ratio of two clocks: oscillators age by some ppm a year."""
+_DECIBELS, _PPM = "dB", "ppm"
+_ADVICE = (
+    "nothing in the configuration has changed: look for a knob, a cable, a loose sensor or a dying "
+    "amplifier; if you have changed something that does not stand there, check it once as a new reference "
+    "(menu Test, or vibench bench check --new-reference)"
+)
+
+
+def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, ...]:
+    """Compare every level of a check with the same of the last one.
+
+    The sine is equally loud in both, since the configuration is the same: whoever calls has seen to that.
+    """
+    before = {finding.name: finding for finding in last.findings}
+    since = f"since {ago(at - last.checked)}"
+    found = [
+        _changed(finding, before[finding.name], since) for finding in now.findings if finding.name in before
+    ]
+    return tuple(finding for finding in found if finding is not None)
+
+
+def _changed(now: Finding, before: Finding, since: str) -> Finding | None:
+    if now.number is None or before.number is None:
+        return None
+    match LASTING.get(now.name):
+        case Lasting.GAIN:
+            return _judged(now.name, now.number - before.number, _DECIBELS, DRIFT_DB, since)
+        case Lasting.LEVEL if now.number > 0 and before.number > 0:
+            change_db = 20 * log10(now.number / before.number)
+            return _judged(now.name, change_db, _DECIBELS, DRIFT_DB, since)
+        case Lasting.CLOCK:
+            return _judged(now.name, now.number - before.number, _PPM, CLOCK_PPM, since)
+        case _:
+            return None
+
+
+def _judged(name: str, change: float, unit: str, bounds: Bounds, since: str) -> Finding:
+    finding = judged(
+        f"{name} since last time",
+        change,
+        unit,
+        f"0 {unit} within {bounds.well:g} {unit}",
+        bounds.verdict(abs(change)),
+        _ADVICE,
+    )
+    return finding.model_copy(update={"value": f"{change:+.2f} {unit} {since}"})
+
+
+Clock = Callable[[], datetime]
+
+
+def utc_now() -> datetime:
+    """Tell the computer's time."""
+    return datetime.now(UTC)
+
+
+def check_bench(
+    bench: Bench,
+    folder: Path,
+    clock: Clock = utc_now,
+    switch: StopSwitch | None = None,
+    *,
+    new_reference: bool = False,
+) -> CheckResult:
+    """Check a bench, compare with the last time that it passed, and keep the result; see `bench_report`.
+
+    Parameters
+    ----------
+    bench
+        Open.
+    folder
+        Where recordings would go: its disk is looked at.
+    clock
+        What time it is.
+    switch
+        Ends the check from another thread.
+    new_reference
+        Compare with nothing: what has changed since was meant.
+
+    """
+    report, at = bench_report(bench, folder, switch), clock()
+    last = None if new_reference else last_passed(bench.rig)
+    if last is not None:
+        report = BenchReport(findings=(*report.findings, *drift(report, last, at)))
+    result = CheckResult.of(bench.rig, report, at)
+    keep(result)
+    bench.last_check = result
+    return result
+
+
+def require_fresh(
+    bench: Bench,
+    folder: Path,
+    rule: CheckRule = CheckRule.FRESH,
+    clock: Clock = utc_now,
+    switch: StopSwitch | None = None,
+) -> CheckResult | None:
+    """Admit a bench to be armed, on its last check or on one made now; recordings then carry the result.
+
+    A virtual rig without a check that holds is checked at once; a real one plays nothing unasked. A recording
+    that is played back needs none.
+
+    Raises CheckFailed when the last check is missing, old, of another configuration, or did not pass (nothing
+    was played then), or the one made now does not pass; InstrumentError when an instrument fails meanwhile.
+
+    Parameters
+    ----------
+    bench
+        Open, and not sampling.
+    folder
+        Where recordings will go.
+    switch
+        Lets others end a check that is made now.
+
+    """
+    if bench.rig.plays_back:
+        return None
+    match rule:
+        case CheckRule.WAIVED:
+            bench.last_check = last_check(bench.rig.name)
+            return bench.last_check
+        case CheckRule.NOW:
+            return _passed(check_bench(bench, folder, clock, switch))
+        case CheckRule.FRESH:
+            return _fresh(bench, folder, clock, switch)
+        case _:
+            assert_never(rule)
+
+
+def _fresh(bench: Bench, folder: Path, clock: Clock, switch: StopSwitch | None) -> CheckResult:
+    last = last_check(bench.rig.name)
+    complaint = why_not(last, bench.rig, clock())
+    if last is not None and complaint is None:
+        bench.last_check = last
+        return last
+    match bench.kind:
+        case BenchKind.SIMULATED:
+            return _passed(check_bench(bench, folder, clock, switch))
+        case BenchKind.REAL:
+            raise CheckFailed(
+                f"{complaint}. Nothing was played; check it with 'vibench bench check --bench FILE', or "
+                "--check now, or go on without with --check waived"
+            )
+
+
+def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
+    """Admit a bench on its last check without playing anything; a virtual one needs none.
+
+    Raises CheckFailed when a real bench has no check that holds.
+    """
+    if bench.rig.plays_back:
+        return
+    last = last_check(bench.rig.name)
+    complaint = why_not(last, bench.rig, clock())
+    if complaint is None:
+        bench.last_check = last
+    elif bench.kind is BenchKind.REAL:
+        raise CheckFailed(f"{complaint}. Nothing was armed; check the bench first")
+
+
+def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
+    """Say why a check does not hold for a rig, in one clause; None when it does."""
+    if last is None:
+        return f"the bench {rig.name!r} was never checked on this account"
+    when = f"the last check of {rig.name!r}, at {last.checked:%Y-%m-%d %H:%M %Z},"
+    if last.rig_digest != rig_digest(rig):
+        return f"{when} was of another configuration"
+    if not 0 <= last.age_h(now) <= rig.check_valid_h:
+        return f"{when} is {last.age_h(now):.1f} h old, {rig.check_valid_h:g} h are allowed (check_valid_h)"
+    if last.verdict is Verdict.FAIL:
+        return f"{when} did not pass: {_failures(last)}"
+    return None
+
+
+def _passed(result: CheckResult) -> CheckResult:
+    if result.verdict is Verdict.FAIL:
+        raise CheckFailed(
+            f"the bench {result.rig!r} did not pass its check: {_failures(result)}. {_output_after(result)} "
+            "put right what 'vibench bench check' advises, and check again"
+        )
+    return result
+
+
+def _output_after(result: CheckResult) -> str:
+    """Say whether the output is off, as far as the check has measured it."""
+    left = next((each for each in result.findings if each.name == DRIVE_LEFT), None)
+    if left is None or left.verdict is Verdict.FAIL:
+        return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand,"
+    return "The output is off;"
+
+
+def _failures(result: CheckResult) -> str:
+    failed = [finding for finding in result.findings if finding.verdict is Verdict.FAIL]
+    return "; ".join(f"{each.name} is {each.value}, expected {each.expected}" for each in failed)

@@ -1,0 +1,251 @@
+"""The check of a whole bench before a day's work: silence first, then a small sine, then silence again."""
+
+import shutil
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+
+from ..bench.bench import Bench
+from ..bench.result import BenchReport, Bounds, Finding, Verdict, judged
+from ..errors import CheckStopped, ConfigurationError, DataLost, RunStalled
+from ..excitation.dwell import Dwell
+from ..excitation.steps import Tone
+from ..instruments import AnalogOutput, IdleOutput, Samples, read_block
+from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState, check_amplitude_vpp
+from ..rig import Channel, calibrations
+from ..run.acquisition_loop import BLOCK_S
+from ..run.drive import Drive, drive_for
+from ..run.drive_guard import DriveGuard
+from ..stopping.stop import Cause, StopSwitch
+from .loop import LoopCheck
+
+CHECK_SHARE = 0.02
+"""Level of the sine at most, of the bench's amplitude limit: far below anything that clips."""
+# An AC coupling of 0.5 Hz has forgotten a step after this time.
+_SETTLE_S = 1.5
+_READ_S = 2.0
+_BYTES_PER_SAMPLE = 4
+_SECONDS_PER_HOUR = 3600.0
+NOISE_SHARE = Bounds(1e-3, 2e-2)
+"""rms of a silent channel, of its full scale."""
+_MEDIAN_OF_NORMAL = 0.6745
+"""Of a normal variable's size, over its standard deviation."""
+_IN_MOMENTS = 0.2
+"""Usual noise over the rms of all, below which moments make it."""
+OFFSET_SHARE = Bounds(1e-2, 1e-1)
+"""Mean of a silent channel, of its full scale."""
+LATENCY_S = Bounds(0.5, 5.0)
+"""Of one verified setting: it bounds how fast the generator can be stopped."""
+ROOM_H = Bounds(-10.0, -1.0)
+"""Recording time that the disk should hold, negative since more is better [h]."""
+
+
+def bench_report(
+    bench: Bench, folder: Path, switch: StopSwitch | None = None, amplitude_vpp: float | None = None
+) -> BenchReport:
+    """Check everything that can be known before a measurement; the generator is silent afterwards.
+
+    Reads all channels in silence, while a small sine plays at 160 Hz for some seconds, and in silence again.
+
+    Raises CheckStopped when somebody ended it, InstrumentError when an instrument fails, DataLost when the
+    converter leaves samples out, ConfigurationError on a recording that is played back; what is merely wrong
+    is a finding.
+
+    Parameters
+    ----------
+    bench
+        Open, and not sampling.
+    folder
+        Where recordings will go.
+    switch
+        Lets others end the check, within a block of samples.
+    amplitude_vpp
+        Of the sine; absent, two per cent of the amplitude limit, or less, so that no stop is touched [V].
+
+    """
+    if bench.rig.plays_back:
+        raise ConfigurationError(
+            f"on the bench {bench.rig.name!r} a recording is played back: there is nothing to check. Measure "
+            "with the plan that it was made with"
+        )
+    findings = [*_identified(bench), *_calibrated(bench), _room(bench, folder)]
+    if amplitude_vpp is None:
+        amplitude_vpp = check_amplitude_vpp(CHECK_SHARE * bench.rig.generator.amplitude_limit_vpp, bench.rig)
+    drive = drive_for(bench, _small_sine(amplitude_vpp))
+    reader = _BlockReader(bench, StopSwitch() if switch is None else switch)
+    bench.generator.stop()
+    quiet = reader.in_silence()
+    during = reader.during_sine(drive)
+    after = reader.in_silence()
+    if drive.drive_source is DriveSource.GENERATOR:
+        findings.append(_latency(bench))
+    if bench.output is not None:
+        findings.append(_idle(bench.output))
+    for channel, row in zip(bench.channels, quiet, strict=True):
+        findings += [_noise(channel, row), _offset(channel, row)]
+    findings += LoopCheck(bench, amplitude_vpp, during, after).findings()
+    return BenchReport(findings=tuple(findings))
+
+
+class _BlockReader:
+    """Reads a bench in blocks, between which the check can be stopped."""
+
+    def __init__(self, bench: Bench, switch: StopSwitch) -> None:
+        self._bench = bench
+        self._switch = switch
+        self._due = 0
+        self._advance: Callable[[], None] = lambda: None
+
+    def in_silence(self) -> Samples:
+        """Read all channels while nothing plays, after couplings have settled."""
+        digitizer = self._bench.digitizer
+        self._begin()
+        try:
+            self._read_for(_SETTLE_S)
+            return np.concatenate(self._read_for(_READ_S), axis=1)
+        finally:
+            digitizer.stop()
+
+    def during_sine(self, drive: Drive) -> Samples:
+        """Play the sine without a ramp, as the check of a run does, and read the settled channels."""
+        tone = Tone(CHECK_FREQUENCY_HZ)
+        settling = Phase(RunState.CHECKING, tone, _SETTLE_S)
+        measuring = Phase(RunState.CHECKING, tone, _READ_S)
+        with DriveGuard(drive, self._switch) as guard:
+            self._advance = guard.advance
+            guard.begin()
+            try:
+                drive.arm((settling, measuring))
+                self._begin()
+                for wait_s in drive.perform(settling):
+                    self._read_for(wait_s)
+                blocks = [block for wait_s in drive.perform(measuring) for block in self._read_for(wait_s)]
+                return np.concatenate(blocks, axis=1)
+            finally:
+                try:
+                    guard.silence()
+                finally:
+                    self._bench.digitizer.stop()
+
+    def _begin(self) -> None:
+        self._bench.digitizer.start()
+        self._due = 0
+
+    def _read_for(self, duration_s: float) -> list[Samples]:
+        digitizer = self._bench.digitizer
+        rate_hz = digitizer.sample_rate_hz
+        left, longest = round(duration_s * rate_hz), round(BLOCK_S * rate_hz)
+        blocks = []
+        while left > 0:
+            if (request := self._switch.request) is not None:
+                if request.cause is Cause.FAULT:
+                    raise RunStalled(request.reason)
+                raise CheckStopped(
+                    f"the bench check was stopped: {request.reason}. The output is off; check the bench again"
+                )
+            block = read_block(digitizer, min(longest, left))
+            self._advance()
+            if block.first_sample != self._due:
+                raise DataLost(
+                    f"the converter handed over sample {block.first_sample} where {self._due} was due: it "
+                    "loses samples while nothing else is asked of it. Look for what keeps the bus busy"
+                )
+            self._due += block.volts.shape[1]
+            blocks.append(block.volts)
+            left -= block.volts.shape[1]
+        return blocks
+
+
+def _small_sine(amplitude_vpp: float) -> Measurement:
+    sine = Dwell(
+        amplitude_vpp=amplitude_vpp,
+        frequency_hz=CHECK_FREQUENCY_HZ,
+        settle_s=_SETTLE_S,
+        duration_s=_READ_S,
+    )
+    return Measurement(name="check", excitation=sine)
+
+
+def _identified(bench: Bench) -> list[Finding]:
+    return [
+        Finding(name=part, value=identity.reply, expected="an answer", verdict=Verdict.OK)
+        for part, identity in bench.identities.items()
+    ]
+
+
+def _calibrated(bench: Bench) -> list[Finding]:
+    today = datetime.now(UTC).astimezone().date()
+    return [
+        Finding(
+            name=f"calibration of {one.what}",
+            value=f"{one.calibrated}",
+            expected=f"at most {one.valid_days} days ago",
+            verdict=Verdict.OK if one.is_valid else Verdict.WARN,
+            number=one.age_days,
+            unit="d",
+            advice="" if one.is_valid else one.advice,
+        )
+        for one in calibrations(bench.rig, today)
+    ]
+
+
+def _room(bench: Bench, folder: Path) -> Finding:
+    bytes_per_s = bench.digitizer.sample_rate_hz * len(bench.channels) * _BYTES_PER_SAMPLE
+    there = next(each for each in (folder, *folder.resolve().parents) if each.exists())
+    hours = shutil.disk_usage(there).free / bytes_per_s / _SECONDS_PER_HOUR
+    return judged(
+        "room on the disk",
+        hours,
+        "h",
+        f"{-ROOM_H.well:g} h or more",
+        ROOM_H.verdict(-hours),
+        "make room, or record elsewhere",
+    )
+
+
+def _idle(output: AnalogOutput) -> Finding:
+    is_zero = output.idle is IdleOutput.ZERO
+    advice = "a program that dies leaves the last value on the shaker: keep the amplifier's knob within reach"
+    return Finding(
+        name="output without a program",
+        value=output.idle.value,
+        expected=IdleOutput.ZERO.value,
+        verdict=Verdict.OK if is_zero else Verdict.WARN,
+        advice="" if is_zero else advice,
+    )
+
+
+def _latency(bench: Bench) -> Finding:
+    latency_s = bench.generator.measured_latency_s()
+    verdict = LATENCY_S.verdict(latency_s)
+    advice = "shorten generator.settle_s, or look for what keeps the bus busy: a stop takes as long"
+    return judged("time of one setting", latency_s, "s", f"{LATENCY_S.well:g} s or less", verdict, advice)
+
+
+def _noise(channel: Channel, row: Samples) -> Finding:
+    rms_v = float(np.std(row))
+    verdict = NOISE_SHARE.verdict(rms_v / channel.full_scale_v)
+    advice = "look for hum, a loose shield, or a cable that picks it up"
+    usual_v = float(np.median(np.abs(row - np.median(row)))) / _MEDIAN_OF_NORMAL
+    if usual_v < _IN_MOMENTS * rms_v:
+        advice = (
+            f"it comes in moments, and is {usual_v:.2g} V otherwise: look for a loose contact, or a laser "
+            "that loses its light; refocus it, or stick on reflective tape"
+        )
+    if rms_v == 0.0:
+        verdict, advice = (
+            Verdict.FAIL,
+            "a living input is never quite still: see whether it is sampled at all",
+        )
+    expected = f"{NOISE_SHARE.well * channel.full_scale_v:.3g} V or less"
+    return judged(f"noise of {channel.role.value}", rms_v, "V", expected, verdict, advice)
+
+
+def _offset(channel: Channel, row: Samples) -> Finding:
+    mean_v = float(np.mean(row))
+    verdict = OFFSET_SHARE.verdict(abs(mean_v) / channel.full_scale_v)
+    advice = "look for an open input, a sensor's bias on DC coupling, or a shaker off its centre"
+    expected = f"0 V within {OFFSET_SHARE.well * channel.full_scale_v:.3g} V"
+    return judged(f"offset of {channel.role.value}", mean_v, "V", expected, verdict, advice)

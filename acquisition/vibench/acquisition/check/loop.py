@@ -1,0 +1,267 @@
+"""One sine round the loop: whether every channel detects it, as loud as generator, knob and model say."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, auto
+from math import hypot, inf, log10, pi, sqrt
+
+import numpy as np
+
+from ..bench.bench import Bench
+from ..bench.result import Bounds, Finding, Verdict, judged
+from ..instruments import Samples
+from ..plan import CHECK_FREQUENCY_HZ, expected_under_check, nearest_expected
+from ..rig import BaseQuantity, ComplexArray, RigModel, Role
+
+_PPM = 1e6
+_WINDOWS = 20
+
+
+@dataclass(frozen=True)
+class SineFit:
+    """A least-squares sine."""
+
+    amplitude: float
+    uncertainty: float
+    """Standard uncertainty of the amplitude, from what the sine leaves."""
+    phase_rad: float
+    """Of a cosine, at the first sample."""
+
+
+@dataclass(frozen=True)
+class ClockRatio:
+    """How fast one clock runs against another."""
+
+    ppm: float
+    uncertainty_ppm: float
+
+
+def fit_sine(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> SineFit:
+    """Fit cosine, sine and a constant.
+
+    The uncertainty is that of white noise, ``residual * sqrt(2 / n)`` (Kay, Fundamentals of
+    Statistical Signal Processing, vol. 1, example 3.14).
+
+    Parameters
+    ----------
+    volts
+        Shape (samples,), more than one period.
+
+    """
+    angle = 2 * pi * frequency_hz * np.arange(volts.size) / sample_rate_hz
+    basis = np.stack([np.cos(angle), np.sin(angle), np.ones_like(angle)], axis=1)
+    solution = np.linalg.lstsq(basis, volts)[0]
+    residual = float(np.sqrt(np.mean((volts - basis @ solution) ** 2)))
+    in_phase, quadrature = float(solution[0]), float(solution[1])
+    return SineFit(
+        amplitude=hypot(in_phase, quadrature),
+        uncertainty=residual * sqrt(2 / volts.size),
+        phase_rad=float(np.arctan2(-quadrature, in_phase)),
+    )
+
+
+def clock_ratio(volts: Samples, frequency_hz: float, sample_rate_hz: float) -> ClockRatio:
+    """Frequency of a sine that should be at ``frequency_hz``, as parts in a million of it.
+
+    A straight line through the phases of twenty stretches; its slope is the offset in frequency.
+    """
+    length = volts.size // _WINDOWS
+    starts = np.arange(_WINDOWS) * length
+    turned = 2 * pi * frequency_hz * starts / sample_rate_hz
+    phases = np.unwrap(
+        [
+            fit_sine(volts[start : start + length], frequency_hz, sample_rate_hz).phase_rad - turn
+            for start, turn in zip(starts, turned, strict=True)
+        ]
+    )
+    line, covariance = np.polyfit(starts / sample_rate_hz, phases, 1, cov=True)
+    scale = _PPM / (2 * pi * frequency_hz)
+    return ClockRatio(float(line[0]) * scale, sqrt(float(covariance[0, 0])) * scale)
+
+
+DRIVE_DEVIATION = Bounds(0.02, 0.15)
+"""Of the measured drive from the setting."""
+GAIN_DB = Bounds(1.0, 3.0)
+"""Of the amplifier's gain from its knob's."""
+BASE_DB = Bounds(1.5, 3.0)
+"""Of the base's acceleration from the rig's model."""
+CLOCK_PPM = Bounds(100.0, 500.0)
+"""Two oscillators of 50 ppm each."""
+DETECTED = 10.0
+"""The sine counts as detected when it is this many times its uncertainty."""
+WRONG_LOAD = 2.0
+PHASE_DEG = Bounds(45.0, 90.0)
+"""Of a channel against the drive from the rig's model: beyond a right angle its sign is wrong."""
+M0_PHASE_DEG = Bounds(90.0, inf)
+"""The same of m0: a specimen is known less well than a shaker, so that nothing FAILs."""
+LEFT_OVER = Bounds(0.02, 0.05)
+"""Share of the drive that may be left when the output is off."""
+
+AMPLIFIER_GAIN = "amplifier gain"
+DRIVE_CLOCK = "drive's clock"
+DRIVE_OVER_SETTING = "drive over setting"
+BASE_ACCELERATION = "base acceleration"
+DRIVE_LEFT = "drive left after stop"
+
+
+def hears_name(role: Role) -> str:
+    """Name the finding on whether a channel hears the sine."""
+    return f"{role.value} hears the sine"
+
+
+class Lasting(Enum):
+    """What stays the same from one check to the next."""
+
+    GAIN = auto()
+    """In decibels."""
+    LEVEL = auto()
+    CLOCK = auto()
+
+
+LASTING: Mapping[str, Lasting] = {
+    AMPLIFIER_GAIN: Lasting.GAIN,
+    DRIVE_CLOCK: Lasting.CLOCK,
+    DRIVE_OVER_SETTING: Lasting.LEVEL,
+    BASE_ACCELERATION: Lasting.LEVEL,
+    **{hears_name(role): Lasting.LEVEL for role in Role},
+}
+"""By the name of the finding."""
+
+
+class LoopCheck:
+    """What a small sine shows on its way from the generator round to the inputs."""
+
+    def __init__(self, bench: Bench, amplitude_vpp: float, during: Samples, after: Samples) -> None:
+        self._rig = bench.rig
+        self._rate_hz = bench.digitizer.sample_rate_hz
+        self._channels = {channel.role: channel for channel in bench.channels}
+        self._rows = dict(zip(self._channels, during, strict=True))
+        self._after = dict(zip(self._channels, after, strict=True))
+        self._terminal_v = 0.5 * amplitude_vpp * bench.rig.generator.terminal_factor()
+        self._amplifier_modelled = np.atleast_1d(
+            RigModel(bench.rig).transfer(BaseQuantity.AMPLIFIER_VOLTAGE, CHECK_FREQUENCY_HZ)
+        )
+        self._base_modelled = expected_under_check(bench.rig, self._terminal_v)
+        self._m0_modelled = expected_under_check(bench.rig, self._terminal_v, BaseQuantity.M0_VELOCITY)
+
+    def findings(self) -> list[Finding]:
+        """Answer what can be answered with the channels that there are."""
+        found = [self._alive(role) for role in self._channels]
+        if Role.DRIVE_VOLTAGE in self._channels:
+            found += [self._drive(), self._silence()]
+        # What detects nothing has no frequency and no gain: it has been found fault with already.
+        if self._detects(Role.DRIVE_VOLTAGE):
+            found.append(self._clocks())
+        if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.AMPLIFIER_VOLTAGE):
+            found += [self._gain(), self._sign(Role.AMPLIFIER_VOLTAGE, self._amplifier_modelled)]
+        if self._detects(Role.BASE_ACCELERATION):
+            found.append(self._base())
+        if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.BASE_ACCELERATION):
+            found.append(self._sign(Role.BASE_ACCELERATION, self._base_modelled))
+        if self._detects(Role.DRIVE_VOLTAGE) and self._detects(Role.M0_VELOCITY):
+            found.append(self._sign(Role.M0_VELOCITY, self._m0_modelled, M0_PHASE_DEG))
+        return found
+
+    def _detects(self, role: Role) -> bool:
+        if role not in self._channels:
+            return False
+        fit = self._fit(role)
+        return fit.amplitude > DETECTED * fit.uncertainty
+
+    def _fit(self, role: Role) -> SineFit:
+        volts = self._rows[role] * self._channels[role].units_per_volt
+        return fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz)
+
+    def _alive(self, role: Role) -> Finding:
+        fit = self._fit(role)
+        is_detected = self._detects(role)
+        advice = {
+            Role.M0_VELOCITY: "see whether the laser is on, focused, and its beam free",
+            Role.BASE_ACCELERATION: "see whether the accelerometer is plugged in and its current on",
+        }.get(role, "see whether the cable is open or shorted, its source plugged in, and the amplifier on")
+        return Finding(
+            name=hears_name(role),
+            value=f"{fit.amplitude:.3g} +- {fit.uncertainty:.1g} {self._channels[role].unit}",
+            expected=f"more than {DETECTED:g} times its uncertainty",
+            verdict=Verdict.OK if is_detected else Verdict.FAIL,
+            number=fit.amplitude,
+            uncertainty=fit.uncertainty,
+            unit=self._channels[role].unit,
+            advice="" if is_detected else advice,
+        )
+
+    def _drive(self) -> Finding:
+        fit = self._fit(Role.DRIVE_VOLTAGE)
+        ratio = fit.amplitude / self._terminal_v
+        verdict = DRIVE_DEVIATION.verdict(abs(ratio - 1))
+        advice = "check the cable to the drive_voltage input, its range and its attenuation"
+        for wrong in (WRONG_LOAD, 1 / WRONG_LOAD):
+            if abs(ratio / wrong - 1) <= DRIVE_DEVIATION.fail:
+                advice = (
+                    f"a factor of {wrong:g} is a wrong load: compare the load on the generator's panel with "
+                    "generator.load_ohm (or the divider with daq.channels.attenuation)"
+                )
+        return judged(
+            DRIVE_OVER_SETTING, ratio, "", f"1 within {DRIVE_DEVIATION.well:.0%}", verdict, advice,
+            fit.uncertainty / self._terminal_v,
+        )  # fmt: skip
+
+    def _silence(self) -> Finding:
+        volts = self._after[Role.DRIVE_VOLTAGE] * self._channels[Role.DRIVE_VOLTAGE].units_per_volt
+        left = fit_sine(volts, CHECK_FREQUENCY_HZ, self._rate_hz).amplitude / self._terminal_v
+        advice = "the output says off and plays on: switch the amplifier off, and have what plays repaired"
+        return judged(
+            DRIVE_LEFT,
+            left,
+            "",
+            f"{LEFT_OVER.well:.0%} or less",
+            LEFT_OVER.verdict(left),
+            advice,
+        )
+
+    def _clocks(self) -> Finding:
+        ratio = clock_ratio(self._rows[Role.DRIVE_VOLTAGE], CHECK_FREQUENCY_HZ, self._rate_hz)
+        verdict = CLOCK_PPM.verdict(abs(ratio.ppm))
+        advice = "compare daq.sample_rate_hz and the reference of what plays; phases over a minute need it"
+        expected = f"0 ppm within {CLOCK_PPM.well:g} ppm"
+        return judged(DRIVE_CLOCK, ratio.ppm, "ppm", expected, verdict, advice, ratio.uncertainty_ppm)
+
+    def _gain(self) -> Finding:
+        drive, output = self._fit(Role.DRIVE_VOLTAGE), self._fit(Role.AMPLIFIER_VOLTAGE)
+        relative = sqrt(
+            (drive.uncertainty / drive.amplitude) ** 2 + (output.uncertainty / output.amplitude) ** 2
+        )
+        gain_db = _db(output.amplitude / drive.amplitude)
+        expected_db = _db(abs(complex(self._amplifier_modelled[0])))
+        verdict = GAIN_DB.verdict(abs(gain_db - expected_db))
+        advice = f"set the gain of the {self._rig.amplifier.model} to {self._rig.amplifier.gain_db:g} dB"
+        expected = f"{expected_db:.2f} dB within {GAIN_DB.well:g} dB"
+        return judged(AMPLIFIER_GAIN, gain_db, "dB", expected, verdict, advice, _db(1 + relative))
+
+    def _base(self) -> Finding:
+        fit = self._fit(Role.BASE_ACCELERATION)
+        modelled = nearest_expected(fit.amplitude, self._base_modelled)
+        verdict = BASE_DB.verdict(abs(_db(fit.amplitude / modelled)))
+        expected = f"{modelled:.3g} m/s2 within {BASE_DB.well:g} dB"
+        advice = "check the accelerometer's sensitivity, fixture, specimen, the amplifier's power and gain"
+        return judged(BASE_ACCELERATION, fit.amplitude, "m/s2", expected, verdict, advice, fit.uncertainty)
+
+    def _sign(self, role: Role, modelled: ComplexArray, bounds: Bounds = PHASE_DEG) -> Finding:
+        """Compare a channel's phase against the drive with the model's: half a turn is a wrong sign."""
+        turned_rad = self._fit(role).phase_rad - self._fit(Role.DRIVE_VOLTAGE).phase_rad
+        each_deg = np.rad2deg((turned_rad - np.angle(modelled) + pi) % (2 * pi) - pi)
+        off_deg = each_deg[np.argmin(np.abs(each_deg))]
+        advice = {
+            Role.BASE_ACCELERATION: "turn the accelerometer round, or swap the wires of coil or amplifier",
+            Role.M0_VELOCITY: (
+                "if the base's sign is right, the vibrometer's is reversed (its direction, or the side "
+                "that the laser sees), or the specimen is not the one described"
+            ),
+        }.get(role, "swap the two wires of this input, or see whether the amplifier inverts")
+        expected = f"0 deg within {bounds.well:g} deg"
+        verdict = bounds.verdict(abs(off_deg))
+        return judged(f"sign of {role.value}", float(off_deg), "deg", expected, verdict, advice)
+
+
+def _db(ratio: float) -> float:
+    return 20 * log10(ratio)

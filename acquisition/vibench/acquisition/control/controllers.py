@@ -1,0 +1,62 @@
+"""Controllers of measurements whose next step depends on what was measured."""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from ..plan import Measurement
+from ..rig import Channel, Rig
+from .continuation_controller import follow_branch
+from .control_action import Controller
+from .dwell_controller import hold_dwell
+from .feedback_channels import feedback_channels_of
+from .noise_controller import equalise_noise
+from .resonance_controller import track_resonance
+from .response_controller import hold_response
+from .settled_controller import step_settled
+from .sine_loop import SineLoop
+from .sweep_controller import hold_sweep
+
+CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = MappingProxyType(
+    {
+        "settled_sine": step_settled,
+        "held_dwell": hold_dwell,
+        "held_sweep": hold_sweep,
+        "resonance_tracking": track_resonance,
+        "held_noise": equalise_noise,
+        "branch_continuation": follow_branch,
+        "held_response": hold_response,
+    }
+)
+"""Controller of each kind with feedback: of the loop, and of a plan of its kind."""
+
+
+def feedback_controller(
+    measurement: Measurement, rig: Rig, channels: tuple[Channel, ...], sample_rate_hz: float
+) -> Controller[None]:
+    """Control a measurement with feedback, from its ramp up to its ramp down.
+
+    Parameters
+    ----------
+    measurement
+        Of a kind of excitation that has a controller.
+    rig
+        What it is carried out on.
+    channels
+        Those that are read, in the order of the rows of samples.
+    sample_rate_hz
+        Of all of them.
+
+    Yields
+    ------
+    ControlAction
+        What is played next. The samples of each phase, shape (channels, n) [V], are sent back in.
+
+    Raises
+    ------
+    ConfigurationError
+        When the rig lacks a channel that feedback listens to; before anything is yielded.
+
+    """
+    loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
+    return CONTROLLERS[measurement.excitation.kind](loop, measurement.excitation)

@@ -1,0 +1,49 @@
+"""A dwell at a level: settled first, then watched and corrected while it is recorded."""
+
+from math import ceil
+
+from ..excitation.held_dwell import HeldDwell
+from ..plan import RunState
+from ..recording import DwellNote, Held, LevelNote, SegmentLabel
+from .closed_loop_check import require_answer
+from .control_action import Controller
+from .level_control import LevelControl, measured_level
+from .settling_controller import SettlingController
+from .sine_loop import SineLoop
+from .start import started
+
+
+def hold_dwell(loop: SineLoop, plan: HeldDwell) -> Controller[None]:
+    """Ramp up to the level, settle, record, ramp down."""
+    settling_controller = SettlingController(loop, plan.settling, plan.base_level)
+    yield from started(loop, plan.frequency_hz, plan.base_level)
+    yield from settling_controller.settled()
+    control = LevelControl(plan.base_level, loop.most_vpp, loop.least_vpp)
+    target = plan.base_level.acceleration_at(plan.frequency_hz)
+    pieces = ceil(plan.duration_s / plan.update_s * (1 - 1e-9))
+    outside = 0
+    loop.forget()
+    for number in range(pieces):
+        begun_s = number * plan.update_s
+        piece_s = min(plan.update_s, plan.duration_s - begun_s)
+        yield from loop.listen(RunState.RECORDING, piece_s, plan.segment)
+        measured = measured_level(loop.periods.base)
+        require_answer(loop.rig, plan.frequency_hz, loop.setting.setting_vpp, measured.amplitude)
+        held = settling_controller.held(measured)
+        outside += held is Held.OUTSIDE
+        loop.note(
+            LevelNote(
+                at_s=begun_s + piece_s,
+                base_m_per_s2=measured.amplitude,
+                base_u=measured.uncertainty,
+                setting_vpp=loop.setting.setting_vpp,
+                level=held,
+            )
+        )
+        # The figures of all pieces since the last change are one mean: chaos needs it long.
+        next_vpp = control.next_vpp(loop.setting.setting_vpp, measured, target)
+        if next_vpp != loop.setting.setting_vpp and number + 1 < pieces:
+            loop.change(plan.frequency_hz, next_vpp)
+    loop.note(DwellNote(segment=SegmentLabel.DWELL, looks=pieces, looks_outside=outside))
+    yield from loop.ramp_down()
+    yield from loop.say()

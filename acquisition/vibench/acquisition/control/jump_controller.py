@@ -1,0 +1,244 @@
+"""Localising one jump: back to before it, on the branch it was left from, and halving the way to it.
+
+Letting a motion die by lowering its drive and bringing it back: the way out of a stubborn branch.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from ..excitation.settled_sine import SettledSine
+from ..excitation.steps import Segment
+from ..plan import RunState
+from ..recording import JumpNote, JumpSearchEnd, JumpSide, SegmentLabel
+from .control_action import Controller
+from .jump_search import LocatedJump, SettledPoint, is_on_branch, located, side
+from .record import recorded
+from .settling_controller import SettledState, SettlingController
+from .sine_loop import SineLoop
+from .start import glided
+
+RUNGS = 12
+RUNG = 1.2
+"""Factor of one rung: the lowest setting is a ninth of the one of now."""
+_RUNG_S = 0.1
+_LOWEST_S = 0.5
+
+
+def decay_motion(loop: SineLoop) -> Controller[None]:
+    """Lower the setting rung by rung, wait, and raise it to what it was."""
+    now = loop.setting
+    for rung in range(1, RUNGS + 1):
+        loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
+        yield from loop.listen(RunState.SETTLING, _RUNG_S)
+    yield from loop.listen(RunState.SETTLING, _LOWEST_S)
+    for rung in range(RUNGS - 1, -1, -1):
+        loop.change(now.frequency_hz, loop.bounded_vpp(now.setting_vpp / RUNG**rung))
+        yield from loop.listen(RunState.SETTLING, _RUNG_S)
+
+
+_MOST_BRACKETS = 4
+"""How often the search begins anew where the motion left its branch earlier than the last time."""
+
+
+class _Return(Enum):
+    """How the way back to the branch ended."""
+
+    BACK = auto()
+    NOT_FOUND = auto()
+    LEFT = auto()
+    """The branch was found, and left again before its end."""
+
+
+class _Pace(Enum):
+    """How the way forward is gone."""
+
+    GLIDE = auto()
+    STEP = auto()
+
+
+@dataclass
+class _JumpSearch:
+    """Where the search stands."""
+
+    branch: list[SettledPoint]
+    """Visits on the branch before the jump, in the order of the pass."""
+    after: SettledPoint
+    here: JumpSide
+
+    @property
+    def bracket(self) -> LocatedJump:
+        """What is known of the jump."""
+        return LocatedJump(self.branch[-1], self.after)
+
+    def narrow(self, point: SettledPoint) -> None:
+        """Take in a visit between the two ends."""
+        self.here = side(point, self.branch[-1], self.after)
+        match self.here:
+            case JumpSide.BEFORE:
+                self.branch.append(point)
+            case JumpSide.AFTER:
+                self.after = point
+
+    def left(self, place: int, point: SettledPoint) -> None:
+        """Take in that the branch was left on the way to its visit number ``place``."""
+        del self.branch[place:]
+        self.after = point
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """Where a search has ended, at the frequency it was begun for."""
+
+    point: SettledPoint
+    branch: JumpSide
+    is_jump: bool
+
+
+class JumpLocator:
+    """Looks into one jump of a pass."""
+
+    def __init__(
+        self, settling_controller: SettlingController, plan: SettledSine, direction: str, number: int
+    ) -> None:
+        assert plan.jumps is not None
+        self._settling_controller = settling_controller
+        self._plan = plan
+        self._rule = plan.jumps
+        self._direction = direction
+        self._number = number
+        self._until_s = settling_controller.loop.elapsed_s + plan.search_s
+
+    def localised(self, points: Sequence[SettledPoint], after: SettledPoint) -> Controller[Arrival]:
+        """Narrow the bracket between the last of ``visited`` and ``after``; end at ``after``'s frequency.
+
+        A response that only changes steeply is no jump: it closes as the bracket does. Where both
+        branches are there at ``after``, the way to it may end on either, which is said.
+        """
+        search = _JumpSearch(list(points), after, JumpSide.AFTER)
+        found, why = yield from self._bisected(search)
+        is_jump = found.is_jump(self._rule.factor)
+        end = yield from self._moved_to(after.frequency_hz)
+        point = end.point
+        has_arrived = is_on_branch(point, after, self._rule.factor)
+        branch = JumpSide.AFTER if has_arrived or not is_jump else JumpSide.BEFORE
+        self._say(found, why, branch)
+        return Arrival(point, branch, is_jump)
+
+    def _bisected(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd]]:
+        for _ in range(_MOST_BRACKETS):
+            found = yield from self._halved(search)
+            if found is not None:
+                return found
+        return search.bracket, JumpSearchEnd.ELSEWHERE
+
+    def _halved(self, search: _JumpSearch) -> Controller[tuple[LocatedJump, JumpSearchEnd] | None]:
+        """Halve the bracket to its end; None when the motion left its branch earlier: a new bracket."""
+        seek = located(search.branch[-1], search.after, self._rule.resolution_hz)
+        try:
+            frequency_hz = next(seek)
+            while True:
+                if search.here is JumpSide.AFTER:
+                    match (yield from self._returned_to_branch(search)):
+                        case _Return.NOT_FOUND if not self._is_late():
+                            return search.bracket, JumpSearchEnd.BRANCH_LOST
+                        case _Return.LEFT:
+                            return None
+                if self._is_late():
+                    return search.bracket, JumpSearchEnd.OUT_OF_TIME
+                point = yield from self._searched(frequency_hz)
+                search.narrow(point)
+                if not search.bracket.is_jump(self._rule.factor):
+                    return search.bracket, JumpSearchEnd.STEEP
+                frequency_hz = seek.send(point)
+        except StopIteration:
+            return search.bracket, JumpSearchEnd.LOCALISED
+
+    def _returned_to_branch(self, search: _JumpSearch) -> Controller[_Return]:
+        """Go back along the pass until its branch is found again, then forward to the branch's end.
+
+        Forward in one glide, which is quick; if that leaves the branch, step by step, which tells where.
+        """
+        left: tuple[int, SettledPoint] | None = None
+        for pace in _Pace:
+            place = yield from self._rejoined(search.branch)
+            if place is None:
+                return _Return.NOT_FOUND
+            end = len(search.branch)
+            steps = range(max(place + 1, end - 1), end) if pace is _Pace.GLIDE else range(place + 1, end)
+            left = yield from self._left(search.branch, steps)
+            if left is None:
+                return _Return.BACK
+            if self._is_late():
+                return _Return.NOT_FOUND
+        assert left is not None, "both paces were gone"
+        search.left(*left)
+        return _Return.LEFT
+
+    def _left(
+        self, branch: Sequence[SettledPoint], steps: range
+    ) -> Controller[tuple[int, SettledPoint] | None]:
+        """Go forward; give place and finding where the motion has left the branch."""
+        for place in steps:
+            found = yield from self._moved_to(branch[place].frequency_hz)
+            if self._is_late() or not is_on_branch(found.point, branch[place], self._rule.factor):
+                return place, found.point
+        return None
+
+    def _rejoined(self, branch: Sequence[SettledPoint]) -> Controller[int | None]:
+        """Go back, in longer and longer strides, until a response of the branch is met; give its place."""
+        stretch = 1
+        place = len(branch) - 1
+        while not self._is_late():
+            found = yield from self._moved_to(branch[place].frequency_hz)
+            if is_on_branch(found.point, branch[place], self._rule.factor):
+                return place
+            if place == 0:
+                return (yield from self._revived(branch[0]))
+            place, stretch = max(0, place - stretch), 2 * stretch
+        return None
+
+    def _revived(self, first: SettledPoint) -> Controller[int | None]:
+        """Let the motion die at the branch's first frequency: a branch that began from rest is back then."""
+        yield from decay_motion(self._settling_controller.loop)
+        found = yield from self._settling_controller.settled()
+        return 0 if is_on_branch(found.point, first, self._rule.factor) else None
+
+    def _moved_to(self, frequency_hz: float) -> Controller[SettledState]:
+        plan = self._plan
+        yield from glided(self._settling_controller.loop, frequency_hz, plan.base_level, plan.glide_step_hz)
+        return (yield from self._settling_controller.settled())
+
+    def _searched(self, frequency_hz: float) -> Controller[SettledPoint]:
+        found = yield from self._moved_to(frequency_hz)
+        segment = Segment(
+            SegmentLabel.SEARCH,
+            {
+                "frequency_hz": frequency_hz,
+                "direction": self._direction,
+                "pass": self._number,
+                **found.note.numbers,
+            },
+        )
+        yield from recorded(self._settling_controller, found, segment, self._plan.record_s)
+        return found.point
+
+    def _is_late(self) -> bool:
+        """Whether the time left is too short for one more step and the way to the end."""
+        step_s = self._plan.settling.longest_wait_s
+        return self._settling_controller.loop.elapsed_s + 2 * step_s + self._plan.record_s > self._until_s
+
+    def _say(self, found: LocatedJump, how: JumpSearchEnd, arrived: JumpSide) -> None:
+        self._settling_controller.loop.note(
+            JumpNote(
+                direction=self._direction,
+                pass_number=self._number,
+                frequency_hz=found.frequency_hz,
+                before_hz=found.before.frequency_hz,
+                after_hz=found.after.frequency_hz,
+                response_before=found.before.response,
+                response_after=found.after.response,
+                how=how,
+                arrived=arrived,
+            )
+        )

@@ -1,0 +1,191 @@
+"""Noise equalised at the base: the gain of every line measured, and the drive made anew from it."""
+
+from dataclasses import dataclass
+from math import log10, sqrt
+
+import numpy as np
+
+from ..errors import LimitExceeded
+from ..excitation.held_noise import HeldNoise, density_at
+from ..excitation.multisine import shaped_period
+from ..excitation.steps import Waveform
+from ..instruments import Samples
+from ..plan import Phase, RunState, ramp
+from ..recording import NoiseNote
+from ..rig import BaseQuantity, OnTable, RigModel
+from .closed_loop_check import LEAST_ANSWER
+from .control_action import ControlAction, Controller
+from .sine_loop import SineLoop
+
+_NEWEST = 0.5
+"""Weight of the newest gains among those before: impacts make them scatter."""
+_MOST_CHANGE = 4.0
+"""Of the squared gain of a line from one realisation to the next."""
+
+
+@dataclass(frozen=True)
+class Heard:
+    """Densities at the lines of one realisation, averaged over the plan's resolution."""
+
+    drive: Samples
+    """[V2/Hz]"""
+    base: Samples
+    """[(m/s2)2/Hz]"""
+    response: Samples
+    """[(m/s)2/Hz]"""
+    kurtosis: float
+    """Of the base's acceleration: 3 of Gaussian noise."""
+
+
+class Equaliser:
+    """What is known of every line: its gain from drive to base, and from base to m0."""
+
+    def __init__(self, loop: SineLoop, plan: HeldNoise) -> None:
+        self._plan = plan
+        self._rate_hz = loop.channels.sample_rate_hz
+        self._factor = loop.rig.generator.terminal_factor()
+        self.frequency_hz = plan.lines * plan.repetition_hz
+        transfer = RigModel(loop.rig, OnTable.NOTHING).transfer(BaseQuantity.ACCELERATION, self.frequency_hz)
+        self._modelled = np.abs(transfer) ** 2
+        self._gain = self._modelled
+        self._to_response: Samples | None = None
+
+    @property
+    def target(self) -> Samples:
+        """What the base should have: the spectrum, lowered where m0 would pass its limit [(m/s2)2/Hz]."""
+        if self._to_response is None or not self._plan.response_limits:
+            return self._plan.density
+        limit = density_at(self._plan.response_limits, self.frequency_hz)
+        return np.minimum(self._plan.density, limit / np.maximum(self._to_response, 1e-300))
+
+    def waveform(self, number: int, level_db: float) -> Waveform:
+        """Make the next period, as the gains of now ask for it.
+
+        Raises
+        ------
+        LimitExceeded
+            When it needs more than the plan's largest setting.
+
+        """
+        plan = self._plan
+        density = self.target * 10 ** (level_db / 10) / self._gain
+        peaks_v = np.sqrt(2 * density * plan.repetition_hz) / self._factor
+        period = shaped_period(plan.lines, peaks_v, plan.points, plan.seed, number)
+        needed_vpp = 2 * float(np.max(np.abs(period)))
+        if needed_vpp > plan.amplitude_vpp:
+            raise LimitExceeded(
+                f"the spectrum needs {needed_vpp:.3g} Vpp at {level_db:g} dB, and amplitude_vpp = "
+                f"{plan.amplitude_vpp:g} is the most that the plan allows. It was ramped down and kept; "
+                "raise amplitude_vpp, or lower the spectrum where the base answers least"
+            )
+        return Waveform(2 * period / plan.amplitude_vpp, plan.repetition_hz)
+
+    def hear(self, drive: Samples, base: Samples, response: Samples) -> Heard:
+        """Take the densities of a realisation into what is known.
+
+        Raises
+        ------
+        LimitExceeded
+            When a density is past its abort line, or the base hardly answers.
+
+        """
+        heard = Heard(self._density(drive), self._density(base), self._density(response), _kurtosis(base))
+        self._require_answer(heard)
+        newest = heard.base / np.maximum(heard.drive, 1e-300)
+        mixed = _NEWEST * newest + (1 - _NEWEST) * self._gain
+        self._gain = np.clip(mixed, self._gain / _MOST_CHANGE, self._gain * _MOST_CHANGE)
+        ratio = heard.response / np.maximum(heard.base, 1e-300)
+        known = self._to_response
+        self._to_response = ratio if known is None else _NEWEST * ratio + (1 - _NEWEST) * known
+        return heard
+
+    def require_below_abort(self, heard: Heard) -> None:
+        """Raise LimitExceeded when the base or m0 is past its abort line."""
+        most = 10 ** (self._plan.abort_db / 10)
+        lines = [("base", "(m/s2)2/Hz", heard.base, self._plan.density)]
+        if self._plan.response_limits:
+            limit = density_at(self._plan.response_limits, self.frequency_hz)
+            lines.append(("velocity of m0", "(m/s)2/Hz", heard.response, limit))
+        for what, unit, measured, line in lines:
+            worst = int(np.argmax(measured / line))
+            if measured[worst] > most * line[worst]:
+                raise LimitExceeded(
+                    f"the {what} has {measured[worst]:.3g} {unit} at {self.frequency_hz[worst]:g} Hz, "
+                    f"{10 * log10(measured[worst] / line[worst]):.1f} dB above {line[worst]:.3g}; abort_db = "
+                    f"{self._plan.abort_db:g}. It was ramped down and kept; lower the spectrum, "
+                    "or give more equalisations"
+                )
+
+    def off_db(self, heard: Heard, level_db: float) -> Samples:
+        """How far the base lies from what was wanted of this realisation, line by line [dB]."""
+        return np.asarray(10 * np.log10(np.maximum(heard.base, 1e-300) / self.target) - level_db)
+
+    def _density(self, values: Samples) -> Samples:
+        """Give the density at the lines, averaged over the resolution; of whole periods, without leakage."""
+        plan = self._plan
+        count = round(self._rate_hz * plan.periods / plan.repetition_hz)
+        spectrum = np.fft.rfft(values[:count])[plan.lines * plan.periods] * 2 / count
+        return _averaged(np.abs(spectrum) ** 2 / 2 / plan.repetition_hz, self._width)
+
+    @property
+    def _width(self) -> int:
+        return max(1, round(self._plan.resolution_hz / self._plan.repetition_hz))
+
+    def _require_answer(self, heard: Heard) -> None:
+        modelled = sqrt(float(np.sum(heard.drive * self._modelled)))
+        measured = sqrt(float(np.sum(heard.base)))
+        if measured < LEAST_ANSWER * modelled:
+            raise LimitExceeded(
+                f"the base moved with {measured / modelled:.1%} of what the model says, and feedback needs "
+                f"{LEAST_ANSWER:.0%}. It was ramped down and its recording kept; look at the accelerometer, "
+                "its cable and the amplifier"
+            )
+
+
+def equalise_noise(loop: SineLoop, plan: HeldNoise) -> Controller[None]:
+    """Equalise at levels that rise to the spectrum, then keep what follows, equalising on."""
+    equaliser = Equaliser(loop, plan)
+    yield from loop.listen_to_silence()
+    segments = [step.segment for step in plan.steps()]
+    for number in range(plan.stretches):
+        kept = number - plan.equalisations
+        level_db = min(0.0, plan.start_db * (1 - number / max(1, plan.equalisations - 1)))
+        play = equaliser.waveform(number, level_db)
+        yield ControlAction(ramp(RunState.RAMPING_UP, play, loop.measurement))
+        if plan.settle_s > 0:
+            yield ControlAction(Phase(RunState.SETTLING, play, plan.settle_s))
+        state, segment = (RunState.SETTLING, None) if kept < 0 else (RunState.RECORDING, segments[kept])
+        samples = yield ControlAction(Phase(state, play, plan.periods / plan.repetition_hz, segment))
+        heard = equaliser.hear(*loop.channels.rows(samples))
+        off_db = equaliser.off_db(heard, level_db)
+        yield ControlAction(None, (_note(plan, equaliser, heard, off_db, kept),))
+        equaliser.require_below_abort(heard)
+        yield ControlAction(ramp(RunState.RAMPING_DOWN, play, loop.measurement))
+
+
+def _note(plan: HeldNoise, equaliser: Equaliser, heard: Heard, off_db: Samples, kept: int) -> NoiseNote:
+    worst = int(np.argmax(np.abs(off_db)))
+    return NoiseNote(
+        realisation=max(kept, -1),
+        base_rms=sqrt(float(np.sum(heard.base)) * plan.repetition_hz),
+        asked_rms=sqrt(float(np.sum(equaliser.target)) * plan.repetition_hz),
+        within=float(np.mean(np.abs(off_db) <= plan.tolerance_db)),
+        worst_db=float(off_db[worst]),
+        worst_hz=float(equaliser.frequency_hz[worst]),
+        notched=float(np.mean(equaliser.target < 0.99 * plan.density)),
+        kurtosis=heard.kurtosis,
+    )
+
+
+def _averaged(values: Samples, width: int) -> Samples:
+    """Average over neighbours; at the ends over those that there are."""
+    sums = np.concatenate(([0.0], np.cumsum(values)))
+    places = np.arange(values.size)
+    first = np.maximum(places - width // 2, 0)
+    last = np.minimum(first + width, values.size)
+    return np.asarray((sums[last] - sums[first]) / (last - first))
+
+
+def _kurtosis(values: Samples) -> float:
+    centred = values - np.mean(values)
+    return float(np.mean(centred**4) / max(float(np.mean(centred**2)) ** 2, 1e-300))

@@ -1,0 +1,148 @@
+"""The law of the phase-locked loop that follows a resonance, and what it learns of the mode on the way."""
+
+from dataclasses import dataclass, replace
+from math import exp, log, pi, radians
+
+import numpy as np
+
+from ..excitation.resonance_tracking import ResonanceTracking
+from ..plan import LOOK_PERIODS
+from .settling_controller import SettledState
+
+_GAIN = 0.3
+"""Part of the error of the phase that the loop takes out at each look."""
+_SLOW, _GROWTH, _LARGEST_GAIN = 0.75, 1.5, 4.0
+"""An error that keeps more than this of itself in a look makes the gain grow by this factor, up to this."""
+_WIDER = np.linspace(-0.25, 0.25, 15)
+"""Logarithms by which the half-width may have changed from one level to the next."""
+_MUCH_WIDER = np.linspace(-1.0, 1.0, 57)
+"""The same for a super- or subharmonic, whose first one the search knows roughly."""
+_SURE_RAD = radians(12.0)
+"""Unexplained drift of the phase that weighs as much as a half-width that has changed by e."""
+_STEEPER = 0.5
+"""Share of its bend by which that of a backbone may grow from level to level."""
+_EXPLAINED_RAD = radians(3.0)
+"""Rms of that drift above which the motion is none that grows from one level to the next."""
+
+
+@dataclass(frozen=True)
+class LearntMode:
+    """What the phase-locked loop knows of a mode."""
+
+    narrowest_hz: float
+    """Half-width of the resonance as it was searched for; contacts and hard springs only widen it. Zero for a
+    super- or subharmonic."""
+    half_width_hz: float
+    bend_hz: float = 0.0
+    """What the resonance moved by while the level grew by e; zero where that is not known."""
+    steeper_hz: float = 0.0
+    """By how much more it should move towards the next level."""
+
+
+@dataclass(frozen=True)
+class TrackedPlace:
+    """Where a level was left."""
+
+    frequency_hz: float
+    base_m_per_s2: float
+    mode: LearntMode | None = None
+    """None as long as no level was found: the next one is searched for."""
+
+
+class PhaseLaw:
+    """The law of the phase-locked loop.
+
+    The phase of a motion over its drive drifts by ``2 pi L (r - f) - h e`` in a look of the time L: f the
+    frequency, r that of the resonance, e the error of the phase in radians, and h = 2 pi L w what the mode
+    forgets in it, w its half-width. The frequency moves by g times what this says of r - f: the error falls
+    by the share g at every look. Where it does not, its own part in that, ``g w e``, grows. Of the n-th
+    harmonic r and w are taken at the drive, and L is n times as long. Of a subharmonic e is that of so many
+    times its phase, r and w are taken at the drive as well, and a look has so many times the drives.
+
+    A bent resonance moves while the motion grows to its new level. The level that the motion has grown to
+    follows the base as fast as the mode forgets; r moves with its logarithm, as the levels before tell, and
+    that is added to the frequency in advance.
+    """
+
+    def __init__(self, plan: ResonanceTracking, last: TrackedPlace, mode: LearntMode) -> None:
+        self._plan = plan
+        self._turns = plan.harmonic * plan.subharmonic * LOOK_PERIODS
+        """By how many turns a look's phase counts: periods of a harmonic, drives of a subharmonic."""
+        self._last = last
+        self._mode = mode
+        self._bend_hz = mode.bend_hz + mode.steeper_hz
+        self._grown = last.base_m_per_s2
+        """The level at which the motion would rest as it is [m/s2]."""
+        self._gain = _GAIN
+        self._motion = 0j
+        self._looks: list[tuple[float, float, float]] = []
+        """Frequency [Hz], error of the phase [rad] and level [m/s2] of each."""
+
+    def see(self, frequency_hz: float, seen: SettledState) -> tuple[float, float]:
+        """Take in a look; gives the error of the phase [rad] and what the motion has still to go, a share."""
+        moved = self._plan.motion(seen.harmonics)
+        off = float(np.angle(moved)) - radians(self._plan.phase_deg)
+        error_rad = (off + pi) % (2 * pi) - pi
+        self._looks.append((frequency_hz, error_rad, seen.base.amplitude))
+        kept = self._kept(frequency_hz)
+        self._grown *= (seen.base.amplitude / self._grown) ** (1.0 - kept)
+        motion = moved * seen.base.amplitude
+        left = abs(motion - self._motion) * kept / (1.0 - kept) / max(abs(motion), 1e-300)
+        self._motion = motion
+        bends = abs(self._bend_hz * log(seen.base.amplitude / self._grown)) / self._mode.half_width_hz
+        return error_rad, max(left, bends)
+
+    def next_hz(self, frequency_hz: float, base: float) -> float:
+        """Give the next frequency, within the plan's band; the base will move with ``base`` [m/s2]."""
+        foreseen_hz = self._bend_hz * (1.0 - self._kept(frequency_hz)) * log(base / self._grown)
+        widest_hz = self._plan.widest_step_hz
+        step_hz = min(max(foreseen_hz + self._off_hz(frequency_hz), -widest_hz), widest_hz)
+        return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
+
+    def learnt(self, found: SettledState, error_rad: float) -> LearntMode:
+        """Give the half-width that explains how the phase drifted from look to look, and the bend.
+
+        Where nothing near the half-width before explains it, the motion is another one: it stays.
+        """
+        grown, bend_hz = log(found.base.amplitude / self._last.base_m_per_s2), self._mode.bend_hz
+        if abs(grown) > self._plan.level_tolerance:
+            bend_hz = (found.frequency_hz - self._last.frequency_hz) / grown
+        frequency_hz, error, base = np.array(self._looks).T
+        turned = 2 * pi * self._turns / frequency_hz.mean()
+
+        def unexplained(width_hz: float) -> float:
+            """Mean square of the drift that is left [rad2]."""
+            levels, level = [], log(self._last.base_m_per_s2)
+            for each in np.log(base):
+                level += (1.0 - exp(-turned * width_hz)) * (each - level)
+                levels.append(level - log(found.base.amplitude))
+            rest_hz = found.frequency_hz + error_rad * width_hz + bend_hz * np.array(levels)
+            away_hz = frequency_hz + width_hz * error - rest_hz
+            drift = np.diff(error) + 0.5 * turned * (away_hz[1:] + away_hz[:-1])
+            return float(np.mean(drift**2))
+
+        wider = _WIDER if self._plan.is_fundamental else _MUCH_WIDER
+        left = np.array([unexplained(self._mode.half_width_hz * exp(each)) for each in wider])
+        best = int(np.argmin(left + (_SURE_RAD * wider) ** 2 / (len(base) - 1)))
+        if left[best] > _EXPLAINED_RAD**2:
+            return replace(self._mode, bend_hz=0.0, steeper_hz=0.0)
+        width_hz = max(self._mode.narrowest_hz, self._mode.half_width_hz * exp(wider[best]))
+        most_hz = _STEEPER * abs(bend_hz) if self._mode.bend_hz else 0.0
+        steeper_hz = min(max(bend_hz - self._mode.bend_hz, -most_hz), most_hz)
+        return LearntMode(self._mode.narrowest_hz, width_hz, bend_hz, steeper_hz)
+
+    def _off_hz(self, frequency_hz: float) -> float:
+        """Give how far the frequency goes for what the newest looks show of the phase."""
+        if not self._looks:
+            return 0.0
+        error_rad = self._looks[-1][1]
+        # Nothing is known of what was before the first look but that it was another level.
+        before_rad = self._looks[-2][1] if len(self._looks) > 1 else error_rad
+        is_slow = error_rad * before_rad > 0 and abs(error_rad) > _SLOW * abs(before_rad)
+        self._gain = min(self._gain * _GROWTH, _LARGEST_GAIN) if is_slow else _GAIN
+        drifted_hz = (error_rad - before_rad) * frequency_hz / (2 * pi * self._turns)
+        return self._gain * error_rad * self._mode.half_width_hz + _GAIN * drifted_hz
+
+    def _kept(self, frequency_hz: float) -> float:
+        """Give the share of a motion that the mode has not forgotten after a look."""
+        return exp(-2 * pi * self._mode.half_width_hz * self._turns / frequency_hz)

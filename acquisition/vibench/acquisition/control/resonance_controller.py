@@ -1,0 +1,296 @@
+"""Tracking a phase resonance from level to level: searched once, then followed by a phase-locked loop."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import degrees, hypot, isfinite, pi, radians, sqrt
+
+import numpy as np
+
+from ..excitation.feedback import BaseLevel
+from ..excitation.resonance_tracking import ResonanceTracking
+from ..plan import LOOK_PERIODS, RunState, needed_vpp
+from ..recording import Held, LockResult, ResonanceNote, Steadiness
+from ..rig import OnTable
+from .closed_loop_check import require_answer
+from .control_action import Controller
+from .mode_fit import Mode, fitted_mode
+from .phase_law import LearntMode, PhaseLaw, TrackedPlace
+from .phase_search import PhaseError, PhaseResonance, PhaseSearch
+from .record import recorded, recorded_and_judged
+from .settling_controller import SettledState, SettlingController
+from .sine_loop import SineLoop
+from .start import moved, started
+from .stroboscope import ORDERS, Periods
+
+_LOST_RAD = pi / 4
+"""An error of the phase beyond which the loop is no longer on the resonance."""
+_CORRECTED = 0.5
+"""Standard uncertainty of the correction for the phase that is left, as a share."""
+_LEFT, _LEFT_TO_CREEP = 1.5, 0.5
+"""How far the motion may have to go still, over the tolerance of the phase in radians; one that creeps."""
+_LOOKS_LOCKED = 3
+"""Looks in a row with phase and level where they should be, before it counts as locked."""
+_FINEST = 2e-6
+"""Share of a frequency by which a search goes at least: closer together lie the sides of a jump."""
+_BATCHES = 8
+_KNOWN = 4.0
+"""Standard errors of a motion above which it has a phase."""
+_FURTHEST = 1.5
+"""Half-widths of the resonance between it and the furthest point of a flank."""
+
+
+def track_resonance(loop: SineLoop, plan: ResonanceTracking) -> Controller[None]:
+    """Lock on to the resonance at every level, record there, go on to the next level from there."""
+    loop.drives = plan.subharmonic
+    if not plan.is_fundamental:
+        # It may be a hundredth of the whole motion, which then seems settled long before.
+        loop.judged_order = plan.harmonic
+    yield from started(loop, plan.start_hz, plan.held_levels[0])
+    last = TrackedPlace(plan.start_hz, plan.accelerations_m_per_s2[0])
+    for number in range(len(plan.accelerations_m_per_s2)):
+        followed = (yield from _followed(loop, plan, number, last, last.mode)) if last.mode else None
+        last = followed or (yield from _searched(loop, plan, number, last))
+    yield from loop.ramp_down()
+    yield from loop.say()
+
+
+def _followed(
+    loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace, mode: LearntMode
+) -> Controller[TrackedPlace | None]:
+    """Go to the next level under the phase-locked loop and record there; None far off the resonance."""
+    level, law = plan.held_levels[number], PhaseLaw(plan, last, mode)
+    change = _first_change(loop, level, last)
+    begin_hz = law.next_hz(last.frequency_hz, last.base_m_per_s2 * change)
+    loop.change(begin_hz, loop.bounded_vpp(loop.setting.setting_vpp * change))
+    controller = SettlingController(loop, plan.settling, level)
+    looks, lock = yield from _locked(controller, plan, law)
+    if lock is None:
+        return None
+    periods = looks * LOOK_PERIODS * loop.drives
+    segment = plan.segment(number, loop.setting.frequency_hz)
+    found = yield from recorded_and_judged(controller, segment, plan.record_s, periods / loop.drive_hz)
+    error = _phase_error(loop.periods, found, plan)
+    is_steady = found.held is Held.WITHIN and found.judgement.steadiness is Steadiness.PERIODIC
+    is_met = abs(error.error_deg) <= plan.phase_tolerance_deg and (lock is LockResult.LOCKED or is_steady)
+    is_met = is_met and _is_there(plan, found)
+    lock = LockResult.LOCKED if is_met else LockResult.LOST
+    mode = law.learnt(found, radians(error.error_deg))
+    left_deg = hypot(error.uncertainty_deg, _open_phase_deg(plan, found), _CORRECTED * error.error_deg)
+    resonance = PhaseResonance(
+        found.drive_hz + radians(error.error_deg) * mode.half_width_hz,
+        radians(left_deg) * mode.half_width_hz,
+        -degrees(1.0) / mode.half_width_hz,
+    )
+    _say(loop, plan, number, found, Tracked(resonance, None, lock, looks, periods))
+    return TrackedPlace(found.frequency_hz, found.base.amplitude, mode)
+
+
+def _locked(
+    controller: SettlingController, plan: ResonanceTracking, law: PhaseLaw
+) -> Controller[tuple[int, LockResult | None]]:
+    """Hold phase and level at once; gives the looks it took, and how it ended: None far off the resonance."""
+    loop, error_rad = controller.loop, 0.0
+    tolerance_rad = radians(plan.phase_tolerance_deg)
+    most_left = tolerance_rad * (_LEFT if plan.is_fundamental else _LEFT_TO_CREEP)
+    in_a_row, looks = 0, plan.most_periods // (LOOK_PERIODS * loop.drives)
+    for look in range(1, looks + 1):
+        now = loop.setting
+        yield from loop.listen(RunState.SETTLING, LOOK_PERIODS / loop.motion_hz)
+        base, seen = controller.measured(), controller.found(0.0)
+        require_answer(loop.rig, now.frequency_hz, now.setting_vpp, base.amplitude)
+        error_rad, left = law.see(now.frequency_hz, seen)
+        is_on = abs(error_rad) <= tolerance_rad and left <= most_left and seen.held is Held.WITHIN
+        in_a_row = in_a_row + 1 if is_on else 0
+        if in_a_row == _LOOKS_LOCKED:
+            return look, LockResult.LOCKED
+        setting_vpp = controller.prompt_vpp(base, now.frequency_hz)
+        frequency_hz = law.next_hz(now.frequency_hz, base.amplitude * setting_vpp / now.setting_vpp)
+        loop.change(frequency_hz, setting_vpp)
+    return looks, None if abs(error_rad) > _LOST_RAD else LockResult.LOST
+
+
+def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
+    """Give the factor by which the setting changes at first when the level does.
+
+    A specimen that holds a light table back to a share of its motion does so only when it has grown: at once
+    the base moves by the whole change of the setting, over that share.
+    """
+    bare_vpp = needed_vpp(loop.rig, last.base_m_per_s2, last.frequency_hz, OnTable.NOTHING)
+    share = min(1.0, bare_vpp / loop.setting.setting_vpp)
+    change = (level.acceleration_at(last.frequency_hz) / last.base_m_per_s2) ** share
+    return float(min(max(change, 1 / level.most_change), level.most_change))
+
+
+def _searched(
+    loop: SineLoop, plan: ResonanceTracking, number: int, last: TrackedPlace
+) -> Controller[TrackedPlace]:
+    """Search the resonance at one level in settled motion, and record there."""
+    level, rule = plan.held_levels[number], plan.settling
+    if not plan.is_fundamental:
+        # Its motion creeps: tries of motions that have still to go would tell a wrong slope of the phase.
+        settled = 0.5 * radians(plan.phase_tolerance_deg) / plan.subharmonic
+        rule = rule.model_copy(update={"tolerance": min(rule.tolerance, settled)})
+    settling_controller = SettlingController(loop, rule, level)
+    search = PhaseSearch(plan.low_hz, plan.high_hz, plan.widest_step_hz, is_mode=plan.is_fundamental)
+    states: list[SettledState] = []
+    frequency_hz, lock = last.frequency_hz, LockResult.LOST
+    for _ in range(plan.most_tries):
+        moved(loop, frequency_hz, level)
+        states.append((yield from settling_controller.settled()))
+        error = _phase_error(loop.periods, states[-1], plan)
+        search.tries.append(error)
+        # Where a harmonic is noise, its phase is any, and while it creeps, one that passes.
+        rests = plan.is_fundamental or states[-1].judgement.steadiness is Steadiness.PERIODIC
+        is_known = rests and error.uncertainty_deg <= plan.phase_tolerance_deg
+        if not any(_is_there(plan, each) for each in states[-2:]):
+            lock = LockResult.ABSENT
+            break
+        if abs(error.error_deg) <= plan.phase_tolerance_deg and is_known and len(search.tries) > 1:
+            lock = LockResult.LOCKED
+            break
+        next_hz = search.next_hz()
+        if plan.low_hz < next_hz < plan.high_hz:
+            # The tries are in the converter's time, what is played in the generator's.
+            next_hz *= states[-1].frequency_hz / states[-1].drive_hz
+        if next_hz == frequency_hz:
+            lock = LockResult.AT_THE_EDGE
+            break
+        if not plan.is_fundamental and abs(next_hz - frequency_hz) < _FINEST * frequency_hz:
+            lock = LockResult.BETWEEN_MOTIONS
+            break
+        frequency_hz = next_hz
+    found = states[-1]
+    resonance = search.resonance(_open_phase_deg(plan, found))
+    mode = None
+    if lock is LockResult.LOCKED and plan.is_fundamental:
+        flanks = yield from _flanks(settling_controller, plan, resonance)
+        mode = _mode([*states, *flanks], resonance)
+        # Back from the flanks before the recording: the next level begins where this one ends.
+        moved(loop, found.frequency_hz, level)
+        found = yield from settling_controller.settled()
+    yield from recorded(settling_controller, found, plan.segment(number, found.frequency_hz), plan.record_s)
+    periods = round(sum(each.waited_s * each.drive_hz for each in states))
+    _say(loop, plan, number, found, Tracked(resonance, mode, lock, len(search.tries), periods))
+    if lock is not LockResult.LOCKED:
+        return TrackedPlace(found.frequency_hz, found.base.amplitude, last.mode)
+    width_hz = resonance.half_width_hz if mode is None else mode.damping_ratio * mode.frequency_hz
+    # Contacts bend the flanks: the first width, found without them, is kept. What drives a superharmonic
+    # hangs on the frequency too, the more the nearer contacts are to their first: that width is no bound.
+    narrowest_hz = width_hz if plan.is_fundamental else 0.0
+    learnt = last.mode or LearntMode(narrowest_hz, width_hz)
+    return TrackedPlace(found.frequency_hz, found.base.amplitude, learnt)
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """What was found of a mode at one level."""
+
+    resonance: PhaseResonance
+    mode: Mode | None
+    lock: LockResult
+    tries: int
+    periods: int
+    """Of the drive, until then."""
+
+
+def _flanks(
+    settling_controller: SettlingController, plan: ResonanceTracking, resonance: PhaseResonance
+) -> Controller[list[SettledState]]:
+    """Measure on both sides, up to one and a half half-widths away."""
+    found: list[SettledState] = []
+    pairs = plan.flank_pairs
+    for place in (*range(-pairs, 0), *range(1, pairs + 1)):
+        frequency_hz = resonance.frequency_hz + _FURTHEST * resonance.half_width_hz * place / pairs
+        if plan.low_hz <= frequency_hz <= plan.high_hz:
+            moved(settling_controller.loop, frequency_hz, settling_controller.level)
+            found.append((yield from settling_controller.settled()))
+    return found
+
+
+def _mode(states: Sequence[SettledState], resonance: PhaseResonance) -> Mode | None:
+    """Fit the mode to all that was visited near it."""
+    reach_hz = 1.1 * _FURTHEST * resonance.half_width_hz
+    near = [each for each in states if abs(each.drive_hz - resonance.frequency_hz) <= reach_hz]
+    return fitted_mode(
+        np.array([each.drive_hz for each in near]), np.array([each.transmissibility for each in near])
+    )
+
+
+def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
+    """Whether a motion may be the one that is tracked: a subharmonic one does not repeat every drive."""
+    return plan.subharmonic == 1 or found.judgement.period != 1
+
+
+def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
+    """Give what both sensors' phases and sensitivities leave open of the phase [degrees].
+
+    Of a super- or subharmonic also what its motion may have to go still; a subharmonic one creeps, too slowly
+    to be seen from one look to the next, so that all counts which passes for settled.
+    """
+    if not plan.is_fundamental:
+        remaining = found.judgement.remaining if isfinite(found.judgement.remaining) else 1.0
+        if plan.subharmonic > 1:
+            remaining = max(remaining, plan.settling.tolerance)
+        return plan.subharmonic * hypot(plan.harmonic * plan.sensor_phase_deg, degrees(remaining))
+    # Of a difference of motions the phase also turns with their ratio; of a single one it does not.
+    turned = plan.motion(found.harmonics) - found.transmissibility
+    size = max(abs(plan.motion(found.harmonics)), plan.sensor_gain)
+    return hypot(plan.sensor_phase_deg, degrees(plan.sensor_gain * abs(turned) / size))
+
+
+def _phase_error(periods: Periods, found: SettledState, plan: ResonanceTracking) -> PhaseError:
+    """Compare the phase of m0 against the base with the wanted one; batches tell its uncertainty."""
+    count = periods.count // 2
+    newer = periods.last(count if plan.is_fundamental else min(count, plan.settling.periods))
+    length = len(newer.base) // _BATCHES
+    angle = float(np.angle(plan.motion(found.harmonics)))
+    error_deg = (degrees(angle) - plan.phase_deg + 180) % 360 - 180
+    if length == 0:
+        return PhaseError(found.drive_hz, error_deg, 180.0)
+    used = slice(len(newer.base) - length * _BATCHES, None)
+    base = newer.base[used].reshape(_BATCHES, length).mean(axis=1)
+    response = newer.response[used, 1:].reshape(_BATCHES, length, -1).mean(axis=1)
+    # Each harmonic over the phase of the base times as much; turned and scaled as all together are.
+    away = np.angle(base * base.mean().conjugate())
+    orders = np.arange(1, ORDERS) / plan.subharmonic
+    ratios = response / np.exp(1j * np.outer(away, orders)) / np.abs(base)[:, None]
+    ratios *= np.array(found.harmonics) / ratios.mean(axis=0)
+    ratios = np.array([plan.motion(each) for each in ratios])
+    if abs(ratios.mean()) <= _KNOWN * float(np.std(ratios, ddof=1)) / sqrt(_BATCHES):
+        # Noise: the spread of its phases has a bound, and with it what they would be known to.
+        return PhaseError(found.drive_hz, error_deg, 180.0)
+    spread = float(np.std(np.angle(ratios * ratios.mean().conjugate()), ddof=1))
+    return PhaseError(found.drive_hz, error_deg, degrees(spread) / sqrt(_BATCHES))
+
+
+def _say(loop: SineLoop, plan: ResonanceTracking, number: int, found: SettledState, tracked: Tracked) -> None:
+    lock = tracked.lock
+    if lock is LockResult.LOCKED and found.judgement.steadiness is Steadiness.UNSETTLED:
+        lock = LockResult.LOST
+    is_told = lock is LockResult.LOCKED
+    resonance, mode = (tracked.resonance, tracked.mode) if is_told else (None, None)
+    base_m = found.base.amplitude / (2 * pi * found.drive_hz) ** 2
+    loop.note(
+        ResonanceNote(
+            level=number,
+            asked_m_per_s2=plan.accelerations_m_per_s2[number],
+            frequency_hz=None if resonance is None else resonance.frequency_hz,
+            frequency_u_hz=None if resonance is None else resonance.uncertainty_hz,
+            at_hz=found.drive_hz,
+            phase_deg=degrees(float(np.angle(plan.motion(found.harmonics)))),
+            response_ii=found.response,
+            base_m_per_s2=found.base.amplitude,
+            base_u=found.base.uncertainty,
+            held=found.held,
+            motion=found.judgement.steadiness,
+            tries=tracked.tries,
+            periods=tracked.periods,
+            lock=lock,
+            mode_hz=None if mode is None else mode.frequency_hz,
+            mode_u_hz=None if mode is None else mode.frequency_u_hz,
+            damping_ratio=None if mode is None else mode.damping_ratio,
+            harmonic=plan.harmonic,
+            subharmonic=plan.subharmonic,
+            harmonic_m=None if plan.is_fundamental else abs(plan.motion(found.harmonics)) * base_m,
+        )
+    )

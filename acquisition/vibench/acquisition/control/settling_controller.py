@@ -1,0 +1,183 @@
+"""Waiting until a motion has settled, while the base is brought to its level and kept there."""
+
+from dataclasses import dataclass
+from math import isfinite
+
+from ..excitation.feedback import BaseLevel, Settling
+from ..plan import LOOK_PERIODS, RunState, look_s
+from ..recording import Held, SettledNote, Steadiness
+from .closed_loop_check import require_answer
+from .control_action import Controller
+from .jump_search import SettledPoint
+from .level_control import LevelControl, MeasuredLevel, measured_level
+from .sine_loop import SineLoop
+from .steadiness import Judgement, in_drives, judged
+from .stroboscope import ORDERS, Phasors
+
+_SURE = 2.0
+_SAME_LEVEL = 0.004
+"""Tolerance with which the level is held where one order of the response alone is judged, a share."""
+_PROMPT = 0.7
+"""Part of a correction that is made at once where the specimen still answers the one before."""
+
+
+@dataclass(frozen=True)
+class SettledState:
+    """What was found at one frequency after waiting."""
+
+    frequency_hz: float
+    """As commanded [Hz]."""
+    drive_hz: float
+    """As seen by the converter [Hz]."""
+    setting_vpp: float
+    waited_s: float
+    judgement: Judgement
+    base: MeasuredLevel
+    """Acceleration of the base's fundamental [m/s2]."""
+    held: Held
+    harmonics: tuple[complex, ...]
+    """Displacement of m0, first and higher orders of its period, over that of the base's fundamental."""
+    drives: int = 1
+    """Periods of the drive in one of m0."""
+
+    @property
+    def transmissibility(self) -> complex:
+        """Displacement of m0 over that of the base, at the drive's frequency."""
+        return self.harmonics[self.drives - 1]
+
+    @property
+    def response(self) -> float:
+        """Response II: the magnitude of the transmissibility."""
+        return abs(self.transmissibility)
+
+    @property
+    def point(self) -> SettledPoint:
+        """What a search for a jump needs of it."""
+        return SettledPoint(self.frequency_hz, self.response, self.judgement.period)
+
+    @property
+    def note(self) -> SettledNote:
+        """What is noted of it; the same numbers stand beside the samples."""
+        found = self.judgement
+        return SettledNote(
+            frequency_hz=self.frequency_hz,
+            motion=found.steadiness,
+            period=found.period,
+            waited_s=round(self.waited_s, 3),
+            # Too few periods for a figure: as wide as the motion itself.
+            scatter=found.scatter if isfinite(found.scatter) else 1.0,
+            noise=found.noise if isfinite(found.noise) else 0.0,
+            setting_vpp=self.setting_vpp,
+            base_m_per_s2=self.base.amplitude,
+            base_u=self.base.uncertainty,
+            level=self.held,
+        )
+
+
+@dataclass(frozen=True)
+class SettlingController:
+    """Brings the motion at one frequency to rest, as far as it comes to rest."""
+
+    loop: SineLoop
+    rule: Settling
+    level: BaseLevel | None
+
+    def settled(self) -> Controller[SettledState]:
+        """Wait at the frequency that is played; correct the setting whenever the level is off."""
+        waited_s = 0.0
+        while True:
+            stretch_s = look_s(self.loop.motion_hz)
+            yield from self.loop.listen(RunState.SETTLING, stretch_s)
+            waited_s += stretch_s
+            is_late = waited_s + stretch_s > self.rule.longest_wait_s
+            if waited_s < self.rule.shortest_wait_s and not is_late:
+                continue
+            if not is_late and self._corrected():
+                continue
+            found = self.found(waited_s)
+            if is_late or (self._is_steady(found) and found.judgement.steadiness is not Steadiness.UNSETTLED):
+                self.loop.note(found.note)
+                return found
+
+    def measured(self) -> MeasuredLevel:
+        """Measure the base over the newer half of what was seen since the last change."""
+        periods = self.loop.periods
+        return measured_level(periods.base[periods.count // 2 :])
+
+    def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
+        """Give the setting that brings a motion without scatter to its level at another frequency [V]."""
+        assert self.level is not None
+        control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
+        seen = MeasuredLevel(measured.amplitude, 0.0)
+        now_vpp = self.loop.setting.setting_vpp
+        next_vpp = control.next_vpp(now_vpp, seen, self.level.acceleration_at(frequency_hz))
+        return float(now_vpp * (next_vpp / now_vpp) ** _PROMPT)
+
+    def held(self, measured: MeasuredLevel) -> Held:
+        """Say whether a measured level is the one to be held."""
+        if self.level is None:
+            return Held.OPEN
+        return measured.held(self._target, self.level.tolerance)
+
+    @property
+    def _target(self) -> float:
+        """Acceleration that the base should have here [m/s2]."""
+        assert self.level is not None
+        return self.level.acceleration_at(self.loop.setting.frequency_hz)
+
+    def _corrected(self) -> bool:
+        """Change the setting if the level asks for it; whether it did."""
+        if self.level is None or self.loop.periods.count < LOOK_PERIODS:
+            return False
+        now = self.loop.setting
+        measured = self.measured()
+        require_answer(self.loop.rig, now.frequency_hz, now.setting_vpp, measured.amplitude)
+        level = self.level
+        if self.loop.judged_order is not None:
+            # Its phase moves with the level as well: all that is compared is seen at the same one.
+            level = level.model_copy(update={"tolerance": min(level.tolerance, _SAME_LEVEL)})
+        control = LevelControl(level, self.loop.most_vpp, self.loop.least_vpp)
+        next_vpp = control.next_vpp(now.setting_vpp, measured, self._target)
+        if next_vpp == now.setting_vpp:
+            return False
+        self.loop.change(now.frequency_hz, next_vpp)
+        return True
+
+    def found(self, waited_s: float) -> SettledState:
+        """Judge what was seen since the last change."""
+        loop, periods = self.loop, self.loop.periods
+        # What creeps has only just come to rest.
+        newest = periods.last(
+            max(self.rule.periods, periods.count // 2) if loop.judged_order is None else self.rule.periods
+        )
+        measured = measured_level(newest.base)
+        return SettledState(
+            frequency_hz=loop.setting.frequency_hz,
+            drive_hz=loop.drive_hz,
+            setting_vpp=loop.setting.setting_vpp,
+            waited_s=waited_s,
+            judgement=self._judged(periods.response),
+            base=measured,
+            held=self.held(measured),
+            harmonics=tuple(
+                loop.channels.transmissibility(
+                    newest.base, newest.response[:, order], loop.drive_hz, order / loop.drives
+                )
+                for order in range(1, ORDERS)
+            ),
+            drives=loop.drives,
+        )
+
+    def _judged(self, points: Phasors) -> Judgement:
+        order, noise = self.loop.judged_order, self.loop.noise
+        found = judged(points if order is None else points[:, order : order + 1], self.rule, noise)
+        newest = points[-self.rule.periods :]
+        return in_drives(found, newest, self.loop.drives, noise) if len(newest) else found
+
+    def _is_steady(self, found: SettledState) -> bool:
+        """Whether the level is known well enough to be called held; it may be out of reach, too."""
+        if self.level is None:
+            return True
+        is_known = _SURE * found.base.uncertainty <= self.level.tolerance * self._target
+        is_at_the_end = found.setting_vpp >= self.loop.most_vpp
+        return is_known and (found.held is Held.WITHIN or is_at_the_end)

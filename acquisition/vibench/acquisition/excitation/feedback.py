@@ -1,0 +1,99 @@
+"""What an excitation asks of its feedback: when a motion is settled, which level of the base is held."""
+
+from math import pi
+from typing import Annotated, Self
+
+from pydantic import Field, PositiveFloat, model_validator
+
+from ..host.toml_file import FrozenModel
+
+MOST_PERIODS = 100_000
+Share = Annotated[float, Field(gt=0, lt=1)]
+HeldMetres = Annotated[float, Field(ge=1e-15, le=1)]
+"""Below what any sensor shows, and beyond what any shaker's stroke allows, a unit was mistaken [m]."""
+HeldMetresPerS2 = Annotated[float, Field(ge=1e-9, le=1e5)]
+"""Likewise; no shaker reaches ten thousand times gravity [m/s2]."""
+
+
+class Settling(FrozenModel):
+    """When the motion of the specimen counts as settled.
+
+    It is seen once in each period of the recorded drive, as amplitude and phase of its first four
+    harmonics. It is settled with period k when these repeat after k drive periods, or when it does
+    not repeat and yet its statistics stay what they are.
+    """
+
+    tolerance: Share = 0.01
+    """How closely the motion must repeat, over its rms size."""
+    periods: int = Field(default=80, ge=12, le=MOST_PERIODS)
+    """For how many drive periods it must repeat."""
+    longest_period: int = Field(default=8, ge=1, le=32)
+    """Longest period that is looked for, in drive periods."""
+    aperiodic_periods: int = Field(default=400, ge=100, le=MOST_PERIODS)
+    """Over how many drive periods a motion that does not repeat must keep its statistics."""
+    shortest_wait_s: float = Field(default=0.2, ge=0, le=600)
+    """Wait at least this long at every frequency [s]."""
+    longest_wait_s: float = Field(default=15.0, gt=0, le=3600)
+    """Wait no longer than this; the motion is then recorded as not settled [s]."""
+
+    @model_validator(mode="after")
+    def _waits_in_order(self) -> Self:
+        if self.shortest_wait_s > self.longest_wait_s:
+            raise ValueError(
+                f"shortest_wait_s = {self.shortest_wait_s:g} is longer than longest_wait_s = "
+                f"{self.longest_wait_s:g}; lower the one or raise the other"
+            )
+        return self
+
+
+class BaseLevel(FrozenModel):
+    """A level of the base's motion that the generator's setting is made to follow.
+
+    Held is the fundamental: what impacts add at other frequencies is not counted. The setting of
+    the plan, ``amplitude_vpp``, is then the largest that may be used.
+    """
+
+    acceleration_m_per_s2: HeldMetresPerS2 | None = None
+    """Peak of the base's fundamental [m/s2]; or give ``displacement_m``."""
+    displacement_m: HeldMetres | None = None
+    """Peak of the base's fundamental [m], the same at every frequency; or give ``acceleration_m_per_s2``."""
+    tolerance: Share = 0.025
+    """How far the measured level may lie from it, as a share."""
+    most_change: float = Field(default=1.25, gt=1, le=4)
+    """The setting changes by at most this factor at once."""
+
+    @model_validator(mode="after")
+    def _one_motion(self) -> Self:
+        if (self.acceleration_m_per_s2 is None) == (self.displacement_m is None):
+            raise ValueError("give either acceleration_m_per_s2 or displacement_m, and not both")
+        return self
+
+    @property
+    def quantity(self) -> str:
+        """The motion that is held: ``"acceleration"`` or ``"displacement"``."""
+        return "acceleration" if self.displacement_m is None else "displacement"
+
+    @property
+    def text(self) -> str:
+        """The level with its unit."""
+        if self.displacement_m is not None:
+            return f"{1e6 * self.displacement_m:g} µm"
+        return f"{self.acceleration_m_per_s2:g} m/s²"
+
+    def acceleration_at(self, frequency_hz: float) -> float:
+        """Acceleration amplitude to be held [m/s2]."""
+        if self.displacement_m is not None:
+            return self.displacement_m * (2 * pi * frequency_hz) ** 2
+        assert self.acceleration_m_per_s2 is not None, "the validator asks for one of them"
+        return self.acceleration_m_per_s2
+
+
+class JumpSearch(FrozenModel):
+    """When two steps of a pass lie on different branches, and how closely the jump between is found."""
+
+    factor: float = Field(default=1.5, gt=1, le=100)
+    """A change of Response II (fundamental of m0 over the base's) by more than this is a jump."""
+    resolution_hz: PositiveFloat = 0.25
+    """The two frequencies around a jump are brought this close together [Hz]."""
+    most_searches: int = Field(default=6, ge=1, le=50)
+    """How many changes of one pass are looked into; some may prove to be steep only."""

@@ -1,0 +1,46 @@
+"""One sine, held, with the base kept at a level while the specimen does what it likes."""
+
+from collections.abc import Iterator
+from typing import ClassVar, Literal
+
+from pydantic import PositiveFloat
+
+from ..recording import SegmentLabel
+from .feedback import BaseLevel, Settling
+from .plan import AbstractFeedback, Family, FixedSine
+from .steps import Segment, Step, Tone
+
+
+class HeldDwell(FixedSine, AbstractFeedback):
+    """A dwell whose base motion is measured and held, before the recording and while it lasts."""
+
+    family: ClassVar[Family] = Family.DWELL
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
+    kind: Literal["held_dwell"] = "held_dwell"
+    base_level: BaseLevel
+    """Level of the base to be held."""
+    settling: Settling = Settling()
+    """When the recording begins."""
+    duration_s: PositiveFloat
+    """Time recorded after settling [s]."""
+    update_s: PositiveFloat = 1.0
+    """How often the level is looked at, and corrected if need be, while recording [s]."""
+
+    @property
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """The one level."""
+        return (self.base_level,)
+
+    @property
+    def playing_s(self) -> float:
+        """The longest wait and the recording [s]."""
+        return self.settling.longest_wait_s + self.duration_s
+
+    @property
+    def segment(self) -> Segment:
+        """What the recorded part is called."""
+        return Segment(SegmentLabel.DWELL, {"frequency_hz": self.frequency_hz})
+
+    def steps(self) -> Iterator[Step]:
+        """One step, without its wait, at the largest setting."""
+        yield Step(Tone(self.frequency_hz), 0.0, self.duration_s, self.segment)

@@ -1,0 +1,48 @@
+"""A sine sweep that keeps the measured motion of the base at a level."""
+
+from collections.abc import Iterator
+from typing import Literal
+
+from pydantic import PositiveFloat
+
+from .feedback import BaseLevel, Settling
+from .plan import AbstractFeedback
+from .sine_sweep import MovingSine
+from .steps import Segment, Step, Tone
+
+
+class HeldSweep(MovingSine, AbstractFeedback):
+    """A sweep whose setting is corrected after every step by what the base did in it.
+
+    A sweep does not wait: where the base's answer changes within a few steps, the level is off for as
+    long, and the recording says where.
+    """
+
+    kind: Literal["held_sweep"] = "held_sweep"
+    base_level: BaseLevel
+    """Level of the base to be held."""
+    average_s: PositiveFloat = 0.5
+    """Chance is averaged away, and the level judged, over this time; a trend is followed faster [s]."""
+    settling: Settling = Settling()
+    """When the sweep begins to move."""
+
+    @property
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """The one level."""
+        return (self.base_level,)
+
+    @property
+    def playing_s(self) -> float:
+        """The longest wait at the start, and the sweep [s]."""
+        return self.settling.longest_wait_s + self.duration_s
+
+    @property
+    def segment(self) -> Segment:
+        """What the sweep is called."""
+        return self.segment_with(f"measured {self.base_level.quantity}")
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every ``step_s``, all of one segment, at the largest setting."""
+        segment = self.segment
+        for mean_hz, duration_s in self.mean_steps():
+            yield Step(Tone(mean_hz), 0.0, duration_s, segment)

@@ -1,0 +1,72 @@
+"""A multisine that shows where nonlinearity goes: odd lines only, and some of them left out on purpose."""
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, PositiveInt, model_validator
+
+from .multisine import Lines
+from .periodic_noise import MOST_REALISATIONS, PeriodicNoise
+
+GROUP = 4
+"""Of every four odd lines one, chosen at random, is left out as a detection line."""
+DETECTION_KEY = 0x0DD
+"""Keeps the choice of detection lines independent of the phases, which use the same seed."""
+
+
+class OddMultisine(PeriodicNoise):
+    """An odd random-phase multisine with random detection lines.
+
+    Even nonlinearity answers on even lines, odd nonlinearity on the odd lines that were left out;
+    both are empty in the drive (Pintelon and Schoukens, System Identification, 2nd ed., section 4.3).
+    """
+
+    kind: Literal["odd_multisine"] = "odd_multisine"
+    realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 7
+    """Waveforms with phases of their own, all on the same lines."""
+    excited_lines: tuple[PositiveInt, ...] = ()
+    """Harmonics of ``repetition_hz`` that are played; left empty, they are drawn from the seed."""
+    detection_lines: tuple[PositiveInt, ...] = ()
+    """Odd harmonics left out; left empty, all odd lines of the band that are not played."""
+
+    @model_validator(mode="after")
+    def _lines_fit_the_band(self) -> Self:
+        odd = [int(line) for line in self.candidates]
+        left_out = self._drawn()
+        excited = self.excited_lines or tuple(line for line in odd if line not in left_out)
+        strangers = sorted(set(excited) - set(odd))
+        if strangers:
+            raise ValueError(
+                f"excited_lines has {strangers[0]}, which is not an odd harmonic in the band; "
+                f"odd lines from {odd[0]} to {odd[-1]} are allowed, or none at all to have them drawn"
+            )
+        silent = tuple(sorted(set(odd) - set(excited)))
+        if self.detection_lines not in ((), silent):
+            raise ValueError(
+                "detection_lines must be the odd lines of the band that are not excited; "
+                "leave them out to have them filled in"
+            )
+        # The drawn lines are part of the plan, so that its file says them without our code.
+        object.__setattr__(self, "excited_lines", tuple(sorted(excited)))
+        object.__setattr__(self, "detection_lines", silent)
+        return self
+
+    @property
+    def candidates(self) -> Lines:
+        """The odd harmonics in the band."""
+        lines = super().candidates
+        return np.asarray(lines[lines % 2 == 1], dtype=np.int64)
+
+    @property
+    def lines(self) -> Lines:
+        """Those of them that are played."""
+        return np.array(self.excited_lines, dtype=np.int64)
+
+    def _drawn(self) -> set[int]:
+        random = np.random.Generator(
+            np.random.PCG64(np.random.SeedSequence(self.seed, spawn_key=(DETECTION_KEY,)))
+        )
+        lines = self.candidates
+        whole_groups = lines[: len(lines) // GROUP * GROUP].reshape(-1, GROUP)
+        chosen = np.floor(random.random(len(whole_groups)) * GROUP).astype(np.int64)
+        return {int(group[place]) for group, place in zip(whole_groups, chosen, strict=True)}

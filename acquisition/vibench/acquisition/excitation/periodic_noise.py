@@ -1,0 +1,99 @@
+"""What all noise out of the generator's memory shares: flat lines of a band, new phases for every average."""
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, Self
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
+
+from ..recording import SegmentLabel
+from .band_noise import BandNoise
+from .multisine import (
+    FEWEST_POINTS,
+    MOST_POINTS,
+    USUAL_POINTS,
+    Lines,
+    band_lines,
+    flat_periods,
+    require_far_image,
+    require_lines,
+)
+from .steps import Segment, Step, Waveform
+
+MOST_REALISATIONS = 1000
+"""Of one measurement: all their waveforms, of 8 bytes a point, are of one level and made together."""
+
+
+class PeriodicNoise(BandNoise):
+    """Whole periods of flat lines with random phases, one waveform for every realisation."""
+
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.REALISATION,)
+    repetition_hz: PositiveFloat = 1.0
+    """Periods per second, and the distance of the harmonics [Hz]."""
+    realisations: Annotated[int, Field(gt=0, le=MOST_REALISATIONS)] = 10
+    """Waveforms with phases of their own, all on the same lines."""
+    periods: PositiveInt = 2
+    """Periods recorded of each realisation; two or more show the noise of the sensors."""
+    points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS
+    """Points of one period in the generator's memory; what it takes is held against them beforehand."""
+    settle_s: NonNegativeFloat = 3.0
+    """Wait after each change of waveform until the transient has died out [s]."""
+    seed: int = Field(default=1, ge=0)
+    """The same seed gives the same waveforms, on any machine."""
+
+    @property
+    @abstractmethod
+    def lines(self) -> Lines:
+        """The excited harmonics of ``repetition_hz``."""
+
+    @property
+    def candidates(self) -> Lines:
+        """Harmonics in the band that a plan of this kind may excite."""
+        return band_lines(self.band_start_hz, self.band_stop_hz, self.repetition_hz)
+
+    @model_validator(mode="after")
+    def _band_fits_the_memory(self) -> Self:
+        require_far_image(self.band_stop_hz, self.repetition_hz, self.points)
+        require_lines(self.candidates, self.band_stop_hz, self.repetition_hz)
+        return self
+
+    @property
+    def period_points(self) -> int:
+        """Points of one period."""
+        return self.points
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and recording of all realisations [s]."""
+        return self.realisations * (self.settle_s + self.periods / self.repetition_hz)
+
+    @property
+    def stretches(self) -> int:
+        """One for every realisation."""
+        return self.realisations
+
+    def steps(self) -> Iterator[Step]:
+        """Yield one step for every realisation."""
+        lines = np.asarray(self.lines, dtype=np.int64)
+        for realisation, values in enumerate(flat_periods(lines, self.realisations, self.seed, self.points)):
+            yield Step(
+                play=Waveform(values, self.repetition_hz),
+                settle_s=self.settle_s,
+                record_s=self.periods / self.repetition_hz,
+                segment=Segment(
+                    SegmentLabel.REALISATION,
+                    {
+                        "realisation": realisation,
+                        "repetition_hz": self.repetition_hz,
+                        "periods": self.periods,
+                        "band_start_hz": self.band_start_hz,
+                        "band_stop_hz": self.band_stop_hz,
+                    },
+                ),
+            )
+
+    def shown_steps(self) -> Iterator[Step]:
+        """Show one period of the first realisation."""
+        first = next(self.steps())
+        yield Step(first.play, settle_s=0.0, record_s=1 / self.repetition_hz, segment=first.segment)

@@ -1,0 +1,213 @@
+"""What every excitation is: a frozen plan with an amplitude setting that lists the steps of the generator."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from enum import StrEnum
+from typing import Annotated, ClassVar, Self
+
+from pydantic import Field
+
+from ..host.toml_file import FrozenModel
+from ..recording import SegmentLabel
+from .base_level import HeldAcceleration, LevelAtBase, RelativeSetting
+from .direction import Approach, Direction
+from .feedback import BaseLevel
+from .preview import SignalPreview, signal_preview
+from .steps import Step, Tone
+
+AmplitudeVpp = Annotated[float, Field(gt=0, le=1000)]
+"""What the generator takes, its description says; beyond the upper bound a unit was mistaken."""
+HIGHEST_FREQUENCY_HZ = 1e5
+"""Beyond what any shaker follows [Hz]."""
+FrequencyHz = Annotated[float, Field(gt=0, le=HIGHEST_FREQUENCY_HZ)]
+
+
+class Family(StrEnum):
+    """What kinds of excitation have in common: their analysis, their pictures."""
+
+    NOISE = "noise"
+    """A whole band at once."""
+    SWEEP = "sweep"
+    """A sine that moves through a band."""
+    DWELL = "dwell"
+    """A sine that stays."""
+    STEPPED = "stepped"
+    """Sines one after the other, each recorded by itself."""
+
+
+class LeadIn(FrozenModel):
+    """A tone that is passed on the way to a dwell."""
+
+    frequency_hz: FrequencyHz
+    amplitude_vpp: AmplitudeVpp
+
+
+def around(frequency_hz: float) -> tuple[float, float]:
+    """Give the band in which a single sine is looked at: an octave to either side [Hz]."""
+    return 0.5 * frequency_hz, 2 * frequency_hz
+
+
+class AbstractExcitation(FrozenModel, ABC):
+    """What the generator plays, from the first waveform to the last, at one amplitude setting."""
+
+    family: ClassVar[Family]
+    result_labels: ClassVar[tuple[SegmentLabel, ...]]
+    """Segments of the recording that results are taken from."""
+
+    amplitude_vpp: AmplitudeVpp
+    """Setting of the generator, peak to peak [V], as its panel shows it."""
+
+    @abstractmethod
+    def steps(self) -> Iterator[Step]:
+        """List what the generator does, in the order of time."""
+
+    def loudest_steps(self) -> Iterator[Step]:
+        """List what limits are checked against: the steps themselves, unless feedback may be louder."""
+        return self.steps()
+
+    @property
+    def highest_amplitude_vpp(self) -> float:
+        """The highest setting there is on the way, peak to peak [V]."""
+        return self.amplitude_vpp
+
+    @property
+    def period_points(self) -> int | None:
+        """Points of a waveform in the generator's memory; None where it needs none."""
+        return None
+
+    @property
+    def lowest_amplitude_vpp(self) -> float:
+        """The lowest setting there is on the way, ramps apart, peak to peak [V]."""
+        return self.amplitude_vpp
+
+    @property
+    def level_text(self) -> str:
+        """How strongly the base is driven, in words."""
+        return f"{self.amplitude_vpp:g} Vpp"
+
+    def level_at(self, frequency_hz: float) -> LevelAtBase:
+        """Say what decides the motion of the base while a frequency of the band is played: the setting."""
+        del frequency_hz
+        return RelativeSetting(1.0)
+
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """List frequencies [Hz] and amplitudes of the base's acceleration [m/s2] that feedback will hold."""
+        return iter(())
+
+    @property
+    @abstractmethod
+    def band_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency that is played; around a single one an octave to either side [Hz]."""
+
+    @property
+    def approach(self) -> Approach:
+        """How the specimen comes to each frequency: led by what moves through them, and else from rest."""
+        return Approach.REST
+
+    @property
+    def glide_step_s(self) -> float | None:
+        """Time at one frequency, where the drive moves on without a pause [s]; None where it does not."""
+        return None
+
+    @property
+    def own_sweep_s(self) -> float | None:
+        """Time of a sweep that the generator makes by itself [s]; None where it makes none."""
+        return None
+
+    @property
+    def lead_in_s(self) -> float:
+        """Time on the way to what is to be measured, along a branch [s]."""
+        return 0.0
+
+    def turned(self, direction: Direction) -> Self | None:
+        """Give the same in a direction; None where the excitation has none of its own, or not this one."""
+        del direction
+        return None
+
+    def led(self, way: tuple[LeadIn, ...], lead_s: float) -> tuple[Self, LeadIn] | None:
+        """Give the same at the end of a way, and the tone that goes on it for the next; None without ways."""
+        del way, lead_s
+        return None
+
+    @property
+    @abstractmethod
+    def playing_s(self) -> float:
+        """Time of all steps, settling included, ramps not [s]; with feedback the longest it may take."""
+
+    @property
+    def stretches(self) -> int:
+        """How often the drive rises out of silence: once for sines, once for every waveform of noise."""
+        return 1
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The highest frequency that is meant to be there; what a converter must be able to follow [Hz]."""
+        return self.band_hz[1]
+
+    def shown_steps(self) -> Iterator[Step]:
+        """List what a preview shows: all steps, unless less says as much."""
+        return self.steps()
+
+    def preview(self, sample_rate_hz: float) -> SignalPreview:
+        """Show what will be played, before anything moves.
+
+        Raises ConfigurationError when ``sample_rate_hz`` is too low to show the highest frequency.
+        """
+        return signal_preview(
+            self.shown_steps(),
+            self.amplitude_vpp,
+            sample_rate_hz,
+            self.highest_frequency_hz,
+            self.playing_s,
+        )
+
+
+class FixedSine(AbstractExcitation):
+    """A sine whose frequency stays."""
+
+    frequency_hz: FrequencyHz
+    """Frequency of the sine [Hz]."""
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """An octave to either side [Hz]."""
+        return around(self.frequency_hz)
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The frequency itself [Hz]."""
+        return self.frequency_hz
+
+
+class AbstractFeedback(AbstractExcitation):
+    """An excitation whose next step depends on what was measured: `vibench.acquisition.control` conducts it.
+
+    Its ``steps`` are what it is expected to play, waits left out: for previews and for whoever lists
+    what will be recorded. ``amplitude_vpp`` is the largest setting that it may use.
+    """
+
+    @property
+    @abstractmethod
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """Levels of the base to be held, in the order played; none to play ``amplitude_vpp`` as it is."""
+
+    @property
+    def level_text(self) -> str:
+        """The levels, and the setting that they may take."""
+        most = super().level_text
+        words = [level.text for level in self.held_levels]
+        return f"base held at {', '.join(words)}, at most {most}" if words else most
+
+    def level_at(self, frequency_hz: float) -> LevelAtBase:
+        """Give the highest level that is held; without one the setting is played."""
+        accelerations = [level.acceleration_at(frequency_hz) for level in self.held_levels]
+        return HeldAcceleration(max(accelerations)) if accelerations else RelativeSetting(1.0)
+
+    def held_accelerations(self) -> Iterator[tuple[float, float]]:
+        """Give the highest level at every sine that it is expected to play."""
+        for step in self.steps():
+            match step.play:
+                case Tone(frequency_hz):
+                    match self.level_at(frequency_hz):
+                        case HeldAcceleration(acceleration):
+                            yield frequency_hz, acceleration

@@ -1,0 +1,68 @@
+"""Sines one after the other, each recorded when its motion has settled, whatever kind of motion that is."""
+
+from collections.abc import Iterator
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, PositiveFloat, model_validator
+
+from ..recording import SegmentLabel
+from .feedback import BaseLevel, JumpSearch, Settling
+from .plan import AbstractFeedback
+from .stepped_sine import FrequencySteps
+from .steps import Segment, Step, Tone
+
+MOST_SETTLED_STEPS = 600
+"""Four events a step, and as many again for searches, fit into a recording's table."""
+GLIDE_TONE_S = 0.1
+"""Time at each tone that is only passed on the way to the next frequency [s]."""
+
+
+class SettledSine(FrequencySteps, AbstractFeedback):
+    """A stepped sine that waits as long as the motion needs, keeps to its branch and localises jumps.
+
+    The phase goes on from one frequency to the next. What is found at each step (period or none,
+    waiting time, level of the base, where the branch came from) stands in the recording beside it.
+    """
+
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP, SegmentLabel.SEARCH)
+    kind: Literal["settled_sine"] = "settled_sine"
+    settling: Settling = Settling()
+    base_level: BaseLevel | None = None
+    """Level of the base to be held; without it ``amplitude_vpp`` is played as it is."""
+    jumps: JumpSearch | None = None
+    """Look for jumps between steps, and localise them; without it they are only crossed."""
+    glide_step_hz: PositiveFloat = 0.5
+    """On its way from one frequency to the next the tone takes no larger steps than this [Hz]."""
+    search_s: float = Field(default=120.0, gt=0, le=7200)
+    """Longest time spent on one jump; what is bracketed by then is kept [s]."""
+
+    @model_validator(mode="after")
+    def _events_have_room(self) -> Self:
+        count = sum(len(frequencies_hz) for _, frequencies_hz in self.passes())
+        if count > MOST_SETTLED_STEPS:
+            raise ValueError(
+                f"the plan has {count} settled steps; one recording notes what is found at "
+                f"{MOST_SETTLED_STEPS} at most: widen the grid or split the measurement"
+            )
+        return self
+
+    @property
+    def held_levels(self) -> tuple[BaseLevel, ...]:
+        """The one level, or none."""
+        return () if self.base_level is None else (self.base_level,)
+
+    @property
+    def playing_s(self) -> float:
+        """All steps with the longest waits, and all searches [s]."""
+        passes = sum(1 for _ in self.passes())
+        steps_s = len(self.rising_hz) * (self.settling.longest_wait_s + self.record_s)
+        glides = (self.rising_hz[-1] - self.rising_hz[0]) / self.glide_step_hz + len(self.rising_hz)
+        searches = 0 if self.jumps is None else self.jumps.most_searches
+        return passes * (steps_s + glides * GLIDE_TONE_S + searches * self.search_s)
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every frequency of the list, without its wait, at the largest setting."""
+        for direction, frequencies_hz in self.passes():
+            for frequency_hz in frequencies_hz:
+                segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
+                yield Step(Tone(frequency_hz), 0.0, self.record_s, segment)

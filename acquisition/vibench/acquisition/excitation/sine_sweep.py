@@ -1,0 +1,207 @@
+"""A sine whose frequency moves slowly through a band, in steps too small to notice."""
+
+from collections.abc import Iterator
+from enum import StrEnum
+from math import ceil
+from typing import ClassVar, Literal, Self
+
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+
+from ..instruments import Spacing, Sweep
+from ..recording import SegmentLabel
+from .base_level import RelativeSetting
+from .direction import Approach, Direction
+from .plan import AbstractExcitation, Family, FrequencyHz
+from .steps import Segment, Step, Tone
+
+
+class Hold(StrEnum):
+    """Which motion of the base stays about constant along a sweep, on a shaker that drives a mass.
+
+    Above its suspension resonance a shaker turns voltage into acceleration. What is held is only as
+    constant as that: what the base really did is in the recording.
+    """
+
+    ACCELERATION = "acceleration"
+    """The amplitude setting stays as it is."""
+    VELOCITY = "velocity"
+    """The setting grows in proportion to frequency."""
+    DISPLACEMENT = "displacement"
+    """The setting grows with the square of frequency: the base displacement of the paper's model."""
+
+    @property
+    def power(self) -> int:
+        """Power of the frequency that the amplitude setting follows."""
+        return {Hold.ACCELERATION: 0, Hold.VELOCITY: 1, Hold.DISPLACEMENT: 2}[self]
+
+
+class SweptBy(StrEnum):
+    """What moves the frequency."""
+
+    COMPUTER = "computer"
+    """In steps, on any generator."""
+    GENERATOR = "generator"
+    """Its own sweep, without steps, where it makes one; it begins with a trigger."""
+
+
+MOST_SWEEP_STEPS = 1_000_000
+"""A day in the usual steps of a tenth of a second."""
+
+
+class MovingSine(AbstractExcitation):
+    """A sine sweep, up or down, that the computer steps through.
+
+    Each step plays the mean frequency of the ideal sweep over its time, so that at the end of every
+    step the phase is the ideal sweep's. What the generator really played, and when, is in the
+    recorded drive.
+    """
+
+    family: ClassVar[Family] = Family.SWEEP
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.SWEEP,)
+    start_hz: FrequencyHz
+    """Frequency at the beginning [Hz]; above ``stop_hz`` for a sweep downwards."""
+    stop_hz: FrequencyHz
+    """Frequency at the end [Hz]."""
+    duration_s: PositiveFloat
+    """Time from start to stop [s]."""
+    spacing: Spacing = Spacing.LINEAR
+    """How the frequency moves with time."""
+    step_s: PositiveFloat = 0.1
+    """Time at one frequency [s]; the last step may be shorter."""
+
+    @model_validator(mode="after")
+    def _sweep_moves(self) -> Self:
+        if self.start_hz == self.stop_hz:
+            raise ValueError(
+                f"start_hz and stop_hz are both {self.start_hz:g}, but a sweep moves; "
+                "use a dwell for one frequency"
+            )
+        if self.step_s > self.duration_s:
+            raise ValueError(
+                f"step_s = {self.step_s:g} is longer than the whole sweep of {self.duration_s:g} s; "
+                "give a shorter step"
+            )
+        if self.duration_s / self.step_s > MOST_SWEEP_STEPS:
+            raise ValueError(
+                f"a sweep of {self.duration_s:g} s in steps of {self.step_s:g} s takes "
+                f"{self.duration_s / self.step_s:.3g} of them, allowed are {MOST_SWEEP_STEPS}; give a longer "
+                "step_s"
+            )
+        return self
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """The two ends, the lower one first [Hz]."""
+        return min(self.start_hz, self.stop_hz), max(self.start_hz, self.stop_hz)
+
+    @property
+    def glide_step_s(self) -> float | None:
+        """The step of the sweep [s]."""
+        return self.step_s
+
+    @property
+    def approach(self) -> Approach:
+        """From the side on which the sweep starts."""
+        return Approach.UP if self.start_hz < self.stop_hz else Approach.DOWN
+
+    def turned(self, direction: Direction) -> Self | None:
+        """Go from the lower end to the upper one, or back; a sweep does not turn on its way."""
+        low_hz, high_hz = self.band_hz
+        match direction:
+            case Direction.UP:
+                return self.model_copy(update={"start_hz": low_hz, "stop_hz": high_hz})
+            case Direction.DOWN:
+                return self.model_copy(update={"start_hz": high_hz, "stop_hz": low_hz})
+            case _:
+                return None
+
+    def cycles(self, time_s: float) -> float:
+        """Cycles of the ideal sweep since its start, in closed form."""
+        return self.course.cycles(time_s)
+
+    @property
+    def course(self) -> Sweep:
+        """The ideal sweep."""
+        return Sweep(self.start_hz, self.stop_hz, self.duration_s, self.spacing)
+
+    def mean_steps(self) -> Iterator[tuple[float, float]]:
+        """Give mean frequency [Hz] and duration [s] of each step, in the order of time."""
+        # 1e-9 keeps a duration that is a whole number of steps, but for rounding, from growing a sliver.
+        count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
+        for number in range(count):
+            begin_s = number * self.step_s
+            end_s = min(begin_s + self.step_s, self.duration_s)
+            yield (self.cycles(end_s) - self.cycles(begin_s)) / (end_s - begin_s), end_s - begin_s
+
+    def segment_with(self, held: str) -> Segment:
+        """Name the recorded sweep, and what is held along it."""
+        numbers = self.model_dump(include={"start_hz", "stop_hz", "duration_s", "step_s"})
+        return Segment(SegmentLabel.SWEEP, {**numbers, "spacing": self.spacing.value, "hold": held})
+
+
+class SineSweep(MovingSine):
+    """A sine sweep at an amplitude setting that follows a power of the frequency."""
+
+    kind: Literal["sine_sweep"] = "sine_sweep"
+    hold: Hold = Hold.ACCELERATION
+    """What stays constant; ``amplitude_vpp`` is then the setting at the highest frequency."""
+    settle_s: NonNegativeFloat = 3.0
+    """Wait before the sweep starts, close to ``start_hz``, until the transient has died out [s]."""
+    swept_by: SweptBy = SweptBy.COMPUTER
+    """What moves the frequency; ``step_s`` is the computer's."""
+
+    @model_validator(mode="after")
+    def _generator_holds_its_setting(self) -> Self:
+        if self.swept_by is SweptBy.GENERATOR and self.hold is not Hold.ACCELERATION:
+            raise ValueError(
+                f"hold = {self.hold.value!r} changes the amplitude on the way, and a generator that sweeps "
+                "by itself keeps its setting; use swept_by = 'computer', or hold = 'acceleration'"
+            )
+        return self
+
+    @property
+    def own_sweep_s(self) -> float | None:
+        """Time of a sweep that the generator makes [s]; None where the computer steps."""
+        return self.duration_s if self.swept_by is SweptBy.GENERATOR else None
+
+    @property
+    def glide_step_s(self) -> float | None:
+        """The step of the sweep [s]; a generator's own has none."""
+        return self.step_s if self.swept_by is SweptBy.COMPUTER else None
+
+    @property
+    def lowest_amplitude_vpp(self) -> float:
+        """The setting at the lowest frequency [V]."""
+        return self.amplitude_vpp * self.level(self.band_hz[0])
+
+    def level(self, frequency_hz: float) -> float:
+        """Amplitude at a frequency as a fraction of ``amplitude_vpp``."""
+        return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
+
+    def level_at(self, frequency_hz: float) -> RelativeSetting:
+        """Give the setting, as it follows the frequency."""
+        return RelativeSetting(self.level(frequency_hz))
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and sweep [s]."""
+        return self.settle_s + self.duration_s
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every ``step_s``, all of one segment; or the whole sweep as one."""
+        if self.swept_by is SweptBy.GENERATOR:
+            segment = self.segment_with(self.hold.value)
+            return iter((Step(self.course, self.settle_s, self.duration_s, segment),))
+        return self.loudest_steps()
+
+    def loudest_steps(self) -> Iterator[Step]:
+        """One step for every ``step_s``, whatever moves the frequency."""
+        segment = self.segment_with(self.hold.value)
+        settle_s = self.settle_s
+        for mean_hz, duration_s in self.mean_steps():
+            yield Step(Tone(mean_hz, self.level(mean_hz)), settle_s, duration_s, segment)
+            settle_s = 0.0
+
+    def shown_steps(self) -> Iterator[Step]:
+        """Show the whole sweep, without the wait before it."""
+        return (Step(step.play, 0.0, step.record_s, step.segment) for step in self.steps())

@@ -1,0 +1,138 @@
+"""Sines one after the other, each settled before it is recorded: the slow, exact way through a band."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+from math import floor
+from typing import ClassVar, Literal, Self
+
+from pydantic import NonNegativeFloat, PositiveFloat, model_validator
+
+from ..host.toml_file import FrozenModel
+from ..recording import SegmentLabel
+from .direction import Approach, Direction
+from .plan import AbstractExcitation, Family, FrequencyHz, around
+from .steps import Segment, Step, Tone
+
+MOST_STEPS = 4000
+"""What the table of segments of one recording holds, with room for the ramps and the check."""
+
+
+class FrequencyGrid(FrozenModel):
+    """Frequencies at equal distances."""
+
+    start_hz: FrequencyHz
+    stop_hz: FrequencyHz
+    """The last frequency, if the steps land on it [Hz]."""
+    step_hz: PositiveFloat
+
+    @model_validator(mode="after")
+    def _grid_rises(self) -> Self:
+        if self.stop_hz < self.start_hz:
+            raise ValueError(
+                f"stop_hz = {self.stop_hz:g} is below start_hz = {self.start_hz:g}; "
+                "give the grid from low to high and choose the way through it with direction"
+            )
+        steps = (self.stop_hz - self.start_hz) / self.step_hz + 1
+        if steps > 2 * MOST_STEPS:
+            # Before any list of them is made: a wrong step could ask for millions.
+            raise ValueError(
+                f"the grid has {steps:.6g} steps; one recording holds at most {MOST_STEPS}: widen step_hz or "
+                "split the measurement"
+            )
+        return self
+
+    @property
+    def values_hz(self) -> tuple[float, ...]:
+        """The frequencies, rising [Hz]."""
+        # 1e-9: a stop that the steps reach but for rounding belongs to the grid.
+        count = floor((self.stop_hz - self.start_hz) / self.step_hz + 1e-9) + 1
+        return tuple(self.start_hz + number * self.step_hz for number in range(count))
+
+
+class FrequencySteps(AbstractExcitation):
+    """A list of frequencies and the way through it; each is recorded as its own segment."""
+
+    family: ClassVar[Family] = Family.STEPPED
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.STEP,)
+    frequencies_hz: tuple[FrequencyHz, ...] = ()
+    """Rising [Hz]; or give ``grid``."""
+    grid: FrequencyGrid | None = None
+    """Frequencies at equal distances; or give ``frequencies_hz``."""
+    direction: Direction = Direction.UP
+    record_s: PositiveFloat = 1.0
+    """Time recorded at every frequency [s]."""
+
+    @model_validator(mode="after")
+    def _one_rising_list(self) -> Self:
+        if bool(self.frequencies_hz) == (self.grid is not None):
+            raise ValueError("give either frequencies_hz or grid, and not both")
+        for low, high in pairwise(self.frequencies_hz):
+            if high <= low:
+                raise ValueError(
+                    f"frequencies_hz has {high:g} after {low:g}; "
+                    "list every frequency once, rising, and choose the way through it with direction"
+                )
+        count = sum(len(frequencies_hz) for _, frequencies_hz in self.passes())
+        if count > MOST_STEPS:
+            raise ValueError(
+                f"the plan has {count} steps; one recording holds at most {MOST_STEPS}: "
+                "widen the grid or split the measurement"
+            )
+        return self
+
+    @property
+    def rising_hz(self) -> tuple[float, ...]:
+        """All frequencies, rising [Hz]."""
+        return self.frequencies_hz if self.grid is None else self.grid.values_hz
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """The first and the last of the list, or an octave to either side of its only one [Hz]."""
+        low_hz, *_, high_hz = (*self.rising_hz, self.rising_hz[-1])
+        return (low_hz, high_hz) if low_hz < high_hz else around(high_hz)
+
+    @property
+    def approach(self) -> Approach:
+        """From the side on which the first way through the list begins."""
+        first, _ = next(self.passes())
+        return Approach.UP if first == Direction.UP.value else Approach.DOWN
+
+    def turned(self, direction: Direction) -> Self:
+        """Go through the list in a direction."""
+        return type(self).model_validate({**self.model_dump(exclude_unset=True), "direction": direction})
+
+    @property
+    def highest_frequency_hz(self) -> float:
+        """The highest frequency of the list [Hz]."""
+        return self.rising_hz[-1]
+
+    def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give each way through the list: its direction, and its frequencies in the order played [Hz]."""
+        return self.direction.ways(self.rising_hz)
+
+
+class SteppedSine(FrequencySteps):
+    """A list of frequencies; each is played until it has settled, then recorded as its own segment.
+
+    The phase goes on from one frequency to the next and the amplitude stays, so that the specimen
+    keeps to its branch.
+    """
+
+    kind: Literal["stepped_sine"] = "stepped_sine"
+    settle_s: NonNegativeFloat = 3.0
+    """Wait at every frequency until the transient has died out [s]."""
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and recording of all steps [s]."""
+        passes = sum(1 for _ in self.passes())
+        return passes * len(self.rising_hz) * (self.settle_s + self.record_s)
+
+    def steps(self) -> Iterator[Step]:
+        """One step for every frequency, in the order of time."""
+        for direction, frequencies_hz in self.passes():
+            for frequency_hz in frequencies_hz:
+                # The direction keeps the turning point of a way there and back
+                # from being one segment.
+                segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
+                yield Step(Tone(frequency_hz), self.settle_s, self.record_s, segment)

@@ -1,0 +1,108 @@
+"""Gaussian noise that never repeats, made on demand for an analogue output."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
+
+from ..recording import SegmentLabel
+from .band_noise import BandNoise
+from .steps import Samples, Segment, Step, Stream
+
+CREST_FACTOR = 4.5
+"""Half the amplitude setting over the rms value. A Gaussian value passes 4.5 standard deviations about
+seven times in a million; those few are cut to the range, which no spectrum shows."""
+CHUNK = 4096
+"""Random numbers drawn with one key: small enough to start anywhere, large enough to be quick."""
+TRANSITION_WIDTH = 0.5
+"""Width of the filter's edges over the band's lower edge; the -6 dB points are the band's edges."""
+HAMMING_WIDTH = 3.3
+"""Taps times transition width over sample rate of a Hamming-windowed filter (Oppenheim and Schafer,
+Discrete-Time Signal Processing, 3rd ed., table 7.2)."""
+PREVIEW_S = 10.0
+"""How much of a long noise a preview shows [s]."""
+
+
+@dataclass(frozen=True)
+class GaussianBand:
+    """A stationary Gaussian signal between two frequencies whose every sample follows from a seed."""
+
+    band_start_hz: float
+    band_stop_hz: float
+    seed: int
+
+    @property
+    def crest_factor(self) -> float:
+        """Full range over rms."""
+        return CREST_FACTOR
+
+    def samples(self, first: int, count: int, sample_rate_hz: float) -> Samples:
+        """Make samples ``first`` to ``first + count - 1``, -1 to 1: the same however they are asked for."""
+        from scipy.signal import oaconvolve  # noqa: PLC0415 - half a second, which `vibench stop` need not wait
+
+        taps = _taps(self.band_start_hz, self.band_stop_hz, sample_rate_hz)
+        # White noise runs ahead of the first sample by the length of the filter, so that the signal
+        # is stationary from its first sample on.
+        white = self._white(first, count + len(taps) - 1)
+        shaped = np.asarray(oaconvolve(white, taps, mode="valid"))
+        return np.clip(shaped / CREST_FACTOR, -1.0, 1.0)
+
+    def _white(self, first: int, count: int) -> Samples:
+        chunks = range(first // CHUNK, (first + count - 1) // CHUNK + 1)
+        numbers = np.concatenate([self._chunk(chunk) for chunk in chunks])
+        start = first - chunks[0] * CHUNK
+        return numbers[start : start + count]
+
+    def _chunk(self, number: int) -> Samples:
+        key = np.random.SeedSequence(self.seed, spawn_key=(number,))
+        return np.random.Generator(np.random.PCG64(key)).standard_normal(CHUNK)
+
+
+@lru_cache(maxsize=8)
+def _taps(band_start_hz: float, band_stop_hz: float, sample_rate_hz: float) -> Samples:
+    half = int(np.ceil(HAMMING_WIDTH * sample_rate_hz / (TRANSITION_WIDTH * band_start_hz) / 2))
+    band = [band_start_hz, band_stop_hz]
+    from scipy.signal import firwin  # noqa: PLC0415 - as above
+
+    taps = firwin(2 * half + 1, band, pass_zero=False, fs=sample_rate_hz, window="hamming")
+    # White noise of variance 1 comes out with the sum of squares of the taps: make that 1.
+    return np.asarray(taps / np.sqrt(np.sum(taps**2)))
+
+
+class StreamedNoise(BandNoise):
+    """Band-limited Gaussian noise of any length, by an analogue output beside the generator.
+
+    The rms value is the amplitude setting over twice the crest factor of 4.5. Edges are -6 dB points.
+    """
+
+    result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.NOISE,)
+    kind: Literal["streamed_noise"] = "streamed_noise"
+    settle_s: NonNegativeFloat = 3.0
+    """Wait until the transient has died out [s]."""
+    duration_s: PositiveFloat
+    """Time recorded after settling [s]."""
+    seed: int = Field(default=1, ge=0)
+    """The same seed gives the same noise, on any machine with the same numpy."""
+
+    @property
+    def source(self) -> GaussianBand:
+        """The signal itself."""
+        return GaussianBand(self.band_start_hz, self.band_stop_hz, self.seed)
+
+    @property
+    def playing_s(self) -> float:
+        """Settling and recording [s]."""
+        return self.settle_s + self.duration_s
+
+    def steps(self) -> Iterator[Step]:
+        """One step."""
+        band = {"band_start_hz": self.band_start_hz, "band_stop_hz": self.band_stop_hz}
+        yield Step(Stream(self.source), self.settle_s, self.duration_s, Segment(SegmentLabel.NOISE, band))
+
+    def shown_steps(self) -> Iterator[Step]:
+        """Show the first seconds of it."""
+        for step in self.steps():
+            yield Step(step.play, 0.0, min(self.duration_s, PREVIEW_S), step.segment)

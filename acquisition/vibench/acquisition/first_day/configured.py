@@ -1,0 +1,171 @@
+"""A configuration from a template and answers: asked one by one, looked up where the computer can see."""
+
+import re
+import tomllib
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from ..bench.instrument_list import InstrumentList
+from ..errors import AcquisitionError, ConfigurationError
+from ..host.schema import schema_line
+from ..host.shipped import shipped_folder
+from ..host.toml_file import complaints, from_toml
+from ..instruments import PlugInKind, plug_in_names
+from ..rig import GeneratorConfig, Rig, generator_driver, load_rig
+from .questions import QUESTIONS, Found, Question
+from .template import place_of, value_in, with_answer
+
+Ask = Callable[[Question, Sequence[str], str], str]
+"""Asks a question, with what was found for it and what the template holds; empty: as it is."""
+Refuse = Callable[[ConfigurationError], None]
+
+
+def refuse_at_once(error: ConfigurationError) -> None:
+    """Raise what is wrong: nobody is there who could be asked again."""
+    raise error
+
+
+_SCHEMA = re.compile(r"^#:schema .*\n")
+_USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECASE)
+
+
+def found_choices(question: Question, seen: InstrumentList) -> tuple[str, ...]:
+    """Give what the computer sees for a question."""
+    match question.found:
+        case Found.GENERATORS:
+            return seen.visa_resources
+        case Found.CONVERTERS:
+            return tuple(device.name for device in seen.daq_devices)
+        case None:
+            return ()
+
+
+def configured(
+    template: Path,
+    target: Path,
+    seen: InstrumentList,
+    ask: Ask,
+    note: str,
+    questions: Sequence[Question] = QUESTIONS,
+    refuse: Refuse = refuse_at_once,
+) -> Rig:
+    """Ask everything, write the configuration, and read it back.
+
+    Comments of ``template`` say CONFIRM where nobody has looked yet. ``note`` says who answers, and when; it
+    stands behind each answer. ``refuse`` receives what is wrong with an answer, or with all together; when it
+    returns, they are asked again.
+
+    Raises ConfigurationError when ``target`` exists, or ``refuse`` raises it; nothing is written then.
+    """
+    if target.exists():
+        raise ConfigurationError(f"{target} is there already, and nothing is overwritten; give another name")
+    if not target.absolute().parent.is_dir():
+        raise ConfigurationError(f"{target.absolute().parent} is no folder; make it, or give another place")
+    text = _SCHEMA.sub("", template.read_text(encoding="utf-8"))  # its path is that of the template
+    for question in questions:
+        if len(choices := found_choices(question, seen)) == 1:
+            text = with_answer(text, question.key, choices[0], "the only one seen")
+    while True:
+        for question in questions:
+            text = _answered(text, question, found_choices(question, seen), ask, note, refuse)
+        text = _with_driver(_with_product(text, seen, note), note)
+        try:
+            from_toml(tomllib.loads(text), Rig, target)
+            break
+        except ConfigurationError as error:
+            refuse(error)
+    _write(target, schema_line(load_rig(template), shipped_folder("schemas")) + text)
+    return load_rig(target)
+
+
+def _answered(
+    text: str, question: Question, choices: Sequence[str], ask: Ask, note: str, refuse: Refuse
+) -> str:
+    """Ask until the answer is of its kind and within its bounds; how answers agree is seen at the end."""
+    while answer := ask(question, choices, _held(text, question.key)):
+        try:
+            _require_text(answer, question.key)
+            changed = with_answer(text, question.key, answer, note)
+            _require_within_bounds(changed, question.key)
+        except ConfigurationError as error:
+            refuse(error)
+        else:
+            return changed
+    return text
+
+
+def _require_text(answer: str, key: str) -> None:
+    if not answer.isprintable():
+        raise ConfigurationError(f"{key}: {answer!a} has a letter that cannot be shown; leave it out")
+
+
+def _held(text: str, key: str) -> str:
+    """Show what the template holds; of a number with its source, the number."""
+    written = value_in(text, key)
+    match tomllib.loads(f"held = {written}")["held"] if written else None:
+        case {"value": number}:
+            return str(number)
+        case _:
+            return written.strip('"')
+
+
+def _require_within_bounds(text: str, key: str) -> None:
+    content = tomllib.loads(text)
+    try:
+        Rig.model_validate(content)
+    except ValidationError as error:
+        if wrong := complaints(error, content, place_of(content, key)):
+            raise ConfigurationError(wrong) from error
+    except ArithmeticError as error:
+        raise ConfigurationError(
+            f"{key}: the number is too large, or too small, to be computed with; give another"
+        ) from error
+
+
+def _write(target: Path, text: str) -> None:
+    try:
+        file = target.open("x", encoding="utf-8")
+        try:
+            with file:
+                file.write(text)
+        except OSError:
+            target.unlink()
+            raise
+    except OSError as error:
+        raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error
+
+
+def _with_product(text: str, seen: InstrumentList, note: str) -> str:
+    """Enter the product of the device that was chosen."""
+    device = value_in(text, "daq.device").strip('"')
+    product = next((each.product for each in seen.daq_devices if each.name == device), "")
+    return with_answer(text, "daq.product", product, note) if product else text
+
+
+def _with_driver(text: str, note: str) -> str:
+    """Enter the driver whose instruments have the address that was chosen."""
+    resource = value_in(text, "generator.resource").strip('"')
+    driver = _driver_of(resource)
+    if driver is None:
+        return text
+    if re.search(
+        r"^driver[ \t]*=", text[text.index("[generator]") :].split("\n[", maxsplit=1)[0], re.MULTILINE
+    ):
+        return with_answer(text, "generator.driver", driver, note)
+    return text.replace("[generator]\n", f'[generator]\ndriver = "{driver}"  # {note}\n', 1)
+
+
+def _driver_of(resource: str) -> str | None:
+    found = _USB.match(resource)
+    if found is None:
+        return None
+    ids = int(found.group(1), 0), int(found.group(2), 0)
+    for name in plug_in_names(PlugInKind.GENERATOR):
+        config = GeneratorConfig(driver=name, resource=resource, connected_ohm=1e6, amplitude_limit_vpp=1.0)
+        with suppress(AcquisitionError):  # a broken package of somebody's is no answer
+            if ids in generator_driver(config).describe(config).usb_ids:
+                return name
+    return None

@@ -1,0 +1,289 @@
+"""TOML files: read and validated, or refused with file, key and what is allowed; written to be read back."""
+
+import json
+import reprlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from datetime import date
+from itertools import compress
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from vibench.sim import (
+    FrozenModel as FrozenModel,  # noqa: PLC0414 - every model of a file is validated like a specimen
+    UnreadableTomlError,
+    fault_in_words,
+    toml_table,
+)
+
+from ..errors import ConfigurationError
+from .printable import shortened
+from .schema import FORMAT, VERSION, schema_line
+from .shipped import shipped_folder
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def load_toml(path: Path, model: type[Model]) -> Model:
+    """Read a TOML file as ``model``; what it names by a path is looked for beside it.
+
+    Validators find the file's folder as ``folder`` in their context.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file is missing, is not TOML, or says something the model does not allow.
+
+    """
+    try:
+        content = toml_table(path)
+    except UnreadableTomlError as error:
+        raise ConfigurationError(str(error)) from error
+    return from_toml(content, model, path)
+
+
+def from_toml(content: dict[str, Any], model: type[Model], path: Path) -> Model:
+    """Read what stands, or will stand, in a TOML file as ``model``; see `load_toml`."""
+    content = migrated(content, model.__name__, str(path))
+    return validated(content, model, str(path), path.absolute().parent)
+
+
+MIGRATIONS: dict[tuple[str, int], Callable[[dict[str, Any]], dict[str, Any]]] = {}
+"""Name of a model, version of a file: how its content becomes that of the next version."""
+
+
+def migrated(content: dict[str, Any], model: str, origin: str) -> dict[str, Any]:
+    """Bring the content of a file that says its version up to the present one.
+
+    Raises ConfigurationError when a later vibench wrote it, or what stands there is no version.
+    """
+    written = content.pop(FORMAT, VERSION)
+    if not isinstance(written, int) or isinstance(written, bool) or not 1 <= written <= VERSION:
+        raise ConfigurationError(
+            f"{origin}: {FORMAT} = {_shown(written)} is not a version that this vibench reads, 1 to "
+            f"{VERSION}; a later vibench wrote it: install that one"
+        )
+    for version in range(written, VERSION):
+        if (model, version) in MIGRATIONS:
+            content = MIGRATIONS[model, version](content)
+    return content
+
+
+def validated(content: dict[str, Any], model: type[Model], origin: str, folder: Path | None = None) -> Model:
+    """Validate ``content`` of TOML or JSON as ``model``; paths in it are relative to ``folder``.
+
+    Raises ConfigurationError, which names ``origin`` and the key, when the model does not allow it.
+    """
+    try:
+        return model.model_validate(content, context={"folder": folder})
+    except ValidationError as error:
+        raise ConfigurationError(f"{origin}: {complaints(error, content)}") from error
+    except ArithmeticError as error:
+        raise ConfigurationError(
+            f"{origin}: a number is too large, or too small, to be computed with ({error}); correct it"
+        ) from error
+
+
+MOST_CLAUSES = 5
+"""Faults that one sentence names; further ones are counted."""
+MOST_KEYS = 12
+LONGEST_SENTENCE = 1600
+
+
+Place = tuple[str | int, ...]
+
+
+def complaints(error: ValidationError, content: object, within: Place = ()) -> str:
+    """Say in a clause each what a model did not allow; keys of one fault share theirs.
+
+    Parameters
+    ----------
+    error
+        What the model said.
+    content
+        What it was given: it tells keys of the file from the model's names of kinds of value.
+    within
+        Where to look; nothing is said of the rest.
+
+    """
+    details = [each for each in _faults(error, content) if each["loc"][: len(within)] == within]
+    missing = _key_clause(details, "missing", "is missing: it is required", "are missing: they are required")
+    unknown = _key_clause(
+        details,
+        "extra_forbidden",
+        "is not a known key: check its spelling and unit suffix, or remove it",
+        "are no known keys: check their spelling and unit suffixes, or give another file",
+    )
+    other = [_complaint(each) for each in details if each["type"] not in {"missing", "extra_forbidden"}]
+    if len(other) > MOST_CLAUSES:
+        other = [*other[:MOST_CLAUSES], f"and {len(other) - MOST_CLAUSES} more"]
+    return shortened("; ".join([*other, *missing, *unknown]), LONGEST_SENTENCE)
+
+
+def _faults(error: ValidationError, content: object) -> list[Any]:
+    """Give what is wrong, once: of a key that may hold several kinds of value, for the kind that was meant.
+
+    A value that would be derived from a key with a fault is no fault of its own, nor is a list too short
+    without an item with a fault.
+    """
+    said = error.errors()
+    meant: dict[Place, dict[Place, list[Any]]] = {}
+    for each in said:
+        place = each["loc"]
+        is_short = each["type"] == "too_short"
+        within = [other for other in said if other["loc"][: len(place)] == place and other is not each]
+        if each["type"] == "default_factory_not_called" or (is_short and within):
+            continue
+        is_key = _of_the_file(each, content)
+        cut = is_key.index(False) if False in is_key else len(place)
+        by_keys = {**each, "loc": tuple(compress(place, is_key))}
+        meant.setdefault(place[:cut], {}).setdefault(place[cut : cut + 1], []).append((each, by_keys))
+    return [each for kinds in meant.values() for each in _of_the_nearest(list(kinds.values()))]
+
+
+def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
+    """Give the faults of one kind, by the keys of the file; a single kind is one that the file names."""
+    if len(kinds) == 1:
+        return (each for each, _ in kinds[0])
+    return (by_keys for _, by_keys in max(kinds, key=_nearness))
+
+
+def _of_the_file(fault: Any, content: object) -> list[bool]:
+    """Say which parts of a fault's place are keys of the file; the rest are kinds of value.
+
+    pydantic names a kind after the key that may hold several: ``frequency_hz``, ``Range``, ``step``. A key
+    of the user's own may have the same name.
+    """
+    place, found = fault["loc"], []
+    for number, part in enumerate(place):
+        match content:
+            case Mapping() if part in content:
+                content = content[part]
+                found.append(True)
+            case list() | tuple() if isinstance(part, int) and part < len(content):
+                content = content[part]
+                found.append(True)
+            case _:
+                found.append(fault["type"] == "missing" and number == len(place) - 1)
+    return found
+
+
+def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
+    """Say how near a value comes to a kind: a fault within it, or in its size, is nearer than its type."""
+    return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
+
+
+def _key_clause(details: Sequence[Any], kind: str, of_one: str, of_many: str) -> tuple[str, ...]:
+    keys = [_key(each) for each in details if each["type"] == kind]
+    if len(keys) > MOST_KEYS:
+        keys = [*keys[:MOST_KEYS], f"{len(keys) - MOST_KEYS} more"]
+    match keys:
+        case []:
+            return ()
+        case [key]:
+            return (f"{key} {of_one}",)
+        case _:
+            return (f"{', '.join(keys)} {of_many}",)
+
+
+def _key(detail: Any) -> str:
+    return shortened(".".join(str(part) for part in detail["loc"]), 120) or "the whole file"
+
+
+def _complaint(detail: Any) -> str:
+    reason = shortened(fault_in_words(detail))
+    if not detail["loc"]:
+        return reason
+    return f"{_key(detail)} = {_shown(detail['input'])}: {reason[0].lower()}{reason[1:]}"
+
+
+def _shown(value: object) -> str:
+    longest = 60
+    # Written whole, a list of a million numbers would take longer than all else.
+    match value:
+        case list() | tuple() | dict():
+            text = reprlib.repr(value)
+        case bool():
+            text = str(value).lower()
+        case date():
+            text = value.isoformat()
+        case _:
+            text = repr(value)
+    return text if len(text) <= longest else f"{text[:longest]}..."
+
+
+Scalar = str | bool | int | float
+Value = Scalar | list["Value"] | dict[str, "Value"]
+Table = Mapping[str, Value]
+
+
+def toml_text(model: BaseModel) -> str:
+    """Write ``model`` as TOML: tables for models, arrays of tables for tuples of models.
+
+    Absent values (None) are left out, as TOML has none; floats keep every digit.
+    """
+    content: dict[str, Value] = model.model_dump(mode="json", exclude_none=True)
+    return "\n".join(_table(content, ())).lstrip("\n") + "\n"
+
+
+def save_toml(model: BaseModel, path: Path) -> None:
+    """Write ``model`` to a file, in folders that are made where they are missing.
+
+    Raises
+    ------
+    ConfigurationError
+        When the file cannot be written.
+
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        schema = schema_line(model, shipped_folder("schemas"))
+        path.write_text(schema + toml_text(model), encoding="utf-8")
+    except OSError as error:
+        raise ConfigurationError(
+            f"{path}: cannot be written ({error.strerror}); save it elsewhere"
+        ) from error
+
+
+def _table(content: Table, path: tuple[str, ...]) -> Iterator[str]:
+    nested = {key: value for key, value in content.items() if _is_nested(value)}
+    for key, value in content.items():
+        if key not in nested:
+            yield f"{key} = {_value(value)}"
+    for key, value in nested.items():
+        inner = (*path, key)
+        match value:
+            case dict():
+                yield f"\n[{'.'.join(inner)}]"
+                yield from _table(value, inner)
+            case list():
+                for element in value:
+                    assert isinstance(element, dict), "_is_nested lets through lists of tables only"
+                    yield f"\n[[{'.'.join(inner)}]]"
+                    yield from _table(element, inner)
+
+
+def _is_nested(value: Value) -> bool:
+    match value:
+        case dict():
+            return True
+        case [dict(), *_]:
+            return True
+        case _:
+            return False
+
+
+def _value(value: Value) -> str:
+    match value:
+        case str():
+            # JSON's escapes are TOML's, but for DEL, which only TOML wants escaped.
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return repr(value)
+        case list():
+            return f"[{', '.join(_value(element) for element in value)}]"
+        case dict():
+            return f"{{ {', '.join(f'{key} = {_value(element)}' for key, element in value.items())} }}"

@@ -1,0 +1,132 @@
+"""From converter to recording without a gap: reads blocks, watches them, keeps them, counts the samples."""
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Protocol
+
+from ..errors import LimitExceeded
+from ..excitation.steps import Segment
+from ..instruments import Block, Digitizer, read_block
+from ..recording import EventKind, RecordingState
+
+BLOCK_S = 0.1
+"""Longest time between two checks of the limits and of the switch [s]; ten reads a second suit NI-DAQmx."""
+
+
+class SampleSink(Protocol):
+    """Where a run puts its samples; `recording.writer.RecordingWriter` is one."""
+
+    def append(self, block: Block) -> None:
+        """Hand over the next samples."""
+
+    def log(self, kind: str, text: str, sample: int | None = None) -> None:
+        """Note an event."""
+
+    def begin_segment(self, label: str, **numbers: int | float | str) -> None:
+        """Begin a named range at the next sample."""
+
+    def end_segment(self) -> None:
+        """End the open segment with the last sample handed over."""
+
+    def finish(self, state: RecordingState, reason: str = "") -> Path:
+        """End the recording, and return the finished file."""
+
+
+class AcquisitionLoop:
+    """The recording as it runs. Its clock is the number of samples read: to wait is to read."""
+
+    def __init__(self, digitizer: Digitizer, sink: SampleSink, advance: Callable[[], None]) -> None:
+        """``advance`` is called after every block."""
+        self._advance = advance
+        self._digitizer = digitizer
+        self._sink = sink
+        self._segment: Segment | None = None
+        self._samples = 0
+        self._lost = 0
+        self._due_s = 0.0
+
+    @property
+    def segment(self) -> Segment | None:
+        """The named range that is open."""
+        return self._segment
+
+    @property
+    def samples(self) -> int:
+        """Samples recorded so far."""
+        return self._samples
+
+    @property
+    def lost_samples(self) -> int:
+        """Samples that the converter did not hand over; they are marked in the recording."""
+        return self._lost
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time recorded so far [s]."""
+        return self._samples / self._digitizer.sample_rate_hz
+
+    def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
+        """Read, keep and hand on blocks until ``duration_s`` more have passed, less a lead.
+
+        The end is the sample nearest to the sum of all durations asked for so far: many short
+        stretches that are no whole number of samples do not drift. A lead [s] is read with the next stretch.
+        """
+        rate_hz = self._digitizer.sample_rate_hz
+        self._due_s += duration_s
+        longest = max(1, round(BLOCK_S * rate_hz))
+        # The goal moves when whoever takes the blocks lingers.
+        while self._samples < (goal := round((self._due_s - lead_s) * rate_hz)):
+            yield self._next(min(longest, goal - self._samples))
+
+    @property
+    def waiting_s(self) -> float:
+        """How long ago the last sample that was read was converted [s]."""
+        return self._digitizer.waiting_samples / self._digitizer.sample_rate_hz
+
+    def catch_up(self) -> Iterator[Block]:
+        """Read what waits, and let everything after it come that much later."""
+        # Once: while it is read more comes, and how much is no sign of lateness.
+        waiting = self._digitizer.waiting_samples
+        self._due_s += waiting / self._digitizer.sample_rate_hz
+        longest = max(1, round(BLOCK_S * self._digitizer.sample_rate_hz))
+        while waiting > 0:
+            yield self._next(min(longest, waiting))
+            waiting -= min(longest, waiting)
+
+    def linger(self, duration_s: float) -> Block:
+        """Read and keep one block more than was asked for; everything after it comes that much later."""
+        self._due_s += duration_s
+        return self._next(round(duration_s * self._digitizer.sample_rate_hz))
+
+    def _next(self, samples: int) -> Block:
+        block = read_block(self._digitizer, samples)
+        self._advance()
+        self._sink.append(block)
+        self._lost += block.first_sample - self._samples
+        self._samples = block.first_sample + block.volts.shape[1]
+        return block
+
+    def cut(self) -> None:
+        """Let the next stretch begin now, however much of the last one is missing."""
+        self._due_s = self.elapsed_s
+
+    def enter(self, segment: Segment | None) -> None:
+        """Be inside ``segment`` from the next sample on; an equal one goes on, another one ends."""
+        if segment == self._segment:
+            return
+        if self._segment is not None:
+            self._sink.end_segment()
+        if segment is not None:
+            self._sink.begin_segment(segment.label, **segment.numbers)
+        self._segment = segment
+
+    def log(self, kind: str, text: str) -> None:
+        """Note an event at the next sample."""
+        self._sink.log(kind, text, self._samples)
+
+    def log_limit_trip(self, error: LimitExceeded) -> None:
+        """Note the numbers of a limit that was passed, at the sample where it was."""
+        if error.trip is not None:
+            self._sink.log(EventKind.LIMIT, json.dumps(asdict(error.trip)), error.trip.sample)

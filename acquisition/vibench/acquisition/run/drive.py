@@ -1,0 +1,107 @@
+"""What makes the sound of a run: a function generator, or an analogue output for what never repeats."""
+
+from collections.abc import Iterable, Iterator
+from typing import Protocol
+
+from ..bench.protocol import RunBench
+from ..errors import ConfigurationError
+from ..excitation.steps import Tone
+from ..instruments import LoopBlock
+from ..plan import DriveSource, Measurement, Phase, known_phases, require_played
+from .generator_drive import DeadMan, GeneratorDrive
+from .loop_drive import LoopDrive
+from .stream_drive import StreamDrive
+
+
+class Drive(Protocol):
+    """Plays phases, one after another, while the run reads.
+
+    A drive never waits: it says how long to read before it has something to do again, and samples
+    read are the only clock. What comes next is told beforehand, since some drives write it ahead.
+    """
+
+    @property
+    def drive_source(self) -> DriveSource:
+        """The instrument that plays."""
+
+    @property
+    def pause_s(self) -> float:
+        """Silence between saying what comes after all that was told, and hearing it [s]."""
+
+    @property
+    def coefficients(self) -> tuple[LoopBlock, ...]:
+        """What a real-time controller has measured since the phase began; nothing of other drives."""
+
+    @property
+    def is_commanded(self) -> bool:
+        """Whether each change is a command that takes its time while samples are converted."""
+
+    @property
+    def setting_vpp(self) -> float:
+        """What is played now, as an amplitude setting, peak to peak [V]; 0 in silence."""
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether there is anything to ramp down."""
+
+    def arm(self, coming: Iterable[Phase]) -> None:
+        """Get ready before the digitizer starts: the first of ``coming`` begins with its first sample."""
+
+    def announce(self, coming: Iterable[Phase]) -> None:
+        """Say what comes after everything told before; it begins after `pause_s`."""
+
+    def perform(self, phase: Phase) -> Iterator[float]:
+        """Play a phase; yields how long to read before the next command is due [s]."""
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether what is played goes on by itself while nobody tells more."""
+
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
+        """Break off what was announced, and ramp down within ``ramp_s`` [s]; yields as `perform` does."""
+
+    def cut(self) -> None:
+        """Switch off at once, with a step. Legal at any time."""
+
+    def silence(self) -> None:
+        """Be silent as soon as it goes without a step, and at once when that fails. Legal at any time."""
+
+
+def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
+    """Choose what plays a measurement.
+
+    Raises ConfigurationError when the bench has none.
+    """
+    source = require_played(measurement, bench.rig)
+    if source is not DriveSource.GENERATOR and bench.rig.generator.dead_man_s is not None:
+        raise _without_dead_man(f"{measurement.name} is played by the {source.value}")
+    match source, bench.output, bench.controller:
+        case DriveSource.CONTROLLER, _, controller if controller is not None:
+            return LoopDrive(controller, measurement)
+        case DriveSource.OUTPUT, output, _ if output is not None:
+            return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())
+        case _:
+            return GeneratorDrive(bench.generator, measurement, _dead_man(bench, measurement))
+
+
+def _dead_man(bench: RunBench, measurement: Measurement) -> DeadMan | None:
+    """Give the dead man that the configuration asks for; raises ConfigurationError where it cannot be."""
+    longest_s = bench.rig.generator.dead_man_s
+    if longest_s is None:
+        return None
+    plays = [phase.play for phase in known_phases(measurement) if phase.play is not None]
+    frequencies_hz = {play.frequency_hz if isinstance(play, Tone) else None for play in plays}
+    frequency_hz = frequencies_hz.pop() if len(frequencies_hz) == 1 else None
+    if frequency_hz is None:  # nothing is known of what is decided while it plays
+        raise _without_dead_man(f"{measurement.name} is not a sine of one frequency")
+    if frequency_hz * longest_s < 1:
+        raise _without_dead_man(f"{measurement.name} has a period longer than dead_man_s = {longest_s:g} s")
+    return DeadMan(bench.generator, longest_s)
+
+
+def _without_dead_man(what: str) -> ConfigurationError:
+    return ConfigurationError(
+        f"{what}, and generator.dead_man_s lets only sines of one frequency play, as bursts of the generator "
+        "that are triggered while the run lives. Nothing was played; leave dead_man_s out of the hardware "
+        "configuration for this campaign"
+    )

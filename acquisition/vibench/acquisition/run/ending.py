@@ -1,0 +1,128 @@
+"""How a run ends: the first cause counts; silence, stop and a finished recording follow whatever fails."""
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import AcquisitionError, DataLost, DriveLate, InstrumentError, LimitExceeded, RecordingError
+from ..excitation.steps import Segment
+from ..instruments import Block, Digitizer
+from ..plan import RunState
+from ..recording import RecordingState
+from ..stopping.stop import Cause
+from .acquisition_loop import SampleSink
+from .drive_guard import DriveGuard
+
+
+@dataclass(frozen=True, eq=False)
+class Progress:
+    """Where a run stands after each block, for whoever watches."""
+
+    state: RunState
+    segment: Segment | None
+    """The named range of the recording that the block belongs to."""
+    block: Block
+    elapsed_s: float
+    """Recorded so far [s]."""
+    total_s: float
+    """Planned, from the first sample to the last [s]."""
+    amplitude_vpp: float
+    """Setting of the generator, peak to peak [V]; 0 while its output is off."""
+    frequency_hz: float | None = None
+    """Of the sine that is played; None for anything else."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended."""
+
+    state: RunState
+    reason: str
+    path: Path
+    """The recording."""
+    cause: Cause | None = None
+    """What ended it before its plan did; None for a plan carried out."""
+
+
+class Ending:
+    """What the recording and the caller will be told about the end of a run."""
+
+    def __init__(self) -> None:
+        self.state = RunState.FAILED
+        self.reason = "the run ended without saying why"
+        self._cause: Cause | None = None
+
+    def is_finished(self, lost_samples: int) -> None:
+        """Note that the plan was carried out, and what the converter has lost meanwhile."""
+        lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
+        self.state, self.reason = RunState.FINISHED, f"the plan was carried out{lost}"
+
+    def is_stopped(self, reason: str, cause: Cause) -> None:
+        """Note that somebody ended it."""
+        self.state, self.reason, self._cause = RunState.STOPPED, reason, cause
+
+    def is_failed(self, error: Exception, reason: str) -> None:
+        """Note what went wrong; what had ended the run before stays in front."""
+        if self._cause is None:
+            self.reason, self._cause = reason, _cause_of(error)
+        else:
+            self.reason = f"{self.reason}; then: {reason}"
+        self.state = RunState.FAILED
+
+    def outcome(self, path: Path) -> Outcome:
+        """Tell how it ended."""
+        return Outcome(self.state, self.reason, path, self._cause)
+
+    def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: SampleSink) -> None:
+        """Silence, end sampling, finish the recording: each of them, whatever the others do."""
+        with ExitStack() as leaving:
+            leaving.callback(self._finish, sink)
+            leaving.callback(self._stop_listening, digitizer)
+            leaving.callback(self._silence, guard)
+
+    def _silence(self, guard: DriveGuard) -> None:
+        try:
+            guard.silence()
+        except AcquisitionError as failure:
+            self._add(failure)
+            raise
+
+    def _stop_listening(self, digitizer: Digitizer) -> None:
+        has_failed_already = self.state is RunState.FAILED
+        try:
+            digitizer.stop()
+        except AcquisitionError as failure:
+            self._add(failure)
+            if not has_failed_already:  # else the first failure is the cause, and must stay in front
+                raise
+
+    def _finish(self, sink: SampleSink) -> None:
+        try:
+            sink.finish(_RECORDED_AS[self.state], self.reason)
+        except AcquisitionError as failure:
+            self._add(failure)
+            raise
+
+    def _add(self, failure: AcquisitionError) -> None:
+        if self._cause is None:
+            self._cause = _cause_of(failure)
+        self.state, self.reason = RunState.FAILED, f"{self.reason}; then: {failure}"
+
+
+def _cause_of(error: Exception) -> Cause:
+    match error:
+        case LimitExceeded():
+            return Cause.LIMIT
+        case InstrumentError() | DataLost() | DriveLate():
+            return Cause.INSTRUMENT
+        case RecordingError():
+            return Cause.DISK
+        case _:
+            return Cause.FAULT
+
+
+_RECORDED_AS = {
+    RunState.FINISHED: RecordingState.COMPLETE,
+    RunState.STOPPED: RecordingState.STOPPED,
+    RunState.FAILED: RecordingState.FAILED,
+}

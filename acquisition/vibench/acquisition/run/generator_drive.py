@@ -1,0 +1,277 @@
+"""A function generator as a drive: one command for each change, and a ramp as a staircase of amplitudes."""
+
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from itertools import takewhile
+
+import numpy as np
+
+from ..errors import AcquisitionError, ConfigurationError
+from ..excitation.steps import Play, Stream, Tone, Waveform
+from ..instruments import FunctionGenerator, Sweep
+from ..plan import FEWEST_STAIRS, DriveSource, Measurement, Phase, RunState, half_cosine, stairs
+
+QUIET = 1.25
+"""Level 0 of a waveform that reaches full range, where ramps begin and end, over the generator's smallest
+setting."""
+
+
+GUARD_S = 0.02
+"""A burst is triggered so long after the last one must have ended: what a trigger does to one that still
+plays is not documented for every firmware, and the times of reading vary by some milliseconds [s]."""
+CHECK_MARGIN_S = 0.5
+"""Extra length of a check's burst, for commands and the reading of samples [s]."""
+LITTLE = 0.98
+"""A level is not lowered before the frequency changes where it is lowered by less than this."""
+MOST_CYCLES = 50_000
+_BLIND_S = 0.1
+"""Of a ramp on which no sample is counted."""
+_ROUNDING_S = 1e-9
+
+
+class DeadMan:
+    """A sine as bursts, each triggered while the run lives; without it the drive ends with its burst.
+
+    See docs/decisions/0030-dead-man.md.
+    """
+
+    def __init__(self, generator: FunctionGenerator, longest_s: float) -> None:
+        self._generator = generator
+        self._longest_s = longest_s
+        self._period_s = 0.0
+        self._left_s = 0.0
+
+    def arm(self, frequency_hz: float, check_s: float = 0.0) -> None:
+        """Get ready for bursts of whole periods; the output is off or quiet.
+
+        A check of ``check_s`` is one burst, which may be longer than others: a gap would change its figures.
+        """
+        longest_s = max(self._longest_s, check_s + CHECK_MARGIN_S if check_s else 0.0)
+        cycles = max(1, min(MOST_CYCLES, int(longest_s * frequency_hz)))
+        self._period_s = cycles / frequency_hz + GUARD_S
+        self._generator.arm_burst(cycles)
+
+    def trigger(self) -> None:
+        """Let the next burst begin."""
+        self._generator.trigger()
+        self._left_s = self._period_s
+
+    def pieces(self, duration_s: float) -> Iterator[float]:
+        """Divide a time of playing so that each burst is triggered when the last one has ended."""
+        while duration_s > _ROUNDING_S:
+            piece_s = min(duration_s, self._left_s)
+            yield piece_s
+            duration_s -= piece_s
+            self._left_s -= piece_s
+            if self._left_s <= _ROUNDING_S:
+                self.trigger()
+
+
+class GeneratorDrive:
+    """A `Drive` whose commands take effect when they are given: each phase is commanded as it begins."""
+
+    drive_source = DriveSource.GENERATOR
+    is_commanded = True
+    coefficients = ()
+    pause_s = 0.0
+    """A generator need not know what is coming."""
+
+    def __init__(
+        self, generator: FunctionGenerator, measurement: Measurement, dead_man: DeadMan | None = None
+    ) -> None:
+        self._generator = generator
+        self._dead_man = dead_man
+        self._amplitude_vpp = measurement.excitation.amplitude_vpp
+        self._stairs = stairs(measurement)
+        self._play: Play | None = None
+        self._level = 0.0
+        self._is_on = False
+        self._setting_vpp = 0.0
+        self._setting_takes_s = 0.0
+        self._check_s = 0.0
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether what is played stays by itself: not where it needs a trigger every time, or sweeps."""
+        return self._dead_man is None and not isinstance(self._play, Sweep)
+
+    @property
+    def setting_vpp(self) -> float:
+        """The amplitude setting while the output is on [V]; 0 while it is off."""
+        return self._setting_vpp if self._is_on else 0.0
+
+    @property
+    def is_playing(self) -> bool:
+        """Whether the output is on, and above the quiet level."""
+        return self._is_on and self._level > 0.0
+
+    def arm(self, coming: Iterable[Phase]) -> None:
+        """Note how long the check plays that comes first; the output is off."""
+        checking = takewhile(lambda phase: phase.state is RunState.CHECKING, coming)
+        self._check_s = sum(phase.duration_s for phase in checking if phase.play is not None)
+
+    def announce(self, coming: Iterable[Phase]) -> None:
+        """Nothing to prepare."""
+
+    def perform(self, phase: Phase) -> Iterator[float]:
+        """Give the commands of a phase; between them, yield how long to read until the next one [s]."""
+        match phase.state:
+            case RunState.CHECKING | RunState.ARMED:
+                self._sound(phase.play)
+                yield phase.duration_s
+            case RunState.RAMPING_UP:
+                self._begin(phase.play)
+                yield from self._ramp(phase.end_level, phase.duration_s, self._stairs)
+            case RunState.RAMPING_DOWN:
+                yield from self._ramp(phase.end_level, phase.duration_s, self._stairs)
+            case _:
+                self._begin(phase.play)
+                if phase.state is RunState.RECORDING and isinstance(phase.play, Sweep):
+                    self._generator.trigger()
+                yield from self._pieces(phase.duration_s)
+
+    def ramp_down(self, ramp_s: float) -> Iterator[float]:
+        """Ramp down from the level of now, in stairs that there is time for; yields how long each is [s]."""
+        yield from self._ramp(0.0, ramp_s, self._stairs_within(ramp_s))
+
+    def cut(self) -> None:
+        """Turn the output off, loud as it is."""
+        self._stop()
+
+    def silence(self) -> None:
+        """Ramp down as fast as the generator takes commands, then turn the output off, whatever happens.
+
+        For the ways out on which no samples can be counted. Some 20 commands of a few milliseconds make a
+        ramp that is short but no step; of a slow generator, four.
+        """
+        try:
+            with suppress(AcquisitionError):  # a ramp that fails leaves it to stop(), which never gives up
+                self._ramp_down_blindly()
+        finally:
+            self._stop()
+
+    def _sound(self, play: Play | None) -> None:
+        """Play the check's small tone at once, without a ramp; or nothing."""
+        match play:
+            case Tone(frequency_hz, _):
+                if not self._is_on:
+                    self._setting_vpp = self._full_vpp(play)
+                    self._generator.load_sine(frequency_hz, self._setting_vpp)
+                    self._begin_bursts(play, self._check_s)
+            case _:
+                if self._is_on:
+                    self._stop()
+
+    def _begin(self, play: Play | None) -> None:
+        """Change what is played, from tone to tone without a break in phase; turn the output on if need be.
+
+        Anything but a change from tone to tone must happen at level 0.
+        """
+        if play != self._play:
+            self._load(play)
+        if not self._is_on:
+            self._begin_bursts(play)
+
+    def _begin_bursts(self, play: Play | None, check_s: float = 0.0) -> None:
+        """Turn the output on; where there is a dead man, with the first of its bursts."""
+        match play:
+            case Tone(frequency_hz, _) if self._dead_man is not None:
+                self._dead_man.arm(frequency_hz, check_s)
+                self._start()
+                self._dead_man.trigger()
+            case _:
+                self._start()
+
+    def _pieces(self, duration_s: float) -> Iterator[float]:
+        return iter((duration_s,)) if self._dead_man is None else self._dead_man.pieces(duration_s)
+
+    def _load(self, play: Play | None) -> None:
+        before, self._play = self._play, play
+        match before, play:
+            case Tone() as old, Tone() as new:
+                self._change_tone(old, new)
+            case _, Tone(frequency_hz, _):
+                self._generator.load_sine(frequency_hz, self._due_vpp)
+            case _, Sweep() as sweep:
+                self._generator.load_sweep(sweep, self._due_vpp)
+            case _, Waveform(values, repetition_hz):
+                self._generator.load_waveform(values, repetition_hz, self._due_vpp)
+            case _, Stream() | None:
+                raise ConfigurationError(
+                    "a function generator was given a stream, which it cannot play. Its output stayed as it "
+                    "was; open the bench with an analogue output"
+                )
+        self._setting_vpp = self._due_vpp
+
+    def _change_tone(self, old: Tone, new: Tone) -> None:
+        """Lower the amplitude before the frequency changes, or raise it after: never too loud on the way.
+
+        Where it changes by little, as from step to step of a sweep, the frequency comes first: in its time.
+        """
+        if new.level < LITTLE * old.level:
+            self._generator.set_amplitude(self._due_vpp)
+        if new.frequency_hz != old.frequency_hz:
+            self._generator.set_frequency(new.frequency_hz)
+        if new.level > old.level or LITTLE * old.level <= new.level < old.level:
+            self._generator.set_amplitude(self._due_vpp)
+
+    def _ramp(self, target: float, ramp_s: float, count: int) -> Iterator[float]:
+        begin = self._level
+        for stair in range(1, count + 1):
+            self._set_level(begin + (target - begin) * half_cosine(stair / count))
+            yield from self._pieces(ramp_s / count)
+
+    def _stairs_within(self, ramp_s: float) -> int:
+        """Count the settings that fit into a time, by how long the last took: a stop waits for no more."""
+        made = self._stairs if self._setting_takes_s == 0.0 else int(ramp_s / self._setting_takes_s)
+        return min(self._stairs, max(FEWEST_STAIRS, made))
+
+    def _start(self) -> None:
+        # Before the command: should it fail half-way, the output counts as on.
+        self._is_on = True
+        self._generator.start()
+
+    def _stop(self) -> None:
+        self._generator.stop()
+        if self._is_on and self._dead_man is not None:
+            self._generator.end_burst()
+        self._is_on = False
+        self._level = 0.0
+
+    def _set_level(self, level: float) -> None:
+        self._level = level
+        self._setting_vpp = self._due_vpp
+        began_s = time.monotonic()
+        self._generator.set_amplitude(self._setting_vpp)
+        self._setting_takes_s = time.monotonic() - began_s
+
+    def _ramp_down_blindly(self) -> None:
+        if not self.is_playing:
+            return
+        top, count = self._level, self._stairs_within(_BLIND_S)
+        for stair in range(1, count + 1):
+            self._set_level(top * half_cosine(1 - stair / count))
+
+    @property
+    def _due_vpp(self) -> float:
+        """The setting that belongs to the level [V], for what is played."""
+        planned_vpp = self._full_vpp(self._play)
+        quiet_vpp = min(planned_vpp, self._quiet_vpp())
+        return quiet_vpp + self._level * (planned_vpp - quiet_vpp)
+
+    def _full_vpp(self, play: Play | None) -> float:
+        match play:
+            case Tone(_, level):
+                return self._amplitude_vpp * level
+            case _:
+                return self._amplitude_vpp
+
+    def _quiet_vpp(self) -> float:
+        quiet_vpp = QUIET * self._generator.amplitude_range_vpp[0]
+        match self._play:
+            case Waveform(values):
+                # Generators stretch a waveform to their full range: their setting is then this much lower.
+                return quiet_vpp / float(np.max(np.abs(values)))
+            case _:
+                return quiet_vpp

@@ -1,0 +1,309 @@
+"""Playing phases while every block is read, kept and held to the limits."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from enum import Enum, auto
+
+from ..errors import DriveLate, RunStalled
+from ..excitation.steps import Play, Tone
+from ..instruments import Block, LoopBlock, Sweep
+from ..plan import Phase, RunState
+from ..recording import HOLD_ROOM_S, EventKind
+from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
+from .acquisition_loop import BLOCK_S, AcquisitionLoop
+from .drive import Drive
+from .ending import Progress
+from .glide_watch import GlideWatch, Heard, SweepWatch
+from .limit_monitor import LimitMonitor
+from .silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
+
+HOLD_LONGEST_S = HOLD_ROOM_S
+"""How long a run may be held in all [s]: its recording has room for that."""
+
+
+LATEST = 0.5
+"""How late a glide from step to step may be, in steps."""
+LATE_STEPS = 4
+LATE_FOR_S = 2.0
+"""So many steps in a row, their length and their lateness together, are no moment of a busy computer [s]."""
+LEARNT = 0.05
+"""Least share of a lateness by which the commands of a glide are given earlier from then on; of the first
+ones it is more, so that the mean is learnt."""
+LONGEST_LEAD = 0.25
+"""Of a step."""
+TOLD_CYCLES = 0.1
+"""Behind its plan by more than this at its end, a glide is noted."""
+MOST_MADE_UP = 3.0
+"""Largest change of a frequency that makes up for lost cycles, over the step between two frequencies."""
+LEAST_LEFT = 0.2
+"""Share of a step in which cycles are made up at least."""
+_RAMPS = frozenset({RunState.RAMPING_UP, RunState.RAMPING_DOWN})
+
+
+class _Pace(Enum):
+    """What decides when a phase and its pieces begin."""
+
+    AFTER_THE_COMMAND = auto()
+    """The end of its first command: what settles, settles from then on."""
+    OF_THE_COMMANDS = auto()
+    """The plan, or the end of the last command where that is later: ramps."""
+    OF_THE_PLAN = auto()
+    """The plan, to which a glide must keep."""
+    OF_ITSELF = auto()
+    """Nothing: no command is due, or none takes time."""
+
+
+class Stopped(Exception):
+    """Somebody asked the run to end."""
+
+    def __init__(self, request: StopRequest) -> None:
+        super().__init__(request.reason)
+        self.request = request
+
+
+class PhaseRunner:
+    """The part of a run in which samples pass: phases, holds, and the ramp of an early end.
+
+    After every block it checks the limits and the switch: it raises LimitExceeded, RunStalled or
+    `Stopped`, and it is up to the run to let it ramp down.
+    """
+
+    def __init__(
+        self,
+        drive: Drive,
+        loop: AcquisitionLoop,
+        limit_monitor: LimitMonitor,
+        silence: SilenceWatch,
+        glide: GlideWatch,
+        switch: StopSwitch,
+        total_s: float,
+    ) -> None:
+        self.state = RunState.CHECKING
+        self.loop = loop
+        self._drive = drive
+        self._limit_monitor = limit_monitor
+        self._silence = silence
+        self._glide = glide
+        self._switch = switch
+        self._total_s = total_s
+        self._look: Callable[[Block], None] = self._go_on
+        self._held_s = 0.0
+        self._play: Play | None = None
+        self._lead_s = 0.0
+        self._glides = 0
+        self._late_steps = 0
+        self._lost_cycles = 0.0
+        self._glided_hz = self._planned_hz = 0.0
+
+    @property
+    def coefficients(self) -> tuple[LoopBlock, ...]:
+        """What a real-time controller has measured since the last phase began."""
+        return self._drive.coefficients
+
+    def run_phase(self, phase: Phase, into: list[Block] | None = None) -> Iterator[Progress]:
+        """Play a phase; its samples go ``into`` a list as well, if one is given.
+
+        A phase begins when its command has been carried out, however long that takes. A drive that glides
+        from step to step of one segment keeps to the time of its plan instead, and fails when it cannot.
+        """
+        self._enter(phase.state)
+        pace, commanded = self._pace_of(phase), phase
+        if pace is _Pace.OF_THE_PLAN:
+            commanded = self._made_up(phase, self._require_pace(phase))
+        else:
+            self._tell_lost_cycles()
+            yield from self._read(0.0)
+            self._glided_hz = phase.play.frequency_hz if isinstance(phase.play, Tone) else 0.0
+            self._planned_hz = self._glided_hz
+        if isinstance(phase.play, Sweep) and phase.state is RunState.RECORDING:
+            yield from self._catch_up()  # its first sample is that of the trigger
+        if phase.segment != self.loop.segment:
+            self.loop.enter(None)  # a segment holds nothing of the time in which its successor is commanded
+        waits = self._drive.perform(commanded)
+        wait_s = next(waits, None)
+        if pace is _Pace.AFTER_THE_COMMAND:
+            yield from self._catch_up()
+        self.loop.enter(phase.segment)
+        self._play = phase.play
+        heard = self._heard(phase) if into is None else into
+        while wait_s is not None:
+            yield from self._read(wait_s, heard, self._lead_s if phase.state is RunState.RECORDING else 0.0)
+            if pace is _Pace.OF_THE_COMMANDS:
+                yield from self._catch_up(into)
+            wait_s = next(waits, None)
+        if isinstance(heard, list) and isinstance(phase.play, Tone) and self._may_glide(phase):
+            self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
+
+    def _heard(self, phase: Phase) -> Heard | None:
+        """Give what takes the blocks of a phase whose drive is held against the plan."""
+        if not self._may_glide(phase):
+            return None
+        return SweepWatch(self._glide, phase.play) if isinstance(phase.play, Sweep) else []
+
+    def _may_glide(self, phase: Phase) -> bool:
+        """Whether a phase may be a tone of a sweep that is recorded, command by command."""
+        return self._drive.is_commanded and phase.state is RunState.RECORDING
+
+    def _pace_of(self, phase: Phase) -> "_Pace":
+        if not self._drive.is_commanded:
+            return _Pace.OF_ITSELF
+        if phase.state in _RAMPS:
+            return _Pace.OF_THE_COMMANDS
+        if phase.play == self._play:
+            return _Pace.OF_ITSELF
+        if phase.state is RunState.RECORDING and phase.segment == self.loop.segment:
+            return _Pace.OF_THE_PLAN
+        return _Pace.AFTER_THE_COMMAND
+
+    def _made_up(self, phase: Phase, late_s: float) -> Phase:
+        """Give the phase with the frequency that makes up, within its step, for the cycles lost before it.
+
+        While a command is late the former tone plays on: the drive falls behind its plan by the difference
+        of the two frequencies times that. What a step cannot make up is left to the next.
+        """
+        if not isinstance(phase.play, Tone):
+            return phase
+        planned_hz, left_s = phase.play.frequency_hz, phase.duration_s - late_s
+        self._lost_cycles += (planned_hz - self._glided_hz) * late_s
+        # Of the plan's own step: what was made up before must not grow from one step to the next.
+        most_hz = min(MOST_MADE_UP * abs(planned_hz - self._planned_hz), LEAST_LEFT * planned_hz)
+        wanted_hz = self._lost_cycles / max(left_s, LEAST_LEFT * phase.duration_s)
+        more_hz = min(max(wanted_hz, -most_hz), most_hz) if left_s > 0 else 0.0
+        self._lost_cycles -= more_hz * left_s
+        self._planned_hz, self._glided_hz = planned_hz, planned_hz + more_hz
+        return replace(phase, play=replace(phase.play, frequency_hz=self._glided_hz))
+
+    def _tell_lost_cycles(self) -> None:
+        """Note how far the recorded drive is from its plan at the end of a glide, if it is."""
+        more, self._lost_cycles = self._glide.more_cycles, 0.0
+        self._glide.begin()
+        if abs(more) > TOLD_CYCLES:
+            text = f"the recorded drive ended {more:+.2g} cycles from its plan"
+            self.loop.log(EventKind.LATE, text)
+
+    def _require_pace(self, phase: Phase) -> float:
+        """Learn how late commands are given; note what is beyond half of a step, raise DriveLate in a row.
+
+        Gives how late this one is [s].
+
+        Samples are handed over some milliseconds after they are converted, so that a command that waits for
+        them is late; over a sweep of 200 Hz that would be a cycle or two. The next ones are given earlier.
+        """
+        late_s = self.loop.waiting_s - self._lead_s
+        self._glides += 1
+        learnt_s = self._lead_s + max(1 / self._glides, LEARNT) * late_s
+        self._lead_s = min(max(0.0, learnt_s), LONGEST_LEAD * phase.duration_s)
+        if late_s <= LATEST * phase.duration_s:
+            self._late_steps = 0
+            return late_s
+        self._late_steps += 1
+        at = f"{phase.play.frequency_hz:.6g} Hz" if isinstance(phase.play, Tone) else "one of its steps"
+        text = (
+            f"the drive was {late_s:.3g} s behind its plan at {at}, where a step lasts {phase.duration_s:g} s"
+        )
+        self.loop.log(EventKind.LATE, text)
+        late_for_s = late_s + self._late_steps * phase.duration_s
+        if self._late_steps >= LATE_STEPS and late_for_s > LATE_FOR_S:
+            raise DriveLate(
+                f"{text}, {self._late_steps} times in a row. The run was ended, and what was played is kept; "
+                "give a longer step_s, or shorten generator.settle_s if the instrument allows it"
+            )
+        return late_s
+
+    def _catch_up(self, into: Heard | None = None) -> Iterator[Progress]:
+        for block in self.loop.catch_up():
+            if into is not None:
+                into.append(block)
+            yield self._told(block)
+            self._look(block)
+
+    def ramp_down_early(
+        self, reason: str, level: StopLevel, ramp_s: Callable[[StopLevel], float]
+    ) -> Iterator[Progress]:
+        """Ramp down from wherever the run is, within no limits; a segment that is open stays incomplete.
+
+        A harder stop that is asked for on the way takes over. ``ramp_s`` tells how long each takes [s].
+        The end is silence that was measured; raises InstrumentError when it does not come.
+        """
+        self._look = self._silence.take
+        self.loop.log(EventKind.END, reason)
+        self.loop.cut()
+        self._silence.begin(self.loop.samples)
+        if self._drive.is_playing:
+            self._enter(RunState.RAMPING_DOWN)
+        while level is not StopLevel.OFF and self._drive.is_playing:
+            for wait_s in self._drive.ramp_down(ramp_s(level)):
+                yield from self._read(wait_s)
+                if self._drive.is_commanded:
+                    yield from self._catch_up()
+                if (harder := self._switch.harder_than(level)) is not None:
+                    level = harder.level
+                    self.loop.log(EventKind.END, harder.reason)
+                    break
+        self._drive.cut()
+        yield from self._listened()
+        self.loop.log(EventKind.SILENCE, f"{level.value}: {self._silence.text()}")
+        self._silence.require_silence()
+
+    def _listened(self) -> Iterator[Progress]:
+        """Go on recording until the drive is silent where it is measured."""
+        give_up_s = self.loop.elapsed_s + LONGEST_S
+        yield from self._read(LISTEN_S)
+        while not self._silence.is_silent and self.loop.elapsed_s < give_up_s:
+            yield from self._read(LISTEN_S)
+
+    def _read(self, duration_s: float, into: Heard | None = None, lead_s: float = 0.0) -> Iterator[Progress]:
+        for block in self.loop.read_for(duration_s, lead_s):
+            if into is not None:
+                into.append(block)
+            yield self._told(block)
+            self._look(block)
+            if self._switch.is_holding and self._look == self._go_on:
+                yield from self._held()
+
+    def _held(self) -> Iterator[Progress]:
+        """Stay where the run is, monitored and recorded, until it is resumed or stopped.
+
+        What must be fed cannot stay, and the recording has room for `HOLD_LONGEST_S` in all: then it is
+        ramped down.
+        """
+        if not self._drive.can_hold:
+            source = self._drive.drive_source.value
+            reason = f"what the {source} plays must be fed and cannot be held: it was ramped down"
+            raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
+        before = self.state
+        self._enter(RunState.HELD)
+        while self._switch.is_holding:
+            self._held_s += BLOCK_S
+            if self._held_s > HOLD_LONGEST_S:
+                reason = f"held for {HOLD_LONGEST_S:g} s, the longest that its recording has room for"
+                raise Stopped(StopRequest.by(Cause.OPERATOR, reason))
+            block = self.loop.linger(BLOCK_S)
+            yield self._told(block)
+            self._look(block)
+        self._enter(before)
+
+    def _go_on(self, block: Block) -> None:
+        """Raise what ends the run early: a limit, a stall, or somebody's wish."""
+        self._limit_monitor.require_safe(block)
+        if (request := self._switch.request) is not None:
+            raise RunStalled(request.reason) if request.cause is Cause.FAULT else Stopped(request)
+
+    def _told(self, block: Block) -> Progress:
+        """Note what others want to be noted, and tell where the run stands."""
+        loop = self.loop
+        for text in self._switch.take_marks():
+            loop.log(EventKind.MARK, text)
+        for text in self._switch.take_changes():
+            loop.log(EventKind.SPECIMEN, text)
+            self._limit_monitor.note_change(text, loop.samples)
+        level_vpp = self._drive.setting_vpp
+        frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
+        return Progress(
+            self.state, loop.segment, block, loop.elapsed_s, self._total_s, level_vpp, frequency_hz
+        )
+
+    def _enter(self, state: RunState) -> None:
+        if state is not self.state:
+            self.state = state
+            self.loop.log(EventKind.STATE, state.value)

@@ -1,0 +1,341 @@
+"""Carrying out a measurement: check, ramp up, settle, record, ramp down, and silence whatever happens."""
+
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+
+from ..bench.protocol import RunBench
+from ..control.control_action import Controller, phase_samples
+from ..control.controllers import CONTROLLERS, feedback_controller
+from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded, RunStalled
+from ..host.closed_on_leaving import ClosedOnLeaving
+from ..instruments import Block
+from ..plan import (
+    CHECK_S,
+    DriveSource,
+    Measurement,
+    Phase,
+    RunState,
+    check_phases,
+    drive_source_of,
+    duration_s,
+    known_phases,
+    phases,
+    require_within_limits,
+    run_check_vpp,
+    shortest_ramp_s,
+)
+from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, create_recording
+from ..rig import Channel, KnobSheet
+from ..stopping.memory_reserve import MEMORY_RESERVE
+from ..stopping.stop import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
+from .acquisition_loop import AcquisitionLoop, SampleSink
+from .command_time import require_time_for_commands
+from .drive import Drive, drive_for
+from .drive_guard import DriveGuard
+from .ending import Ending, Outcome, Progress
+from .glide_watch import GlideWatch
+from .limit_monitor import LimitMonitor
+from .low_level_check import LowLevelCheck, judged, require_checkable
+from .phase_runner import PhaseRunner, Stopped
+from .silence_watch import SilenceWatch
+
+
+def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None] | None:
+    """Give the feedback controller of a measurement; None for one whose course is known.
+
+    Raises ConfigurationError when the bench cannot do it: before anything plays.
+    """
+    if measurement.excitation.kind not in CONTROLLERS:
+        return None
+    if drive_source_of(measurement, bench.rig) is DriveSource.OUTPUT:
+        raise ConfigurationError(
+            f"{measurement.name} is decided while it plays, and an analogue output is written ahead of its "
+            "time. Nothing was played; let daq.output play streams only, and connect the function generator"
+        )
+    return feedback_controller(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)
+
+
+def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> RecordingHeader:
+    """Describe the recording of ``planned_s`` that a run of ``measurement`` on ``bench`` is going to make."""
+    rig = bench.rig
+    steps = bench.digitizer.volts_per_count
+    sample_rate_hz = bench.digitizer.sample_rate_hz
+    return RecordingHeader(
+        channels=tuple(_channel(channel, step) for channel, step in zip(bench.channels, steps, strict=True)),
+        sample_rate_hz=sample_rate_hz,
+        expected_samples=round(planned_s * sample_rate_hz),
+        origin=_origin(bench),
+        plan_json=measurement.model_dump_json(),
+        bench_json=rig.model_dump_json(),
+        requested_sample_rate_hz=rig.daq.sample_rate_hz,
+        instruments=bench.identities,
+        confirmations=_confirmations(bench.confirmations),
+        bench_check_json="{}" if bench.last_check is None else bench.last_check.model_dump_json(),
+    )
+
+
+def _origin(bench: RunBench) -> Origin:
+    """Say where samples come from: simulated where the rig is, or an instrument knows that its own are."""
+    told = {identity.origin for identity in bench.identities.values()}
+    simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in told
+    return Origin.SIMULATED if simulated else Origin.REAL
+
+
+def _channel(channel: Channel, volts_per_count: float | None) -> ChannelHeader:
+    calibrated = channel.sensor_calibrated or channel.converter_calibrated
+    return ChannelHeader(
+        role=channel.role.value,
+        physical_channel=channel.physical,
+        quantity=channel.quantity,
+        unit=channel.unit,
+        physical_per_volt=channel.units_per_volt,
+        range_v=channel.range_v,
+        volts_per_count=volts_per_count,
+        coupling=channel.coupling,
+        iepe_current_a=channel.iepe_current_a,
+        sensitivity=1 / channel.units_per_volt,
+        sensitivity_unit=f"V/({channel.unit})",
+        serial=channel.serial,
+        calibration_date=calibrated.isoformat(),
+        delay_s=channel.delay_s,
+        long_name=f"{channel.role.value.replace('_', ' ')} ({channel.sensor})",
+    )
+
+
+def _confirmations(sheet: KnobSheet) -> dict[str, str]:
+    knobs = {f"{knob.instrument} {knob.setting}": knob.value for knob in sheet.knobs}
+    return {"operator": sheet.operator, "confirmed": sheet.confirmed.isoformat(), **knobs}
+
+
+CreateRecording = Callable[[Path, RecordingHeader], SampleSink]
+
+
+class Run(ClosedOnLeaving):
+    """One measurement being carried out: iterate it, and it plays, watches and records, block by block.
+
+    `RunState` has the diagram of its states. However the run ends (plan done, cancelled, limit,
+    failed instrument, full disk, keyboard, abandoned iterator), the generator is silent afterwards
+    and the recording is finished and says why. Leave it through a ``with``, so that an abandoned
+    run ends at once::
+
+        with Run(bench, measurement, path) as run:
+            for progress in run:
+                print(progress.state, progress.elapsed_s)
+
+    Iterating raises LimitExceeded (before anything moves when the plan passes a limit, later when a
+    measured value does), CheckFailed when the bench does not answer at low level as it should, RunStalled
+    when it read no samples for too long, and InstrumentError, DataLost or RecordingError when an instrument
+    or the disk fails.
+    """
+
+    def __init__(
+        self,
+        bench: RunBench,
+        measurement: Measurement,
+        path: Path,
+        bench_check: LowLevelCheck = LowLevelCheck.AT_LOW_LEVEL,
+        create: CreateRecording = create_recording,
+        switch: StopSwitch | None = None,
+    ) -> None:
+        """``switch``: what others hold or end the run by; one of its own if absent."""
+        self._switch = StopSwitch() if switch is None else switch
+        self._bench = bench
+        self._measurement = measurement
+        self._path = path
+        self._bench_check = bench_check
+        self._create = create
+        self._drive: Drive  # chosen when the plan is admitted; nothing plays before
+        self._silence: SilenceWatch  # made when the plan is admitted: the drive is recorded then
+        self._guard: DriveGuard  # likewise
+        self._controller: Controller[None] | None = None
+        self._limit_monitor = LimitMonitor(
+            bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz
+        )
+        self._total_s = duration_s(measurement)
+        self._state = RunState.IDLE
+        self._ending = Ending()
+        self._runner: PhaseRunner | None = None
+        self._blocks = self._carry_out()
+
+    @property
+    def state(self) -> RunState:
+        """Where the run stands."""
+        return self._state if self._runner is None else self._runner.state
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the run ended, once it is finished, stopped or failed."""
+        return self._ending.outcome(self._path)
+
+    @property
+    def switch(self) -> StopSwitch:
+        """What holds or ends the run, within a block; from any thread, and from a signal handler."""
+        return self._switch
+
+    def cancel(self, reason: str = "cancelled") -> None:
+        """Ask the run to ramp down and end, as the operator would.
+
+        Without effect on a run that has ended, or is ramping down for the last time.
+        """
+        self._switch.ask(StopRequest.by(Cause.OPERATOR, reason))
+
+    def close(self) -> None:
+        """End the run if it has not ended: ramp down, silence, finish the recording."""
+        self._blocks.close()
+
+    def __iter__(self) -> Iterator[Progress]:
+        return self._blocks
+
+    def _carry_out(self) -> Generator[Progress, None, None]:
+        sink = self._admitted()
+        loop = AcquisitionLoop(self._bench.digitizer, sink, self._guard.advance)
+        self._runner = PhaseRunner(
+            self._drive,
+            loop,
+            self._limit_monitor,
+            self._silence,
+            GlideWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz),
+            self._switch,
+            self._total_s,
+        )
+        try:
+            yield from self._played_or_stopped(self._runner)
+        except (GeneratorExit, DriveLate, LimitExceeded, RunStalled):
+            raise
+        except KeyboardInterrupt:
+            self._ending.is_stopped("interrupted from the keyboard", Cause.KEYBOARD)
+            raise
+        except Exception as error:
+            if isinstance(error, MemoryError):
+                MEMORY_RESERVE.release()
+            self._ending.is_failed(error, f"{type(error).__name__}: {error}")
+            raise
+        finally:
+            try:
+                with self._guard as guard:
+                    self._ending.leave(guard, self._bench.digitizer, sink)
+            finally:
+                self._runner.state = self._ending.state
+
+    def _played_or_stopped(self, runner: PhaseRunner) -> Iterator[Progress]:
+        """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
+        try:
+            yield from self._played(runner)
+            self._ending.is_finished(runner.loop.lost_samples)
+        except Stopped as stop:
+            self._ending.is_stopped(str(stop), stop.request.cause)
+            yield from self._ramped_down_early(runner, stop.request.level)
+        except (DriveLate, LimitExceeded, RunStalled) as error:
+            self._ending.is_failed(error, str(error))
+            if isinstance(error, LimitExceeded):
+                runner.loop.log_limit_trip(error)
+            cause = Cause.FAULT if isinstance(error, RunStalled) else Cause.LIMIT
+            yield from self._ramped_down_early(runner, LEVELS[cause])
+            raise
+        except GeneratorExit:
+            self._ending.is_stopped("the program that carried it out left it", Cause.PROGRAM)
+            deque(self._ramped_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
+            raise
+
+    def _admitted(self) -> SampleSink:
+        """Refuse what can be refused before anything moves; then begin the recording."""
+        self._state = RunState.CHECKING
+        try:
+            require_checkable(self._bench.channels)
+            require_within_limits(self._measurement, self._bench.rig)
+            self._drive = drive_for(self._bench, self._measurement)
+            self._controller = controller_for(self._bench, self._measurement)
+            self._total_s += self._before_s()
+            if self._drive.is_commanded:
+                self._total_s += require_time_for_commands(self._measurement, self._bench.generator)
+            self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
+            with ExitStack() as refused:
+                self._guard = DriveGuard(self._drive, self._switch, lambda: self._silence.is_heard)
+                refused.enter_context(self._guard)
+                header = run_header(self._bench, self._measurement, self._total_s)
+                sink = self._create(self._path, header)
+                refused.pop_all()
+                return sink
+        except AcquisitionError as error:
+            self._ending.is_failed(error, str(error))
+            self._state = RunState.FAILED
+            raise
+
+    def _played(self, runner: PhaseRunner) -> Iterator[Progress]:
+        loop = runner.loop
+        loop.log(EventKind.PLAYER, self._drive.drive_source.value)
+        match self._bench_check:
+            case LowLevelCheck.AT_LOW_LEVEL:
+                self._begin(check_phases(self._measurement, self._bench.rig))
+                yield from self._checked(runner)
+                self._drive.announce(known_phases(self._measurement))
+                pause_s = self._drive.pause_s
+            case LowLevelCheck.RECENTLY_PASSED:
+                self._begin(known_phases(self._measurement))
+                loop.log(EventKind.CHECK, "left out: the bench was checked shortly before")
+                pause_s = 0.0
+        yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))
+        if self._controller is None:
+            for phase in phases(self._measurement):
+                yield from runner.run_phase(phase)
+        else:
+            yield from _controlled(runner, self._controller)
+        loop.enter(None)
+
+    def _before_s(self) -> float:
+        """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
+        match self._bench_check:
+            case LowLevelCheck.AT_LOW_LEVEL:
+                return CHECK_S + self._drive.pause_s
+            case LowLevelCheck.RECENTLY_PASSED:
+                return 0.0
+
+    def _begin(self, coming: Iterable[Phase]) -> None:
+        """Start sampling, and with it what plays by the digitizer's trigger."""
+        self._guard.begin()
+        self._drive.arm(coming)
+        self._bench.digitizer.start()
+
+    def _checked(self, runner: PhaseRunner) -> Iterator[Progress]:
+        before: list[Block] = []
+        during: list[Block] = []
+        silence, settling, measuring = check_phases(self._measurement, self._bench.rig)
+        yield from runner.run_phase(silence, before)
+        self._silence.learn_hum(phase_samples(before).volts)
+        yield from runner.run_phase(settling)
+        yield from runner.run_phase(measuring, during)
+        figures = judged(
+            self._bench.rig,
+            self._bench.channels,
+            phase_samples(before).volts,
+            phase_samples(during).volts,
+            self._bench.digitizer.sample_rate_hz,
+            run_check_vpp(self._measurement.excitation.amplitude_vpp, self._bench.rig),
+        )
+        runner.loop.log(EventKind.CHECK, figures.text())
+
+    def _ramped_down_early(self, runner: PhaseRunner, level: StopLevel) -> Iterator[Progress]:
+        return runner.ramp_down_early(self._ending.reason, level, self._ramp_s)
+
+    def _ramp_s(self, level: StopLevel) -> float:
+        """How long the ramp of a stop takes [s]."""
+        planned_s = self._measurement.ramp_s
+        return planned_s if level is StopLevel.RAMP else min(planned_s, shortest_ramp_s(self._bench.rig))
+
+
+def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[Progress]:
+    """Carry out actions one by one; the samples of each decide the next."""
+    try:
+        action = next(controller)
+        while True:
+            for note in action.notes:
+                runner.loop.log(note.kind, note.text)
+            blocks: list[Block] = []
+            if action.phase is not None:
+                yield from runner.run_phase(action.phase, blocks)
+            action = controller.send(replace(phase_samples(blocks), coefficients=runner.coefficients))
+    except StopIteration:
+        pass

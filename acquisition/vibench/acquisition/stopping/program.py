@@ -1,0 +1,291 @@
+"""Programs that drive a bench say so in the state folder, and can be stopped from outside while they do."""
+
+import os
+import platform
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from datetime import UTC, datetime
+from pathlib import Path
+from threading import Lock
+from typing import TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from vibench.sim.operating_system.open_file import OpenFile
+from vibench.sim.operating_system.processes import Place, is_process, place_of
+from vibench.sim.operating_system.this import process_start
+
+from ..errors import AcquisitionError
+from .kept_stops import KeptStops, engines_folder
+from .stop import StopLevel
+from .watchdog import Watchdog
+
+Press = Callable[[StopLevel, str], None]
+
+
+class Program(BaseModel):
+    """A program of this user on this computer that drives a bench, or may at any moment."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore")
+
+    pid: int
+    what: str
+    """What it was started for: a campaign's name, or ``"window"``."""
+    started_utc: str
+    process_start: str = ""
+    """When its process began, as the system counts: a number is given again, this pair is not."""
+    computer: str = ""
+    """A state folder may lie in a home that several computers share."""
+
+    @property
+    def place(self) -> Place:
+        """Where it runs: containers and computers may share a state folder."""
+        return place_of(self.process_start)
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether its process lives, answering or not."""
+        if self.place is Place.HERE:
+            return is_process(self.pid, self.process_start)
+        return _is_marked(_path(self))
+
+    @property
+    def was_killed(self) -> bool:
+        """Whether its process ended without taking back its announcement."""
+        return not self.is_alive and _path(self).exists()
+
+
+AnyProgram = TypeVar("AnyProgram", bound=Program)
+
+
+def facts_of_this_process(what: str) -> dict[str, object]:
+    """Give what a program says of itself."""
+    pid = os.getpid()
+    return {
+        "pid": pid,
+        "what": what,
+        "started_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "process_start": process_start(pid) or "",
+        "computer": platform.node(),
+    }
+
+
+def announced_programs(model: type[AnyProgram]) -> tuple[AnyProgram, ...]:
+    """Every living program that is known here by its number and says what ``model`` asks, oldest first.
+
+    What is left of processes that have ended is swept away; nothing else is.
+
+    Raises
+    ------
+    AcquisitionError
+        When there is no state folder and none can be made.
+
+    """
+    found = []
+    for path, told in _announcements(model):
+        is_here = told.computer in ("", platform.node())
+        if told.place is not Place.HERE:
+            continue
+        # A computer may be given another name while a program runs; number and start together are no other's.
+        if told.is_alive and (is_here or told.process_start):
+            found.append(told)
+        elif is_here:
+            with suppress(OSError):
+                path.unlink()
+    _sweep()
+    return tuple(sorted(found, key=lambda each: each.started_utc))
+
+
+def programs_of_other_places() -> tuple[Program, ...]:
+    """Every living program that shares the state folder, in another container or on another computer.
+
+    Raises AcquisitionError as `announced_programs` does.
+    """
+    others = (each for _, each in _announcements(Program) if each.place is not Place.HERE)
+    return tuple(sorted((each for each in others if each.is_alive), key=lambda each: each.started_utc))
+
+
+def _announcements(model: type[AnyProgram]) -> Iterator[tuple[Path, AnyProgram]]:
+    try:
+        paths = sorted(engines_folder().iterdir())  # glob would find nothing in a folder that it may not read
+    except OSError as error:
+        raise AcquisitionError(
+            f"what drives a bench cannot be looked for in the state folder ({error}); name the program's own "
+            "with VIBENCH_STATE_DIR. In an emergency switch the amplifier off by hand"
+        ) from error
+    for path in paths:
+        if path.suffix != ".json" or not path.is_file():  # a pipe would be waited for
+            continue
+        try:
+            yield path, model.model_validate_json(_told(path))
+        except (ValueError, OSError):  # another version's, of another kind, or ended in between
+            continue
+
+
+def _told(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except PermissionError:  # started as root, say: who may write in this folder may stop it all the same
+        pid, start, _ = path.name.split(".")
+        facts = Program(pid=int(pid), what="a program of another user", started_utc="", process_start=start)
+        return facts.model_dump_json().encode()
+
+
+def withdraw(program: Program) -> None:
+    """Take away what a program said of itself; legal where nothing is, or can be taken away."""
+    with suppress(OSError):
+        _path(program).unlink()
+
+
+class _Reached:
+    """All of this process that a stop from outside is to reach: an engine, runs, checks.
+
+    The first of them speaks for the process until it ends, an engine for the runs in it.
+    """
+
+    def __init__(self) -> None:
+        self._inside: list[tuple[Press, Program]] = []
+        self._kept: KeptStops | None = None
+        self._mark: OpenFile | None = None
+        """A lock by which those who do not know this process by its number see that it lives."""
+        self._watchdog: Watchdog | None = None
+        self._changing = Lock()
+
+    def enter(self, entry: tuple[Press, Program]) -> None:
+        """Let one more be reached; raises OSError when the state folder cannot be written."""
+        with self._changing:
+            if not self._inside:
+                announced_programs(Program)  # removes what killed programs have left
+                kept = KeptStops.of_this_process(self._press)
+                try:
+                    self._announce(entry[1])
+                except OSError:
+                    kept.close()
+                    raise
+                self._kept, self._watchdog = kept, Watchdog(self._look, "kept stops")
+            self._inside.append(entry)
+
+    def leave(self, entry: tuple[Press, Program]) -> None:
+        """Let it go; with the last, nothing is looked for any more."""
+        with self._changing:
+            spoke = self._inside[0] is entry
+            self._inside = [each for each in self._inside if each is not entry]
+            if self._inside and spoke:
+                with suppress(OSError):
+                    self._announce(self._inside[0][1])
+            if self._inside:
+                return
+            self._unmark()
+            watchdog, kept, self._watchdog, self._kept = self._watchdog, self._kept, None, None
+        if watchdog is not None and kept is not None:
+            watchdog.close()
+            kept.confirm()
+            kept.close()
+        withdraw(entry[1])
+
+    def _look(self) -> None:
+        """Obey what was put down, and be found: somebody may have emptied the state folder."""
+        kept, inside = self._kept, self._inside
+        if kept is None or not inside:
+            return
+        kept.obey()
+        with suppress(OSError):
+            if not _path(inside[0][1]).exists():
+                with self._changing:
+                    if self._inside:
+                        self._announce(self._inside[0][1])
+            elif self._mark is None:
+                with self._changing:
+                    if self._inside:
+                        self._mark = _marked(_path(self._inside[0][1]))
+
+    def _announce(self, program: Program) -> None:
+        self._unmark()  # Windows replaces no file that is open
+        self._mark = _marked(_write(program))
+
+    def _unmark(self) -> None:
+        mark, self._mark = self._mark, None
+        if mark is not None:
+            mark.close()
+
+    def _press(self, level: StopLevel, reason: str) -> None:
+        for press, _ in tuple(self._inside):
+            press(level, reason)
+
+
+_REACHED = _Reached()
+
+
+@contextmanager
+def reached(press: Press, program: Program) -> Iterator[None]:
+    """While inside, be found by `announced_programs`, and let ``press`` carry out the stops put down for it.
+
+    Raises
+    ------
+    AcquisitionError
+        When the state folder cannot be written: nobody could stop what cannot be found.
+
+    """
+    entry = (press, program)
+    try:
+        _REACHED.enter(entry)
+    except OSError as error:
+        raise AcquisitionError(
+            f"{program.what} cannot be announced in the state folder ({error}), so that nobody could stop "
+            "it. Nothing was started; make room there, or name another folder with VIBENCH_STATE_DIR"
+        ) from error
+    try:
+        yield
+    finally:
+        _REACHED.leave(entry)
+
+
+def _path(program: Program) -> Path:
+    return engines_folder() / f"{program.pid}.{program.process_start}.json"
+
+
+def _marked(path: Path) -> OpenFile | None:
+    """Lock a file for as long as this process lives; None where it is not to be had, now or at all."""
+    try:
+        file = OpenFile(path)
+    except OSError:
+        return None
+    try:
+        if file.is_locked_alone():
+            return file
+    except OSError:  # a disk without locks
+        pass
+    file.close()
+    return None
+
+
+def _is_marked(path: Path) -> bool:
+    try:
+        with closing(OpenFile(path)) as file:
+            return not file.is_locked_alone()
+    except OSError:  # gone by now, or on a disk without locks
+        return False
+
+
+def _write(program: Program) -> Path:
+    path = _path(program)
+    coming = path.with_suffix(".coming")
+    coming.unlink(missing_ok=True)  # left by a process of the same number that was killed
+    # Nobody else may read a token, not even for the moment before the mode is set.
+    descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    with os.fdopen(descriptor, "w", encoding="utf-8") as file:
+        file.write(program.model_dump_json())
+    return coming.replace(path)  # whole, or not there
+
+
+def _sweep() -> None:
+    """Take away what was put down for processes that have ended; names begin with the process's number."""
+    folder = engines_folder()
+    for path in folder.iterdir():
+        pid, _, rest = path.name.partition(".")
+        start, _, rest = rest.rpartition(".")
+        is_announced = (folder / f"{pid}.{start}.json").exists()  # perhaps of another computer
+        is_here = place_of(start) is Place.HERE
+        if is_here and not is_announced and pid.isdecimal() and not is_process(int(pid), start):
+            with suppress(OSError):
+                path.unlink()

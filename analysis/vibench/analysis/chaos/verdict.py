@@ -1,0 +1,321 @@
+"""The verdict on a recorded motion: periodic, quasi-periodic, chaotic, or that the data cannot say.
+
+Where in a record its last motion begins: chaos may be a transient that ends in the middle of a dwell.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals.arrays import Reals
+from ..tables import Labelled
+from .divergence import Divergence, divergence
+from .embedding import embedded
+from .period import Points, is_settled, shortest_period, slow_share
+from .surrogates import SurrogateTest, gaussianised, surrogate_test
+from .torus import Rotation, is_torus, mains_hz, rotation
+from .zero_one import FEWEST, ZeroOne, zero_one
+
+_BLOCKS = 10
+_SHORTEST_BLOCK = 50
+"""Drive periods that say whether a motion repeats."""
+
+
+def begin_of_last_motion(points: Points) -> int:
+    """Give the index of the first point of the motion that a record ends in; 0 where it never changes.
+
+    A record is cut into blocks, each of which repeats itself within its noise or does not. One change from
+    the one to the other is a transient that has ended, or a motion that was lost. More than one are chaos
+    with calm stretches, and belong to one motion.
+    """
+    count = len(points.value)
+    edges = np.linspace(0, count, max(min(_BLOCKS, count // _SHORTEST_BLOCK), 1) + 1).astype(int)
+    repeats = np.array(
+        [
+            shortest_period(Points(points.value[first:stop], points.noise)) is not None
+            for first, stop in pairwise(edges)
+        ]
+    )
+    changes = np.flatnonzero(repeats[1:] != repeats[:-1])
+    if changes.size != 1:
+        return 0
+    # The block in which it changes does not repeat: a motion that is lost begins somewhere inside it.
+    last = int(changes[0]) + 1
+    return int(edges[last] if repeats[-1] else edges[min(last + 1, len(edges) - 1)])
+
+
+MOST_POINTS = 3000
+"""Number of last points whose shape is tested: more would only cost time."""
+ABOVE_NOISE = 5.0
+"""Scatter of the points over their noise below which its shape says nothing."""
+LARGEST_NOISE = 0.1
+"""Noise over the size of the orbit, beyond which points that repeat within it may hide any other motion."""
+SMALL = 0.05
+"""Scatter, as part of the orbit, up to which linear noise about a fixed point leaves a motion periodic."""
+SLOW = 0.5
+"""Part of the points' variance between tenths of the record, beyond which slow change explains it."""
+_FEWEST_TURNS = 3.0
+"""Turns of a closed curve in a record below which it counts as a slow change."""
+_LARGEST_HUM = 0.1
+"""Part of the orbit that mains hum may reach; more may be a motion at its frequency."""
+_LOW_PERIOD = 4
+"""Period doublings reach it; a drive of twice the mains' frequency makes hum repeat as soon."""
+CHAOTIC_K = 0.9
+_BEYOND_CHANCE = 3.5
+"""Standard deviations below the surrogates' mean: a rank alone is reached once in 40 series of noise."""
+_SURELY = 3.0
+"""Standard deviations, from tenths of a record, by which a bound lies below a slope."""
+_DELAYS = 3
+_STEPS = 8
+
+
+class MotionKind(StrEnum):
+    """How a motion under a sine repeats."""
+
+    PERIODIC = "periodic"
+    QUASI_PERIODIC = "quasi-periodic"
+    CHAOTIC = "chaotic"
+    UNDECIDED = "undecided"
+    """The data carry no verdict; `MotionVerdict.why` says what is missing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What was measured on the points; None where a question did not arise."""
+
+    drive_hz: float
+    periods: int
+    """Drive periods judged."""
+    spread: float
+    """Scatter of the points, over the size of the orbit."""
+    noise: float
+    """The same of the noise."""
+    is_settled: bool
+    rotation: Rotation | None = None
+    zero_one: ZeroOne | None = None
+    surrogates: SurrogateTest | None = None
+    divergence: Divergence | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class MotionVerdict(Labelled):
+    """What a motion is, and why one may say so."""
+
+    kind: MotionKind
+    why: str
+    evidence: Evidence
+    period: int | None = None
+    """Drive periods after which a periodic motion repeats."""
+
+    @property
+    def least_exponent_per_s(self) -> float | None:
+        """Lower bound on the largest Lyapunov exponent of a chaotic motion; None where the data resolve none.
+
+        Noise and the size of the motion flatten the slope that neighbours part with, by up to a half, and
+        nothing in a record tells how much. Points that scatter for other reasons part as well.
+        """
+        parting = self.evidence.divergence
+        if self.kind is not MotionKind.CHAOTIC or parting is None or not parting.is_resolved:
+            return None
+        least = parting.exponent - _SURELY * parting.sd_exponent
+        return least * self.evidence.drive_hz if least > 0.0 else None
+
+
+def motion_verdict(points: Points, drive_hz: float, *, seed: int = 0) -> MotionVerdict:
+    """Judge a motion by its points, taken once per drive period.
+
+    A motion is *periodic* when its points repeat within their noise, *quasi-periodic* when they run round
+    a closed curve, and *chaotic* only when all witnesses agree: settled, far above the noise, on no curve,
+    the 0-1 test near one on points that are not oversampled, and more than linear noise by surrogates. Each
+    of these alone passes noise for chaos; anything less is undecided. Of a motion that changes once, as when
+    a chaotic transient ends, the last part is judged: an end that repeats by itself, any other if it is the
+    longer part. Where the noise is more than a tenth of the orbit, nothing can be said to repeat.
+
+    Parameters
+    ----------
+    points
+        As many drive periods as there are; whether they repeat is judged over all, their shape over the last
+        3000.
+    drive_hz
+        Turns exponents per period into exponents per second.
+    seed
+        Of the random frequencies and surrogates.
+
+    Raises
+    ------
+    InvalidRequest
+        When the drive's frequency is not positive and finite.
+
+    """
+    if not 0.0 < drive_hz < math.inf:
+        raise InvalidRequest(f"a drive of {drive_hz} Hz is none; give a positive frequency")
+    count = len(points.value)
+    if count < FEWEST:
+        return _too_few(
+            f"{count} drive periods were recorded clear of the ends, and {FEWEST} are needed; dwell longer",
+            points,
+            drive_hz,
+        )
+    before = begin_of_last_motion(points)
+    if before == 0:
+        return _of_one_motion(points, drive_hz, seed)
+    rest = Points(points.value[before:], points.noise)
+    too_late = "before the end, too late to judge what it became; dwell longer"
+    if count - before < FEWEST:
+        return _too_few(f"the motion changed fewer than {FEWEST} drive periods {too_late}", rest, drive_hz)
+    found = _of_one_motion(rest, drive_hz, seed)
+    # A settled end is seen to repeat, however long the transient; an irregular one may be a transient.
+    if found.kind is not MotionKind.PERIODIC and count - before < before:
+        return _undecided(f"the motion changed {count - before} drive periods {too_late}", found.evidence)
+    return replace(found, why=f"{found.why}; so for {len(rest.value)} drive periods, otherwise before")
+
+
+def _of_one_motion(last: Points, drive_hz: float, seed: int) -> MotionVerdict:
+    evidence = Evidence(drive_hz, len(last.value), last.spread, last.noise_level, is_settled=is_settled(last))
+    if not evidence.is_settled:
+        return _undecided(
+            "the motion still changes: its mean or its scatter drifts; let it settle for longer",
+            evidence,
+        )
+    if last.noise_level > LARGEST_NOISE:
+        return _undecided(
+            f"noise is {100 * last.noise_level:.0f} % of the orbit, which may hide whether "
+            "it repeats, or that there is any motion at all; raise the level or use a finer range",
+            evidence,
+        )
+    period = shortest_period(last)
+    if period is None:
+        return _aperiodic(Points(last.value[-MOST_POINTS:], last.noise), evidence, seed)
+    if period > 1:
+        found = rotation(last.value)
+        hum_hz = mains_hz(found, drive_hz, len(last.value))
+        if hum_hz is not None and (period > _LOW_PERIOD or last.spread <= _LARGEST_HUM):
+            return _humming(replace(evidence, rotation=found), hum_hz, period)
+    every = "drive period" if period == 1 else f"{period} drive periods"
+    why = f"the points repeat every {every} to within their noise"
+    return MotionVerdict(MotionKind.PERIODIC, why, evidence, period)
+
+
+def _humming(evidence: Evidence, hum_hz: float, period: int | None) -> MotionVerdict:
+    """Mains hum on a motion that repeats every drive period, unless it may be a motion at its frequency."""
+    if evidence.spread <= _LARGEST_HUM and (period is None or period > _LOW_PERIOD):
+        why = (
+            f"the points repeat every drive period, except for {100 * evidence.spread:.2g} % of the orbit at "
+            f"{hum_hz:g} Hz, which is mains hum"
+        )
+        return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
+    return _undecided(
+        f"{100 * evidence.spread:.2g} % of the orbit is at {hum_hz:g} Hz, which may be mains hum or motion; "
+        "dwell at another frequency",
+        evidence,
+    )
+
+
+def _too_few(why: str, points: Points, drive_hz: float) -> MotionVerdict:
+    return _undecided(
+        why, Evidence(drive_hz, len(points.value), np.nan, points.noise_level, is_settled=False)
+    )
+
+
+def _undecided(why: str, evidence: Evidence) -> MotionVerdict:
+    return MotionVerdict(MotionKind.UNDECIDED, why, evidence)
+
+
+def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
+    found = rotation(points.value)
+    evidence = replace(so_far, rotation=found)
+    is_curve = is_torus(found, evidence.noise / evidence.spread)
+    turns = found.turns_per_period * len(points.value)
+    if slow_share(points) > SLOW or (is_curve and turns < _FEWEST_TURNS):
+        return _undecided(
+            f"the motion changes slowly, by {100 * evidence.spread:.2g} % of the orbit, and less than "
+            f"{_FEWEST_TURNS:g} times in the record; record longer",
+            evidence,
+        )
+    if is_curve:
+        hum_hz = mains_hz(found, so_far.drive_hz, len(points.value))
+        if hum_hz is not None:
+            return _humming(evidence, hum_hz, None)
+        why = f"the points run round a closed curve, {found.turns_per_period:.4f} turns a drive period"
+        return MotionVerdict(MotionKind.QUASI_PERIODIC, why, evidence)
+    if evidence.spread < ABOVE_NOISE * evidence.noise:
+        if evidence.spread <= SMALL:
+            why = (
+                f"the points stay within {100 * evidence.spread:.1f} % of the orbit, hardly above their noise"
+            )
+            return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
+        return _undecided(
+            f"the points scatter by {evidence.spread / evidence.noise:.1f} times their noise, and below "
+            f"{ABOVE_NOISE:g} times its shape says nothing; raise the level or use a finer vibrometer range",
+            evidence,
+        )
+    line = np.asarray(points.value[:, int(np.argmax(np.std(points.value, axis=0)))])
+    test, noise_test = zero_one(line, seed=seed), surrogate_test(line, seed=seed)
+    bent_test = noise_test
+    if noise_test.rejects_linear_noise:
+        bent = [surrogate_test(gaussianised(each), seed=seed) for each in points.value.T]
+        weakest, strongest = max(bent, key=lambda each: each.p), max(bent, key=lambda each: each.margin)
+        is_more = weakest.rejects_linear_noise
+        bent_test = replace(strongest, least_margin=_BEYOND_CHANCE) if is_more else weakest
+    parting = _parting(points)
+    return _judged(
+        replace(evidence, zero_one=test, surrogates=bent_test, divergence=parting),
+        test,
+        noise_test,
+        bent_test,
+    )
+
+
+def _judged(
+    evidence: Evidence, test: ZeroOne, noise_test: SurrogateTest, bent_test: SurrogateTest
+) -> MotionVerdict:
+    if not noise_test.is_valid:
+        return _undecided(
+            f"surrogates missed the spectrum by {100 * noise_test.spectrum_error:.0f} %, so linear noise "
+            "cannot be excluded; record longer",
+            evidence,
+        )
+    if not noise_test.rejects_linear_noise:
+        return _noisy(evidence, noise_test)
+    if not bent_test.rejects_linear_noise:
+        return _undecided(
+            f"noise after a static nonlinearity also explains the points (p = {bent_test.p:.2f})",
+            evidence,
+        )
+    if test.is_oversampled:
+        return _undecided(
+            f"neighbouring points resemble each other ({test.neighbour_correlation:.2f}), which the 0-1 test "
+            "takes for order; record longer",
+            evidence,
+        )
+    if test.k < CHAOTIC_K:
+        return _undecided(f"the 0-1 test says {test.k:.2f}, neither regular nor chaotic", evidence)
+    above = "" if evidence.noise == 0.0 else f"{evidence.spread / evidence.noise:.0f} times above the noise, "
+    why = (
+        f"settled, {above}on no closed curve, 0-1 test {test.k:.3f}, and more than linear noise "
+        f"(p = {noise_test.p:.3f})"
+    )
+    return MotionVerdict(MotionKind.CHAOTIC, why, evidence)
+
+
+def _noisy(evidence: Evidence, noise_test: SurrogateTest) -> MotionVerdict:
+    """Nothing but linear noise is seen: about a fixed point if it is small, else who can say."""
+    if evidence.spread > SMALL:
+        return _undecided(f"linear noise explains the points as well (p = {noise_test.p:.2f})", evidence)
+    why = (
+        f"the points scatter about one point by {100 * evidence.spread:.1f} % of the orbit like linear noise "
+        f"(p = {noise_test.p:.2f}), though by more than the vibrometer's own"
+    )
+    return MotionVerdict(MotionKind.PERIODIC, why, evidence, 1)
+
+
+def _parting(points: Points) -> Divergence | None:
+    space: Reals = embedded(points.value, _DELAYS)
+    try:
+        return divergence(space, steps=_STEPS, noise=points.noise_level)
+    except NotEnoughData:
+        return None

@@ -1,0 +1,180 @@
+"""A tracked resonance: frequency and amplitude over the level of the base, and the backbone they make."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
+
+from ..model.overlay import SteppedSineOverlay
+from ..signals.arrays import Reals
+from ..sine.stepped_response import SteppedSineAnalysis
+from ..sine.tracked_resonance import (
+    TrackedResonance,
+    backbone_sentence,
+    feedback_sentences,
+    lost_levels,
+    tracked_resonances,
+)
+from ..tables import table
+from .drawn import DrawnFigure
+from .stepped_sine import tracked_caption
+from .style import BOUNDS, MEASURED, PREDICTED, SIMULATED, legend_above, new_figure, prefixed, styled
+
+_HEIGHT_IN = 4.2
+_MARGIN = 0.15
+"""Room around the points, in parts of their range: few points must not lie on the frame."""
+_MOST_MARKS = 5
+"""Intervals of the backbone's frequency axis: numbers such as 266.385 are wide."""
+_LEVEL = "base acceleration [m/s²]"
+_PHASE = "phase resonance, ± two standard uncertainties"
+_MODE = "natural frequency of the mode"
+_LOST = "no resonance found at this level"
+_SIMULATED = "simulated under the recorded base"
+
+
+def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None = None) -> DrawnFigure:
+    """Draw the resonance over level, and m0's amplitude over the resonance; of levels where it was found."""
+    levels = tracked_resonances(analysis.facts.feedback)
+    base = np.array([each.base_m_per_s2 for each in levels])
+    amplitude_m = np.array([each.amplitude_m for each in levels])
+    simulated_m = _simulated_m(levels, analysis, laid)
+    lost = lost_levels(analysis.facts.feedback)
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        places = figure.subplot_mosaic([["frequency", "backbone"], ["amplitude", "backbone"]])
+        broken = _broken(levels, lost)
+        _frequencies(places["frequency"], broken)
+        _amplitudes(places["amplitude"], broken, base, simulated_m)
+        _backbone(places["backbone"], broken)
+        for each in ("frequency", "amplitude"):
+            _mark_lost(places[each], lost)
+            places[each].set_xlim(0.0, (1 + _MARGIN) * max((*base, *lost)))
+        places["frequency"].sharex(places["amplitude"])
+        places["frequency"].tick_params(labelbottom=False)
+        legend_above(figure, [places["frequency"], places["amplitude"]], columns=2)
+    name = f"backbone_{analysis.facts.name}"
+    columns = {
+        "base_m_per_s2": base,
+        "frequency_hz": np.array([each.frequency_hz for each in levels]),
+        "u_frequency_hz": np.array([each.u_frequency_hz for each in levels]),
+        "mode_hz": _or_nan([each.mode_hz for each in levels]),
+        "u_mode_hz": _or_nan([each.u_mode_hz for each in levels]),
+        "damping_ratio": _or_nan([each.damping_ratio for each in levels]),
+        "amplitude_m": amplitude_m,
+    }
+    if simulated_m is not None:
+        columns["amplitude_m_simulated"] = simulated_m
+    return DrawnFigure(
+        name=name,
+        title=f"Tracked resonance, around {np.median(columns['frequency_hz']):.4g} Hz",
+        caption=_caption(analysis, levels),
+        figure=figure,
+        tables=(table(name, **columns),),
+    )
+
+
+def _broken(levels: Sequence[TrackedResonance], lost: Sequence[float]) -> list[TrackedResonance]:
+    """Put a gap, which no line crosses, where a level was not met."""
+    nowhere = replace(levels[0], frequency_hz=np.nan, amplitude_m=np.nan, mode_hz=None, u_mode_hz=None)
+    gaps = [replace(nowhere, base_m_per_s2=each) for each in lost]
+    return sorted([*levels, *gaps], key=lambda each: each.base_m_per_s2)
+
+
+def _base(levels: Sequence[TrackedResonance]) -> list[float]:
+    return [each.base_m_per_s2 for each in levels]
+
+
+def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
+    """Give amplitudes in the unit to draw them in, with its scale and name."""
+    amplitude_m = np.array([each.amplitude_m for each in levels])
+    scale, unit = prefixed(float(np.nanmax(amplitude_m)), "m")
+    return scale * amplitude_m, scale, unit
+
+
+def _frequencies(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
+    axes.errorbar(
+        _base(levels), [each.frequency_hz for each in levels], [2 * each.u_frequency_hz for each in levels],
+        color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8, label=_PHASE,
+    )  # fmt: skip
+    mode_hz, u_hz = _or_nan([each.mode_hz for each in levels]), _or_nan([each.u_mode_hz for each in levels])
+    if np.isfinite(mode_hz).any():
+        axes.errorbar(
+            _base(levels), mode_hz, 2 * u_hz, color=PREDICTED, marker="D", markerfacecolor="none",
+            markersize=4, linestyle="none", capsize=2, linewidth=0.8, label=_MODE,
+        )  # fmt: skip
+    axes.set_ylabel("frequency [Hz]")
+    axes.margins(_MARGIN)
+
+
+def _amplitudes(
+    axes: Axes, levels: Sequence[TrackedResonance], base: Reals, simulated_m: Reals | None
+) -> None:
+    amplitude, scale, unit = _amplitude(levels)
+    axes.plot(_base(levels), amplitude, color=MEASURED, marker="o", markersize=4, linewidth=0.8)
+    if simulated_m is not None:
+        axes.plot(
+            base, scale * simulated_m, color=SIMULATED, marker="s", markerfacecolor="none",
+            markersize=5, linestyle="none", label=_SIMULATED,
+        )  # fmt: skip
+    axes.set_xlabel(_LEVEL)
+    axes.margins(_MARGIN)
+    _from_zero(axes, levels, unit)
+
+
+def _backbone(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
+    amplitude, _, unit = _amplitude(levels)
+    axes.errorbar(
+        [each.frequency_hz for each in levels], amplitude,
+        xerr=[2 * each.u_frequency_hz for each in levels],
+        color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8,
+    )  # fmt: skip
+    axes.xaxis.set_major_locator(MaxNLocator(_MOST_MARKS))
+    axes.set_xlabel("phase resonance [Hz]" if levels[0].is_fundamental else "drive at phase resonance [Hz]")
+    axes.margins(_MARGIN)
+    _from_zero(axes, levels, unit)
+
+
+def _from_zero(axes: Axes, levels: Sequence[TrackedResonance], unit: str) -> None:
+    """Name the amplitude, and draw it from zero to above the largest."""
+    of = "at resonance"
+    if levels[0].harmonic > 1:
+        of = f"at {levels[0].harmonic} times the drive"
+    if levels[0].subharmonic > 1:
+        of = f"at 1/{levels[0].subharmonic} of the drive"
+    axes.set_ylabel(f"m0 {of} [{unit}]")
+    axes.set_ylim(0.0, (1.0 + _MARGIN) * axes.dataLim.ymax)
+
+
+def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:
+    for number, level in enumerate(lost_m_per_s2):
+        label = _LOST if number == 0 else None
+        axes.axvline(level, color=BOUNDS, linestyle="--", linewidth=0.8, label=label, zorder=1)
+
+
+def _simulated_m(
+    levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None
+) -> Reals | None:
+    """Give m0's simulated amplitude at each level, where one recorded stretch belongs to each."""
+    if laid is None or not levels[0].is_fundamental or laid.response.left_out or analysis.response.left_out:
+        return None
+    found = laid.response.response_ii * laid.response.drive_amplitude_m
+    return found[[each.number for each in levels]] if max(_numbers(levels)) < found.size else None
+
+
+def _numbers(levels: Sequence[TrackedResonance]) -> list[int]:
+    return [each.number for each in levels]
+
+
+def _or_nan(values: Sequence[float | None]) -> Reals:
+    return np.array([np.nan if each is None else each for each in values])
+
+
+def _caption(analysis: SteppedSineAnalysis, levels: Sequence[TrackedResonance]) -> str:
+    text = tracked_caption(analysis.response)
+    return " ".join(
+        each
+        for each in (text, backbone_sentence(levels), *feedback_sentences(analysis.facts.feedback))
+        if each
+    )

@@ -1,0 +1,51 @@
+"""What every channel recorded, from the bench check to the last ramp: the first figure to look at."""
+
+from ..recordings.channel_levels import ChannelLevel
+from ..recordings.facts import RecordingFacts
+from ..tables import table
+from .drawn import DrawnFigure
+from .style import MEASURED, new_figure, prefixed, styled
+
+_ROW_IN = 0.85
+_FRAME_IN = 0.6
+_UNITS = {"m s-1": "m/s", "m s-2": "m/s²"}
+"""As a reader writes what a file says in UDUNITS text."""
+
+
+def bench_levels_figure(facts: RecordingFacts) -> DrawnFigure:
+    """Draw the extremes of every channel over the whole recording."""
+    with styled():
+        figure = new_figure(_FRAME_IN + _ROW_IN * len(facts.channels))
+        panels = figure.subplots(len(facts.channels), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, level in zip(panels, facts.channels, strict=True):
+            factor, unit = prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
+            shape = level.envelope
+            axes.fill_between(
+                shape.time_s, factor * shape.lower, factor * shape.upper, color=MEASURED, linewidth=0.3
+            )
+            axes.set_ylabel(f"{level.header.role.replace('_', chr(10))}\n[{unit}]", fontsize=7.5)
+        panels[-1].set_xlabel("time since the first sample [s]")
+        panels[-1].set_xlim(0, facts.duration_s)
+        figure.align_ylabels()
+    columns = {"time_s": facts.channels[0].envelope.time_s}
+    for level in facts.channels:
+        columns[f"{level.header.role}_lower"] = level.envelope.lower
+        columns[f"{level.header.role}_upper"] = level.envelope.upper
+    return DrawnFigure(
+        name=f"levels_{facts.name}",
+        title="Levels of all channels",
+        caption=bench_levels_caption(facts),
+        figure=figure,
+        tables=(table(f"levels_{facts.name}", **columns),),
+    )
+
+
+def bench_levels_caption(facts: RecordingFacts) -> str:
+    """Say how much of its range each channel used."""
+    parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
+    return f"Extremes of every channel, ramps and waits included. Peaks: {', '.join(parts)}."
+
+
+def _peak(level: ChannelLevel) -> str:
+    factor, unit = prefixed(level.peak, _UNITS.get(level.header.unit, level.header.unit))
+    return f"{level.header.role.replace('_', ' ')} {factor * level.peak:.3g} {unit}"

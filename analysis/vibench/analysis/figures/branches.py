@@ -1,0 +1,233 @@
+"""Branches of periodic motions: stable ones solid, unstable ones dashed, special points marked."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from vibench.sim import Parameter
+from vibench.sim.branches import least_growth_time_s
+
+from ..comparison.curve import Curve, CurveKind, CurveOrigin
+from ..dynamics import BranchDiagram, BranchLine
+from ..signals.arrays import Reals
+from ..sine.tracked_resonance import TrackedResonance
+from ..tables import Table, table
+from .drawn import DrawnFigure
+from .style import (
+    COLLIDING,
+    LEVELS,
+    MEASURED,
+    PREDICTED,
+    SIMULATED,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    plain_label,
+    styled,
+)
+
+_HEIGHT_IN = 5.6
+_GROWTH_HEIGHT_IN = 1.8
+"""Of a third panel, where a bench is asked what it can hold."""
+EVENT_MARKS = {
+    "fold": ("o", "#d55e00"),
+    "period doubling": ("s", "#009e73"),
+    "Neimark-Sacker": ("D", "#cc79a7"),
+    "symmetry breaking": ("^", "#e69f00"),
+    "grazing": ("x", "#1b1b1b"),
+}
+"""Mark and colour of each special point."""
+_PANELS = (("response_i", CurveKind.RESPONSE_I), ("response_ii", CurveKind.RESPONSE_II))
+
+
+def branches_figure(
+    diagram: BranchDiagram, measured: Sequence[Curve] = (), tracked: Sequence[TrackedResonance] = ()
+) -> DrawnFigure:
+    """Draw Responses I and II of m0 on every branch, over what changes, and recordings beneath.
+
+    Where the request names a bench's loop, a third panel says which unstable motions it can hold.
+
+    Parameters
+    ----------
+    diagram
+        What was found.
+    measured
+        Responses of stepped sines and sweeps; drawn where frequency changes.
+    tracked
+        Resonances at every level; drawn over a phase resonance, whose first panel is its frequency.
+
+    """
+    with styled():
+        holdable = diagram.holdable
+        figure = new_figure(_HEIGHT_IN + (0.0 if holdable is None else _GROWTH_HEIGHT_IN))
+        panels = figure.subplots(2 if holdable is None else 3, 1, sharex=True)
+        for axes, (name, kind) in zip(panels[:2], _PANELS, strict=True):
+            _measured(axes, diagram, [each for each in measured if each.response is kind])
+            for line in diagram.lines:
+                draw_line(axes, line, _place(diagram, line), getattr(line, name)[:, 0])
+            magnitude_axis(axes)
+            axes.set_ylabel(f"{kind.value}\nof m0 over A0")
+        if diagram.request.resonance_band_hz is not None:
+            _backbone(panels, diagram, tracked)
+        _events(panels[1], diagram)
+        if diagram.request.loop_time_s is not None and holdable is not None:
+            _growth(panels[2], diagram, holdable, least_growth_time_s(diagram.request.loop_time_s))
+        _across(panels[-1], diagram)
+        legend_above(figure, list(panels), columns=4)
+        figure.align_ylabels()
+    return DrawnFigure(
+        name="branches",
+        title=f"Branches: {diagram.request.title}",
+        caption=(
+            "Periodic motions; solid: stable, dashed: unstable. Motions of more than one drive period are "
+            f"in other colours. {diagram.cost_sentence} {diagram.request.sentence}"
+            f"{diagram.holding_sentence and ' '}{diagram.holding_sentence} Chaotic and "
+            "quasi-periodic motions are no branches: where no solid line is, look for them."
+        ),
+        figure=figure,
+        tables=branch_tables(diagram),
+    )
+
+
+def draw_line(axes: Axes, line: BranchLine, place: Reals, size: Reals) -> None:
+    """Draw a branch, ``size`` over ``place``, into ``axes``: stable parts solid, unstable ones dashed."""
+    colour = PREDICTED if line.periods == 1 else LEVELS[1 + (line.periods - 2) % (len(LEVELS) - 1)]
+    period = "" if line.periods == 1 else f", period {line.periods}"
+    for is_stable, piece in line.pieces():
+        axes.plot(
+            place[piece],
+            size[piece],
+            color=colour,
+            linestyle="-" if is_stable else (0, (3, 1.5)),
+            linewidth=1.3 if is_stable else 0.9,
+            label=f"{'stable' if is_stable else 'unstable'}{period}",
+        )
+
+
+def _backbone(panels: Sequence[Axes], diagram: BranchDiagram, tracked: Sequence[TrackedResonance]) -> None:
+    """Draw the frequency of a phase resonance in the place of Response I, and what was tracked."""
+    panels[0].clear()
+    for line in diagram.lines:
+        draw_line(panels[0], line, _place(diagram, line), line.frequency_hz)
+    panels[0].set_ylabel("phase\nresonance [Hz]")
+    if not tracked:
+        return
+    frequency_hz = np.array([each.frequency_hz for each in tracked])
+    base_m = np.array([each.base_m_per_s2 for each in tracked]) / (2.0 * np.pi * frequency_hz) ** 2
+    response = np.array([each.amplitude_m for each in tracked]) / base_m
+    error_hz = [2.0 * each.u_frequency_hz for each in tracked]
+    panels[0].errorbar(
+        1e6 * base_m, frequency_hz, error_hz, color=MEASURED, linestyle="none", marker="o", markersize=3.5,
+        capsize=2, label="tracked, ± two standard uncertainties",
+    )  # fmt: skip
+    panels[1].plot(1e6 * base_m, response, color=MEASURED, linestyle="none", marker="o", markersize=3.5)
+
+
+def _growth(
+    axes: Axes, diagram: BranchDiagram, holdable: Sequence[NDArray[np.bool_]], least_s: float
+) -> None:
+    """Draw how fast unstable motions are left; below the line no loop of this bench holds them."""
+    for line, held in zip(diagram.lines, holdable, strict=True):
+        place, grows = _place(diagram, line), ~line.is_stable
+        for told, chosen, colour in (
+            ("holdable", grows & held, MEASURED),
+            ("not holdable by this bench", grows & ~held, SIMULATED),
+        ):
+            if np.any(chosen):
+                axes.plot(
+                    place[chosen], line.growth_time_s[chosen], ".", markersize=3, color=colour, label=told
+                )
+    axes.axhline(least_s, color=MEASURED, linewidth=0.8, linestyle=":", label=f"{least_s:.3g} s")
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    axes.axhspan(min(low, 0.5 * least_s), least_s, color=COLLIDING, alpha=0.6, linewidth=0)
+    axes.set_ylim(min(low, 0.5 * least_s), max(high, 2.0 * least_s))
+    axes.set_ylabel("time to\ngrow by e [s]")
+
+
+def _place(diagram: BranchDiagram, line: BranchLine) -> Reals:
+    scale = 1.0 if diagram.request.along is Parameter.FREQUENCY else 1e6
+    return np.asarray(scale * line.along(diagram.request.along))
+
+
+def _events(axes: Axes, diagram: BranchDiagram) -> None:
+    along = diagram.request.along
+    for kind, (mark, colour) in EVENT_MARKS.items():
+        found = [each for line in diagram.lines for each in line.events if each.kind == kind]
+        if found:
+            place = [
+                each.frequency_hz if along is Parameter.FREQUENCY else 1e6 * each.amplitude_m
+                for each in found
+            ]
+            axes.plot(
+                place,
+                [each.response_ii for each in found],
+                linestyle="none",
+                marker=mark,
+                markersize=4,
+                markerfacecolor="none",
+                color=colour,
+                label=kind,
+            )
+
+
+def _measured(axes: Axes, diagram: BranchDiagram, curves: Sequence[Curve]) -> None:
+    if diagram.request.along is not Parameter.FREQUENCY:
+        return
+    for curve in curves:
+        is_simulated = curve.origin is CurveOrigin.SIMULATED
+        axes.plot(
+            curve.frequency_hz,
+            curve.magnitude,
+            color=SIMULATED if is_simulated else MEASURED,
+            linestyle="none",
+            marker=".",
+            markersize=2.5,
+            alpha=0.7,
+            label=plain_label(f"{curve.source}, {curve.origin.value}"),
+        )
+
+
+def _across(axes: Axes, diagram: BranchDiagram) -> None:
+    request = diagram.request
+    if request.along is Parameter.FREQUENCY:
+        axes.set_xlabel("drive frequency [Hz]")
+        frequency_axis(axes, request.start, request.stop)
+        return
+    axes.set_xlabel("base amplitude A0 [µm]")
+    axes.set_xlim(1e6 * request.start, 1e6 * request.stop)
+
+
+def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
+    """Give every point of every branch, and every special point."""
+    lines = diagram.lines
+    if not lines:
+        return ()
+    owner = np.concatenate([np.full(line.points, number) for number, line in enumerate(lines)])
+    points = table(
+        "branches",
+        branch=owner,
+        periods=np.concatenate([np.full(line.points, line.periods) for line in lines]),
+        frequency_hz=np.concatenate([line.frequency_hz for line in lines]),
+        amplitude_m=np.concatenate([line.amplitude_m for line in lines]),
+        response_i=np.concatenate([line.response_i[:, 0] for line in lines]),
+        response_ii=np.concatenate([line.response_ii[:, 0] for line in lines]),
+        largest_multiplier=np.concatenate([line.largest_multiplier for line in lines]),
+        growth_time_s=np.concatenate([line.growth_time_s for line in lines]),
+        impacts=np.concatenate([line.impacts for line in lines]),
+        error_estimate=np.concatenate([line.error_estimate for line in lines]),
+    )
+    events = [(number, each) for number, line in enumerate(lines) for each in line.events]
+    if not events:
+        return (points,)
+    special = table(
+        "branches_special_points",
+        branch=[number for number, _ in events],
+        kind=[each.kind for _, each in events],
+        frequency_hz=[each.frequency_hz for _, each in events],
+        amplitude_m=[each.amplitude_m for _, each in events],
+    )
+    return points, special

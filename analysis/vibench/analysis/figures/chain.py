@@ -1,0 +1,192 @@
+"""A chain: waves of the endless one, transmission from cell to cell, motion over place and time, energy."""
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from ..dynamics import ChainAnswer, ChainDrive, ChainRun
+from ..tables import Table, table
+from .drawn import DrawnFigure
+from .style import (
+    BOUNDS,
+    COLLIDING,
+    LEVELS,
+    LINEAR,
+    MEASURED,
+    SIMULATED,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    prefixed,
+    styled,
+)
+
+_WAVES_IN, _RUNS_IN = 4.2, 9.0
+"""Heights without and with runs."""
+_SMALLEST = 1e-8
+"""Transmissions below are drawn at the foot of the axis."""
+_DECADES = 4.0
+"""Of a map of motion below its largest."""
+_NOTHING = 1e-300
+"""Stands for a motion of zero where a logarithm is taken."""
+
+
+def chain_figure(found: ChainAnswer) -> DrawnFigure:
+    """Draw waves and transmission; where there are runs, the last one's motion, energies and impacts."""
+    last = found.shown_run
+    with styled():
+        figure = new_figure(_WAVES_IN if last is None else _RUNS_IN)
+        if last is None:
+            waves, across = figure.subplots(2, 1, sharex=True)
+        else:
+            grid = figure.add_gridspec(4, 2, height_ratios=(1.0, 1.3, 1.5, 1.0))
+            waves = figure.add_subplot(grid[0, :])
+            across = figure.add_subplot(grid[1, :], sharex=waves)
+            _map(figure, figure.add_subplot(grid[2, :]), found, last)
+            _per_cell(figure.add_subplot(grid[3, 0]), figure.add_subplot(grid[3, 1]), last)
+        _waves(waves, found)
+        _across(across, found)
+        legend_above(figure, [waves, across], columns=4)
+    return DrawnFigure(
+        name="chain",
+        title=f"Chain: {found.request.title}",
+        caption=_caption(found, last),
+        figure=figure,
+        tables=tuple(_numbers(found)),
+    )
+
+
+def _caption(found: ChainAnswer, last: ChainRun | None) -> str:
+    said = (
+        "Above: phase and decay from unit to unit in the endless chain without contact; grey: gaps. Below: "
+        "transmission from the base to m0 of cells, without contact and as driven."
+    )
+    if last is not None:
+        what = "x of m0" if found.request.drive is ChainDrive.STEADY else "root mean square of x of m0"
+        said += (
+            f" Map: {what} over place and time in the last run, dots: impacts. Bottom: mean energy, with its "
+            "standard error, and impacts of every cell."
+        )
+    return f"{said} {found.cost_sentence} {found.request.sentence}"
+
+
+def _shade(axes: Axes, found: ChainAnswer) -> None:
+    top_hz = float(found.linear_hz[-1])
+    for gap in found.gaps:
+        axes.axvspan(gap.lower_hz, min(gap.upper_hz, top_hz), color=COLLIDING, linewidth=0)
+    axes.set_xlim(0.0, top_hz)
+
+
+def _waves(axes: Axes, found: ChainAnswer) -> None:
+    _shade(axes, found)
+    for number, band_hz in enumerate(found.bands_hz.T):
+        axes.plot(band_hz, found.wave_numbers / np.pi, color=LINEAR, label="phase" if number == 0 else None)
+    axes.set_ylabel("phase / π")
+    axes.set_ylim(0.0, 1.0)
+    decay = axes.twinx()
+    decay.plot(found.linear_hz, found.attenuation_db, color=BOUNDS, linewidth=0.8)
+    decay.set_ylabel("decay [dB a unit]", color=BOUNDS)
+    decay.set_ylim(0.0, 1.1 * float(np.max(found.attenuation_db)))
+    decay.grid(visible=False)
+    axes.tick_params(labelbottom=False)
+
+
+def _across(axes: Axes, found: ChainAnswer) -> None:
+    _shade(axes, found)
+    for number, (cells, place, name) in enumerate(found.shown_cells):
+        colour = LEVELS[number % len(LEVELS)]
+        linear = np.maximum(found.linear_transmission(cells)[:, place], _SMALLEST)
+        axes.plot(found.linear_hz, linear, "--", color=colour, linewidth=0.8, label=name)
+        over_hz, driven = found.driven_transmission(cells, place)
+        marker = "o" if found.request.drive is ChainDrive.STEADY else ""
+        axes.plot(over_hz, np.maximum(driven, _SMALLEST), color=colour, marker=marker, markersize=3)
+    axes.plot([], "--", color=BOUNDS, linewidth=0.8, label="without contact")
+    magnitude_axis(axes)
+    axes.set_ylabel("|x / U|")
+    axes.set_xlabel("frequency [Hz]")
+
+
+def _map(figure: Figure, axes: Axes, found: ChainAnswer, run: ChainRun) -> None:
+    largest = float(np.nanmax(np.abs(run.motion_m), initial=0.0))
+    factor, unit = prefixed(largest, "m")
+    edges = np.arange(run.cells + 1) + 0.5
+    middle = run.time_s
+    half = 0.5 * float(middle[1] - middle[0]) if middle.size > 1 else 0.5
+    times = np.append(middle - half, middle[-1] + half)
+    is_steady = found.request.drive is ChainDrive.STEADY
+    top = max(factor * largest, _NOTHING)
+    mesh = axes.pcolormesh(
+        times,
+        edges,
+        factor * (run.motion_m if is_steady else np.maximum(np.abs(run.motion_m), _NOTHING)).T,
+        cmap="RdBu_r" if is_steady else "viridis",
+        norm=Normalize(-top, top) if is_steady else LogNorm(top * 10.0**-_DECADES, top),
+        rasterized=True,
+    )
+    axes.plot(run.impact_time_s, run.impact_cell + 1, ".", color=MEASURED, markersize=2 if is_steady else 0.6)
+    axes.set_xlim(times[0], times[-1])
+    axes.set_ylabel("cell")
+    axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.set_xlabel("time [s]")
+    axes.grid(visible=False)
+    what = "x" if is_steady else "rms of x"
+    figure.colorbar(mesh, ax=axes, label=f"{what} of m0 [{unit}]", pad=0.01)
+
+
+def _per_cell(energies: Axes, impacts: Axes, run: ChainRun) -> None:
+    place = np.arange(1, run.cells + 1)
+    factor, unit = prefixed(float(np.nanmax(run.energy_j, initial=0.0)), "J")
+    energies.errorbar(
+        place, factor * run.energy_j, factor * run.energy_error_j, fmt="o", markersize=3, color=SIMULATED
+    )
+    if float(np.nanmin(run.energy_j, initial=math.inf)) > 0.0:
+        magnitude_axis(energies)
+    energies.set_ylabel(f"mean energy [{unit}]")
+    impacts.bar(place, run.impacts / run.observed_s, color=MEASURED, width=0.7)
+    impacts.set_ylabel("impacts a second")
+    for axes in (energies, impacts):
+        axes.set_xlabel("cell, from the base")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _numbers(found: ChainAnswer) -> list[Table]:
+    waves = table(
+        "chain_waves",
+        linear_hz=found.linear_hz,
+        decay_db_per_unit=found.attenuation_db,
+        wave_number_rad=found.wave_numbers,
+        **{f"band_{k + 1}_hz": band for k, band in enumerate(found.bands_hz.T)},
+    )
+    if not found.runs:
+        return [waves]
+    rows = [
+        (run, line, cell)
+        for run in found.runs
+        for line in range(len(run.over_hz))
+        for cell in range(run.cells)
+    ]
+    across = table(
+        "chain_transmission",
+        cells=[run.cells for run, _, _ in rows],
+        frequency_hz=[run.over_hz[line] for run, line, _ in rows],
+        cell=[cell + 1 for _, _, cell in rows],
+        transmission=[run.transmission[line, cell] for run, line, cell in rows],
+    )
+    each = [(run, cell) for run in found.runs for cell in range(run.cells)]
+    cells = table(
+        "chain_cells",
+        cells=[run.cells for run, _ in each],
+        frequency_hz=[run.frequency_hz for run, _ in each],
+        cell=[cell + 1 for _, cell in each],
+        energy_j=[run.energy_j[cell] for run, cell in each],
+        energy_error_j=[run.energy_error_j[cell] for run, cell in each],
+        impacts=[run.impacts[cell] for run, cell in each],
+        largest_p_m=[run.largest_m[cell] for run, cell in each],
+        exponent_per_s=[run.exponent_per_s for run, _ in each],
+        exponent_error_per_s=[run.exponent_error_per_s for run, _ in each],
+    )
+    return [waves, across, cells]

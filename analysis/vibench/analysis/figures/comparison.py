@@ -1,0 +1,186 @@
+"""Curves laid over one another, as they are compared in the window, for paper: always light."""
+
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from vibench.acquisition import printable
+
+from ..comparison.curve import Curve, CurveKind, CurveOrigin, curve_difference
+from ..comparison.curve_peaks import curve_peaks
+from ..errors import InvalidRequest
+from ..model.difference import CurveDifference
+from ..tables import Table, table
+from .drawn import DrawnFigure
+from .style import (
+    BOUNDS,
+    LEVELS,
+    MEASURED,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    plain_label,
+    styled,
+)
+
+Dashes: TypeAlias = str | tuple[int, tuple[int, ...]]
+_HEIGHT_IN = 4.6
+_DIFFERENCE_IN = 1.4
+_STYLES: Mapping[CurveOrigin, tuple[Dashes, Dashes]] = {
+    CurveOrigin.MEASURED: ("-", ":"),
+    CurveOrigin.SIMULATED: ("--", "-."),
+    CurveOrigin.PREDICTED: ((0, (9, 3)), (0, (5, 2, 1, 2, 1, 2))),
+    CurveOrigin.STABLE: ("-", ":"),
+    CurveOrigin.UNSTABLE: ("--", "-."),
+}
+"""Of the transmission or Response I, and of Response II."""
+_LONE = 1
+"""A curve of one point is drawn as a mark."""
+_SINGLE_BAND = 0.2
+
+
+def comparison_figure(
+    name: str,
+    curves: Sequence[Curve],
+    pair: tuple[Curve, Curve] | None = None,
+    markers_hz: Sequence[float] = (),
+) -> DrawnFigure:
+    """Draw curves with their bounds, the difference of two of them, and markers.
+
+    Raises InvalidRequest when there is no curve, and NotEnoughData when the pair has no frequency in common.
+
+    Parameters
+    ----------
+    name
+        Becomes the files' name.
+    pair
+        The curve and its reference, whose difference is drawn below.
+
+    """
+    if not curves:
+        raise InvalidRequest("a figure of no curves was asked for; choose one or more")
+    difference = None if pair is None else curve_difference(*pair)
+    with styled():
+        rows = 1 if difference is None else 2
+        figure = new_figure(_HEIGHT_IN + (rows - 1) * _DIFFERENCE_IN)
+        panels = figure.subplots(rows, 1, sharex=True, height_ratios=(3.2, 1.0)[:rows], squeeze=False)[:, 0]
+        top: Axes = panels[0]
+        sources = list(dict.fromkeys(each.source for each in curves))
+        for curve in curves:
+            _curve(top, curve, LEVELS[sources.index(curve.source) % len(LEVELS)])
+        magnitude_axis(top)
+        top.set_ylim(*_heights(curves))
+        top.set_ylabel("|x / U|  (m0 over base)")
+        if difference is not None and pair is not None:
+            _difference(panels[1], difference)
+        for marker_hz in markers_hz:
+            for axes in panels:
+                axes.axvline(marker_hz, color=BOUNDS, linewidth=0.8, linestyle="-.")
+        panels[-1].set_xlabel("frequency [Hz]")
+        frequency_axis(top, *_span(curves))
+        legend_above(figure, [top], columns=2)
+        figure.align_ylabels()
+    return DrawnFigure(
+        name=name,
+        title="Comparison",
+        caption=comparison_caption(curves, pair),
+        figure=figure,
+        tables=comparison_tables(name, curves, pair),
+    )
+
+
+def _curve(axes: Axes, curve: Curve, colour: str) -> None:
+    lone = curve.frequency_hz.size <= _LONE
+    known = np.isfinite(curve.relative_sd)
+    if known.any() and not lone:
+        axes.fill_between(
+            curve.frequency_hz, curve.lower, curve.upper, color=colour, alpha=0.18, linewidth=0, where=known
+        )
+    axes.plot(
+        curve.frequency_hz,
+        curve.magnitude,
+        color=colour,
+        linestyle="none" if lone else _STYLES[curve.origin][curve.response is CurveKind.RESPONSE_II],
+        marker="o" if lone else None,
+        markersize=5,
+        linewidth=1.0,
+        label=plain_label(curve.name),
+        gid=printable(curve.name),
+    )
+
+
+def _difference(axes: Axes, difference: CurveDifference) -> None:
+    axes.plot(difference.frequency_hz, difference.decibel, color=MEASURED, linewidth=0.8)
+    axes.axhline(0, color=BOUNDS, linewidth=0.6)
+    axes.set_ylabel("difference\n[dB]")
+
+
+def _heights(curves: Sequence[Curve]) -> tuple[float, float]:
+    """Let the curves fill the picture, not their bounds."""
+    known = np.concatenate([each.magnitude[np.isfinite(each.magnitude)] for each in curves])
+    positive = known[known > 0]
+    return (float(positive.min()) / 2, 2 * float(positive.max())) if positive.size else (0.1, 10.0)
+
+
+def _span(curves: Sequence[Curve]) -> tuple[float, float]:
+    low = min(float(np.min(each.frequency_hz)) for each in curves)
+    high = max(float(np.max(each.frequency_hz)) for each in curves)
+    return (low, high) if high > low else (low * (1 - _SINGLE_BAND), high * (1 + _SINGLE_BAND))
+
+
+def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
+    """Say what each curve is, with its numbers."""
+    said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
+    said.append("Shaded: two standard deviations.")
+    if pair is not None:
+        difference = curve_difference(*pair)
+        said.append(
+            f"Difference of {pair[0].name} over {pair[1].name}: median {difference.median_abs_db:.2g} dB, "
+            f"root mean square {difference.rms_db:.2g} dB."
+        )
+    return " ".join(said)
+
+
+def comparison_tables(
+    name: str, curves: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
+) -> tuple[Table, ...]:
+    """Give every curve, the difference, and the peaks, with units in the headings."""
+    found = [
+        table(
+            f"{name}_{number}_{_file_word(curve)}",
+            frequency_hz=curve.frequency_hz,
+            magnitude_displacement_over_displacement=curve.magnitude,
+            relative_standard_deviation=curve.relative_sd,
+        )
+        for number, curve in enumerate(curves, start=1)
+    ]
+    peaks = [(curve.name, peak) for curve in curves for peak in curve_peaks(curve)]
+    if peaks:
+        found.append(
+            table(
+                f"{name}_peaks",
+                curve=[label for label, _ in peaks],
+                frequency_hz=[each.frequency_hz for _, each in peaks],
+                magnitude=[each.magnitude for _, each in peaks],
+                half_power_width_hz=[each.half_power_width_hz or np.nan for _, each in peaks],
+            )
+        )
+    if pair is not None:
+        difference = curve_difference(*pair)
+        found.append(
+            table(
+                f"{name}_difference",
+                frequency_hz=difference.frequency_hz,
+                difference_db=difference.decibel,
+                standard_errors=difference.standard_errors,
+            )
+        )
+    return tuple(found)
+
+
+def _file_word(curve: Curve) -> str:
+    kept = (each if each.isalnum() or each in "-_" else "_" for each in curve.name.replace(", ", "_"))
+    return "".join(kept)

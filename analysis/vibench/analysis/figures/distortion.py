@@ -1,0 +1,154 @@
+"""Noise and nonlinear distortion of a transmission from noise that repeats, and its detection lines."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..frequency_response.distortion import Distortion, distortion, is_even_line
+from ..frequency_response.noise_response import NoiseAnalysis
+from ..frequency_response.periodic import PeriodicFrequencyResponse
+from ..signals.arrays import Reals
+from ..tables import table
+from .drawn import DrawnFigure
+from .style import (
+    BOUNDS,
+    LINEAR,
+    MEASURED,
+    SIMULATED,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    styled,
+)
+
+_HEIGHT_IN = 4.6
+_LOW_HEIGHT_IN = 3.0
+_EVEN, _ODD = LINEAR, SIMULATED
+
+
+def distortion_figure(analysis: NoiseAnalysis, periodic: PeriodicFrequencyResponse) -> DrawnFigure:
+    """Draw how much of the scatter is noise and how much distortion, and what lies on quiet lines."""
+    lines = periodic.detection
+    has_quiet_lines = lines.order.size > 0
+    with styled():
+        figure = new_figure(_HEIGHT_IN if has_quiet_lines else _LOW_HEIGHT_IN)
+        panels: list[Axes] = list(figure.subplots(1 + has_quiet_lines, 1, sharex=True, squeeze=False)[:, 0])
+        _shares(panels[0], periodic)
+        if has_quiet_lines:
+            _detection(panels[1], periodic)
+        panels[-1].set_xlabel("frequency [Hz]")
+        driven_hz = periodic.frequency_response.frequency_hz
+        frequency_axis(panels[0], float(driven_hz[0]), float(driven_hz[-1]))
+        legend_above(figure, panels)
+        figure.align_ylabels()
+    name = f"distortion_{analysis.facts.name}"
+    varied = periodic.distortion_variance
+    columns = {
+        "frequency_hz": driven_hz,
+        "noise_share": _share(periodic.noise_variance, periodic),
+        **({} if varied is None else {"distortion_share": _share(varied, periodic)}),
+        "detection_frequency_hz": lines.frequency_hz,
+        "detection_order": lines.order,
+        "detection_m_per_s": lines.response_amplitude,
+        "detection_noise_m_per_s": lines.noise_amplitude,
+    }
+    return DrawnFigure(
+        name=name,
+        title=f"Noise and distortion, {analysis.excitation.amplitude_vpp:g} Vpp noise",
+        caption=distortion_caption(periodic),
+        figure=figure,
+        tables=(table(name, **columns),),
+    )
+
+
+def _share(variance: Reals, periodic: PeriodicFrequencyResponse) -> Reals:
+    return np.asarray(np.sqrt(variance) / periodic.frequency_response.magnitude)
+
+
+def _shares(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
+    frequency_hz = periodic.frequency_response.frequency_hz
+    axes.plot(
+        frequency_hz,
+        _share(periodic.noise_variance, periodic),
+        color=BOUNDS,
+        linewidth=0.9,
+        label="not repeating (noise or chaos), one realisation",
+    )
+    varied = periodic.distortion_variance
+    if varied is not None:
+        # Where noise explains all of the scatter there is nothing to draw.
+        seen = np.where(varied > 0, _share(varied, periodic), np.nan)
+        axes.plot(
+            frequency_hz,
+            seen,
+            color=MEASURED,
+            marker=".",
+            markersize=3,
+            linewidth=0.7,
+            label="nonlinear distortion",
+        )
+    magnitude_axis(axes)
+    axes.set_ylabel("sd over |H|")
+
+
+def _detection(axes: Axes, periodic: PeriodicFrequencyResponse) -> None:
+    lines = periodic.detection
+    is_even = is_even_line(lines)
+    for chosen, colour, marker, label in (
+        (is_even, _EVEN, "o", "even lines, not driven"),
+        (~is_even, _ODD, "x", "odd lines, not driven"),
+    ):
+        _dots(axes, lines.frequency_hz[chosen], lines.response_amplitude[chosen], (colour, marker, label))
+    axes.plot(
+        lines.frequency_hz,
+        lines.noise_amplitude,
+        color=BOUNDS,
+        linewidth=0.9,
+        linestyle=":",
+        label="what does not repeat there",
+    )
+    magnitude_axis(axes)
+    axes.set_ylabel("m0 velocity [m/s]")
+
+
+def _dots(axes: Axes, frequency_hz: Reals, amplitude: Reals, look: tuple[str, str, str]) -> None:
+    colour, marker, label = look
+    axes.plot(
+        frequency_hz, amplitude, color=colour, marker=marker, markersize=2.5, linestyle="none", label=label
+    )
+
+
+def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
+    """Say how much of the scatter does not repeat from period to period, and how much is distortion."""
+    found = distortion(periodic)
+    said = [
+        (
+            f"From {periodic.realisations} realisations: what does not repeat from one period to the next, "
+            "noise of the channels or chaos of the specimen, gives one of them a standard deviation of "
+            f"{_percent(found.noise_share)} of the transmission (median)"
+        )
+    ]
+    if found.distortion_share is None:
+        said.append("; one realisation cannot show distortion.")
+    else:
+        said.append(f", distortion {_percent(found.distortion_share)}.")
+    if periodic.drift is not None:
+        said.append(f" The {periodic.drift.text}; this is not distortion.")
+    return "".join(said) + _quiet_text(found)
+
+
+def _percent(share: float) -> str:
+    """Two digits, and never a power of ten: in chaos more than the transmission itself is usual."""
+    return f"{100 * share:.0f} %" if share >= 1 else f"{100 * share:.2g} %"
+
+
+def _quiet_text(found: Distortion) -> str:
+    levels = {"even": found.even_m_per_s, "odd": found.odd_m_per_s}
+    shown = [f"{1e6 * level:.3g} µm/s on {name} lines" for name, level in levels.items() if level is not None]
+    if not shown or found.detection_noise_m_per_s is None:
+        return ""
+    return (
+        f" Lines that were not driven hold {' and '.join(shown)} (rms, what does not repeat, "
+        f"{1e6 * found.detection_noise_m_per_s:.2g} µm/s taken off): even and odd distortion of all from "
+        "the drive voltage to m0."
+    )

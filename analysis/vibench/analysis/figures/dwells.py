@@ -1,0 +1,160 @@
+"""Dwells at one frequency and several levels: time signals and spectra (the paper's Fig. 14)."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..chaos.verdict import MotionKind
+from ..model.overlay import SPECTRUM, DwellOverlay
+from ..recordings.facts import specimen_of
+from ..signals.arrays import Reals
+from ..sine.dwell import DwellResponse
+from ..sine.dwell_analysis import COLUMN_HZ, DwellAnalysis, spectrum_columns
+from ..tables import Table, plus_minus, table
+from .drawn import DrawnFigure
+from .ensemble_band import band_columns, draw_band, run_text, simulated_label
+from .marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
+from .style import (
+    COLLIDING,
+    MEASURED,
+    SIMULATED,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    prefixed,
+    styled,
+)
+
+_ROW_IN = 1.75
+_FRAME_IN = 1.1
+_ZOOM_PERIODS = 12.0
+_RANGE_DECADES = 5.0
+
+Pair = tuple[DwellAnalysis, DwellOverlay | None]
+
+
+def dwells_figure(pairs: Sequence[Pair]) -> DrawnFigure:
+    """Draw one row a level, weak to strong: whole dwell, its last periods, spectrum of its window."""
+    rising = sorted(pairs, key=lambda pair: pair[0].excitation.amplitude_vpp)
+    at = model_resonances(specimen_of(rising[0][0].facts.bench))
+    with styled():
+        figure = new_figure(_FRAME_IN + _ROW_IN * len(rising))
+        panels = figure.subplots(len(rising), 3, squeeze=False, width_ratios=(1.0, 1.0, 1.5))
+        for row, (analysis, laid) in zip(panels, rising, strict=True):
+            _whole(row[0], analysis)
+            _zoom(row[1], analysis.response, laid)
+            _spectrum(row[2], analysis.response, laid, at)
+        for axes, label in zip(panels[-1], ("time [s]", "time [ms]", "frequency [Hz]"), strict=True):
+            axes.set_xlabel(label)
+        panels[0, 0].set_title("whole dwell")
+        panels[0, 1].set_title(f"last {_ZOOM_PERIODS:g} periods")
+        label_resonances(panels[0, 2], ModelResonances((), at.bound_hz))
+        legend_above(figure, [panels[0, 1], panels[0, 0], panels[0, 2]], columns=3)
+        figure.align_ylabels(panels[:, 0])
+    return DrawnFigure(
+        name="dwells_" + "_".join(analysis.facts.name for analysis, _ in rising),
+        title=f"Dwells at {rising[0][0].excitation.frequency_hz:g} Hz",
+        caption=dwells_caption(rising),
+        figure=figure,
+        tables=tuple(each for pair in rising for each in _tables(pair)),
+    )
+
+
+def _whole(axes: Axes, analysis: DwellAnalysis) -> None:
+    found, response = analysis.displacement, analysis.response
+    factor, unit = prefixed(float(np.max(np.abs(found.upper))), "m")
+    motion = response.displacement
+    stop_s = (motion.samples.size - motion.edge_samples) / motion.sample_rate_hz
+    axes.axvspan(stop_s - response.window_s, stop_s, color=COLLIDING, zorder=0, label="window analysed")
+    axes.fill_between(found.time_s, factor * found.lower, factor * found.upper, color=MEASURED, linewidth=0)
+    axes.set_xlim(0, motion.samples.size / motion.sample_rate_hz)
+    axes.set_ylabel(f"{analysis.excitation.amplitude_vpp:g} Vpp\nx of m0 [{unit}]")
+
+
+def last_periods(response: DwellResponse) -> tuple[Reals, Reals]:
+    """Time before the window's end [s] and x [m] over the last periods of the window."""
+    rate = response.displacement.sample_rate_hz
+    count = round(_ZOOM_PERIODS / response.drive.frequency_hz * rate)
+    time_s: Reals = (np.arange(count, dtype=np.float64) - count) / rate
+    return time_s, response.displacement.settled[-count:]
+
+
+def _zoom(axes: Axes, response: DwellResponse, laid: DwellOverlay | None) -> None:
+    time_s, motion = last_periods(response)
+    factor, unit = prefixed(float(np.max(np.abs(motion))), "m")
+    axes.plot(1e3 * time_s, factor * motion, color=MEASURED, linewidth=1.2, label="measured")
+    if laid is not None:
+        axes.plot(
+            1e3 * time_s,
+            factor * last_periods(laid.response)[1],
+            color=SIMULATED,
+            linewidth=0.8,
+            linestyle=(0, (4, 2)),
+            label=simulated_label(laid.run),
+        )
+    axes.set_xlim(1e3 * float(time_s[0]), 0)
+    axes.set_ylabel(f"x [{unit}]")
+
+
+def _spectrum(axes: Axes, response: DwellResponse, laid: DwellOverlay | None, at: ModelResonances) -> None:
+    mark_resonances(axes, ModelResonances((), at.bound_hz))
+    frequency_hz, size = spectrum_columns(response)
+    axes.plot(frequency_hz, size, color=MEASURED, linewidth=1.0)
+    if laid is not None:
+        middle = draw_band(axes, frequency_hz, laid, SPECTRUM)
+        curve = spectrum_columns(laid.response) if middle is None else (frequency_hz, middle)
+        axes.plot(*curve, color=SIMULATED, linewidth=0.6, zorder=3)
+    magnitude_axis(axes)
+    top = float(np.max(size))
+    axes.set_ylim(top * 10**-_RANGE_DECADES, 3 * top)
+    axes.set_xlim(0, float(frequency_hz[-1]))
+    axes.set_ylabel("|x| / A0")
+
+
+def dwells_caption(rising: Sequence[Pair]) -> str:
+    """Say the responses and how much went to the terminal bands, level by level."""
+    said = []
+    for analysis, laid in rising:
+        found = analysis.response
+        text = (
+            f"{analysis.excitation.amplitude_vpp:g} Vpp (A0 = {1e6 * found.drive.amplitude_m:.3g} µm): "
+            f"Response I {found.response_i:.3g}, Response II "
+            f"{plus_minus(found.response_ii, 2 * found.sd_response_ii)}"
+        )
+        if laid is not None:
+            text += f". {run_text(laid)}"
+        bands = ", ".join(
+            f"{each.decibel:.1f} dB around {each.towards_hz:.0f} Hz" for each in analysis.terminal
+        )
+        said.append(f"{text} Measured bands: {bands} re the drive's line." if bands else text)
+    window_s = rising[0][0].response.window_s
+    text = (
+        f"Displacement of m0 and its spectrum over the last {window_s:.3g} s (largest line in each "
+        f"{COLUMN_HZ:g} Hz). {' '.join(said)}"
+    )
+    if all(analysis.motion.verdict.kind is MotionKind.PERIODIC for analysis, _ in rising):
+        return text
+    return (
+        f"{text} Where the motion is chaotic, measured and simulated signals agree in their statistics, not "
+        "instant by instant; the signal shown is that of one draw."
+    )
+
+
+def _tables(pair: Pair) -> tuple[Table, ...]:
+    analysis, laid = pair
+    name = f"dwell_{analysis.facts.name}"
+    frequency_hz, size = spectrum_columns(analysis.response)
+    time_s, motion = last_periods(analysis.response)
+    spectrum = {"frequency_hz": frequency_hz, "amplitude_over_a0": size}
+    signal = {"time_s": time_s, "displacement_m": motion}
+    if laid is not None:
+        spectrum |= band_columns(laid, SPECTRUM, "amplitude_over_a0")
+        spectrum["amplitude_over_a0_simulated"] = spectrum_columns(laid.response)[1]
+        signal["displacement_simulated_m"] = last_periods(laid.response)[1]
+    whole = analysis.displacement
+    return (
+        table(f"{name}_spectrum", **spectrum),
+        table(f"{name}_signal", **signal),
+        table(f"{name}_envelope", time_s=whole.time_s, lower_m=whole.lower, upper_m=whole.upper),
+    )

@@ -1,0 +1,101 @@
+"""The draws of a twin in a figure: their middle, the band of 95 %, and what is said of them."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..model.draws import SimulatedRun
+from ..model.overlay import AbstractOverlay
+from ..model.prediction import ResponsePrediction
+from ..signals.arrays import Reals
+from ..tables import Table, named, table
+from .style import SIMULATED
+
+
+def simulated_label(run: SimulatedRun) -> str:
+    """Name the simulated curve in a legend."""
+    if not run.driven.by_voltage:
+        return "simulated under the recorded base"
+    return "simulated under the recorded voltage"
+
+
+def draw_band(
+    axes: Axes,
+    along: Reals,
+    laid: AbstractOverlay[Any],
+    name: str,
+    shown: Callable[[Reals], Reals] = lambda values: values,
+) -> Reals | None:
+    """Fill the band of 95 % of one quantity, and give the middle to draw over it; None without an ensemble.
+
+    ``along`` belongs to the points of the quantity; ``shown`` turns its values into those of the axis.
+    """
+    found = laid.quantity(name)
+    if found is None or laid.run.draws == 1:
+        return None
+    axes.fill_between(
+        along,
+        shown(found.lower),
+        shown(found.upper),
+        color=SIMULATED,
+        alpha=0.25,
+        linewidth=0,
+        zorder=1.5,
+        label="95 % of draws",  # how many differs from recording to recording: the caption says it
+    )
+    return shown(found.median)
+
+
+def run_text(laid: AbstractOverlay[Any]) -> str:
+    """Say what was simulated, and where the measurement lies in it."""
+    run = laid.run
+    if not run.driven.by_voltage:
+        why = f" ({run.why})" if run.why else ""
+        return (
+            f"Simulated under the recorded base motion{why}, {run.impact_rate_hz:.0f} impacts per second: "
+            f"median difference {laid.difference.median_abs_db:.2g} dB, "
+            f"{100 * laid.difference.share_within_two:.0f} % of the values within two standard errors. The "
+            "recorded base does not yield to the simulated specimen's blows, so that in chaos the two differ."
+        )
+    said = [
+        (
+            f"Rig and specimen simulated together under the {run.driven.value}, {run.draws} draws from "
+            f"slightly different starts, {run.impact_rate_hz:.0f} impacts per second"
+        ),
+        *laid.agreement,
+    ]
+    ending = [] if laid.escape is None else [laid.escape.sentence]
+    known = [run.why] if run.why else []
+    return ". ".join(["; ".join(said), *ending, *known]) + "."
+
+
+def agreement_text(laid: AbstractOverlay[Any]) -> str:
+    """Say where the measurement lies within the draws, to go on a sentence; nothing under a base motion."""
+    if not laid.run.driven.by_voltage:
+        return ""
+    said = [*laid.agreement]
+    if laid.escape is not None:
+        said.append(laid.escape.sentence)
+    return "".join(f"; {each}" for each in said)
+
+
+def sines_table(name: str, sines: ResponsePrediction) -> Table:
+    """Give the responses to steady sines that a figure shows beside a measurement."""
+    wanted = ("frequency_hz", "amplitude_m", "response_i", "response_ii", "linear", "impacts")
+    return table(f"{name}_sines", **named(sines, *wanted))
+
+
+def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
+    """Give the columns of a table that hold a quantity's draws."""
+    found = laid.quantity(name)
+    if found is None or laid.run.draws == 1:
+        return {}
+    return {
+        f"{column}_draws_median": found.median,
+        f"{column}_draws_lower": found.lower,
+        f"{column}_draws_upper": found.upper,
+        f"{column}_z": found.z,
+        f"{column}_rank": found.rank.astype(np.float64),
+    }

@@ -1,0 +1,98 @@
+"""All exponents and the dimension they give, over frequency or level, with their intervals."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from vibench.sim import Parameter
+
+from ..dynamics import ExponentSpectrum
+from ..signals.arrays import Reals
+from ..tables import Table, table
+from .drawn import DrawnFigure
+from .style import BOUNDS, LEVELS, MEASURED, legend_above, new_figure, styled
+
+_HEIGHT_IN = 5.2
+
+
+def exponent_spectrum_figure(found: ExponentSpectrum) -> DrawnFigure:
+    """Draw six exponents with their intervals, and below them the Kaplan-Yorke dimension."""
+    request = found.request
+    is_frequency = request.along is Parameter.FREQUENCY
+    place = found.column("frequency_hz") if is_frequency else 1e6 * found.column("amplitude_m")
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1.0))
+        _exponents(upper, place, found)
+        _dimension(lower, place, found)
+        lower.set_xlabel("drive frequency [Hz]" if is_frequency else "base amplitude A0 [µm]")
+        legend_above(figure, [upper], columns=6)
+        figure.align_ylabels()
+    return DrawnFigure(
+        name="spectrum",
+        title=f"All exponents: {request.title}",
+        caption=(
+            f"Lyapunov exponents of the motion that a run from rest ends in; bars: {request.confidence:.0%} "
+            f"intervals. Below: Kaplan and Yorke's dimension. {found.cost_sentence} "
+            f"{request.specimen_text}, "
+            f"{request.accuracy.value} accuracy, {request.duration_s:g} s after {request.settle_s:g} s."
+        ),
+        figure=figure,
+        tables=(_numbers(found),),
+    )
+
+
+def _exponents(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
+    values, low, high = (found.column(name) for name in ("exponents_per_s", "low_per_s", "high_per_s"))
+    for k in range(values.shape[1]):
+        known = np.isfinite(values[:, k])
+        if not known.any():
+            continue
+        reach = np.abs(np.stack([values[known, k] - low[known, k], high[known, k] - values[known, k]]))
+        axes.errorbar(
+            place[known],
+            values[known, k],
+            np.nan_to_num(reach),
+            color=LEVELS[k],
+            marker=".",
+            markersize=3,
+            linewidth=0.9,
+            elinewidth=0.7,
+            label=f"λ{k + 1}",
+        )
+    axes.axhline(0.0, color=BOUNDS, linewidth=0.7)
+    axes.set_ylabel("exponent [1/s]")
+
+
+def _dimension(axes: Axes, place: Reals, found: ExponentSpectrum) -> None:
+    middle, low, high = (found.column(n) for n in ("dimension", "dimension_low", "dimension_high"))
+    axes.errorbar(
+        place,
+        middle,
+        np.nan_to_num(np.abs(np.stack([middle - low, high - middle]))),
+        color=MEASURED,
+        marker=".",
+        markersize=3,
+        linewidth=0.9,
+        elinewidth=0.7,
+    )
+    axes.set_ylabel("dimension")
+
+
+def _numbers(found: ExponentSpectrum) -> Table:
+    values, low, high = (found.column(name) for name in ("exponents_per_s", "low_per_s", "high_per_s"))
+    six = {
+        f"{name}_{k + 1}_per_s": columns[:, k]
+        for name, columns in (("exponent", values), ("low", low), ("high", high))
+        for k in range(values.shape[1])
+    }
+    return table(
+        "spectrum",
+        frequency_hz=found.column("frequency_hz"),
+        amplitude_m=found.column("amplitude_m"),
+        **six,
+        sum_per_s=found.column("sum_per_s"),
+        dampers_per_s=found.column("dampers_per_s"),
+        dimension=found.column("dimension"),
+        dimension_low=found.column("dimension_low"),
+        dimension_high=found.column("dimension_high"),
+    )

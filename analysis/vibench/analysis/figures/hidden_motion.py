@@ -1,0 +1,225 @@
+"""The hidden motion of one recording: p between its stops, and what its collisions say."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, measured_gaps
+from ..signals.arrays import Reals
+from ..tables import Table, table
+from .drawn import DrawnFigure
+from .style import (
+    BOUNDS,
+    COLLIDING,
+    MEASURED,
+    PREDICTED,
+    SIMULATED,
+    legend_above,
+    new_figure,
+    prefixed,
+    styled,
+)
+
+_MICRO = 1e6
+_COLUMNS = 1200
+_ZOOM_S = 0.025
+_BOUND = 1.96
+"""Standard deviations of bounds of 95 %."""
+_BINS = 40
+_DEEPEST_SHOWN_M = 2e-6
+_POINTS = 200
+
+
+def hidden_motion_figure(motion: HiddenMotion) -> DrawnFigure:
+    """Draw p over the whole stretch and over an instant of it, between the stops."""
+    with styled():
+        figure = new_figure(4.4)
+        whole, zoom = figure.subplots(2, 1)
+        _whole(whole, motion)
+        tables = _zoom(zoom, motion)
+        legend_above(figure, [zoom, whole], columns=4)
+        figure.align_ylabels([whole, zoom])
+    return DrawnFigure(
+        name=f"hidden_motion_{motion.name}",
+        title=f"Hidden motion of {motion.name}",
+        caption=(
+            "Relative displacement p = y - z of m1, told from base acceleration and m0's velocity. Above: "
+            "its extremes; where it was not followed nothing is drawn, and the ground is grey. Below: "
+            f"{1e3 * _ZOOM_S:g} ms amid the impacts, tracked with bounds of 95 %, and without a model. "
+            + " ".join(motion.sentences)
+        ),
+        figure=figure,
+        tables=tables,
+    )
+
+
+def _stops(axes: Axes, motion: HiddenMotion) -> None:
+    lower, upper = motion.gaps_m
+    for level in (-lower, upper):
+        if np.isfinite(level):
+            axes.axhline(_MICRO * level, color=SIMULATED, linewidth=0.9, label="stops")
+    axes.set_ylabel("p [µm]")
+
+
+def _whole(axes: Axes, motion: HiddenMotion) -> None:
+    rate = motion.sample_rate_hz
+    for gone in motion.tracked.not_followed:
+        first, last = (motion.first_sample + each for each in (gone.first, gone.stop))
+        axes.axvspan(first / rate, last / rate, color=COLLIDING, linewidth=0, label="not followed")
+    length = max(1, motion.tracked.p.size // _COLUMNS)
+    count = motion.tracked.p.size // length
+    pieces = motion.tracked.p[: count * length].reshape(count, length)
+    told = ~np.isnan(pieces).all(axis=1)
+    low, high = np.full(count, np.nan), np.full(count, np.nan)
+    low[told], high[told] = np.nanmin(pieces[told], axis=1), np.nanmax(pieces[told], axis=1)
+    time_s = motion.time_s[: count * length : length]
+    axes.fill_between(time_s, _MICRO * low, _MICRO * high, color=MEASURED, linewidth=0)
+    _stops(axes, motion)
+    axes.set_xlim(motion.time_s[0], motion.time_s[-1])
+    axes.set_xlabel("time [s]")
+
+
+def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
+    place = _zoomed(motion)
+    time_s, p, sd = motion.time_s[place], motion.tracked.p[place], motion.tracked.p_sd[place]
+    free = motion.free.p[place]
+    low, high = _MICRO * (p - _BOUND * sd), _MICRO * (p + _BOUND * sd)
+    axes.fill_between(time_s, low, high, color=BOUNDS, linewidth=0, label="bounds of 95 %")
+    axes.plot(time_s, _MICRO * p, color=MEASURED, linewidth=1.1, label="tracked")
+    axes.plot(time_s, _MICRO * free, color=PREDICTED, linestyle=":", label="without a contact model")
+    _stops(axes, motion)
+    if time_s.size:
+        axes.set_xlim(time_s[0], time_s[-1])
+    axes.set_xlabel("time [s]")
+    return (
+        table(
+            f"hidden_motion_{motion.name}",
+            time_s=time_s,
+            p_m=p,
+            p_sd_m=sd,
+            p_without_contact_model_m=free,
+        ),
+    )
+
+
+def _zoomed(motion: HiddenMotion) -> slice:
+    """Choose the stretch that is shown closely: around the middle one of the impacts, or of the motion."""
+    count = round(_ZOOM_S * motion.sample_rate_hz)
+    impacts = motion.tracked.collisions.samples
+    middle = int(np.median(impacts)) if impacts.size else motion.tracked.p.size // 2
+    start = min(max(0, middle - count // 2), max(0, motion.tracked.p.size - count))
+    return slice(start, start + count)
+
+
+def hidden_impacts_figure(motion: HiddenMotion) -> DrawnFigure:
+    """Draw impulses over time, force against penetration, energy lost at impacts, and measured gaps."""
+    with styled():
+        figure = new_figure(5.2)
+        (impulses, force), (energy, gaps) = figure.subplots(2, 2)
+        _impulses(impulses, motion)
+        law = _force(force, motion)
+        _energy(energy, motion)
+        _gaps(gaps, motion)
+    return DrawnFigure(
+        name=f"hidden_impacts_{motion.name}",
+        title=f"Collisions of {motion.name}",
+        caption=(
+            "Above left: impulse of every impact on m1 (tracked; crosses without a contact model). "
+            "Above right: force of a stop against penetration, as tracking measured it, with bounds of 95 % "
+            "where it was told. Below left: energy of relative motion that an impact took, of what it had, "
+            "without a contact model. Below right: gap as each impact measured it without a contact model, "
+            "and the gaps that were tracked with (orange)."
+        ),
+        figure=figure,
+        tables=(*_impact_tables(motion), *law),
+    )
+
+
+def _impulses(axes: Axes, motion: HiddenMotion) -> None:
+    found, free = motion.tracked.collisions, motion.free.impacts
+    largest = max([*found.impulses, *free.impulses], default=1.0)
+    factor, unit = prefixed(largest, "N s")
+    for impacts, mark, color in ((found, ".", MEASURED), (free, "x", PREDICTED)):
+        time_s = (motion.first_sample + impacts.samples) / motion.sample_rate_hz
+        axes.plot(time_s, factor * impacts.impulses, mark, color=color, markersize=2.0, rasterized=True)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(f"impulse [{unit}]")
+
+
+def _force(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
+    found = {each.what: each for each in motion.parameters}
+    tracked = motion.specimen
+    depth = np.linspace(0.0, _DEEPEST_SHOWN_M, _POINTS)
+    force = tracked.steepness * depth**tracked.exponent
+    axes.plot(_MICRO * depth, force, color=MEASURED)
+    axes.set_xlabel("penetration [µm]")
+    axes.set_ylabel("force [N]")
+    at_1um, exponent = found.get(Hidden.FORCE), found.get(Hidden.EXPONENT)
+    is_told = at_1um is not None and exponent is not None and at_1um.is_determined
+    if not is_told or at_1um is None or exponent is None:
+        axes.set_title("as described: not told by this motion", fontsize="small")
+        return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force),)
+    low, high = _band(depth, at_1um, exponent)
+    axes.fill_between(_MICRO * depth, low, high, color=BOUNDS, alpha=0.5, linewidth=0)
+    return (table(f"hidden_force_{motion.name}", penetration_m=depth, force_n=force, low_n=low, high_n=high),)
+
+
+def _band(depth: Reals, at_1um: FoundParameter, exponent: FoundParameter) -> tuple[Reals, Reals]:
+    """Give the largest band of laws whose two numbers lie within their bounds."""
+    exponents = (exponent.low, exponent.high) if exponent.is_determined else (exponent.described,) * 2
+    laws = np.stack([f * (_MICRO * depth) ** n for f in (at_1um.low, at_1um.high) for n in exponents])
+    return np.asarray(laws.min(axis=0)), np.asarray(laws.max(axis=0))
+
+
+def _energy(axes: Axes, motion: HiddenMotion) -> None:
+    free = motion.free.impacts
+    share = 1.0 - (free.rate_after / free.rate_before) ** 2
+    good = (free.rate_before > 0) & (np.abs(share) < 1.0)
+    axes.plot(
+        free.rate_before[good], 100 * share[good], ".", color=PREDICTED, markersize=2.0, rasterized=True
+    )
+    axes.axhline(0.0, color=BOUNDS, linewidth=0.8)
+    if good.any():
+        axes.axhline(100 * float(np.median(share[good])), color=MEASURED, linewidth=1.0)
+    axes.set_xlabel("speed of approach [m/s]")
+    axes.set_ylabel("energy lost [%]")
+
+
+def _gaps(axes: Axes, motion: HiddenMotion) -> None:
+    free, measured = motion.free.impacts, measured_gaps(motion.free.impacts)
+    for side, label, color in ((-1.0, "lower", PREDICTED), (1.0, "upper", MEASURED)):
+        here = measured[(free.sides == side) & ~np.isnan(measured)]
+        if here.size:
+            axes.hist(_MICRO * here, bins=_BINS, histtype="step", color=color, label=label)
+    for gap, style in zip(motion.gaps_m, ("--", "-"), strict=True):
+        if np.isfinite(gap):
+            axes.axvline(_MICRO * gap, color=SIMULATED, linestyle=style, linewidth=1.0)
+    axes.set_xlabel("gap [µm]")
+    axes.set_ylabel("impacts")
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(fontsize="small")
+
+
+def _impact_tables(motion: HiddenMotion) -> tuple[Table, ...]:
+    found, free = motion.tracked.collisions, motion.free.impacts
+    return (
+        table(
+            f"hidden_impacts_{motion.name}",
+            time_s=(motion.first_sample + found.samples) / motion.sample_rate_hz,
+            side=found.sides,
+            duration_s=found.durations_s,
+            impulse_ns=found.impulses,
+            penetration_m=found.penetrations_m,
+            speed_before_m_per_s=found.speeds_before,
+            speed_after_m_per_s=found.speeds_after,
+        ),
+        table(
+            f"hidden_impacts_without_contact_model_{motion.name}",
+            middle_s=(motion.first_sample + free.samples) / motion.sample_rate_hz,
+            side=free.sides,
+            impulse_ns=free.impulses,
+            p_m=free.p,
+            gap_m=measured_gaps(free),
+            speed_before_m_per_s=free.rate_before,
+            speed_after_m_per_s=free.rate_after,
+        ),
+    )

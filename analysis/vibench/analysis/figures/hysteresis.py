@@ -1,0 +1,81 @@
+"""An up and a down sweep in one picture: where the response depends on where one comes from."""
+
+import numpy as np
+
+from ..sine.hysteresis import Hysteresis, hysteresis
+from ..sine.jumps import Jump
+from ..sine.sweep_analysis import SweepAnalysis
+from ..tables import table
+from .drawn import DrawnFigure
+from .style import COLLIDING, LEVELS, legend_above, magnitude_axis, new_figure, styled
+
+_HEIGHT_IN = 3.4
+
+
+def hysteresis_figure(up: SweepAnalysis, down: SweepAnalysis) -> DrawnFigure:
+    """Draw Response II of both directions, their jumps, and where they differ."""
+    found = hysteresis(up.response, down.response, up.jumps, down.jumps)
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        axes = figure.subplots()
+        axes.fill_between(
+            found.frequency_hz,
+            0,
+            1,
+            where=found.differs.tolist(),
+            transform=axes.get_xaxis_transform(),
+            color=COLLIDING,
+            linewidth=0,
+            label="they differ",
+        )
+        for curve, jumps, colour, line, label in (
+            (found.up, up.jumps, LEVELS[0], "-", "up"),
+            (found.down, down.jumps, LEVELS[2], "--", "down"),
+        ):
+            axes.plot(found.frequency_hz, curve, color=colour, linestyle=line, label=f"sweep {label}")
+            for jump in jumps:
+                axes.axvspan(jump.lower_hz, jump.upper_hz, color=colour, alpha=0.4, linewidth=0.5)
+        magnitude_axis(axes)
+        axes.set_xlim(float(found.frequency_hz[0]), float(found.frequency_hz[-1]))
+        axes.set_xlabel("drive frequency [Hz]")
+        axes.set_ylabel("Response II\n|x at f| / A0")
+        legend_above(figure, [axes])
+    name = f"hysteresis_{up.facts.name}_{down.facts.name}"
+    return DrawnFigure(
+        name=name,
+        title=f"Up against down, {up.excitation.amplitude_vpp:g} Vpp",
+        caption=_caption(up, down, found),
+        figure=figure,
+        tables=(
+            table(
+                name,
+                frequency_hz=found.frequency_hz,
+                response_ii_up=found.up,
+                response_ii_down=found.down,
+                differs=found.differs.astype(np.int64),
+            ),
+        ),
+    )
+
+
+def jumps_text(jumps: tuple[Jump, ...]) -> str:
+    """Say jumps in words, with their bounds."""
+    if not jumps:
+        return "no jump"
+    return " and ".join(
+        f"a jump of {each.decibel:+.1f} dB at {each.frequency_hz:.1f} Hz ({each.lower_hz:.1f} to "
+        f"{each.upper_hz:.1f})"
+        for each in jumps
+    )
+
+
+def _caption(up: SweepAnalysis, down: SweepAnalysis, found: Hysteresis) -> str:
+    widths = "; ".join(
+        f"hysteresis {width:.1f} Hz wide ({low:.1f} to {high:.1f})" for width, low, high in found.widths_hz
+    )
+    share = float(np.mean(found.differs))
+    return (
+        f"Response II of sweeps up and down at {up.excitation.amplitude_vpp:g} Vpp. "
+        f"Up: {jumps_text(up.jumps)}. Down: {jumps_text(down.jumps)}. {widths + '. ' if widths else ''}"
+        f"Grey: more than 1.5 dB apart, {100 * share:.0f} % of the band."
+    )

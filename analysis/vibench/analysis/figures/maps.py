@@ -1,0 +1,230 @@
+"""Maps, basins and diagrams along one parameter: what motions there are, and one quantity of them."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from vibench.sim.maps import MapMotion, MapResults, Quantity, Spacing
+
+from ..dynamics import (
+    MOTION_CLASSES,
+    BranchDiagram,
+    BranchLine,
+    RecordedLevel,
+    map_caption,
+    motion_classes,
+    motion_words,
+)
+from ..signals.arrays import Reals
+from ..tables import Table, table
+from .branches import draw_line
+from .drawn import DrawnFigure
+from .map_quantities import SHOWN
+from .style import (
+    LEVELS,
+    MEASURED,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    plain_label,
+    prefixed,
+    styled,
+)
+
+_PANEL_IN = 3.6
+_STRIP_IN = 2.6
+MICRO = 1e6
+_LINEAR = ("lyapunov", "motions", "duration")
+_COLOURS = (*LEVELS, "#f0e442", "#1b1b1b")
+_UP_AND_DOWN = {"up": ("#0072b2", "up"), "down": ("#d55e00", "down")}
+
+
+def map_figure(
+    results: MapResults,
+    shown: str | None = None,
+    diagram: BranchDiagram | None = None,
+    levels: Sequence[RecordedLevel] = (),
+) -> DrawnFigure:
+    """Draw a map over two quantities, or the diagram along one.
+
+    Parameters
+    ----------
+    results
+        The map, complete or growing.
+    shown
+        One of `SHOWN`, beside the kinds of motion. When None, Response I, and of a basin map how long each
+        start was followed.
+    diagram
+        Branches that are laid over a diagram along one quantity.
+    levels
+        Of recordings, laid over a map of frequency and amplitude as lines.
+
+    """
+    with styled():
+        if len(results.plan.varied) == 1:
+            figure, title = _diagram(results, diagram), "Motions along one parameter"
+        else:
+            usual = "duration" if results.plan.is_basin else "response_i"
+            figure, title = _map(results, shown or usual, levels), "Map of motions"
+    return DrawnFigure(
+        name="map",
+        title=f"{title}: {', '.join(each.long_name for each in results.plan.varied)}",
+        caption=map_caption(results),
+        figure=figure,
+        tables=(motion_table(results.motions),),
+    )
+
+
+def _map(
+    results: MapResults,
+    shown: str,
+    levels: Sequence[RecordedLevel],
+) -> Figure:
+    has_several = len(results.plan.start_labels) > 1 and shown != "motions"
+    quantities = [shown, "motions"] if has_several else [shown]
+    figure = new_figure(_PANEL_IN * (1 + len(quantities)))
+    panels = figure.subplots(1 + len(quantities), 1, sharex=True)
+    if results.plan.is_basin:
+        _draw_basins(panels[0], results)
+    else:
+        _draw_classes(panels[0], results)
+    for axes, name in zip(panels[1:], quantities, strict=True):
+        mesh = _draw(axes, results, results.shown(name), norm=_scale(name, results.shown(name)))
+        figure.colorbar(mesh, ax=axes, label=SHOWN[name])
+        for level in levels:
+            _draw_level(axes, level, mesh)
+    for axes in panels:
+        _place(axes, results)
+    return figure
+
+
+def _draw(axes: Axes, results: MapResults, values: Reals, **style: Any) -> QuadMesh:
+    first, second = results.plan.varied
+    (across, _), (up, _) = _scaled(results, first), _scaled(results, second)
+    return axes.pcolormesh(across, up, values, rasterized=True, shading="flat", **style)
+
+
+def _scaled(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
+    """Give the edges of the cells along one axis, in the unit that reads best, and its label."""
+    chosen = results.plan.range_of(quantity)
+    edges = np.array(chosen.edges)
+    factor, unit = (
+        (1.0, quantity.units) if quantity.units == "Hz" else prefixed(max(map(abs, edges)), quantity.units)
+    )
+    return factor * edges, f"{quantity.long_name} [{unit.replace('u', 'µ')}]"
+
+
+def _place(axes: Axes, results: MapResults) -> None:
+    first, second = results.plan.varied
+    for quantity, label, scale in (
+        (first, axes.set_xlabel, partial(axes.set_xscale, "log")),
+        (second, axes.set_ylabel, partial(magnitude_axis, axes)),
+    ):
+        label(_scaled(results, quantity)[1])
+        if results.plan.range_of(quantity).spacing is Spacing.LOGARITHMIC:
+            scale()
+    axes.grid(visible=False)
+    axes.label_outer()
+
+
+def _draw_classes(axes: Axes, results: MapResults) -> None:
+    classes = motion_classes(results)
+    colours = ListedColormap([colour for _, colour in MOTION_CLASSES])
+    _draw(
+        axes,
+        results,
+        classes,
+        cmap=colours,
+        norm=BoundaryNorm(np.arange(len(MOTION_CLASSES) + 1) - 0.5, colours.N),
+    )
+    known = [k for k in range(len(MOTION_CLASSES)) if np.any(classes == k)]
+    handles = [
+        Patch(facecolor=MOTION_CLASSES[k][1], edgecolor="#9a9a9a", label=MOTION_CLASSES[k][0]) for k in known
+    ]
+    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=5)
+
+
+def _draw_basins(axes: Axes, results: MapResults) -> None:
+    numbers = results.motion_numbers[:, 0].astype(np.float64)
+    numbers[numbers < 0] = np.nan
+    shown = results.motions[: len(_COLOURS)]
+    colours = ListedColormap(list(_COLOURS[: len(shown)]))
+    norm = BoundaryNorm(np.arange(len(shown) + 1) - 0.5, colours.N)
+    _draw(axes, results, np.minimum(numbers, len(shown) - 1), cmap=colours, norm=norm)
+    handles = [Patch(facecolor=_COLOURS[k], label=motion_words(each)) for k, each in enumerate(shown)]
+    axes.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=1)
+
+
+def _scale(name: str, values: Reals) -> Normalize:
+    known = values[np.isfinite(values)]
+    positive = known[known > 0.0]
+    if name in _LINEAR or not positive.size:
+        return Normalize(float(known.min(initial=0.0)), float(known.max(initial=1.0)))
+    low, high = np.quantile(positive, [0.002, 0.998])
+    return LogNorm(float(low), float(max(high, 1.001 * low)))
+
+
+def _draw_level(axes: Axes, level: RecordedLevel, mesh: QuadMesh) -> None:
+    """Draw the level of a recording as a line, and on it what was measured, in the colours of the map."""
+    frequency_hz, amplitude_m = np.array(level.pairs).T
+    axes.plot(frequency_hz, MICRO * amplitude_m, color=MEASURED, linewidth=4.0, label=plain_label(level.name))
+    for curve in level.measured:
+        place = np.interp(curve.frequency_hz, frequency_hz, MICRO * amplitude_m)
+        axes.scatter(curve.frequency_hz, place, c=mesh.to_rgba(curve.magnitude), s=5.0, zorder=3)
+
+
+def _diagram(results: MapResults, diagram: BranchDiagram | None) -> Figure:
+    figure = new_figure(2.0 * _STRIP_IN)
+    panels = figure.subplots(2, 1, sharex=True)
+    quantity = results.plan.varied[0]
+    values = np.array(results.plan.axes[-1].values)
+    _, label = _scaled(results, quantity)
+    factor = _scaled(results, quantity)[0][0] / results.plan.range_of(quantity).edges[0]
+    for index, start in enumerate(results.plan.start_labels):
+        colour, said = _UP_AND_DOWN.get(start, (LEVELS[index % len(LEVELS)], f"from {start}"))
+        dots = {"color": colour, "linestyle": "none", "marker": "."}
+        panels[0].plot([], [], markersize=5.0, label=said, **dots)
+        panels[0].plot(factor * values, results.shown("response_i", index), markersize=2.0, **dots)
+        sections = MICRO * results.shown("section_p", index)
+        places = np.repeat(factor * values[:, None], sections.shape[1], axis=1)
+        panels[1].plot(places.reshape(-1), sections.reshape(-1), markersize=0.6, rasterized=True, **dots)
+    if diagram is not None:
+        for line in diagram.lines:
+            place = factor * line.along(diagram.request.along)
+            draw_line(panels[0], line, place, line.response_i[:, 0])
+            draw_line(panels[1], line, place, _section(line))
+    magnitude_axis(panels[0])
+    panels[0].set_ylabel("Response I of m0 over A0")
+    panels[1].set_ylabel("p once a drive period [µm]")
+    panels[1].set_xlabel(label)
+    if quantity.axis == "frequency":
+        frequency_axis(panels[1], float(values[0]), float(values[-1]))
+    legend_above(figure, list(panels), columns=4)
+    figure.align_ylabels()
+    return figure
+
+
+def _section(line: BranchLine) -> Reals:
+    return np.asarray(MICRO * (line.states[:, 1] - line.states[:, 2]))
+
+
+def motion_table(motions: Sequence[MapMotion]) -> Table:
+    """Give the motions of a map and their shares."""
+    return table(
+        "map_motions",
+        motion=[str(each.motion) for each in motions],
+        period=[-1 if each.period is None else each.period for each in motions],
+        response_i=[each.response_i for each in motions],
+        response_ii=[each.response_ii for each in motions],
+        share=[each.share.share for each in motions],
+        share_low=[each.share.low for each in motions],
+        share_high=[each.share.high for each in motions],
+    )

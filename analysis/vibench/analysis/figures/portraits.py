@@ -1,0 +1,97 @@
+"""Phase portraits of dwells with their Poincaré sections: how the motion repeats, level by level."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..chaos.verdict import MotionKind, MotionVerdict
+from ..sine.dwell_analysis import DwellAnalysis
+from ..tables import Table, named, table
+from .drawn import DrawnFigure
+from .style import BOUNDS, SIMULATED, legend_above, new_figure, prefixed, styled
+
+_PANEL_IN = 2.9
+_COLUMNS = 3
+_ORBIT_PERIODS = 60.0
+"""More lines would fill the panel."""
+_MOST_POINTS = 2000
+
+
+def portraits_figure(analyses: Sequence[DwellAnalysis]) -> DrawnFigure:
+    """Draw velocity over displacement of m0, and a point once a drive period, one panel a level."""
+    rising = sorted(analyses, key=lambda each: each.excitation.amplitude_vpp)
+    rows = -(-len(rising) // _COLUMNS)
+    with styled():
+        figure = new_figure(0.5 + _PANEL_IN * rows)
+        panels = figure.subplots(rows, min(_COLUMNS, len(rising)), squeeze=False).ravel()
+        for axes, analysis in zip(panels, rising, strict=False):
+            _portrait(axes, analysis)
+        for unused in panels[len(rising) :]:
+            unused.set_axis_off()
+        legend_above(figure, [panels[0]], columns=2)
+    return DrawnFigure(
+        name="portraits_" + "_".join(each.facts.name for each in rising),
+        title=f"Phase portraits at {rising[0].excitation.frequency_hz:g} Hz",
+        caption=_caption(rising),
+        figure=figure,
+        tables=tuple(_table(each) for each in rising),
+    )
+
+
+def verdict_text(verdict: MotionVerdict) -> str:
+    """Say the kind of motion in a few words."""
+    match verdict:
+        case MotionVerdict(kind=MotionKind.PERIODIC, period=period) if period is not None and period > 1:
+            return f"periodic, {period} drive periods"
+        case _:
+            return verdict.kind.value
+
+
+def _portrait(axes: Axes, analysis: DwellAnalysis) -> None:
+    section = analysis.motion.section
+    length, unit = prefixed(float(np.max(np.abs(section.orbit_displacement_m))), "m")
+    speed, speed_unit = prefixed(float(np.max(np.abs(section.orbit_velocity_m_per_s))), "m/s")
+    rate = analysis.response.displacement.sample_rate_hz
+    shown = round(_ORBIT_PERIODS / section.drive_hz * rate)
+    axes.plot(
+        length * section.orbit_displacement_m[-shown:],
+        speed * section.orbit_velocity_m_per_s[-shown:],
+        color=BOUNDS,
+        linewidth=0.4,
+        label=f"last {_ORBIT_PERIODS:g} drive periods",
+    )
+    axes.plot(
+        length * section.displacement_m[-_MOST_POINTS:],
+        speed * section.velocity_m_per_s[-_MOST_POINTS:],
+        color=SIMULATED,
+        linestyle="none",
+        marker=".",
+        markersize=2.5,
+        label="once a drive period",
+    )
+    axes.set_xlabel(f"x of m0 [{unit}]")
+    axes.set_ylabel(f"velocity of m0 [{speed_unit}]")
+    axes.set_title(f"{analysis.excitation.amplitude_vpp:g} Vpp: {verdict_text(analysis.motion.verdict)}")
+
+
+def _caption(rising: Sequence[DwellAnalysis]) -> str:
+    said = []
+    for each in rising:
+        verdict = each.motion.verdict
+        text = f"{each.excitation.amplitude_vpp:g} Vpp: {verdict_text(verdict)} ({verdict.why})"
+        if verdict.least_exponent_per_s is not None:
+            text += f", largest exponent at least {verdict.least_exponent_per_s:.3g} per second"
+        said.append(text)
+    return (
+        "Velocity over displacement of m0 (grey) and one point at the same phase of every recorded drive "
+        f"period (colour). {'. '.join(said)}."
+    )
+
+
+def _table(analysis: DwellAnalysis) -> Table:
+    section = analysis.motion.section
+    return table(
+        f"section_{analysis.facts.name}",
+        **named(section, "time_s", "displacement_m", "velocity_m_per_s"),
+    )

@@ -1,0 +1,210 @@
+"""Responses I and II at every frequency, or every level, of a stepped sine, up and down apart."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from vibench.acquisition.plan import (
+    EXCITATION_KINDS,
+    ResonanceTracking,
+    SettledSine,
+    SteppedLevel,
+    SteppedSine,
+)
+
+from ..model.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
+from ..signals.arrays import Flags, Reals
+from ..sine.level_jumps import hysteresis_vpp, level_jumps
+from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
+from ..sine.tracked_resonance import feedback_sentences, noted_jumps
+from ..tables import named, plus_minus, table
+from .drawn import DrawnFigure
+from .ensemble_band import band_columns, run_text, simulated_label
+from .style import LINEAR, MEASURED, PREDICTED, SIMULATED, legend_above, magnitude_axis, new_figure, styled
+
+_HEIGHT_IN = 4.6
+_ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
+_MARKERS = {"up": "^", "down": "v"}
+
+
+P = TypeVar("P")
+
+
+@dataclass(frozen=True)
+class SteppedLook(Generic[P]):
+    """How a stepped sine is drawn and titled, by what was stepped."""
+
+    along: Callable[[SteppedResponse], Reals]
+    axis: str
+    title: Callable[[P, SteppedResponse], str]
+    caption: Callable[[P, SteppedResponse], str]
+    """Its first sentences, without feedback and simulation."""
+
+
+def stepped_sine_figure(
+    analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]
+) -> DrawnFigure:
+    """Draw Response I and II against what was stepped, one marker a direction."""
+    along = look.along(analysis.response)
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        first, second = figure.subplots(2, 1, sharex=True)
+        _responses(first, along, analysis, laid, RESPONSE_I)
+        _responses(second, along, analysis, laid, RESPONSE_II)
+        first.set_ylabel("Response I\nmax |x| / A0")
+        second.set_ylabel("Response II\n|x at f| / A0")
+        second.set_xlabel(look.axis)
+        legend_above(figure, [first], columns=2)
+    found = analysis.response
+    columns = {
+        "frequency_hz": found.frequency_hz,
+        "direction": np.asarray(found.direction),
+        **named(found, "amplitude_vpp", "drive_amplitude_m", "response_i"),
+        **named(found, "response_ii", "sd_response_ii", "phase_rad"),
+    }
+    if laid is not None:
+        columns["response_i_simulated"] = laid.response.response_i
+        columns["response_ii_simulated"] = laid.response.response_ii
+        columns |= band_columns(laid, RESPONSE_I, "response_i")
+        columns |= band_columns(laid, RESPONSE_II, "response_ii")
+    name = f"stepped_sine_{analysis.facts.name}"
+    return DrawnFigure(
+        name=name,
+        title=look.title(analysis.excitation, found),
+        caption=_caption(analysis, laid, look),
+        figure=figure,
+        tables=(table(name, **columns),),
+    )
+
+
+def _responses(
+    axes: Axes, along: Reals, analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, what: str
+) -> None:
+    found, attribute = analysis.response, _ATTRIBUTES[what]
+    rising = np.argsort(along)
+    if laid is not None:
+        sines = laid.prediction
+        axes.plot(
+            along[rising],
+            sines.linear[rising],
+            color=LINEAR,
+            linestyle="--",
+            label="without contact",
+        )
+        axes.plot(
+            along,
+            getattr(sines, attribute),
+            color=PREDICTED,
+            linestyle="none",
+            marker=".",
+            markersize=4,
+            label="steady sines from rest",
+        )
+    for direction in sorted(set(found.direction)):
+        chosen = np.array([each == direction for each in found.direction])
+        marker = _MARKERS.get(direction, "o")
+        axes.plot(
+            along[chosen],
+            getattr(found, attribute)[chosen],
+            color=MEASURED,
+            label=f"measured, {direction}",
+            linestyle="none",
+            marker=marker,
+            markersize=4,
+        )
+        if laid is not None:
+            _simulated(axes, along, chosen, laid, what, (marker, direction))
+    for jump in noted_jumps(analysis.facts.feedback):
+        axes.axvspan(jump.low_hz, jump.high_hz, color=MEASURED, alpha=0.3, linewidth=0)
+    magnitude_axis(axes)
+
+
+def _simulated(
+    axes: Axes, along: Reals, chosen: Flags, laid: SteppedSineOverlay, what: str, look: tuple[str, str]
+) -> None:
+    """Mark the middle of the draws at every step of one direction, with the band of 95 % as a bar."""
+    values, reach = getattr(laid.response, _ATTRIBUTES[what])[chosen], None
+    found = laid.quantity(what)
+    if found is not None and laid.run.draws > 1:
+        values = found.median[chosen]
+        reach = np.clip([values - found.lower[chosen], found.upper[chosen] - values], 0.0, None)
+    marker, direction = look
+    axes.errorbar(
+        along[chosen],
+        values,
+        yerr=reach,
+        color=SIMULATED,
+        markerfacecolor="none",
+        label=f"{simulated_label(laid.run)}, {direction}",
+        linestyle="none",
+        marker=marker,
+        markersize=4,
+        elinewidth=0.8,
+        capsize=1.5,
+    )
+
+
+def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:
+    """Say what was found, and how far the simulation lies from it."""
+    text = look.caption(analysis.excitation, analysis.response)
+    text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
+    if laid is None:
+        return text
+    return f"{text} {run_text(laid)}"
+
+
+def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
+    """Say where the largest response was."""
+    top = int(np.argmax(found.response_ii))
+    return (
+        f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} "
+        f"steps from {np.min(found.frequency_hz):.4g} to {np.max(found.frequency_hz):.4g} Hz. "
+        f"Response II is largest at {found.frequency_hz[top]:.4g} Hz: "
+        f"{plus_minus(found.response_ii[top], 2 * found.sd_response_ii[top])}."
+    )
+
+
+def stepped_level_caption(found: SteppedResponse) -> str:
+    """Say between which levels the motion jumps, and how far apart the two ways lie."""
+    text = (
+        f"Level stepped at {np.median(found.frequency_hz):.4g} Hz, {found.frequency_hz.size} steps from "
+        f"{np.min(found.amplitude_vpp):.4g} to {np.max(found.amplitude_vpp):.4g} Vpp."
+    )
+    jumps = level_jumps(found)
+    told = [
+        f"Going {each.direction}, Response II changes by a factor of {each.factor:.3g} between "
+        f"{each.before_vpp:.4g} and {each.after_vpp:.4g} Vpp."
+        for each in jumps
+    ]
+    apart = hysteresis_vpp(jumps)
+    if apart is not None:
+        told.append(f"The jump up lies {max(apart[0], 0.0):.3g} to {apart[1]:.3g} V above the fall back.")
+    return " ".join([text, *(told or ["No jump by more than a factor of two."])])
+
+
+def tracked_caption(found: SteppedResponse) -> str:
+    """Say how many levels there are."""
+    return f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
+
+
+STEPPED_FREQUENCIES: SteppedLook[SteppedSine | SettledSine] = SteppedLook(
+    along=lambda found: found.frequency_hz,
+    axis="drive frequency [Hz]",
+    title=lambda plan, _: f"{EXCITATION_KINDS[plan.kind].title}, {plan.amplitude_vpp:g} Vpp",
+    caption=_frequencies_caption,
+)
+STEPPED_LEVELS: SteppedLook[SteppedLevel] = SteppedLook(
+    along=lambda found: found.amplitude_vpp,
+    axis="level at the generator [Vpp]",
+    title=lambda plan, _: f"Stepped level, {plan.frequency_hz:g} Hz",
+    caption=lambda _, found: stepped_level_caption(found),
+)
+TRACKED_RESONANCE: SteppedLook[ResonanceTracking] = SteppedLook(
+    along=lambda found: found.frequency_hz,
+    axis="drive frequency [Hz]",
+    title=lambda _, found: f"Tracked resonance, around {np.median(found.frequency_hz):.4g} Hz",
+    caption=lambda _, found: tracked_caption(found),
+)

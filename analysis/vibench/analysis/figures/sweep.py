@@ -1,0 +1,209 @@
+"""A sweep: time envelope, responses against frequency, where the masses collide (the paper's Fig. 13 d)."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike
+
+from ..model.overlay import RESPONSE_I, RESPONSE_II, SweepOverlay
+from ..signals.arrays import Reals
+from ..sine.collision_region import Collisions
+from ..sine.sweep import SweepResponse
+from ..sine.sweep_analysis import SweepAnalysis
+from ..tables import Table, named, plus_minus, table
+from .drawn import DrawnFigure
+from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
+from .hysteresis import jumps_text
+from .style import (
+    COLLIDING,
+    LINEAR,
+    MEASURED,
+    PREDICTED,
+    SIMULATED,
+    TERMINAL,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    prefixed,
+    styled,
+)
+
+_HEIGHT_IN = 6.4
+_ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}
+
+
+def sweep_figure(analysis: SweepAnalysis, laid: SweepOverlay | None = None) -> DrawnFigure:
+    """Draw the envelope in time under a frequency axis, and Responses I and II against frequency."""
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        envelope, first, second = figure.subplots(3, 1, height_ratios=(1.25, 1.0, 1.0))
+        _envelope(envelope, analysis, laid)
+        _responses(first, analysis, laid, RESPONSE_I, "Response I\nmax |x| / A0")
+        _responses(second, analysis, laid, RESPONSE_II, "Response II\n|x at f| / A0")
+        second.set_xlabel("drive frequency [Hz]")
+        first.tick_params(labelbottom=False)
+        legend_above(figure, [envelope, first], columns=3)
+        figure.align_ylabels()
+    return DrawnFigure(
+        name=f"sweep_{analysis.facts.name}",
+        title=f"Sweep, {analysis.excitation.amplitude_vpp:g} Vpp",
+        caption=sweep_caption(analysis, laid),
+        figure=figure,
+        tables=_tables(analysis, laid),
+    )
+
+
+def _envelope(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None) -> None:
+    found = analysis.response
+    largest = float(max(np.max(found.upper), -np.min(found.lower)))
+    factor, unit = prefixed(largest, "m/s")
+    for number, region in enumerate(analysis.collisions.regions):
+        label = "masses collide (measured)" if number == 0 else None
+        axes.axvspan(region.start.time_s, region.stop.time_s, color=COLLIDING, zorder=0, label=label)
+    axes.fill_between(
+        found.time_s,
+        factor * found.lower,
+        factor * found.upper,
+        color=MEASURED,
+        alpha=0.85,
+        linewidth=0,
+        label="measured m0 velocity",
+    )
+    if laid is not None:
+        for number, outline in enumerate((laid.response.upper, laid.response.lower)):
+            label = simulated_label(laid.run) if number == 0 else None
+            axes.plot(laid.response.time_s, factor * outline, color=SIMULATED, linewidth=0.7, label=label)
+    axes.set_xlim(float(found.time_s[0]), float(found.time_s[-1]))
+    axes.set_ylabel(f"m0 velocity\n[{unit}]")
+    axes.set_xlabel("time of the sweep [s]")
+    _frequency_on_top(axes, found)
+
+
+def _frequency_on_top(axes: Axes, found: SweepResponse) -> None:
+    """Write the frequency above the time at which it was played."""
+    order = np.argsort(found.frequency_hz)
+
+    def to_frequency(time_s: ArrayLike) -> Reals:
+        return np.asarray(np.interp(np.asarray(time_s), found.time_s, found.frequency_hz))
+
+    def to_time(frequency_hz: ArrayLike) -> Reals:
+        return np.asarray(np.interp(np.asarray(frequency_hz), found.frequency_hz[order], found.time_s[order]))
+
+    top = axes.secondary_xaxis("top", functions=(to_frequency, to_time))
+    top.set_xlabel("drive frequency [Hz]")
+
+
+def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, what: str, label: str) -> None:
+    measured, attribute = analysis.response, _ATTRIBUTES[what]
+    for region in analysis.collisions.regions:
+        axes.axvspan(region.low_hz, region.high_hz, color=COLLIDING, zorder=0)
+    if laid is not None:
+        sines = laid.prediction
+        axes.plot(
+            sines.frequency_hz,
+            sines.linear,
+            color=LINEAR,
+            linestyle="--",
+            linewidth=1.0,
+            label="without contact",
+        )
+        axes.plot(
+            sines.frequency_hz,
+            getattr(sines, attribute),
+            color=PREDICTED,
+            linestyle="none",
+            marker=".",
+            markersize=3,
+            label="steady sines of the measured A0",
+        )
+    axes.plot(
+        measured.frequency_hz,
+        getattr(measured, attribute),
+        color=MEASURED,
+        linewidth=1.3,
+        label="measured response",
+    )
+    if laid is not None:
+        middle = draw_band(axes, measured.frequency_hz, laid, what)
+        axes.plot(
+            laid.response.frequency_hz,
+            getattr(laid.response, attribute) if middle is None else middle,
+            color=SIMULATED,
+            linewidth=0.7,
+            linestyle=(0, (4, 2)),
+        )
+    for number, jump in enumerate(analysis.jumps):
+        named = "jump" if number == 0 else None
+        axes.axvline(jump.frequency_hz, color=TERMINAL, linestyle=":", linewidth=1.0, label=named)
+    ends = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
+    axes.set_xlim(*ends)
+    magnitude_axis(axes)
+    axes.set_ylabel(label)
+
+
+def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
+    """Say where the masses collided, with bounds, and what the simulation says."""
+    found = analysis.response
+    amplitudes = 1e6 * found.drive_amplitude_m
+    said = [
+        (
+            f"Sweep at {analysis.excitation.amplitude_vpp:g} Vpp from {found.frequency_hz[0]:.0f} to "
+            f"{found.frequency_hz[-1]:.0f} Hz, {analysis.rate_text}; the base moved by A0 = "
+            f"{amplitudes[0]:.3g} µm at the beginning and {amplitudes[-1]:.3g} µm at the end."
+        ),
+        f"Grey: {regions_text(analysis.collisions)}.",
+        f"Response II has {jumps_text(analysis.jumps)}.",
+    ]
+    if laid is not None:
+        outside = ~analysis.collisions.is_colliding
+        apart = laid.difference.where(outside)
+        smooth = (
+            f" Outside of the measured collisions {apart.median_abs_db:.2g} dB median difference, "
+            f"{100 * apart.share_within_two:.0f} % of the intervals within two standard errors."
+            if outside.any()
+            else ""
+        )
+        said += [
+            run_text(laid),
+            f"In the first of these runs {regions_text(laid.collisions)}.{smooth}",
+            "Blue dots: steady sines from rest, which know nothing of the sweep's history.",
+        ]
+    return " ".join(said)
+
+
+def regions_text(found: Collisions) -> str:
+    """Say in words where a sweep collided."""
+    unclear = " and ".join(f"from {first:.1f} to {last:.1f} Hz" for first, last in found.too_fast_hz)
+    unclear = f"; {unclear} the sweep was too fast to distinguish ringing from collisions" if unclear else ""
+    if not found.regions:
+        return f"no collisions were found{unclear}" if unclear else "the masses did not collide"
+    parts = []
+    for region in found.regions:
+        start, stop = region.start, region.stop
+        middle_hz = 0.5 * (start.upper_hz + start.lower_hz)
+        begin = plus_minus(middle_hz, start.upper_hz - middle_hz) + " Hz"
+        # Collisions live on by chance: where they end in one run is no edge with bounds.
+        end = f"{stop.frequency_hz:.1f} Hz in this run"
+        first = "the sweep's beginning" if region.reaches_start else begin
+        last = "the sweep's end" if region.reaches_stop else end
+        parts.append(f"from {first} to {last}")
+    return f"the masses collide {' and '.join(parts)}{unclear}"
+
+
+def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, ...]:
+    name = f"sweep_{analysis.facts.name}"
+    found = analysis.response
+    columns = {
+        **named(found, "time_s", "frequency_hz", "drive_amplitude_m"),
+        "velocity_upper_m_per_s": found.upper,
+        "velocity_lower_m_per_s": found.lower,
+        **named(found, "response_i", "response_ii", "sd_response_ii", "phase_rad"),
+        "is_colliding": analysis.collisions.is_colliding.astype(np.int64),
+    }
+    if laid is None:
+        return (table(name, **columns),)
+    columns["velocity_upper_simulated_m_per_s"] = laid.response.upper
+    columns["velocity_lower_simulated_m_per_s"] = laid.response.lower
+    columns["response_i_simulated"] = laid.response.response_i
+    columns["response_ii_simulated"] = laid.response.response_ii
+    columns |= band_columns(laid, RESPONSE_I, "response_i") | band_columns(laid, RESPONSE_II, "response_ii")
+    return table(name, **columns), sines_table(name, laid.prediction)

@@ -1,0 +1,97 @@
+"""What a sweep holds besides the drive's own frequency: spectrogram, and orders 1/3 to 5."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..sine.sweep_analysis import SweepAnalysis
+from ..tables import Table, table
+from ..tones.order_tracking import order_label
+from .drawn import DrawnFigure
+from .style import COLLIDING, LEVELS, MEASURED, legend_above, magnitude_axis, new_figure, prefixed, styled
+
+_HEIGHT_IN = 6.0
+_RANGE_DB = 80.0
+_SHOWN = (0.5, 1.0, 1.5, 2.0, 3.0)
+"""Orders drawn; all are in the table."""
+_ORDER_STYLES = ("-", "-", "--", "-.", ":")
+
+
+def sweep_orders_figure(analysis: SweepAnalysis) -> DrawnFigure:
+    """Draw the spectrogram of the velocity and the displacement at orders of the drive."""
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        picture, orders = figure.subplots(2, 1, height_ratios=(1.3, 1.0))
+        _picture(figure, picture, analysis)
+        _orders(orders, analysis)
+        legend_above(figure, [orders], columns=6)
+    name = f"orders_{analysis.facts.name}"
+    return DrawnFigure(
+        name=name,
+        title=f"Orders of a sweep, {analysis.excitation.amplitude_vpp:g} Vpp",
+        caption=_caption(analysis),
+        figure=figure,
+        tables=(_table(name, analysis),),
+    )
+
+
+def _picture(figure: Figure, axes: Axes, analysis: SweepAnalysis) -> None:
+    found = analysis.spectrogram
+    top = float(found.amplitude.max())
+    decibel = 20 * np.log10(np.maximum(found.amplitude / top, 10 ** (-_RANGE_DB / 20)))
+    shown = axes.pcolormesh(
+        found.time_s, found.frequency_hz, decibel, cmap="viridis", vmin=-_RANGE_DB, vmax=0, rasterized=True
+    )
+    factor, unit = prefixed(top, "m/s")
+    figure.colorbar(shown, ax=axes, label=f"dB re {factor * top:.3g} {unit}")
+    axes.set_xlabel("time of the sweep [s]")
+    axes.set_ylabel("frequency in the\nvelocity of m0 [Hz]")
+    axes.grid(visible=False)
+
+
+def _orders(axes: Axes, analysis: SweepAnalysis) -> None:
+    response = analysis.response
+    for region in analysis.collisions.regions:
+        axes.axvspan(region.low_hz, region.high_hz, color=COLLIDING, zorder=0)
+    shown = response.harmonics.amplitude
+    factor, unit = prefixed(float(shown.max()), "m")
+    for order, colour, line in zip(_SHOWN, (LEVELS[0], MEASURED, *LEVELS[1:4]), _ORDER_STYLES, strict=True):
+        axes.plot(
+            response.harmonics_hz,
+            factor * np.abs(response.harmonics.order(order)),
+            color=colour,
+            linestyle=line,
+            linewidth=1.0,
+            label=order_label(order),
+        )
+    ends = sorted((float(response.frequency_hz[0]), float(response.frequency_hz[-1])))
+    axes.set_xlim(*ends)
+    magnitude_axis(axes)
+    axes.set_xlabel("drive frequency [Hz]")
+    axes.set_ylabel(f"displacement of m0 [{unit}]")
+
+
+def _caption(analysis: SweepAnalysis) -> str:
+    found = analysis.spectrogram
+    tracked = analysis.response.harmonics
+    share = tracked.amplitude / np.abs(tracked.order(1.0))
+    loudest = max(
+        (float(np.median(row)), order_label(order))
+        for row, order in zip(share, tracked.orders, strict=True)
+        if order != 1.0
+    )
+    return (
+        f"Above: amplitude in the recorded velocity, {found.resolution_hz:.2g} Hz wide at half power. Below: "
+        "displacement of m0 at orders of the recorded drive, grey where the masses collide; with collisions "
+        f"each holds what chaos puts near it. Strongest beside order 1 is {loudest[1]}, "
+        f"{20 * np.log10(loudest[0]):.0f} dB below it (median)."
+    )
+
+
+def _table(name: str, analysis: SweepAnalysis) -> Table:
+    tracked = analysis.response.harmonics
+    columns = {"frequency_hz": analysis.response.harmonics_hz}
+    for order, value, sd in zip(tracked.orders, tracked.amplitude, tracked.sd, strict=True):
+        label = order_label(order).replace(" ", "_")
+        columns[f"{label}_m"], columns[f"sd_{label}_m"] = value, sd
+    return table(name, **columns)

@@ -1,0 +1,258 @@
+"""The transmission of one noise level: the paper's Fig. 13 a to c, with coherence and bounds."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
+from ..frequency_response.request import MagnitudeScale
+from ..model.overlay import TRANSMISSION, NoiseOverlay
+from ..model.prediction import linear_transmissibility
+from ..recordings.facts import specimen_of
+from ..signals.arrays import Reals
+from ..tables import Table, named, plus_minus, table
+from .drawn import DrawnFigure
+from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
+from .marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
+from .style import (
+    BOUNDS,
+    LINEAR,
+    MEASURED,
+    PREDICTED,
+    SIMULATED,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    styled,
+)
+
+_HEIGHT_IN = 6.4
+_LARGEST_BOUND_RATIO = 10.0
+"""Bounds are drawn no further from the curve than this: where nothing is known they would fill the figure."""
+_DIFFERENCE_LIMIT_DB = 12.0
+_LINEAR_POINTS = 4000
+_HALF_TURN_DEG = 180.0
+_BELOW = 0.5
+"""The axis begins at half the smallest value."""
+
+
+def transmission_figure(analysis: NoiseAnalysis, laid: NoiseOverlay | None = None) -> DrawnFigure:
+    """Draw measured transmission and bounds, the simulation over it, coherence and difference."""
+    at = model_resonances(specimen_of(analysis.facts.bench) if laid is None else laid.run.specimen)
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        rows = 3 if laid is None else 4
+        panels = figure.subplots(
+            rows, 1, sharex=True, height_ratios=(3.6, 1.2, 1.0, 1.0)[:rows], squeeze=False
+        )
+        top = panels[0, 0]
+        _magnitudes(top, analysis, laid, at)
+        _phases(panels[1, 0], analysis, laid, at)
+        _coherence(panels[2, 0], analysis, at)
+        if laid is not None:
+            _differences(panels[3, 0], laid, at)
+        panels[-1, 0].set_xlabel("frequency [Hz]")
+        found = analysis.response.frequency_response.frequency_hz
+        frequency_axis(top, float(found[0]), float(found[-1]))
+        label_resonances(top, at)
+        legend_above(figure, [top], columns=2)
+        figure.align_ylabels()
+    return DrawnFigure(
+        name=f"transmission_{analysis.facts.name}",
+        title=f"Transmission, {analysis.facts.measurement.excitation.amplitude_vpp:g} Vpp noise",
+        caption=transmission_caption(analysis, laid),
+        figure=figure,
+        tables=_tables(analysis, laid),
+    )
+
+
+def _magnitudes(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:
+    view = analysis.request.view
+    measured = view.shown(analysis.response.frequency_response)
+    size = measured.magnitude
+    low = np.maximum(measured.magnitude_lower, size / _LARGEST_BOUND_RATIO)
+    high = np.minimum(measured.magnitude_upper, size * _LARGEST_BOUND_RATIO)
+    mark_resonances(axes, at)
+    axes.fill_between(
+        measured.frequency_hz,
+        view.drawn(low),
+        view.drawn(high),
+        color=BOUNDS,
+        alpha=0.45,
+        linewidth=0,
+        label=f"{100 * measured.settings.confidence:g} % bounds",
+    )
+    if laid is not None:
+        simulated, sines = view.shown(laid.response.frequency_response), laid.prediction
+        fine_hz = np.geomspace(measured.frequency_hz[0], measured.frequency_hz[-1], _LINEAR_POINTS)
+        linear = linear_transmissibility(laid.run.specimen, fine_hz)
+        linear = view.drawn(linear * view.factor(fine_hz))
+        axes.plot(fine_hz, linear, color=LINEAR, linestyle="--", label="without contact")
+        micrometres = 1e6 * float(sines.amplitude_m[0])
+        axes.plot(
+            sines.frequency_hz,
+            view.drawn(sines.response_i * view.factor(sines.frequency_hz)),
+            color=PREDICTED,
+            linewidth=0.9,
+            label=f"Response I, sines of A0 = {micrometres:.3g} µm",
+        )
+        factor = view.factor(simulated.frequency_hz)
+        middle = draw_band(
+            axes, simulated.frequency_hz, laid, TRANSMISSION, lambda values: view.drawn(values * factor)
+        )
+        axes.plot(
+            simulated.frequency_hz,
+            view.drawn(simulated.magnitude) if middle is None else middle,
+            color=SIMULATED,
+            linewidth=0.8,
+            linestyle=(0, (4, 2)),
+            zorder=3.5,
+            label=simulated_label(laid.run),
+        )
+    axes.plot(
+        measured.frequency_hz, view.drawn(size), color=MEASURED, linewidth=1.5, label="measured", zorder=3
+    )
+    peaks = analysis.response.resonances
+    peaks_hz = np.array([each.peak_frequency_hz for each in peaks])
+    heights = np.array([each.peak_magnitude for each in peaks])
+    axes.plot(
+        peaks_hz,
+        view.drawn(heights * view.factor(peaks_hz)),
+        linestyle="none",
+        marker="v",
+        markersize=5,
+        color=MEASURED,
+        label="resonances found" if peaks else None,
+        zorder=4,
+    )
+    if view.scale is MagnitudeScale.LOG:
+        magnitude_axis(axes)
+    seen = size[np.isfinite(size) & (size > 0)]
+    if seen.size:
+        axes.set_ylim(bottom=float(view.drawn(np.array([_BELOW * np.min(seen)]))[0]))
+    axes.set_ylabel(view.label)
+
+
+def _phases(axes: Axes, analysis: NoiseAnalysis, laid: NoiseOverlay | None, at: ModelResonances) -> None:
+    """Draw the phase in degrees, -180 to 180, with its bounds where they say anything."""
+    view = analysis.request.view
+    measured = view.shown(analysis.response.frequency_response)
+    mark_resonances(axes, at)
+    low, high = np.rad2deg(measured.phase_lower_rad), np.rad2deg(measured.phase_upper_rad)
+    axes.fill_between(measured.frequency_hz, low, high, color=BOUNDS, alpha=0.45, linewidth=0)
+    if laid is not None:
+        simulated = view.shown(laid.response.frequency_response)
+        axes.plot(
+            *_unbroken(simulated.frequency_hz, np.rad2deg(simulated.phase_rad)),
+            color=SIMULATED,
+            linewidth=0.8,
+            linestyle=(0, (4, 2)),
+            zorder=3.5,
+        )
+    axes.plot(
+        *_unbroken(measured.frequency_hz, np.rad2deg(measured.phase_rad)), color=MEASURED, linewidth=0.9
+    )
+    axes.set_ylim(-_HALF_TURN_DEG, _HALF_TURN_DEG)
+    axes.set_yticks([-_HALF_TURN_DEG, 0, _HALF_TURN_DEG])
+    axes.set_ylabel("phase [°]")
+
+
+def _unbroken(frequency_hz: Reals, phase_deg: Reals) -> tuple[Reals, Reals]:
+    """Interrupt a curve where its phase passes half a turn, so that no line crosses the panel."""
+    wraps = np.flatnonzero(np.abs(np.diff(phase_deg)) > _HALF_TURN_DEG) + 1
+    return np.insert(frequency_hz, wraps, frequency_hz[wraps]), np.insert(phase_deg, wraps, np.nan)
+
+
+def _coherence(axes: Axes, analysis: NoiseAnalysis, at: ModelResonances) -> None:
+    measured = analysis.response.frequency_response
+    mark_resonances(axes, at)
+    axes.plot(measured.frequency_hz, measured.coherence, color=MEASURED, linewidth=0.8)
+    axes.axhline(measured.coherence_significance, color=SIMULATED, linewidth=0.9, linestyle="-.")
+    axes.set_ylim(0, 1.05)
+    axes.set_ylabel("coherence")
+
+
+def _differences(axes: Axes, laid: NoiseOverlay, at: ModelResonances) -> None:
+    mark_resonances(axes, at)
+    shown = np.clip(laid.difference.decibel, -_DIFFERENCE_LIMIT_DB, _DIFFERENCE_LIMIT_DB)
+    axes.plot(laid.difference.frequency_hz, shown, color=SIMULATED, linewidth=0.8)
+    axes.axhline(0, color=MEASURED, linewidth=0.6)
+    reach = max(1.0, float(np.nanmax(np.abs(shown))) * 1.1)
+    axes.set_ylim(-reach, reach)
+    axes.set_ylabel("meas. − sim.\n[dB]")
+
+
+def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> str:
+    """Say what the figure shows, with its numbers."""
+    response = analysis.response
+    view = analysis.request.view
+    symbol, unit = view.symbol.replace(" ", ""), f" {view.unit}" if view.unit else ""
+    found = ", ".join(
+        f"{plus_minus(each.frequency_hz, 2 * each.sd_frequency_hz)} Hz ({symbol} = "
+        f"{each.peak_magnitude * float(view.factor(np.array([each.peak_frequency_hz]))[0]):.3g}{unit})"
+        for each in response.resonances
+    )
+    median = float(np.median(response.frequency_response.coherence))
+    said = [
+        (
+            f"Noise at {analysis.excitation.amplitude_vpp:g} Vpp, base acceleration "
+            f"{response.base_level.rms_acceleration:.3g} m/s² rms between {response.base_level.low_hz:g} and "
+            f"{response.base_level.high_hz:g} Hz; {response.frequency_response.n_eff:.3g} independent "
+            f"averages of {response.used_s:.0f} s in all."
+        ),
+        estimate_sentence(response),
+        f"Resonances found: {found}." if found else "No resonance stands above its uncertainty.",
+        f"Median coherence {median:.4f}; the dash-dotted line is what independent noises would show.",
+    ]
+    if laid is not None:
+        said.append(
+            f"{run_text(laid)} Median difference {laid.difference.median_abs_db:.2g} dB. "
+            f"The blue curve is Response I under sines, {laid.amplitude_basis}; "
+            f"it is a different excitation and no fit."
+        )
+    return " ".join(said)
+
+
+def estimate_sentence(response: NoiseResponse) -> str:
+    """Say how a transmission was estimated, how fine its lines are, and what had to be left out."""
+    found = response.frequency_response
+    how = found.settings
+    ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"
+    if response.periodic is None:
+        fineness = (
+            f"{how.window} segments of {how.segment_samples / how.sample_rate_hz:.3g} s overlapping by "
+            f"{100 * how.overlap:g} %, lines {found.resolution_hz:.3g} Hz wide"
+        )
+    else:
+        fineness = f"whole periods of {how.segment_samples / how.sample_rate_hz:.3g} s, lines without leakage"
+    text = f"Estimator {how.estimator.value}{ratio}; {fineness}."
+    if not response.left_out:
+        return text
+    parts = "segments" if response.periodic is None else "realisations"
+    return (
+        f"{text} Left out: {response.left_out} {parts}, for {response.lost_samples} lost and "
+        f"{response.overloaded_samples} overloaded samples, or because they were cut short."
+    )
+
+
+def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, ...]:
+    view = analysis.request.view
+    measured = view.shown(analysis.response.frequency_response)
+    name = f"transmission_{analysis.facts.name}"
+    columns = {
+        **named(measured, "frequency_hz", "magnitude", "magnitude_lower", "magnitude_upper"),
+        "magnitude_db": measured.decibel,
+        "phase_rad": measured.phase_rad,
+        "phase_lower_rad": measured.phase_lower_rad,
+        "phase_upper_rad": measured.phase_upper_rad,
+        "coherence": measured.coherence,
+        "magnitude_h1": view.shown(analysis.response.h1).magnitude,
+        "magnitude_h2": view.shown(analysis.response.h2).magnitude,
+    }
+    if laid is None:
+        return (table(name, **columns),)
+    columns |= band_columns(laid, TRANSMISSION, "transmission")
+    columns["magnitude_simulated"] = view.shown(laid.response.frequency_response).magnitude
+    columns["difference_db"] = laid.difference.decibel
+    columns["difference_standard_errors"] = laid.difference.standard_errors
+    return table(name, **columns), sines_table(name, laid.prediction)

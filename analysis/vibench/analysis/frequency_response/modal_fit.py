@@ -1,0 +1,245 @@
+"""Modes fitted to lines: poles by variable projection, after their errors were made independent."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from ..signals.arrays import Complexes, Flags, Reals
+from ..signals.confidence import chi_square_limit, chi_square_of
+from .leakage import leakage_of
+from .mode import LARGEST_DAMPING, RESOLVED_LINES, SMALLEST_RELATIVE_SD, WELL_FITTED, Resonance
+from .results import FrequencyResponse
+
+Background = Callable[[Reals], Complexes]
+"""Shapes with real factors that are added to modes, shape (lines, factors)."""
+_FINE_POINTS = 401
+_STEP = 1e-6
+_WORST_CONDITION = 1e14
+_MOST_STEPS = 40
+"""Of a fit; one that takes more is of lines that no such modes describe."""
+_STEADY_AVERAGES = 49.0
+"""Averages that scatter steadied by neighbouring lines is worth."""
+_LEAST_LINES_ABOUT = 8
+_EDGE = 1e-3
+"""Of its reach within which a fit ends at a bound: it has found no minimum."""
+
+
+class Lines:
+    """Lines of a transmission, weighted; neighbours whose errors correlate are made independent.
+
+    Parameters
+    ----------
+    band
+        Their transmission; its spread is the standard deviation that weights them.
+    chosen
+        Which of its lines are fitted, where they are known at all.
+
+    """
+
+    def __init__(self, band: FrequencyResponse, chosen: Flags) -> None:
+        spread = np.maximum(band.relative_sd_magnitude, SMALLEST_RELATIVE_SD) * band.magnitude
+        usable = chosen & np.isfinite(spread) & np.isfinite(band.value) & (spread > 0)
+        self.frequency_hz, self.value = band.frequency_hz[usable], band.value[usable]
+        self._spread = spread[usable]
+        self._leakage = leakage_of(band)
+        slope = band.drive_slope_per_hz
+        self._slope_per_hz = np.zeros(self.value.size) if slope is None else slope[usable]
+        # Scatter of few averages is steadied, elsewhere it is each line's own.
+        self._averages = band.n_eff if band.steady_relative_sd is None else max(band.n_eff, _STEADY_AVERAGES)
+        self._root: Complexes | None = None
+        self.ringing_share = np.zeros(self.value.size)
+        """Of the variance of each line's error, what cut-off ringing makes; all of it with a boxcar."""
+        if self._leakage is not None and self.value.size:
+            number = np.rint(self.frequency_hz * self._leakage.segment_s).astype(np.int64)
+            rung = self._leakage.rung(number, self.value, self._spread)
+            bands = self._leakage.covariance(number, rung, self._spread)
+            self.ringing_share += 1.0 if self.narrowest_hz else np.abs(rung / self._spread) ** 2
+            self._root = np.asarray(scipy.linalg.cholesky_banded(bands, lower=True))
+
+    @property
+    def narrowest_hz(self) -> float:
+        """Half-power bandwidth [Hz] below which a boxcar tells no damping: its leakage is not local."""
+        leakage = self._leakage
+        return 1 / leakage.segment_s if leakage is not None and leakage.ringing[0] == 0 else 0.0
+
+    def independent(self, columns: Complexes) -> Reals:
+        """Turn complex values of the lines into real ones of variance one, shape (2 lines, ...)."""
+        if self._root is None:
+            shape = (-1,) + (1,) * (columns.ndim - 1)
+            scaled = columns / self._spread.reshape(shape)
+        else:
+            scaled = scipy.linalg.solve_banded((len(self._root) - 1, 0), self._root, columns)
+        return np.concatenate([scaled.real, scaled.imag])
+
+    def relative_sd(self, frequency_hz: float) -> float:
+        """Give the relative scatter of the line nearest to a frequency."""
+        line = int(np.argmin(np.abs(self.frequency_hz - frequency_hz)))
+        return float(self._spread[line] / np.abs(self.value[line]))
+
+    def squares(self, left: Reals) -> Reals:
+        """Give chi square of each line, 2 degrees of freedom, from residuals of variance one."""
+        real, imaginary = np.split(left, 2)
+        return chi_square_of(real**2 + imaginary**2, self._averages)
+
+    def modes(self, poles: Reals) -> Complexes:
+        """Give the shapes of modes as the averages show them; see `mode_shapes`."""
+        if self._leakage is None:
+            return mode_shapes(self.frequency_hz, poles)
+        columns = []
+        for log_frequency, log_damping in poles.reshape(-1, 2):
+            natural, damping = 2 * np.pi * np.exp(log_frequency), np.exp(log_damping)
+            pole = natural * complex(-damping, np.sqrt(1 - damping**2))
+            both = [
+                (each, self._leakage.smeared_pole(self.frequency_hz, each, self._slope_per_hz))
+                for each in (pole, pole.conjugate())
+            ]
+            over = damping * natural / (1j * pole.imag)
+            (first, one), (second, other) = both
+            columns += [natural * over * (one - other), over * (first * one - second * other)]
+        return np.stack(columns, axis=1)
+
+
+def mode_shapes(frequency_hz: Reals, poles: Reals) -> Complexes:
+    """Give two shapes with real factors for each mode, shape (lines, 2 modes), scaled to order one.
+
+    2 zeta / (1 - r^2 + 2 i zeta r) and i r times it, with r = w / w0; `poles` are ln w0 / 2 pi and ln zeta.
+    """
+    columns = []
+    for log_frequency, log_damping in poles.reshape(-1, 2):
+        ratio, damping = frequency_hz / np.exp(log_frequency), np.exp(log_damping)
+        mode = 2 * damping / (1 - ratio**2 + 2j * damping * ratio)
+        columns += [mode, 1j * ratio * mode]
+    return np.stack(columns, axis=1)
+
+
+@dataclass(frozen=True)
+class ModalFit:
+    """Modes fitted together on one background."""
+
+    resonances: tuple[Resonance, ...]
+    chi_square: float
+    """Per degree of freedom, of all lines."""
+    freedom: int
+
+    @property
+    def explains(self) -> bool:
+        """Whether what is left, of all lines and of those about each mode, is no more than their scatter."""
+        return self.chi_square < max(WELL_FITTED, chi_square_limit(self.freedom)) and all(
+            each.is_explained for each in self.resonances
+        )
+
+
+def modal_fit(
+    band: FrequencyResponse, lines: Lines, start: Reals, reach: Reals, background: Background
+) -> ModalFit | None:
+    """Fit poles from a start, within a reach of it; None where the lines do not determine them.
+
+    Variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432).
+
+    Parameters
+    ----------
+    band
+        What the lines are of.
+    lines
+        What is fitted.
+    start, reach
+        Logarithms of natural frequency [Hz] and damping ratio of each mode, and how far they may go, shape
+        (2 modes,).
+    background
+        What is added to the modes.
+
+    """
+    target, behind = lines.independent(lines.value), lines.independent(background(lines.frequency_hz))
+
+    def basis(poles: Reals) -> Reals:
+        return np.hstack((lines.independent(lines.modes(poles)), behind))
+
+    def factors(poles: Reals) -> tuple[Reals, Reals]:
+        columns = basis(poles)
+        found = np.asarray(np.linalg.lstsq(columns, target, rcond=None)[0], dtype=np.float64)
+        return found, np.asarray(target - columns @ found)
+
+    top = np.tile([np.inf, np.log(LARGEST_DAMPING)], start.size // 2)
+
+    low, high = start - reach, np.minimum(start + reach, np.maximum(top, start + 1e-6))
+
+    def misfit(poles: Reals) -> Reals:
+        return factors(poles)[1]
+
+    result = scipy.optimize.least_squares(
+        misfit,
+        start,
+        bounds=(low, high),
+        x_scale=reach / 20,
+        xtol=1e-9,
+        ftol=1e-9,
+        max_nfev=_MOST_STEPS,
+    )
+    poles = np.asarray(result.x, dtype=np.float64)
+    if not result.success or np.any(np.minimum(poles - low, high - poles) < _EDGE * reach):
+        return None
+    found, left = factors(poles)
+    # How the lines follow poles and factors together, and with what covariance.
+    follows = np.hstack((_moved(lambda moved: basis(moved) @ found, poles), basis(poles)))
+    curvature: Reals = np.asarray(np.real(follows.T @ follows), dtype=np.float64)
+    freedom = left.size - follows.shape[1]
+    if freedom < 1 or np.linalg.cond(_scaled(curvature)) > _WORST_CONDITION:
+        return None
+    squares = lines.squares(left)
+    chi_square = float(np.sum(squares)) / freedom
+    covariance = np.asarray(np.linalg.inv(curvature), dtype=np.float64)
+
+    def curve(frequency_hz: Reals, poles: Reals) -> Complexes:
+        return np.hstack((mode_shapes(frequency_hz, poles), background(frequency_hz)))
+
+    def resonance(mode: int) -> Resonance:
+        natural_hz, damping = np.exp(poles[2 * mode : 2 * mode + 2]).tolist()
+        half_hz = damping * natural_hz
+        away_hz = np.abs(lines.frequency_hz - natural_hz)
+        nearest_hz = float(np.sort(away_hz)[min(_LEAST_LINES_ABOUT, away_hz.size) - 1])
+        about = away_hz <= max(2 * half_hz, nearest_hz)
+        share = freedom / left.size
+        beside = 2 * float(np.count_nonzero(about)) * share
+        nearby = float(np.sum(squares[about])) / beside
+        # Ringing is the drive's own: its errors correlate with the conjugates of others too, by so much that
+        # the variance of a fitted number is up to twice what covariances of the lines give.
+        widened = max(1.0, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
+        sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
+        ends_hz = lines.frequency_hz[[0, -1]]
+        fine_hz = np.clip(
+            np.linspace(natural_hz - 2 * half_hz, natural_hz + 2 * half_hz, _FINE_POINTS), *ends_hz
+        )
+        height = np.abs(curve(fine_hz, poles) @ found)
+        top_hz = fine_hz[[int(np.argmax(height))]]
+        value = curve(top_hz, poles) @ found
+        changes = np.hstack((_moved(lambda moved: curve(top_hz, moved) @ found, poles), curve(top_hz, poles)))
+        along = np.real(np.conj(value / np.abs(value))[:, None] * changes)[0]
+        return Resonance(
+            frequency_hz=natural_hz,
+            sd_frequency_hz=float(natural_hz * sd[0]),
+            damping_ratio=damping,
+            sd_damping_ratio=float(damping * sd[1]),
+            peak_frequency_hz=float(top_hz[0]),
+            peak_magnitude=float(np.abs(value[0])),
+            sd_peak_magnitude=float(np.sqrt(widened * (along @ covariance @ along))),
+            reduced_chi_square=nearby,
+            chi_square_limit=chi_square_limit(max(round(beside), 1)),
+            lines_used=lines.frequency_hz.size,
+            is_resolved=2 * half_hz > RESOLVED_LINES * band.resolution_hz,
+        )
+
+    return ModalFit(tuple(resonance(mode) for mode in range(poles.size // 2)), chi_square, freedom)
+
+
+def _scaled(curvature: Reals) -> Reals:
+    """Scale to ones on the diagonal: how well a matrix is conditioned is not a matter of units."""
+    size = np.sqrt(np.diag(curvature))
+    return np.asarray(curvature / np.outer(size, size))
+
+
+def _moved(shape: Callable[[Reals], Complexes | Reals], poles: Reals) -> Complexes:
+    """Give how a shape follows each pole, by central differences."""
+    steps = _STEP * np.eye(poles.size)
+    return np.stack([(shape(poles + step) - shape(poles - step)) / (2 * _STEP) for step in steps], axis=-1)

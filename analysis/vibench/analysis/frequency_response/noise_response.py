@@ -1,0 +1,316 @@
+"""What a noise measurement shows: the transmission from base to m0, with bounds and resonances."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from vibench.acquisition.plan import OddMultisine, StreamedNoise, WhiteNoise
+from vibench.acquisition.recording import SegmentLabel
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..recordings.channels import Channels, Stretch, only_stretch
+from ..recordings.checks import AbstractAnalysis
+from ..signals.arrays import Complexes, Flags, Reals
+from ..signals.confidence import relative_sd, student_half_width
+from ..signals.quantity import Quantity
+from ..spectra.spectra import DensitySums
+from ..tables import Labelled
+from ..tones.drive_level import NoiseDriveLevel, noise_drive_level
+from .distortion import scatters_beyond_noise
+from .estimators import coherence, least_squares
+from .mode import Resonance
+from .periodic import PeriodicFrequencyResponse, PeriodicSums
+from .repetition import Repetition
+from .request import FrequencyResponseRequest
+from .resonance import resonances, scattered_resonances
+from .results import Estimator, FrequencyResponse, converted_frequency_response
+from .transmissibility import FrequencyResponseSums
+
+Noise = WhiteNoise | OddMultisine | StreamedNoise
+_BLOCK = 1 << 19
+"""Samples of a record that are looked at together."""
+_LEVEL_SEGMENT_S = 1.0
+DEFAULT_REQUEST = FrequencyResponseRequest()
+_LEAST_PERIODS = 2
+_SURELY = 3.0
+"""Standard deviations of a mean difference between estimators that is bias."""
+_ALIKE_LINES = 4
+"""Neighbouring lines under a window that are worth one, and a median for a mean."""
+
+
+@dataclass(frozen=True)
+class NoiseResponse(Labelled):
+    """Transmission of base displacement to m0's displacement, and what was found in it."""
+
+    OWN_UNITS: ClassVar = {"frequency_response": "1", "h1": "1", "h2": "1", "periodic": "s"}
+
+    frequency_response: FrequencyResponse
+    """The estimate to use: by default referenced to the drive voltage, so that noise biases it nowhere."""
+    h1: FrequencyResponse
+    h2: FrequencyResponse
+    resonances: tuple[Resonance, ...]
+    base_level: NoiseDriveLevel
+    bias: str
+    """Sentence on an estimator that noise biases; empty where it does not."""
+    periodic: PeriodicFrequencyResponse | None
+    """Where the scatter comes from; None for noise that does not repeat."""
+    used_s: float
+    """Length of what was averaged [s]."""
+    left_out: int
+    """Realisations or segments that were cut short or touch lost or overloaded samples."""
+    lost_samples: int
+    """Samples inside the noise that were lost."""
+    overloaded_samples: int
+    """Samples inside the noise at which a channel was near its full scale."""
+
+
+def repeated_response(
+    channels: Channels,
+    noise: WhiteNoise | OddMultisine,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    *,
+    repetitions: Sequence[Repetition] = (),
+) -> NoiseResponse:
+    """Estimate the transmission of noise that repeats from everything usable in it.
+
+    Raises NotEnoughData when no realisation is left, and InvalidRequest when segments are chosen: the periods
+    are the segments.
+
+    Parameters
+    ----------
+    channels, noise, request
+        What was recorded, how it was driven, and what is asked.
+    repetitions
+        Of every realisation, where they were measured on the same drive before; measured if absent. A draw
+        of a measurement has them: how its resonances scatter among realisations is not asked again.
+
+    """
+    if request.cuts_segments:
+        raise InvalidRequest(
+            f"this noise repeats every {1 / noise.repetition_hz:g} s: its periods are its segments, without "
+            f"window, and give a line every {noise.repetition_hz:g} Hz; resolution, segment, averages, "
+            "window and overlap can be chosen for streamed noise only"
+        )
+    rate = channels.sample_rate_hz
+    sums = PeriodicSums(rate, noise.repetition_hz, confidence=request.confidence)
+    level = DensitySums(
+        rate, segment_samples=round(rate * min(_LEVEL_SEGMENT_S, _LEAST_PERIODS / noise.repetition_hz))
+    )
+    stretches = channels.stretches(SegmentLabel.REALISATION)
+    known: Sequence[Repetition | None] = repetitions or [None] * len(stretches)
+    taken = used = 0
+    bad = _Unusable()
+    for stretch, repetition in zip(stretches, known, strict=True):
+        data = _usable(channels, stretch, rate / noise.repetition_hz, bad)
+        if data is None:
+            continue
+        sums.add(*data, repetition=repetition)
+        level.add(data[1])
+        used += data.shape[1]
+        taken += 1
+    if not taken:
+        raise NotEnoughData(
+            f"none of the {noise.realisations} planned realisations of noise holds two whole periods of "
+            f"{1 / noise.repetition_hz:g} s without a fault{bad.text}; measure again"
+        )
+    periodic = sums.frequency_response(delay_s=channels.response_delay_s, orders=noise.lines)
+    order = np.rint(periodic.frequency_response.frequency_hz / noise.repetition_hz).astype(int)
+    sensors = channels.response_gain(periodic.frequency_response.frequency_hz)
+
+    def by(estimator: Estimator, given: PeriodicSums = sums) -> FrequencyResponse:
+        found = (
+            periodic
+            if given is sums
+            else given.frequency_response(delay_s=channels.response_delay_s, orders=noise.lines)
+        ).frequency_response
+        if estimator is Estimator.DRIVE:
+            return as_displacements(found).without_gain(sensors)
+        return _least_squares(
+            found, given.motion()[..., order], estimator, channels.response_delay_s, request.noise_ratio
+        ).without_gain(sensors)
+
+    chosen = by(request.estimator)
+    found = _resonances(chosen)
+    if found and not repetitions and scatters_beyond_noise(periodic):
+        without = (_resonances(by(request.estimator, each)) for each in sums.without_each())
+        found = scattered_resonances(found, tuple(without))
+    return NoiseResponse(
+        frequency_response=chosen,
+        h1=by(Estimator.H1),
+        h2=by(Estimator.H2),
+        resonances=found,
+        base_level=noise_drive_level(level.density(), low_hz=noise.band_start_hz, high_hz=noise.band_stop_hz),
+        bias=_bias(chosen, by(Estimator.DRIVE), found),
+        periodic=periodic,
+        used_s=used / rate,
+        left_out=len(stretches) - taken,
+        lost_samples=bad.lost,
+        overloaded_samples=bad.overloaded,
+    )
+
+
+@dataclass
+class _Unusable:
+    """Counts samples that no estimate may touch."""
+
+    lost: int = 0
+    overloaded: int = 0
+
+    def valid(self, data: Reals, overloaded: Flags) -> Flags:
+        """Which samples may be used; the others are counted."""
+        lost = np.isnan(data).any(axis=0)
+        self.lost += int(np.count_nonzero(lost))
+        self.overloaded += int(np.count_nonzero(overloaded & ~lost))
+        return np.asarray(~(lost | overloaded))
+
+    @property
+    def text(self) -> str:
+        """What was found, to end a sentence with; empty when nothing was."""
+        found = ((self.lost, "lost"), (self.overloaded, "near full scale"))
+        said = " and ".join(f"{count} samples {what}" for count, what in found if count)
+        return f" ({said})" if said else ""
+
+
+def _usable(channels: Channels, stretch: Stretch, period_samples: float, bad: _Unusable) -> Reals | None:
+    """Read a realisation that holds two whole periods or more and no fault; else None."""
+    shortfall = 1e-3
+    periods = int(stretch.samples / period_samples + shortfall)
+    if periods < _LEAST_PERIODS:
+        return None
+    data = channels.read(stretch.start, stretch.stop)
+    valid = bad.valid(data, channels.overloaded(stretch.start, stretch.stop))
+    return data if valid.all() else None
+
+
+def _least_squares(
+    like: FrequencyResponse,
+    motion: Complexes,
+    estimator: Estimator,
+    delay_s: float,
+    noise_ratio: float | None,
+) -> FrequencyResponse:
+    """h1, h2 or hv over realisations; ``motion`` has the shape (realisations, 2, lines)."""
+    s_xx = np.sum(np.abs(motion[:, 0]) ** 2, axis=0)
+    s_yy = np.sum(np.abs(motion[:, 1]) ** 2, axis=0)
+    s_xy = np.sum(np.conj(motion[:, 0]) * motion[:, 1], axis=0)
+    value = least_squares(estimator, s_xx, s_yy, s_xy, noise_ratio)
+    agreement = coherence(s_xx, s_yy, s_xy)
+    spread = relative_sd(np.maximum(agreement, np.finfo(float).tiny), like.n_eff)
+    result = replace(
+        like,
+        value=value,
+        coherence=agreement,
+        relative_sd_magnitude=spread,
+        sd_phase_rad=spread,
+        half_width=student_half_width(spread, like.n_eff, like.settings.confidence),
+        settings=replace(like.settings, estimator=estimator, noise_ratio=noise_ratio, delay_s=0.0),
+    )
+    return as_displacements(result.without_delay(delay_s))
+
+
+def streamed_response(
+    channels: Channels, noise: StreamedNoise, request: FrequencyResponseRequest = DEFAULT_REQUEST
+) -> NoiseResponse:
+    """Estimate the transmission of noise that does not repeat from everything usable in it.
+
+    Raises NotEnoughData when less than two segments are left.
+    """
+    rate = channels.sample_rate_hz
+    stretch = only_stretch(channels, SegmentLabel.NOISE)
+    segment = request.segment_samples(stretch.samples, rate)
+    if segment < round(rate / noise.band_start_hz):
+        raise NotEnoughData(
+            f"{stretch.samples / rate:.3g} s of noise leave segments of {segment / rate:.3g} s, and one "
+            f"must hold a period of {noise.band_start_hz:g} Hz: ask for fewer averages, or measure longer"
+        )
+    sums = FrequencyResponseSums(
+        rate,
+        segment_samples=segment,
+        window=request.window,
+        overlap=request.overlap,
+        estimator=Estimator.DRIVE,
+        confidence=request.confidence,
+    )
+    level = DensitySums(rate, segment_samples=min(round(_LEVEL_SEGMENT_S * rate), segment))
+    bad = _Unusable()
+    for first in range(stretch.start, stretch.stop, _BLOCK):
+        last = min(first + _BLOCK, stretch.stop)
+        data = channels.read(first, last)
+        valid = bad.valid(data, channels.overloaded(first, last))
+        if not valid.all():
+            data = np.where(valid, data, 0.0)
+        # What drives, what stands below and what stands above the fraction bar come in another order here.
+        sums.add(data[[1, 2, 0]], valid)
+        level.add(data[1], valid)
+    band = (noise.band_start_hz, noise.band_stop_hz)
+
+    def by(estimator: Estimator) -> FrequencyResponse:
+        noise_ratio = request.noise_ratio if estimator is Estimator.HV else None
+        found = sums.by(estimator, noise_ratio).without_delay(channels.response_delay_s)
+        inside = found.between(*band)
+        return as_displacements(inside).without_gain(channels.response_gain(inside.frequency_hz))
+
+    chosen = by(request.estimator)
+    found = _resonances(chosen)
+    return NoiseResponse(
+        frequency_response=chosen,
+        h1=by(Estimator.H1),
+        h2=by(Estimator.H2),
+        resonances=found,
+        base_level=noise_drive_level(level.density(), low_hz=band[0], high_hz=band[1]),
+        bias=_bias(chosen, by(Estimator.DRIVE), found),
+        periodic=None,
+        used_s=stretch.samples / rate,
+        left_out=chosen.segments_excluded,
+        lost_samples=bad.lost,
+        overloaded_samples=bad.overloaded,
+    )
+
+
+def _bias(chosen: FrequencyResponse, referenced: FrequencyResponse, found: Sequence[Resonance]) -> str:
+    """Compare an estimate with the one referenced to the drive, which noise of the channels does not bias.
+
+    Over the band and about each resonance, their median difference is bias where it exceeds three of its
+    standard deviations and half of a line's.
+    """
+    sd = np.fmax(chosen.relative_sd_magnitude, referenced.relative_sd_magnitude)
+    known = np.isfinite(sd) & (chosen.magnitude > 0) & (referenced.magnitude > 0) & referenced.is_significant
+    stretches = [("over the band", np.inf, 0.0)]
+    stretches += [
+        (f"about {each.frequency_hz:.4g} Hz", each.half_power_bandwidth_hz, each.frequency_hz)
+        for each in found
+    ]
+    said = []
+    for where, width_hz, middle_hz in stretches:
+        lines = known & (np.abs(chosen.frequency_hz - middle_hz) <= width_hz)
+        worth = np.count_nonzero(lines) / _ALIKE_LINES
+        if worth >= 1:
+            off = float(np.median(chosen.magnitude[lines] / referenced.magnitude[lines])) - 1
+            if abs(off) > np.median(sd[lines]) * max(0.5, _SURELY / np.sqrt(worth)):
+                said.append(f"{100 * abs(off):.2g} % {'above' if off > 0 else 'below'} it {where}")
+    name = chosen.settings.estimator
+    return f"noise biases {name}; use drive: {name} lies {' and '.join(said)}" if said else ""
+
+
+def as_displacements(frequency_response: FrequencyResponse) -> FrequencyResponse:
+    """Turn m0 velocity over base acceleration into displacement over displacement."""
+    return converted_frequency_response(
+        frequency_response,
+        drive=(Quantity.ACCELERATION, Quantity.DISPLACEMENT),
+        response=(Quantity.VELOCITY, Quantity.DISPLACEMENT),
+    )
+
+
+def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
+    low, high = float(frequency_response.frequency_hz[0]), float(frequency_response.frequency_hz[-1])
+    return resonances(frequency_response, low_hz=low, high_hz=high)
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
+    """A noise measurement: transmission base to m0."""
+
+    request: FrequencyResponseRequest
+    """What was asked for."""

@@ -1,0 +1,241 @@
+"""What an analyst asks of a noise measurement: estimator, resolution or averages, and how it is shown.
+
+In which quantities, and on which scale, a transmission is shown.
+"""
+
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from typing import ClassVar
+
+import numpy as np
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals.arrays import Reals
+from ..signals.confidence import DEFAULT_CONFIDENCE
+from ..signals.quantity import Quantity, derivative_factor
+from ..signals.window import Window, hop_samples, taper
+from .results import Estimator, FrequencyResponse, converted_frequency_response
+
+
+class MagnitudeScale(StrEnum):
+    """How magnitudes are drawn."""
+
+    LOG = "log"
+    """The ratio itself on a logarithmic axis."""
+    DECIBEL = "db"
+    """20 log10 of the ratio on a linear axis."""
+
+
+_ABOVE_AND_BELOW = 2
+_SYMBOLS = {Quantity.DISPLACEMENT: "x", Quantity.VELOCITY: "v", Quantity.ACCELERATION: "a"}
+_BASE_SYMBOLS = {Quantity.DISPLACEMENT: "U", Quantity.VELOCITY: "U'", Quantity.ACCELERATION: "U''"}
+_UNITS = {-2: "s²", -1: "s", 0: "", 1: "1/s", 2: "1/s²"}
+
+
+@dataclass(frozen=True)
+class FrequencyResponseView:
+    """The motion of m0 over the motion of the base."""
+
+    response: Quantity = Quantity.DISPLACEMENT
+    base: Quantity = Quantity.DISPLACEMENT
+    scale: MagnitudeScale = MagnitudeScale.LOG
+
+    @property
+    def power(self) -> int:
+        """How often i omega multiplies displacement over displacement."""
+        return self.response.derivatives - self.base.derivatives
+
+    @property
+    def unit(self) -> str:
+        """Of the magnitude; empty for a plain ratio."""
+        return _UNITS[self.power]
+
+    @property
+    def name(self) -> str:
+        """``"velocity/acceleration"``: what `quantities_named` reads."""
+        return f"{self.response.value}/{self.base.value}"
+
+    @property
+    def symbol(self) -> str:
+        """``"|x / U|"``, for captions and axes."""
+        return f"|{_SYMBOLS[self.response]} / {_BASE_SYMBOLS[self.base]}|"
+
+    @property
+    def label(self) -> str:
+        """Text of the magnitude axis."""
+        unit = self.unit
+        match self.scale:
+            case MagnitudeScale.LOG:
+                return f"{self.symbol}{f' [{unit}]' if unit else ''}  (m0 over base)"
+            case MagnitudeScale.DECIBEL:
+                return f"{self.symbol} [dB re 1{f' {unit}' if unit else ''}]"
+
+    def factor(self, frequency_hz: Reals) -> Reals:
+        """Give what turns magnitudes of displacement over displacement into the view's quantities."""
+        start, stop = (Quantity.DISPLACEMENT, list(Quantity)[abs(self.power)])
+        steps = (start, stop) if self.power >= 0 else (stop, start)
+        return np.asarray(np.abs(derivative_factor(frequency_hz, *steps)))
+
+    def shown(self, frequency_response: FrequencyResponse) -> FrequencyResponse:
+        """Turn displacement over displacement into the view's quantities, bounds included."""
+        return converted_frequency_response(
+            frequency_response,
+            drive=(Quantity.DISPLACEMENT, self.base),
+            response=(Quantity.DISPLACEMENT, self.response),
+        )
+
+    def drawn(self, magnitude: Reals) -> Reals:
+        """Turn magnitudes into the heights that are drawn."""
+        match self.scale:
+            case MagnitudeScale.LOG:
+                return magnitude
+            case MagnitudeScale.DECIBEL:
+                with np.errstate(divide="ignore"):
+                    return np.asarray(20 * np.log10(magnitude))
+
+
+def quantities_named(text: str, scale: MagnitudeScale = MagnitudeScale.LOG) -> FrequencyResponseView:
+    """Read ``"velocity/acceleration"``; a single word stands for both.
+
+    Parameters
+    ----------
+    text
+        What m0 and the base are taken as, with a slash between them.
+    scale
+        Of the magnitude in figures.
+
+    Raises
+    ------
+    InvalidRequest
+        For anything else.
+
+    """
+    words = text.split("/")
+    known = {each.value: each for each in Quantity}
+    if len(words) > _ABOVE_AND_BELOW or any(word not in known for word in words):
+        raise InvalidRequest(
+            f"the quantity {text!r} is not known; give m0's over the base's, each one of "
+            f"{', '.join(known)}, such as velocity/acceleration"
+        )
+    found = FrequencyResponseView(response=known[words[0]], base=known[words[-1]])
+    return replace(found, scale=scale)
+
+
+_SEGMENT_S = 4.0
+"""Segment of streamed noise: a quarter of a hertz between lines resolves a bandwidth of 1 Hz."""
+_LEAST_SEGMENTS = 8
+"""Nobody asked: a short record gets shorter segments rather than fewer averages than this."""
+_PROXY_SAMPLES = 4096
+"""Length of the window that overlaps are judged on; their correlations do not depend on it."""
+
+
+@dataclass(frozen=True)
+class FrequencyResponseRequest:
+    """How to estimate a frequency response; the defaults suit the paper's specimen.
+
+    At most one of resolution, segment length and averages can be chosen: the other two follow.
+    """
+
+    OWN_UNITS: ClassVar = {"noise_ratio": "s2"}
+
+    estimator: Estimator = Estimator.DRIVE
+    noise_ratio: float | None = None
+    """For hv: noise density of m0's velocity over that of the base's acceleration [s2]."""
+    resolution_hz: float | None = None
+    """Noise bandwidth of a line; the segment becomes as long as that needs."""
+    segment_s: float | None = None
+    averages: float | None = None
+    """Independent averages; the segments become as long as they leave."""
+    window: Window = Window.HANN
+    overlap: float = 0.5
+    confidence: float = DEFAULT_CONFIDENCE
+    view: FrequencyResponseView = field(default_factory=FrequencyResponseView)
+
+    def __post_init__(self) -> None:
+        lengths = {
+            "a resolution": self.resolution_hz,
+            "a segment length": self.segment_s,
+            "a number of averages": self.averages,
+        }
+        given = {name: value for name, value in lengths.items() if value is not None}
+        if len(given) > 1:
+            raise InvalidRequest(f"{' and '.join(given)} were given; give one, the others follow from it")
+        for name, value in given.items():
+            if not (np.isfinite(value) and value > 0):
+                raise InvalidRequest(f"{name} of {value:g} was asked for; it must be finite and more than 0")
+        if self.averages is not None and self.averages <= 1:
+            raise InvalidRequest(f"{self.averages:g} averages were asked for; a coherence needs more than 1")
+        if self.estimator is Estimator.HV and self.noise_ratio is None:
+            raise InvalidRequest(
+                "hv was asked for without a noise ratio; give the noise density of the response over that of "
+                "the base, or use the drive-referenced estimator"
+            )
+        if self.estimator is not Estimator.HV and self.noise_ratio is not None:
+            raise InvalidRequest(f"a noise ratio has no meaning for {self.estimator.value}; only hv uses it")
+        if self.noise_ratio is not None and not (np.isfinite(self.noise_ratio) and self.noise_ratio >= 0):
+            raise InvalidRequest(
+                f"the noise ratio is {self.noise_ratio:g}; it is a finite number, zero or more"
+            )
+        if not 0 < self.confidence < 1:
+            raise InvalidRequest(
+                f"a confidence of {self.confidence:g} was asked for; it lies between 0 and 1"
+            )
+        hop_samples(_PROXY_SAMPLES, self.overlap)
+
+    @property
+    def cuts_segments(self) -> bool:
+        """Whether it asks for something that only averages over segments have."""
+        chosen = (self.resolution_hz, self.segment_s, self.averages)
+        return any(each is not None for each in chosen) or (self.window, self.overlap) != (
+            FrequencyResponseRequest.window,
+            FrequencyResponseRequest.overlap,
+        )
+
+    def segment_samples(self, samples: int, sample_rate_hz: float) -> int:
+        """Choose the length of a segment for a record of so many samples.
+
+        Raises
+        ------
+        NotEnoughData
+            When the record does not hold two segments of the length asked for.
+
+        """
+        wished = self._wished(samples, sample_rate_hz)
+        # Beyond the record first: what is beyond all numbers is no whole one.
+        if samples < wished or samples < wished + hop_samples(int(wished), self.overlap):
+            raise NotEnoughData(
+                f"{samples / sample_rate_hz:.3g} s of noise were recorded, less than two segments of the "
+                f"{wished / sample_rate_hz:.3g} s asked for: ask for a coarser resolution, or measure longer"
+            )
+        return int(wished)
+
+    def _wished(self, samples: int, sample_rate_hz: float) -> float:
+        if self.resolution_hz is not None:
+            lines = float(_bandwidth_lines(self.window))
+            return max(2.0, float(np.ceil(lines * sample_rate_hz / self.resolution_hz)))
+        if self.segment_s is not None:
+            return max(2.0, float(np.rint(self.segment_s * sample_rate_hz)))
+        if self.averages is not None:
+            return longest_segment(samples, self.averages, self.window, self.overlap)
+        return min(round(_SEGMENT_S * sample_rate_hz), 2 * samples // (_LEAST_SEGMENTS + 1))
+
+
+def longest_segment(samples: int, averages: float, window: Window, overlap: float) -> int:
+    """Give the longest segment that still leaves so many independent averages of a whole record.
+
+    K segments are worth at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples hold
+    K segments of N / (1 + (K - 1) (1 - overlap)).
+    """
+    values = taper(window, _PROXY_SAMPLES)
+    hop = hop_samples(_PROXY_SAMPLES, overlap)
+    energy = float(values @ values)
+    lags = range(hop, _PROXY_SAMPLES, hop)
+    shared = sum((float(values[:-lag] @ values[lag:]) / energy) ** 2 for lag in lags)
+    segments = int(np.ceil(averages * (1 + 2 * shared)))
+    return max(2, int(samples / (1 + (segments - 1) * (1 - overlap))))
+
+
+def _bandwidth_lines(window: Window) -> float:
+    """Noise bandwidth of a window in lines: 1.5 for Hann."""
+    values = taper(window, _PROXY_SAMPLES)
+    return float(values.size * (values @ values) / np.sum(values) ** 2)

@@ -1,0 +1,311 @@
+"""Resonances of a transmission: frequency, damping and quality factor, with their uncertainties."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from ..errors import InvalidRequest
+from ..signals.arrays import Complexes, Reals
+from ..signals.confidence import standard_uncertainty
+from .modal_fit import Background, Lines, ModalFit, modal_fit
+from .mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, Resonance
+from .results import FrequencyResponse
+
+_REACH_BANDWIDTHS = 2.0
+"""The fit uses lines within so many half-power bandwidths of the peak."""
+_LEAST_LINES = 8
+"""Two pole and at most ten linear parameters need more reals than that: eight lines are sixteen."""
+_LEAST_RISE = 3.0
+"""A peak stands above the valley beside it by at least so many standard deviations of the difference."""
+_MOST_MODES = 3
+"""Taken for one peak."""
+_APART = (0.5, 1.5)
+"""Of a half-width, at which poles side by side start."""
+_LEAST_GAIN = 25.0
+"""In chi square, by which a fit is better with one more mode: of its four numbers chance gives 19 once in a
+thousand."""
+_REACH_DAMPING = 4.0
+"""In its logarithm."""
+_USUAL_HZ = 300.0
+"""Scales the background."""
+_LARGEST_SD_UNRESOLVED = 0.1
+"""Believe a peak too narrow for the lines only where its line or its damping is known to a tenth: else it
+is a ripple on top of a broad hill."""
+_BACKGROUND_DEGREES = (1, 2, 3)
+"""Tried in turn: broad peaks see more of their neighbours than a straight line can follow."""
+_LARGEST_RELATIVE_SD_DAMPING = 1 / _LEAST_RISE
+"""Past it the damping is not significantly above zero: a ripple of noisy lines, and no resonance."""
+
+
+def resonances(
+    frequency_response: FrequencyResponse, *, low_hz: float, high_hz: float
+) -> tuple[Resonance, ...]:
+    """Find and fit the resonances of a transmission in a band, in the order of frequency.
+
+    Each significant peak is fitted, weighted by the stated spreads, with
+    H(w) = R / (w0^2 - w^2 + 2 i zeta w0 w) + b0 + b1 (w - w0) + ..., complex R, b0, b1: one mode on what
+    its neighbours leave there, a straight line or, where that does not do, up to a cubic. The pole is
+    found by variable projection (Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413-432). A peak that
+    noise explains is left out. Then all modes are fitted together, and that fit stands where it explains
+    the whole band: no polynomial follows the skirt of a neighbour to the last digit of a fine measurement.
+
+    Raises
+    ------
+    InvalidRequest
+        When fewer than eight lines lie in the band.
+
+    """
+    band = frequency_response.between(low_hz, high_hz)
+    if band.frequency_hz.size < _LEAST_LINES:
+        raise InvalidRequest(
+            f"{band.frequency_hz.size} lines lie between {low_hz:g} and {high_hz:g} Hz; a fit needs at least "
+            f"{_LEAST_LINES}"
+        )
+    found: list[tuple[Resonance, ...]] = []
+    if band.steady_relative_sd is not None:
+        band = replace(band, relative_sd_magnitude=band.steady_relative_sd)
+    for line, width in _significant_peaks(band):
+        together = _refitted(band, width, _fitted(band, line, width, 1))
+        found.append(tuple(each for each in together if low_hz <= each.frequency_hz <= high_hz))
+    return _jointly_fitted(band, _distinct(found))
+
+
+def scattered_resonances(
+    found: Sequence[Resonance], without: Sequence[Sequence[Resonance]]
+) -> tuple[Resonance, ...]:
+    """Widen what resonances are known to by how they move when each realisation in turn is left out.
+
+    Where masses collide, each realisation moves all lines about a resonance together, and a fit that takes
+    lines as independent knows too much: Tukey's jackknife (Miller 1974, Biometrika 61, 1-15) does not. A
+    resonance that is there with one realisation only is none.
+
+    Parameters
+    ----------
+    found
+        From all realisations.
+    without
+        The same without each of them.
+
+    """
+    widened = []
+    for each in found:
+        half = each.half_power_bandwidth_hz
+        rest = [
+            min(others, key=lambda other: abs(other.frequency_hz - each.frequency_hz))
+            for others in without
+            if any(abs(other.frequency_hz - each.frequency_hz) < half for other in others)
+        ]
+        if len(rest) > 1:
+            widened.append(
+                replace(
+                    each,
+                    sd_frequency_hz=_moved(each, rest, "frequency_hz", len(without)),
+                    sd_damping_ratio=_moved(each, rest, "damping_ratio", len(without)),
+                    sd_peak_magnitude=_moved(each, rest, "peak_magnitude", len(without)),
+                )
+            )
+    return tuple(widened)
+
+
+def _moved(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
+    """Give the largest of what the fit says, what realisations move, and what the choice of a fit moves.
+
+    A fit of all modes together and one of this mode alone differ by more than a realisation moves either:
+    only fits over about as many lines tell the latter, which the jackknife multiplies.
+    """
+    alike = [each for each in rest if 0.5 < each.lines_used / found.lines_used < 2.0]
+    told, moved = (
+        np.array([getattr(each, name) for each in some]) for some in (rest, alike if len(alike) > 2 else rest)
+    )
+    jackknife = (realisations - 1) * np.sqrt(moved.size / realisations) * standard_uncertainty(moved)
+    choice = np.std(np.append(told, getattr(found, name)), ddof=1)
+    return float(max(getattr(found, f"sd_{name}"), jackknife, choice))
+
+
+def _significant_peaks(band: FrequencyResponse) -> list[tuple[int, int]]:
+    """Lines of peaks, and their half-power widths in lines."""
+    spread = np.maximum(np.nan_to_num(band.relative_sd_magnitude, posinf=1e9), SMALLEST_RELATIVE_SD)
+    size = _smoothed(np.nan_to_num(np.log(np.maximum(band.magnitude, 1e-300)), nan=-700.0), spread)
+    significant = band.is_significant & (np.nan_to_num(band.coherence) > band.coherence_significance)
+    # A rise of ln(magnitude) by less than this is noise, whatever the line.
+    lines, about = scipy.signal.find_peaks(size, prominence=0.0)
+    result = []
+    for line, rise in zip(lines, about["prominences"], strict=True):
+        width = _half_power_lines(size, int(line))
+        # Peaks as wide as the band are fitted with the same lines: one of them does.
+        is_wide = 2 * width >= size.size - 1 and line != np.argmax(size)
+        if significant[line] and rise > _LEAST_RISE * np.sqrt(2) * spread[line] and not is_wide:
+            result.append((int(line), width))
+    return result
+
+
+def _smoothed(size: Reals, spread: Reals) -> Reals:
+    """Average over the few lines that bring typical noise below a hundredth; a noise-free curve stays."""
+    lines = min(int((np.median(spread) / 0.02) ** 2) // 2 * 2 + 1, 9)
+    if lines <= 1:
+        return size
+    padded = np.pad(size, lines // 2, mode="edge")
+    return np.convolve(padded, np.full(lines, 1 / lines), mode="valid")
+
+
+def _half_power_lines(size: Reals, line: int) -> int:
+    """Lines from the peak to where the magnitude has fallen by 3 dB, the nearer side."""
+    level = size[line] - 0.5 * np.log(2)
+    below = np.flatnonzero(size < level)
+    return int(np.min(np.abs(below - line))) if below.size else size.size // 2
+
+
+def _fitted(band: FrequencyResponse, line: int, half_width: int, most: int) -> tuple[Resonance, ...]:
+    """Fit the lines about a peak with one mode, or with as many as explain them, up to a number."""
+    reach = max(int(np.ceil(2 * _REACH_BANDWIDTHS * half_width)), _LEAST_LINES // 2)
+    chosen = np.zeros(band.frequency_hz.size, dtype=np.bool_)
+    chosen[max(0, line - reach) : line + reach + 1] = True
+    lines = Lines(band, chosen)
+    if lines.value.size < _LEAST_LINES:
+        return ()
+    centre_hz = float(band.frequency_hz[line])
+    spacing_hz = float(np.median(np.diff(lines.frequency_hz)))
+    damping = float(np.clip(max(half_width, 0.5) * spacing_hz / centre_hz, 2e-6, 0.9 * LARGEST_DAMPING))
+    span = (lines.frequency_hz[-1] - lines.frequency_hz[0]) / centre_hz
+    first: tuple[Resonance, ...] = ()
+    start = np.array([[np.log(centre_hz), np.log(damping)]])
+    for modes in range(1, most + 1):
+        for degree in _BACKGROUND_DEGREES if modes == 1 else _BACKGROUND_DEGREES[1:2]:
+            for split in _split(start, modes):
+                reaches = np.tile([span, _REACH_DAMPING], modes)
+                fit = modal_fit(band, lines, split, reaches, _powers(centre_hz, degree))
+                told = () if fit is None else _told(fit, lines)
+                if fit is not None and told and fit.explains:
+                    return told
+                first = told if modes == 1 and told else first
+        if not first:
+            return ()
+        start = _poles(first)
+    return first
+
+
+def _powers(centre_hz: float, degree: int) -> Background:
+    """Powers of a background with complex factors."""
+
+    def shapes(frequency_hz: Reals) -> Complexes:
+        off = frequency_hz / centre_hz - 1
+        return np.stack([factor * off**power for power in range(degree + 1) for factor in (1, 1j)], axis=1)
+
+    return shapes
+
+
+def _split(poles: Reals, modes: int) -> Iterator[Reals]:
+    """Start so many poles where one was: side by side, closer and farther, each narrower than it."""
+    ((log_frequency, log_damping),) = poles
+    if modes == 1:
+        yield poles.ravel()
+        return
+    sides = np.linspace(-1, 1, modes)
+    for apart in _APART:
+        off = apart * float(np.exp(log_damping)) * sides
+        yield np.stack((log_frequency + off, np.full(modes, log_damping - np.log(modes) / 2)), axis=1).ravel()
+
+
+def _is_told(found: Resonance, lines: Lines) -> bool:
+    """Say whether lines determine a mode: damping above zero, inside of them, and no ripple of noise."""
+    natural_hz, damping = found.frequency_hz, found.damping_ratio
+    first_hz, last_hz = lines.frequency_hz[[0, -1]]
+    if damping > 0.99 * LARGEST_DAMPING or not first_hz <= natural_hz <= last_hz:
+        return False
+    if found.sd_damping_ratio > _LARGEST_RELATIVE_SD_DAMPING * damping:
+        return False
+    if found.half_power_bandwidth_hz < lines.narrowest_hz:
+        return False
+    known = min(lines.relative_sd(natural_hz), found.sd_damping_ratio / damping)
+    return found.is_resolved or known <= _LARGEST_SD_UNRESOLVED
+
+
+def _refitted(
+    band: FrequencyResponse, half_width: int, first: tuple[Resonance, ...]
+) -> tuple[Resonance, ...]:
+    """Fit once more over the bandwidth found: the first width was read off single, noisy lines.
+
+    What one mode does not describe is fitted over all its lines: a background follows fewer.
+    """
+    if not first:
+        return ()
+    (one,) = first
+    line = int(np.argmin(np.abs(band.frequency_hz - one.frequency_hz)))
+    spacing_hz = float(np.median(np.diff(band.frequency_hz)))
+    found = round(0.5 * one.half_power_bandwidth_hz / spacing_hz)
+    return _fitted(band, line, found if one.is_explained else max(found, half_width), _MOST_MODES) or first
+
+
+def _jointly_fitted(band: FrequencyResponse, found: list[Resonance]) -> tuple[Resonance, ...]:
+    """Fit all modes of a band at once, from the single fits; those stand where the modes do not explain it.
+
+    H = sum of (a_k + i w b_k) / (w_k^2 - w^2 + 2 i zeta_k w_k w) + c0 + i w c1 + w^2 c2, all factors real:
+    exact for a linear specimen with any damping. Where these modes do not explain the band, the one about
+    which most is left is taken for two. With impacts nothing explains it, and nothing is gained.
+    """
+    if not found:
+        return ()
+    lines = Lines(band, band.is_significant)
+    starts, best, last = [_poles(found)], tuple(found), np.inf
+    for _ in range(_MOST_MODES):
+        if 2 * lines.value.size < 2 * (4 * len(starts[0]) + 3):
+            break
+        fit = _best(band, lines, starts)
+        if fit is None or fit.chi_square * fit.freedom > last - _LEAST_GAIN:
+            break
+        told = _told(fit, lines)
+        best = told if fit.explains and told else best
+        if best is told and max(each.reduced_chi_square for each in told) <= fit.chi_square:
+            break
+        last, poles = fit.chi_square * fit.freedom, _poles(fit.resonances)
+        worst = int(np.argmax([each.reduced_chi_square for each in fit.resonances]))
+        rest = np.delete(poles, worst, axis=0)
+        starts = [np.vstack((rest, two.reshape(2, 2))) for two in _split(poles[worst : worst + 1], 2)]
+    return best
+
+
+def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> ModalFit | None:
+    """Fit all modes from each start; the best of these."""
+    fits = (
+        modal_fit(band, lines, np.ravel(each), np.tile([0.02, 1.0], len(each)), _outside) for each in starts
+    )
+    return min((fit for fit in fits if fit is not None), key=lambda fit: fit.chi_square, default=None)
+
+
+def _told(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
+    """Give the modes of a fit that its lines determine, in the order of frequency."""
+    told = (each for each in fit.resonances if _is_told(each, lines))
+    return tuple(sorted(told, key=lambda one: one.frequency_hz))
+
+
+def _poles(found: Sequence[Resonance]) -> Reals:
+    """Logarithms of natural frequency and damping ratio, shape (modes, 2)."""
+    return np.log([[each.frequency_hz, each.damping_ratio] for each in found])
+
+
+def _outside(frequency_hz: Reals) -> Complexes:
+    """Of modes outside of the band, and of what the channels' phases err: 1, i w and w^2."""
+    scaled = frequency_hz / _USUAL_HZ
+    return np.stack([np.ones_like(frequency_hz), 1j * scaled, scaled**2], axis=1)
+
+
+def _distinct(found: list[tuple[Resonance, ...]]) -> list[Resonance]:
+    """Keep one fit of each pole: two ripples of one resonance give the same."""
+    kept: list[Resonance] = []
+    for together in sorted(filter(None, found), key=lambda fit: min(map(_doubt, fit))):
+        known = tuple(kept)
+        for each in together:
+            half = 0.5 * each.half_power_bandwidth_hz
+            if all(
+                abs(each.frequency_hz - other.frequency_hz) > max(half, 0.5 * other.half_power_bandwidth_hz)
+                for other in known
+            ):
+                kept.append(each)
+    return sorted(kept, key=lambda one: one.frequency_hz)
+
+
+def _doubt(found: Resonance) -> tuple[bool, float]:
+    """Rank fits that explain their lines first, and these by the relative uncertainty of their damping."""
+    return not found.is_explained, found.sd_damping_ratio / found.damping_ratio

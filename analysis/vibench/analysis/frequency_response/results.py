@@ -1,0 +1,190 @@
+"""Frequency responses: the shape every estimator of response over drive hands on to figures and reports."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import ClassVar
+
+import numpy as np
+
+from ..errors import InvalidRequest
+from ..signals.arrays import Complexes, Flags, Reals
+from ..signals.confidence import magnitude_bounds, phase_half_width
+from ..signals.quantity import Quantity, derivative_factor
+from ..tables import Labelled
+
+LEAST_COHERENCE = 0.1
+"""Below it no line is significant."""
+
+
+class Estimator(StrEnum):
+    """How response over drive is formed from averaged spectra."""
+
+    H1 = "h1"
+    """S_xy / S_xx: unbiased when only the response is noisy."""
+    H2 = "h2"
+    """S_yy / S_yx: unbiased when only the drive is noisy."""
+    HV = "hv"
+    """Total least squares with a stated ratio of the noise densities (response over drive)."""
+    DRIVE = "drive"
+    """S_ry / S_rx: unbiased by noise on both channels, given a clean reference such as the drive voltage."""
+
+
+@dataclass(frozen=True)
+class FrequencyResponseSettings:
+    """What made a frequency response, kept beside it."""
+
+    estimator: Estimator
+    sample_rate_hz: float
+    segment_samples: int
+    """Samples of one segment, or of one period."""
+    window: str
+    overlap: float
+    confidence: float
+    """Probability that a bound pair holds the truth, one line at a time."""
+    noise_ratio: float | None = None
+    """S_nn / S_mm given to hv."""
+    delay_s: float = 0.0
+    """Delay of the response channel behind the drive channel that was removed from the phase."""
+
+
+@dataclass(frozen=True)
+class FrequencyResponse(Labelled):
+    """Response over drive against frequency, with bounds; all arrays have the shape (lines,)."""
+
+    OWN_UNITS: ClassVar = {
+        "value": "{unit}",
+        "magnitude": "{unit}",
+        "magnitude_lower": "{unit}",
+        "magnitude_upper": "{unit}",
+    }
+
+    frequency_hz: Reals
+    value: Complexes
+    """Response over drive [unit of the response per unit of the drive]."""
+    coherence: Reals
+    """Squared coherence between drive and response, 0 to 1."""
+    n_eff: float
+    """Independent averages behind every line."""
+    relative_sd_magnitude: Reals
+    """Standard deviation of ln(magnitude)."""
+    sd_phase_rad: Reals
+    """Standard deviation of the phase [rad]."""
+    half_width: Reals
+    """Relative half width of the bounds, from which the four bounds below follow."""
+    coherence_significance: float
+    """Coherence that independent noises stay below with probability ``settings.confidence``."""
+    resolution_hz: float
+    """Noise bandwidth of a line: finer features are smeared; zero for exactly periodic drive."""
+    segments_used: int
+    segments_excluded: int
+    settings: FrequencyResponseSettings
+    steady_relative_sd: Reals | None = None
+    """As `relative_sd_magnitude`, steadied by neighbouring lines: weights of a fit. None: that is steady."""
+    drive_slope_per_hz: Complexes | None = None
+    """Relative slope of the density that lines average the transmission with; None where it is level."""
+    reference_coherence: Reals | None = None
+    """For the drive-referenced estimator: the lower of the reference's coherences with the two channels."""
+
+    @property
+    def magnitude(self) -> Reals:
+        """|response / drive|."""
+        return np.abs(self.value)
+
+    @property
+    def phase_rad(self) -> Reals:
+        """Phase of the response ahead of the drive [rad], -pi to pi."""
+        return np.angle(self.value)
+
+    @property
+    def decibel(self) -> Reals:
+        """Magnitude in dB re 1."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(20 * np.log10(self.magnitude))
+
+    @property
+    def magnitude_lower(self) -> Reals:
+        """Lower bound of the magnitude."""
+        return magnitude_bounds(self.magnitude, self.half_width)[0]
+
+    @property
+    def magnitude_upper(self) -> Reals:
+        """Upper bound of the magnitude."""
+        return magnitude_bounds(self.magnitude, self.half_width)[1]
+
+    @property
+    def phase_lower_rad(self) -> Reals:
+        """Lower bound of the phase [rad]; may pass -pi."""
+        return np.asarray(self.phase_rad - phase_half_width(self.half_width))
+
+    @property
+    def phase_upper_rad(self) -> Reals:
+        """Upper bound of the phase [rad]; may pass pi."""
+        return np.asarray(self.phase_rad + phase_half_width(self.half_width))
+
+    @property
+    def is_significant(self) -> Flags:
+        """Lines where drive and response have something to do with each other, and their bounds hold.
+
+        Where the drive explains less than a tenth of the response, bounds that rest on a linear error hold
+        the truth in 3 to 75 % of all cases, however many averages make the coherence itself significant.
+        """
+        decisive = self.coherence if self.reference_coherence is None else self.reference_coherence
+        return np.asarray(decisive > max(self.coherence_significance, LEAST_COHERENCE))
+
+    def without_delay(self, delay_s: float) -> "FrequencyResponse":
+        """Turn the phase back by a delay of the response channel behind the drive channel [s]."""
+        turned = self.value * np.exp(2j * np.pi * self.frequency_hz * delay_s)
+        settings = replace(self.settings, delay_s=self.settings.delay_s + delay_s)
+        return replace(self, value=turned, settings=settings)
+
+    def without_gain(self, gain: Complexes) -> "FrequencyResponse":
+        """Divide by what the sensors did to the response over what they did to the drive, shape (lines,)."""
+        return replace(self, value=self.value / gain)
+
+    def between(self, low_hz: float, high_hz: float) -> "FrequencyResponse":
+        """Keep the lines from ``low_hz`` to ``high_hz``, both included."""
+        kept = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
+        if not np.any(kept):
+            span = f"{self.frequency_hz[0]:g} to {self.frequency_hz[-1]:g} Hz"
+            raise InvalidRequest(
+                f"no line lies between {low_hz:g} and {high_hz:g} Hz; the lines are at {span}"
+            )
+        steady, reference = self.steady_relative_sd, self.reference_coherence
+        slope = self.drive_slope_per_hz
+        return replace(
+            self,
+            frequency_hz=self.frequency_hz[kept],
+            value=self.value[kept],
+            coherence=self.coherence[kept],
+            relative_sd_magnitude=self.relative_sd_magnitude[kept],
+            sd_phase_rad=self.sd_phase_rad[kept],
+            half_width=self.half_width[kept],
+            steady_relative_sd=None if steady is None else steady[kept],
+            drive_slope_per_hz=None if slope is None else slope[kept],
+            reference_coherence=None if reference is None else reference[kept],
+        )
+
+
+def converted_frequency_response(
+    transmission: FrequencyResponse,
+    *,
+    drive: tuple[Quantity, Quantity],
+    response: tuple[Quantity, Quantity],
+) -> FrequencyResponse:
+    """Express a transmission in other quantities: each pair is (recorded, wanted).
+
+    Base acceleration to m0 velocity becomes displacement over displacement by
+    ``drive=(ACCELERATION, DISPLACEMENT), response=(VELOCITY, DISPLACEMENT)``. Relative bounds and the
+    coherence stay what they are; the line at 0 Hz is NaN when the result needs an integral.
+    """
+    power = (response[1].derivatives - response[0].derivatives) - (
+        drive[1].derivatives - drive[0].derivatives
+    )
+    start = Quantity.ACCELERATION if power < 0 else Quantity.DISPLACEMENT
+    value = transmission.value
+    while power != 0:
+        step = max(-2, min(2, power))
+        stop = list(Quantity)[start.derivatives + step]
+        value = np.asarray(value * derivative_factor(transmission.frequency_hz, start, stop))
+        power -= step
+    return replace(transmission, value=value)

@@ -1,0 +1,30 @@
+"""The analysis of each kind of excitation: that of its family, or its own."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from vibench.acquisition.plan import Family, rows_by_kind
+
+from .analysis_kind import AnalysisKind
+from .dwell import DWELL
+from .noise import REPEATED_NOISE, STREAMED_NOISE
+from .stepped import BRANCH_CONTINUATION, RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE
+from .sweep import SWEEP
+
+ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
+    {
+        Family.NOISE: REPEATED_NOISE,
+        Family.SWEEP: SWEEP,
+        Family.DWELL: DWELL,
+        Family.STEPPED: STEPPED_SINE,
+    },
+    {
+        "streamed_noise": STREAMED_NOISE,
+        "settled_sine": SETTLED_SINE,
+        "stepped_level": STEPPED_LEVEL,
+        "resonance_tracking": RESONANCE_TRACKING,
+        "branch_continuation": BRANCH_CONTINUATION,
+        "held_response": SETTLED_SINE,
+    },
+)
+"""By the word in a plan; families in the order in which a report shows them."""

@@ -1,0 +1,70 @@
+"""What a result is, and what must be known of a kind of excitation to get one."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, Generic, TypeAlias, TypeVar
+
+from ..comparison.curve import Curve, CurveOrigin
+from ..frequency_response.noise_response import NoiseAnalysis
+from ..frequency_response.request import FrequencyResponseRequest
+from ..model.draws import Draw, Drawn
+from ..model.ensemble import Quantity
+from ..model.overlay import AbstractOverlay, DwellOverlay, NoiseOverlay, SteppedSineOverlay, SweepOverlay
+from ..model.simulated_channels import SimulatedChannels
+from ..recordings.channels import Channels
+from ..recordings.checks import AbstractAnalysis
+from ..recordings.facts import RecordingFacts
+from ..sine.dwell_analysis import DwellAnalysis
+from ..sine.stepped_response import SteppedSineAnalysis
+from ..sine.sweep_analysis import SweepAnalysis
+from ..tables import Labelled
+from ..uncertainty.budget import Budget
+
+Json = dict[str, Any]
+P = TypeVar("P")
+A = TypeVar("A", bound=AbstractAnalysis[Any, Any])
+L = TypeVar("L", bound=AbstractOverlay[Any])
+
+
+@dataclass(frozen=True, eq=False)
+class Result(Labelled, Generic[A, L]):
+    """A measurement and its simulation."""
+
+    analysis: A
+    laid: L | None
+
+    @property
+    def kind(self) -> str:
+        """Of the excitation."""
+        return self.analysis.facts.measurement.excitation.kind
+
+
+AnyResult: TypeAlias = Result[Any, Any]
+NoiseResult: TypeAlias = Result[NoiseAnalysis, NoiseOverlay]
+SweepResult: TypeAlias = Result[SweepAnalysis, SweepOverlay]
+DwellResult: TypeAlias = Result[DwellAnalysis, DwellOverlay]
+SteppedSineResult: TypeAlias = Result[SteppedSineAnalysis, SteppedSineOverlay]
+
+
+@dataclass(frozen=True)
+class AnalysisKind(Generic[P, A, L]):
+    """How recordings of one kind of excitation are analysed: plan, analysis and overlay belong together."""
+
+    family: str
+    """What JSON calls the results; kinds with equal results share it."""
+    analyse: Callable[[RecordingFacts, Channels, P, FrequencyResponseRequest], A]
+    draw: Callable[[A, SimulatedChannels], Draw[Any]]
+    """Estimate from simulated channels what was estimated from the recorded ones."""
+    compared: Callable[[A], tuple[Quantity, ...]]
+    """What of the measurement is set into the draws."""
+    lay: Callable[[A, Drawn[Any]], L]
+    """Compare with all draws."""
+    curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
+    """Of the response, measured or simulated, of the recording with that name."""
+    measured: Callable[[A], Json]
+    """The numbers of a result."""
+    simulated: Callable[[L], Json]
+    budgets: Callable[[A, L | None], tuple[Budget, ...]]
+    """Of the numbers that a reader takes away."""
+    place: Callable[[P], tuple[float, ...]] = lambda _: ()
+    """Sorts the results of a family, weak to strong; without it they stay in the order given."""

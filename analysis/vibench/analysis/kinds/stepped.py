@@ -1,0 +1,110 @@
+"""Stepped sines: responses frequency by frequency or level by level, and what JSON says of them."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+
+from vibench.acquisition.recording import SegmentLabel
+
+from ..comparison.recording_curves import stepped_traces
+from ..errors import UnusableData
+from ..frequency_response.request import FrequencyResponseRequest
+from ..model.draws import Draw
+from ..model.ensemble import Quantity
+from ..model.overlay import SteppedSineOverlay, stepped_overlay, stepped_quantities
+from ..model.simulated_channels import SimulatedChannels
+from ..recordings.channels import Channels, Stretch
+from ..recordings.checks import measurement_checks
+from ..recordings.facts import RecordingFacts
+from ..sine.drive_frequency import frequency_check
+from ..sine.level_jumps import level_summary
+from ..sine.stepped_response import (
+    SteppedResponse,
+    SteppedSineAnalysis,
+    Steps,
+    settled_check,
+    stepped_response,
+)
+from ..tables import named
+from ..uncertainty.quantities import stepped_budgets
+from .analysis_kind import AnalysisKind, Json
+
+Setting = Callable[[Steps, Stretch], float]
+
+
+def _measured(analysis: SteppedSineAnalysis) -> Json:
+    found = analysis.response
+    return {
+        **named(found, "frequency_hz", "direction", "drive_amplitude_m", "response_i"),
+        **named(found, "noise_bias_i", "noise_error_i", "response_ii", "sd_response_ii"),
+        **named(found, "slow_change", "left_out"),
+    }
+
+
+def _measured_levels(analysis: SteppedSineAnalysis) -> Json:
+    return {**_measured(analysis), **level_summary(analysis.response)}
+
+
+def _simulated(laid: SteppedSineOverlay) -> Json:
+    return {"response_i": laid.response.response_i, "response_ii": laid.response.response_ii}
+
+
+def _compared(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
+    return stepped_quantities(analysis.response)
+
+
+def _stepped(
+    setting_vpp: Setting,
+    label: SegmentLabel = SegmentLabel.STEP,
+    measured: Callable[[SteppedSineAnalysis], Json] = _measured,
+) -> AnalysisKind[Steps, SteppedSineAnalysis, SteppedSineOverlay]:
+    def analyse(
+        facts: RecordingFacts, channels: Channels, plan: Steps, _: FrequencyResponseRequest
+    ) -> SteppedSineAnalysis:
+        response = stepped_response(channels, plan, label, setting_vpp)
+        planned_hz = np.array(
+            [each.numbers["frequency_hz"] for each in channels.stretches(label)], dtype=float
+        )
+        frequency = frequency_check(response.frequency_hz, planned_hz)
+        checks = (*measurement_checks(facts), frequency, settled_check(response))
+        return SteppedSineAnalysis(facts, checks, plan, response)
+
+    def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:
+        response = stepped_response(channels, analysis.excitation, label, setting_vpp)
+        return Draw(response, stepped_quantities(response), (), *channels.played_impacts(label))
+
+    return AnalysisKind(
+        family="stepped_sine",
+        analyse=analyse,
+        draw=draw,
+        compared=_compared,
+        lay=stepped_overlay,
+        curves=stepped_traces,
+        measured=measured,
+        simulated=_simulated,
+        budgets=stepped_budgets,
+    )
+
+
+STEPPED_SINE = _stepped(lambda plan, _: plan.amplitude_vpp)
+STEPPED_LEVEL = _stepped(
+    lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), measured=_measured_levels
+)
+# With feedback the setting is not the plan's, and is known of no step.
+SETTLED_SINE = _stepped(lambda *_: nan)
+RESONANCE_TRACKING = _stepped(lambda *_: nan, SegmentLabel.RESONANCE)
+
+
+def _undrawn(_: SteppedSineAnalysis, __: SimulatedChannels) -> Draw[SteppedResponse]:
+    raise UnusableData(
+        "the motions of a branch were held by a fast loop, and under the recorded voltage alone the model "
+        "leaves them; nothing was simulated, compare them with the model's branch"
+    )
+
+
+# A branch folds: it is no curve over frequency.
+BRANCH_CONTINUATION = replace(
+    _stepped(lambda *_: nan, SegmentLabel.BRANCH), draw=_undrawn, curves=lambda *_: iter(())
+)

@@ -1,0 +1,319 @@
+"""Draws of a recording: rig and specimen under its voltage, from slightly different starts."""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import BridgedChannel, Recording
+from vibench.sim import Accuracy, Specimen
+from vibench.sim.shaker.loaded_shaker import MotionFailed
+from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
+
+from ..errors import UnusableData
+from ..recordings.channels import BASE, DRIVE, RESPONSE, RecordedChannels
+from ..signals.arrays import Reals
+from .channel_noise import ChannelNoise, channel_noise
+from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
+from .ensemble import FEWEST_DRAWS, Quantity, ensemble_curves
+from .escape import Ending
+from .played_voltage import PlayedVoltage, above_noise
+from .shaker_fit import FittedShaker
+from .simulated_channels import (
+    HIGHEST_PART,
+    LOWEST_PART,
+    SimulatedChannels,
+    lowest_frequency_hz,
+    under_base_motion,
+)
+
+DRAWS = 16
+"""Of a colliding motion: its band of 95 % is then known to a fifth of its width."""
+DRAWS_WITHOUT_IMPACTS = 8
+"""Of one that never collides, whose draws differ by noise and clocks alone."""
+START_M = 5e-9
+"""Standard deviation of each mass' place at the start."""
+CLOCK_TOLERANCE = 50e-6
+"""Of the converter's clock, relative: what NI 9234 and its kind promise. It shifts resonances."""
+_LEAD_S, _FADE_S, _TAIL_S = 0.5, 0.2, 0.05
+"""Simulated before a stretch, raised from nothing within it, and lowered to nothing behind [s]."""
+_NOISE = 0.15
+"""How far, as a logarithm, a channel's noise may be from what its quietest stretch shows."""
+_MORE = 3
+_SEED = 17
+_MOST_BYTES = 2e9
+"""That the draws under way at a time may take."""
+_BYTES_PER_SAMPLE = 120
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedRun:
+    """What was simulated beside a recording, in numbers."""
+
+    specimen: Specimen
+    driven: Driven
+    accuracy: Accuracy
+    """Of the contacts under a recorded base motion; under a voltage they are resolved as standard."""
+    base_band_hz: tuple[float, float] | None
+    """Band of the base displacement that drove; None under a voltage."""
+    draws: int
+    impacts: float
+    """Contacts that began inside the parts that were analysed, mean over the draws."""
+    played_s: float
+    why: str = ""
+    """Why the recorded voltage did not drive, where it could not; else what is to be known of the rig."""
+
+    @property
+    def impact_rate_hz(self) -> float:
+        """Impacts per second."""
+        return self.impacts / self.played_s if self.played_s else 0.0
+
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, eq=False)
+class Draw(Generic[R]):
+    """One draw, through the estimator of the recording."""
+
+    response: R
+    quantities: tuple[Quantity, ...]
+    endings: tuple[Ending, ...]
+    impacts: float
+    played_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn(Generic[R]):
+    """All draws; of the first its whole estimate, of the others what is compared."""
+
+    run: SimulatedRun
+    response: R
+    quantities: tuple[tuple[Quantity, ...], ...]
+    endings: tuple[tuple[Ending, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class DrawSource:
+    """Where draws come from: each number gives the same one every time."""
+
+    specimen: Specimen
+    driven: Driven
+    accuracy: Accuracy
+    base_band_hz: tuple[float, float] | None
+    most: int
+    why: str
+    channels: Callable[[int], SimulatedChannels]
+
+
+def voltage_source(
+    recording: Recording,
+    specimen: Specimen,
+    fitted: FittedShaker | None = None,
+    draws: int = DRAWS,
+) -> DrawSource:
+    """Let the recorded voltage move rig and specimen together.
+
+    Raises UnusableData when samples were lost, or nothing is known of the shaker.
+
+    Parameters
+    ----------
+    recording
+        Whose bench configuration describes the rig.
+    fitted
+        A shaker to take instead of the described one; each draw takes another of its uncertainty.
+    draws
+        How many, at most.
+
+    """
+    rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
+    volts = recorded_voltage(recording, rig)
+    drive_v = volts if rig.role == DRIVE else recording.read(DRIVE)
+    noise = channel_noise(recording, tuple(recording.roles))
+    voltage = PlayedVoltage(volts, noise.converter_v * abs(recording.channel(rig.role).physical_per_volt))
+    return DrawSource(
+        specimen=specimen,
+        driven=rig.driven,
+        accuracy=Accuracy.STANDARD,
+        base_band_hz=None,
+        most=draws,
+        why="" if fitted is None else fitted.sentence,
+        channels=partial(_drawn_channels, RecordedChannels(recording), rig, fitted, voltage, drive_v, noise),
+    )
+
+
+def base_source(
+    recording: Recording, measurement: Measurement, specimen: Specimen, accuracy: Accuracy, why: str = ""
+) -> DrawSource:
+    """Let the recorded base motion shake the specimen: one draw, for linear and coherent motion."""
+    channels = under_base_motion(recording, measurement, specimen, accuracy)
+    rate = recording.sample_rate_hz
+    band = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
+    return DrawSource(specimen, Driven.BASE, accuracy, band, 1, why, lambda _: channels)
+
+
+def drawn(
+    source: DrawSource, estimate: Callable[[SimulatedChannels], Draw[R]], measured: Sequence[Quantity]
+) -> Drawn[R]:
+    """Estimate from every draw what was estimated from the recording.
+
+    Where most of what was ``measured`` is of a kind of motion that few draws come to, up to three times as
+    many are made. Raises UnusableData when a simulation did not reach its end.
+    """
+    channels = source.channels(0)
+    first = estimate(channels)
+    samples = channels.samples
+    del channels
+    workers = max(1, min(os.cpu_count() or 1, int(_MOST_BYTES / (_BYTES_PER_SAMPLE * samples))))
+    others = source.most if first.impacts else min(source.most, DRAWS_WITHOUT_IMPACTS)
+    found = [_without_response(first)]
+    with ThreadPoolExecutor(workers) as pool:
+        # No more than are computed at a time wait with their whole estimates.
+        numbers = _numbers(others, others if source.most == 1 else _MORE * others, found, measured)
+        while batch := list(islice(numbers, workers)):
+            found += pool.map(lambda number: _without_response(estimate(source.channels(number))), batch)
+    run = SimulatedRun(
+        specimen=source.specimen,
+        driven=source.driven,
+        accuracy=source.accuracy,
+        base_band_hz=source.base_band_hz,
+        draws=len(found),
+        impacts=float(np.mean([each.impacts for each in found])),
+        played_s=first.played_s,
+        why=source.why,
+    )
+    return Drawn(
+        run, first.response, tuple(each.quantities for each in found), tuple(each.endings for each in found)
+    )
+
+
+def _numbers(usual: int, most: int, found: list[Draw[None]], measured: Sequence[Quantity]) -> Iterator[int]:
+    """Yield the numbers of the draws that are still to be made."""
+    for number in range(1, most):
+        if number >= usual:
+            curves = ensemble_curves(measured, [each.quantities for each in found])
+            count = np.concatenate([each.count for each in curves])
+            if np.median(count) >= FEWEST_DRAWS:
+                return
+        yield number
+
+
+def _without_response(draw: Draw[R]) -> Draw[None]:
+    return Draw(None, draw.quantities, draw.endings, draw.impacts, draw.played_s)
+
+
+def _drawn_channels(
+    recorded: RecordedChannels,
+    rig: DrivenRig,
+    fitted: FittedShaker | None,
+    voltage: PlayedVoltage,
+    drive_v: Reals,
+    noise: ChannelNoise,
+    number: int,
+) -> SimulatedChannels:
+    rng = np.random.default_rng([_SEED, number])
+    table = rig.table if fitted is None else replace(rig.table, shaker=fitted.drawn(rng))
+    motion, base, velocity = _moved(
+        replace(rig, table=table), voltage.drawn(rng), recorded.recording, noise, rng
+    )
+    return SimulatedChannels(
+        recorded,
+        velocity,
+        (motion.impact_times_s, motion.impacts.astype(np.float64)),
+        recorded.response_delay_s,
+        base,
+        drive_v,
+        recorded.response_gain,
+    )
+
+
+def _moved(
+    rig: DrivenRig, volts: Reals, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
+) -> tuple[SampledMotion, Reals, Reals]:
+    """Move rig and specimen from a start of their own; gives the base's and m0's channels too, with noise."""
+    try:
+        motion = follow_voltage(
+            rig.table,
+            volts,
+            recording.sample_rate_hz * (1 + CLOCK_TOLERANCE * rng.uniform(-1.0, 1.0)),
+            start=np.concatenate([START_M * rng.standard_normal(3), np.zeros(3)]),
+        )
+    except MotionFailed as error:
+        raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
+    base, velocity = (
+        seen + noise.rms[role] * rng.standard_normal(seen.size)
+        for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity))
+    )
+    return motion, base, velocity
+
+
+@dataclass(frozen=True, eq=False)
+class StretchDraws:
+    """Draws of a stretch of a recording, each of a specimen of its own: for statistics of irregular motion.
+
+    A run begins at rest, half a second before the stretch, with the recorded voltage faded in: how a motion
+    began is not a part of it.
+    """
+
+    recording: Recording
+    rig: DrivenRig
+    fitted: FittedShaker | None
+    noise: ChannelNoise
+    volts: Reals
+    """Without the noise of its channel."""
+    first: int
+    """Sample of the recording with which it begins."""
+    kept: slice
+    """The stretch within ``volts``."""
+
+    @property
+    def measured(self) -> Reals:
+        """Base acceleration and m0's velocity of the recording, over the same samples as a draw's."""
+        start, stop = (self.first + each for each in (self.kept.start, self.kept.stop))
+        velocity = BridgedChannel(self.recording, RESPONSE).read(start, stop)
+        return np.stack([self.recording.read(BASE, start, stop), velocity])
+
+    @property
+    def noise_rms(self) -> Reals:
+        """White noise of base acceleration [m/s2] and m0's velocity [m/s], per sample."""
+        return np.array([self.noise.rms[role] for role in (BASE, RESPONSE)])
+
+    def draw(self, specimen: Specimen, rng: np.random.Generator) -> Reals:
+        """Give base acceleration [m/s2] and m0's velocity [m/s] of a run, noise included; shape (2, samples).
+
+        Raises UnusableData when the simulation did not reach its end.
+        """
+        shaker = self.rig.table.shaker if self.fitted is None else self.fitted.drawn(rng)
+        rig = replace(self.rig, table=replace(self.rig.table, shaker=shaker, specimen=specimen))
+        rms = {role: each * np.exp(rng.uniform(-1, 1) * _NOISE) for role, each in self.noise.rms.items()}
+        noise = ChannelNoise(rms, self.noise.converter_v)
+        _, base, velocity = _moved(rig, self.volts, self.recording, noise, rng)
+        return np.stack([base[self.kept], velocity[self.kept]])
+
+
+def stretch_draws(
+    recording: Recording, specimen: Specimen, start: int, stop: int, fitted: FittedShaker | None = None
+) -> StretchDraws:
+    """Let the recorded voltage of samples ``start`` to ``stop`` move rig and specimens together.
+
+    Where the recording ends there, the stretch ends a little earlier.
+
+    Raises UnusableData when samples were lost there, or nothing is known of the shaker.
+    """
+    rig = driven_rig(recording, specimen, None if fitted is None else fitted.shaker)
+    rate = recording.sample_rate_hz
+    first, last = max(0, start - round(_LEAD_S * rate)), min(recording.samples, stop + round(_TAIL_S * rate))
+    stop = min(stop, last - round(_TAIL_S * rate))
+    volts = recorded_voltage(recording, rig, first, last)
+    for end, fade_s in ((volts, _FADE_S), (volts[::-1], _TAIL_S)):
+        fade = min(volts.size, round(fade_s * rate))
+        end[:fade] *= 0.5 - 0.5 * np.cos(np.pi * np.arange(fade) / fade)
+    noise = channel_noise(recording, (rig.role, BASE, RESPONSE))
+    played = above_noise(volts, noise.rms[rig.role])
+    return StretchDraws(recording, rig, fitted, noise, played, first, slice(start - first, stop - first))

@@ -1,0 +1,118 @@
+"""The rig that a recording was made on, as numbers, and the voltage in the recording that drove it."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+
+import numpy as np
+from pydantic import ValidationError
+
+from vibench.acquisition.recording import Recording, coupling_cut_hz
+from vibench.acquisition.rig import Rig, amplifier_of, shaker_of
+from vibench.sim import Specimen
+from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.sampled_voltage import DrivenTable
+
+from ..errors import UnusableData
+from ..recordings.channels import BASE, DRIVE, RESPONSE
+from ..recordings.sensor_gain import sensor_gain
+from ..signals.arrays import Reals
+
+AMPLIFIER = "amplifier_voltage"
+"""Role of the channel that shows the amplifier's output."""
+
+
+class Driven(StrEnum):
+    """What moves the simulated specimen."""
+
+    AMPLIFIER = "recorded amplifier voltage"
+    GENERATOR = "recorded generator voltage"
+    BASE = "recorded base motion"
+
+    @property
+    def by_voltage(self) -> bool:
+        """Whether the table is simulated too, and yields to the specimen's blows."""
+        return self is not Driven.BASE
+
+
+@dataclass(frozen=True)
+class DrivenRig:
+    """Everything that moved under a recorded voltage."""
+
+    table: DrivenTable
+    driven: Driven
+    role: str
+    """Of the channel that holds the voltage."""
+
+
+def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
+    """Say what the recorded voltage was played into.
+
+    Raises UnusableData when the recording does not say what shaker, or amplifier, it was made with.
+
+    Parameters
+    ----------
+    recording
+        With the amplifier's output where it was recorded, else with the generator's.
+    specimen
+        On the table.
+    shaker
+        Its numbers, as fitted; by default those of the bench configuration.
+
+    """
+    rig = _configured(recording)
+    if AMPLIFIER in recording.roles:
+        amplifier, driven, role = Amplifier(), Driven.AMPLIFIER, AMPLIFIER
+    else:
+        amplifier, driven, role = Amplifier() if rig is None else amplifier_of(rig), Driven.GENERATOR, DRIVE
+    if shaker is None:
+        if rig is None:
+            raise UnusableData(
+                "what the recording says of its bench describes no shaker, so that its voltage moves no "
+                "simulated table; record with a whole bench configuration, or analyse it together with weak "
+                "noise of the same rig, to which a shaker can be fitted"
+            )
+        shaker = shaker_of(rig)
+    base, m0 = (recording.channel(each) for each in (BASE, RESPONSE))
+    table = DrivenTable(
+        amplifier,
+        shaker,
+        specimen,
+        partial(sensor_gain, recording.bench, base),
+        partial(sensor_gain, recording.bench, m0),
+        coupling_cut_hz(base.coupling),
+    )
+    return DrivenRig(table, driven, role)
+
+
+def says_shaker(recording: Recording) -> bool:
+    """Whether the bench configuration in a recording describes a whole rig, shaker included."""
+    return described_shaker(recording) is not None
+
+
+def described_shaker(recording: Recording) -> Shaker | None:
+    """Give the shaker that the bench configuration in a recording describes; None where it does not."""
+    rig = _configured(recording)
+    return None if rig is None else shaker_of(rig)
+
+
+def _configured(recording: Recording) -> Rig | None:
+    try:
+        return Rig.model_validate(dict(recording.bench))
+    except ValidationError:
+        return None
+
+
+def recorded_voltage(recording: Recording, rig: DrivenRig, start: int = 0, stop: int | None = None) -> Reals:
+    """Read the voltage that drove the rig, over the whole recording unless told otherwise [V]; (samples,).
+
+    Raises UnusableData when samples were lost: a motion cannot be followed across a hole.
+    """
+    volts = recording.read(rig.role, start, stop)
+    lost = int(np.count_nonzero(np.isnan(volts)))
+    if lost:
+        raise UnusableData(
+            f"{lost} samples of the {rig.driven.value.removeprefix('recorded ')} were lost, and a motion "
+            "cannot be followed across a hole; the measured result stands without a simulation of it"
+        )
+    return volts

@@ -1,0 +1,251 @@
+"""A measurement within the draws of its twin: bands, ranks and z, corrected for how many are compared.
+
+In chaos a measurement and its simulation are two draws of one distribution. What can be asked is whether
+the measured value could be one more draw.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from ..signals.arrays import Integers, Reals
+from ..tables import Labelled
+
+AGREEMENT = 0.99
+"""Share of agreeing twins that the limit lets pass, whatever the number of values compared."""
+BAND = 0.95
+MIXED = -1
+"""State of a value that holds some of either motion: it is not compared."""
+FEWEST_DRAWS = 5
+"""Of one kind of motion, below which a value is not compared: two draws more than a mean and a scatter."""
+_FEWEST_POINTS = 30
+"""Below them the largest of a draw is hardly of Gumbel's distribution."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quantity:
+    """Positive values of one kind, from one estimate; arrays of shape (points,)."""
+
+    name: str
+    """``"Response II"``, ``"band around 201 Hz"``."""
+    frequency_hz: Reals
+    value: Reals
+    """NaN where there is none."""
+    state: Integers | None = None
+    """What kind of motion it is of, where there are several (colliding or not): only equals are compared."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnsembleCurve(Labelled):
+    """One quantity, measured and in every draw.
+
+    Square roots are compared: they are near to normal for magnitudes that are known well, as logarithms are,
+    and for those that are mostly chance (of Rayleigh's distribution they have a skewness of -0.1, logarithms
+    -1.1).
+
+    Values at several frequencies are corrected for their number (Sidak 1967), draws of which there are few
+    by Student's t, tails that are longer than normal ones by setting each draw into the others: a limit is
+    exceeded in one per cent of all agreeing twins.
+    """
+
+    name: str
+    frequency_hz: Reals
+    """Shape (points,)."""
+    measured: Reals
+    """Shape (points,)."""
+    draws: Reals
+    """Shape (draws, points); NaN where the draw's motion is of another kind than the measured."""
+
+    @cached_property
+    def count(self) -> Integers:
+        """Draws at each point, shape (points,)."""
+        return np.asarray(np.sum(np.isfinite(self._roots), axis=0), dtype=np.int64)
+
+    @cached_property
+    def median(self) -> Reals:
+        """Of the draws, shape (points,); NaN where there is none."""
+        return _over_draws(self.draws, np.nanmedian)
+
+    @cached_property
+    def lower(self) -> Reals:
+        """Lower end of the band that holds 95 % of further draws; NaN below five draws."""
+        return np.asarray(np.maximum(self._mean - self._reach, 0.0) ** 2)
+
+    @cached_property
+    def upper(self) -> Reals:
+        """Upper end of the same."""
+        return np.asarray((self._mean + self._reach) ** 2)
+
+    @cached_property
+    def relative_sd(self) -> Reals:
+        """Scatter of the draws over their size, shape (points,); NaN below two."""
+        return 2 * self._sd / self._mean
+
+    @cached_property
+    def rank(self) -> Integers:
+        """How many draws lie below the measured value, shape (points,)."""
+        return np.asarray(np.sum(self.draws < self.measured, axis=0), dtype=np.int64)
+
+    @cached_property
+    def z(self) -> Reals:
+        """Place of the measured value as that of a normal deviate, shape (points,); NaN where not compared.
+
+        Student's t of one more draw, (sqrt(m) - mean) / (sd sqrt(1 + 1/n)), at equal probability.
+        """
+        with np.errstate(invalid="ignore"):
+            found = _deviates(np.sqrt(self.measured), self._mean, self._sd, self.count)
+        return np.where(self._is_compared, found, np.nan)
+
+    @property
+    def compared(self) -> int:
+        """Points at which there are draws enough."""
+        return int(np.sum(self._is_compared))
+
+    @property
+    def largest_z(self) -> float:
+        """The z furthest from zero; NaN where nothing is compared."""
+        z = self.z[np.isfinite(self.z)]
+        return float(z[np.argmax(np.abs(z))]) if z.size else np.nan
+
+    @cached_property
+    def limit(self) -> float:
+        """Largest |z| that is still chance among the points compared.
+
+        That of normal values, or where the draws themselves lie further out among one another, that of
+        Gumbel's distribution of the largest |z| of each: chaos has longer tails than square roots cure.
+        """
+        normal = z_limit(self.compared)
+        own = np.abs(self._z_of_draws[:, self._is_compared])
+        own = own[np.isfinite(own).any(axis=1)]
+        if self.compared < _FEWEST_POINTS or len(own) < FEWEST_DRAWS:
+            return normal
+        largest = np.nanmax(own, axis=1)
+        scale = float(np.std(largest, ddof=1)) * np.sqrt(6) / np.pi
+        mode = float(np.mean(largest)) - np.euler_gamma * scale
+        return max(normal, float(mode - scale * np.log(-np.log(AGREEMENT))))
+
+    @property
+    def outside(self) -> int:
+        """Points beyond the limit."""
+        return int(np.sum(np.abs(self.z[np.isfinite(self.z)]) > self.limit))
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the measured values could be one more draw."""
+        return self.outside == 0
+
+    @property
+    def share_in_band(self) -> float:
+        """Part of the compared points within the band of 95 %."""
+        inside = (self.measured >= self.lower) & (self.measured <= self.upper)
+        return float(np.mean(inside[self._is_compared])) if self.compared else np.nan
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        if not self.compared:
+            return f"{self.name}: too few draws of the measured kind of motion to compare"
+        verdict = "within" if self.agrees else "outside"
+        if self.measured.size == 1:
+            agrees = "agrees with" if self.agrees else "is not"
+            # Where the band alone does not show the verdict, the limit does.
+            limit = "" if self.share_in_band else f", {verdict} the limit of {self.limit:.1f}"
+            return (
+                f"{self.name} {self.measured[0]:.4g} {agrees} the twin's {self.median[0]:.4g} (95 % of draws "
+                f"{self.lower[0]:.4g} to {self.upper[0]:.4g}; rank {self.rank[0]} of {self.count[0]}, z = "
+                f"{self.z[0]:+.1f}{limit})"
+            )
+        return (
+            f"{self.name}: {100 * self.share_in_band:.0f} % of {self.compared} values within the twin's 95 % "
+            f"band, largest |z| {abs(self.largest_z):.1f} at {self._worst_hz:.4g} Hz, {verdict} the limit "
+            f"of {self.limit:.1f}"
+        )
+
+    @property
+    def _worst_hz(self) -> float:
+        return float(self.frequency_hz[np.nanargmax(np.abs(self.z))])
+
+    @cached_property
+    def _z_of_draws(self) -> Reals:
+        """Of each draw among the others, shape (draws, points); NaN where these are too few."""
+        left = self.count - 1
+        away = self._roots - self._mean
+        with np.errstate(invalid="ignore", divide="ignore"):
+            squares = left * self._sd**2
+            # What is left of the squares without the draw: of a thousandth of a millionth nothing is told.
+            others = np.maximum(squares - away**2 * self.count / left, 1e-9 * squares)
+            found = _deviates(self._roots, self._mean - away / left, np.sqrt(others / (left - 1)), left)
+        return np.where(left >= FEWEST_DRAWS, found, np.nan)
+
+    @cached_property
+    def _roots(self) -> Reals:
+        with np.errstate(invalid="ignore"):
+            found = np.sqrt(self.draws)
+        return np.where(np.isfinite(found), found, np.nan)
+
+    @cached_property
+    def _mean(self) -> Reals:
+        return _over_draws(self._roots, np.nanmean)
+
+    @cached_property
+    def _sd(self) -> Reals:
+        return _over_draws(self._roots, lambda x, axis: np.nanstd(x, axis=axis, ddof=1))
+
+    @cached_property
+    def _reach(self) -> Reals:
+        count = np.maximum(self.count, 2)
+        reach = scipy.stats.t.ppf(0.5 + 0.5 * BAND, count - 1) * self._sd * np.sqrt(1 + 1 / count)
+        return np.where(self.count >= FEWEST_DRAWS, reach, np.nan)
+
+    @cached_property
+    def _is_compared(self) -> Integers:
+        with np.errstate(invalid="ignore"):
+            known = np.isfinite(self.measured) & (self.measured > 0)
+            return np.asarray(known & (self.count >= FEWEST_DRAWS) & (self._sd > 0))
+
+
+def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
+    """Student's t of one more draw, as a normal deviate; beyond a probability of 1e-300 nothing is told."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        deviate = (roots - mean) / (sd * np.sqrt(1 + 1 / np.maximum(count, 1)))
+        tail = scipy.stats.t.logsf(np.abs(deviate), np.maximum(count - 1, 1))
+    return np.asarray(np.sign(deviate) * scipy.stats.norm.isf(np.exp(np.maximum(tail, -690.0))))
+
+
+def z_limit(values: int) -> float:
+    """Largest |z| in 99 % of all cases among so many independent normal deviates."""
+    return float(scipy.stats.norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
+
+
+def ensemble_curves(
+    measured: Sequence[Quantity], draws: Sequence[Sequence[Quantity]]
+) -> tuple[EnsembleCurve, ...]:
+    """Set each measured quantity into the draws of the same name; what no draw has is left out."""
+    found = []
+    for each in measured:
+        rows = [_alike(each, one) for draw in draws for one in draw if one.name == each.name]
+        if rows:
+            found.append(EnsembleCurve(each.name, each.frequency_hz, each.value, np.array(rows)))
+    return tuple(found)
+
+
+def _alike(measured: Quantity, drawn: Quantity) -> Reals:
+    """Give a draw's values where its motion is of the measured kind; equal places are the caller's."""
+    if drawn.value.shape != measured.value.shape:
+        return np.full(measured.value.shape, np.nan)
+    if measured.state is None or drawn.state is None:
+        return drawn.value
+    alike = (measured.state == drawn.state) & (measured.state != MIXED)
+    return np.where(alike, drawn.value, np.nan)
+
+
+def _over_draws(values: Reals, reduce: object) -> Reals:
+    """Reduce over draws; NaN at points without any, silently."""
+    some = np.sum(np.isfinite(values), axis=0) > 1
+    found = np.full(values.shape[1:], np.nan)
+    if some.any():
+        found[some] = reduce(values[:, some], axis=0)  # type: ignore[operator]
+    return found

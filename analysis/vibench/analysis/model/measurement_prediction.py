@@ -1,0 +1,83 @@
+"""What the specimen is predicted to do under a plan: responses and where it collides."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from vibench.acquisition.plan import Approach, Measurement, base_motion
+from vibench.acquisition.rig import Rig
+
+from ..signals.arrays import Flags, Reals
+from ..tables import Labelled
+from .overlay import prediction_grid
+from .prediction import ResponsePrediction, predicted
+
+MOST_POINTS = 60
+"""Frequencies that are simulated: some seconds of work."""
+SIMULATED_S = 6.0
+"""Simulated from rest at each frequency; all but a thousandth of the transient has died out by half of it."""
+FOLLOWED_POINTS = 200
+FOLLOWED_S = 2.0
+"""Where a sweep is followed: steps so small that they disturb little, and the time spent at each [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementPrediction(Labelled):
+    """Responses under sines of the base amplitude that the plan holds, or that the rig's model promises."""
+
+    measurement: Measurement
+    prediction: ResponsePrediction
+    basis: str
+    """Where the base amplitude comes from."""
+    approach: Approach
+    """Where each simulated point begins."""
+    specimen_name: str
+    """As the rig calls it."""
+
+    @property
+    def collision_bands_hz(self) -> tuple[tuple[float, float], ...]:
+        """Stretches of frequency in which the masses are predicted to strike."""
+        return bands_of(self.prediction.frequency_hz, self.prediction.is_colliding)
+
+    @property
+    def base_text(self) -> str:
+        """The base amplitude, or the range that it has over the frequencies."""
+        bounds = (np.min(self.prediction.amplitude_m), np.max(self.prediction.amplitude_m))
+        return " to ".join(dict.fromkeys(f"{1e6 * each:.3g} µm" for each in bounds))
+
+    @property
+    def model(self) -> str:
+        """The model that said so, for a legend."""
+        gaps = " and ".join(f"{1e6 * each:g}" for each in dict.fromkeys(self.prediction.specimen.gaps_m))
+        return f"{self.specimen_name}, gap {gaps} µm"
+
+
+def predict_measurement(measurement: Measurement, rig: Rig) -> MeasurementPrediction:
+    """Simulate the specimen of a rig over the band that a measurement excites."""
+    specimen = rig.specimen.specimen()
+    low_hz, high_hz = measurement.excitation.band_hz
+    approach = measurement.excitation.approach
+    match approach:
+        case Approach.REST:
+            grid, each_s = _thinned(prediction_grid(specimen, low_hz, high_hz)), SIMULATED_S
+        case Approach.UP | Approach.DOWN:
+            grid, each_s = np.linspace(low_hz, high_hz, FOLLOWED_POINTS, dtype=np.float64), FOLLOWED_S
+    base = base_motion(measurement.excitation, rig, grid)
+    prediction = predicted(specimen, grid, base.amplitude_m, duration_s=each_s, approach=approach)
+    return MeasurementPrediction(measurement, prediction, base.basis, approach, rig.specimen.name)
+
+
+def bands_of(frequency_hz: Reals, is_inside: Flags) -> tuple[tuple[float, float], ...]:
+    """Stretches of rising frequencies whose points are inside; an edge lies half way to the next point."""
+    middles = np.array([0.5 * (low + high) for low, high in pairwise(frequency_hz)])
+    lows = np.concatenate([frequency_hz[:1], middles])
+    highs = np.concatenate([middles, frequency_hz[-1:]])
+    change = np.diff(np.concatenate([[0], np.asarray(is_inside, dtype=np.int64), [0]]))
+    starts, ends = np.flatnonzero(change == 1), np.flatnonzero(change == -1) - 1
+    return tuple((float(lows[a]), float(highs[b])) for a, b in zip(starts, ends, strict=True))
+
+
+def _thinned(grid: Reals) -> Reals:
+    step = -(-len(grid) // MOST_POINTS)
+    return np.asarray(grid[::step])

@@ -1,0 +1,319 @@
+"""The simulation laid over a measurement: draws of the same recording, same estimator, and agreement."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from vibench.sim import Accuracy, Specimen
+
+from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
+from ..signals.arrays import Reals
+from ..signals.envelope import Envelope
+from ..sine.collision_region import Collisions, collisions
+from ..sine.dwell import DwellResponse
+from ..sine.dwell_analysis import DwellAnalysis, bound_frequencies_hz, settled_envelope, spectrum_columns
+from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
+from ..sine.sweep import SweepResponse
+from ..sine.sweep_analysis import SweepAnalysis
+from ..sine.terminal_level import TerminalLevel, terminal_levels
+from ..tables import Labelled
+from .difference import CurveDifference, logarithmic_difference
+from .draws import Drawn, SimulatedRun
+from .ensemble import MIXED, EnsembleCurve, Quantity, ensemble_curves
+from .escape import Ending, EscapeRate, escape_rate
+from .prediction import ResponsePrediction, paper_amplitude_m, predicted
+
+PREDICTION_STEP_HZ = 2.0
+_FINE_STEP_HZ = 0.25
+_HIGHEST_PREDICTED_HZ = 700.0
+"""Above the highest mode (500 Hz) the curves fall smoothly; predicting there shows nothing."""
+
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, eq=False)
+class AbstractOverlay(Labelled, Generic[R]):
+    """A measurement, and what the model says of it."""
+
+    run: SimulatedRun
+    response: R
+    """Of the first draw: under a voltage, one run as good as any other."""
+    ensemble: tuple[EnsembleCurve, ...]
+    """Every compared quantity, measured and in all draws; bands only where there are draws enough."""
+    escape: EscapeRate | None
+    """How often the motion ends, where that is chance."""
+    difference: CurveDifference
+    """Measured over simulated transmission, or Response II: over the median of all draws."""
+    prediction: ResponsePrediction
+    """Under sines of the measured A0."""
+
+    @property
+    def shown(self) -> tuple[EnsembleCurve, ...]:
+        """What has draws and is not compared."""
+        return ()
+
+    @property
+    def agreement(self) -> tuple[str, ...]:
+        """Which quantities disagree with the twin, where any does, then each of them in numbers."""
+        outside = [each.name for each in self.ensemble if not each.agrees]
+        compared = sum(each.compared > 0 for each in self.ensemble)
+        headline = [f"{len(outside)} of {compared} quantities disagree with the twin: {', '.join(outside)}"]
+        ordered = sorted(self.ensemble, key=lambda each: each.agrees)
+        return (*(headline if outside else []), *(each.sentence for each in ordered))
+
+    def quantity(self, name: str) -> EnsembleCurve | None:
+        """Give one quantity that has draws; None where it has none."""
+        return next((each for each in (*self.ensemble, *self.shown) if each.name == name), None)
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseOverlay(AbstractOverlay[NoiseResponse]):
+    """A transmission, and what the model says of it."""
+
+    amplitude_basis: str
+    """Where the sines' A0 comes from."""
+
+
+@dataclass(frozen=True, eq=False)
+class SweepOverlay(AbstractOverlay[SweepResponse]):
+    """A sweep, and what the model says of it."""
+
+    collisions: Collisions
+    """Of the first draw."""
+
+
+@dataclass(frozen=True, eq=False)
+class DwellOverlay(AbstractOverlay[DwellResponse]):
+    """A dwell, and what the model says of it."""
+
+    OWN_UNITS: ClassVar = {"displacement": "m"}
+
+    displacement: Envelope
+    terminal: tuple[TerminalLevel, ...]
+    """Both of the first draw."""
+    spectrum: EnsembleCurve
+    """Of the displacement over A0; not compared: its floor is noise that the model does not know."""
+
+    @property
+    def shown(self) -> tuple[EnsembleCurve, ...]:
+        """The spectrum."""
+        return (self.spectrum,)
+
+
+@dataclass(frozen=True, eq=False)
+class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
+    """A stepped sine, and what the model says of it."""
+
+
+TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", "Response II", "spectrum"
+"""Names of quantities."""
+
+
+def _difference(
+    drawn: Drawn[R], measured: Quantity, sd: Reals, simulated: tuple[Reals, Reals]
+) -> CurveDifference:
+    """Compare with the median of the draws, or with the one there is, and its own standard deviation."""
+    (found,) = ensemble_curves([measured], drawn.quantities)
+    if drawn.run.draws > 1:
+        simulated = found.median, found.relative_sd
+    return logarithmic_difference(measured.frequency_hz, (measured.value, sd), simulated)
+
+
+def noise_quantities(response: NoiseResponse) -> tuple[Quantity, ...]:
+    """Give what a draw of noise is compared by."""
+    found = response.frequency_response
+    return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
+
+
+def noise_overlay(analysis: NoiseAnalysis, drawn: Drawn[NoiseResponse]) -> NoiseOverlay:
+    """Compare a transmission with those of the draws."""
+    noise = analysis.excitation
+    measured, simulated = analysis.response.frequency_response, drawn.response.frequency_response
+    amplitude_m, basis = equivalent_amplitude(analysis)
+    stop_hz = min(noise.band_stop_hz, _HIGHEST_PREDICTED_HZ)
+    specimen = drawn.run.specimen
+    compared = noise_quantities(analysis.response)
+    return NoiseOverlay(
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=ensemble_curves(compared, drawn.quantities),
+        escape=None,
+        difference=_difference(
+            drawn,
+            compared[0],
+            measured.relative_sd_magnitude,
+            (simulated.magnitude, simulated.relative_sd_magnitude),
+        ),
+        prediction=predicted(specimen, prediction_grid(specimen, noise.band_start_hz, stop_hz), amplitude_m),
+        amplitude_basis=basis,
+    )
+
+
+def prediction_grid(specimen: Specimen, low_hz: float, high_hz: float) -> Reals:
+    """Frequencies to predict at: every 2 Hz, and closer around the resonances, which are narrower."""
+    coarse = np.arange(low_hz, high_hz + PREDICTION_STEP_HZ / 2, PREDICTION_STEP_HZ)
+    near = np.arange(-PREDICTION_STEP_HZ, PREDICTION_STEP_HZ + _FINE_STEP_HZ / 2, _FINE_STEP_HZ)
+    middles = (*specimen.natural_frequencies_hz, *specimen.bound_frequencies_hz)
+    grid = np.unique(np.concatenate([coarse, *(middle + near for middle in middles)]))
+    return np.asarray(grid[(grid >= low_hz) & (grid <= high_hz)])
+
+
+def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
+    """Sine amplitude A0 to set beside a noise level, and where it comes from."""
+    setting_vpp = analysis.facts.measurement.excitation.amplitude_vpp
+    paper = paper_amplitude_m(setting_vpp)
+    if paper is not None:
+        return paper, f"the paper's A0 for {setting_vpp:g} V"
+    rms = analysis.response.base_level.rms_displacement_m
+    return float(np.sqrt(2) * rms), "a sine of the same rms base displacement"
+
+
+def _sine_difference(
+    drawn: Drawn[R],
+    compared: Sequence[Quantity],
+    measured: SweepResponse | DwellResponse | SteppedResponse,
+    simulated: SweepResponse | DwellResponse | SteppedResponse,
+) -> CurveDifference:
+    """Compare Responses II."""
+    (quantity,) = (each for each in compared if each.name == RESPONSE_II)
+    sd, sd_simulated = (
+        np.atleast_1d(each.sd_response_ii / each.response_ii) for each in (measured, simulated)
+    )
+    return _difference(drawn, quantity, sd, (np.atleast_1d(simulated.response_ii), sd_simulated))
+
+
+_EDGE_S = 1.0
+"""How near the edge of a stretch of collisions a sweep's intervals are not compared."""
+
+
+def sweep_quantities(response: SweepResponse, found: Collisions) -> tuple[Quantity, ...]:
+    """Give what a draw of a sweep is compared by: where one collides and another does not, nothing.
+
+    Nor within a second of an edge, where an interval holds some of either motion.
+    """
+    state = found.is_colliding.astype(np.int64)
+    reach = max(1, round(_EDGE_S / response.interval_s))
+    for edge in np.flatnonzero(np.diff(found.is_colliding)):
+        state[max(0, edge + 1 - reach) : edge + 1 + reach] = MIXED
+    return (
+        Quantity(RESPONSE_I, response.frequency_hz, response.response_i, state),
+        Quantity(RESPONSE_II, response.frequency_hz, response.response_ii, state),
+    )
+
+
+def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
+    """Say when the longest stretch of collisions ended, in seconds of the sweep."""
+    if not found.regions:
+        return ()
+    longest = max(found.regions, key=lambda each: each.stop.time_s - each.start.time_s)
+    return (Ending("collisions", longest.start.time_s, longest.stop.time_s, not longest.reaches_stop),)
+
+
+def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweepResponse]) -> SweepOverlay:
+    """Compare a sweep with those of the draws."""
+    measured = analysis.response
+    rising = np.argsort(measured.frequency_hz)
+    low, high = sorted((float(measured.frequency_hz[0]), float(measured.frequency_hz[-1])))
+    specimen = drawn.run.specimen
+    grid = prediction_grid(specimen, low, high)
+    amplitude_m = np.interp(grid, measured.frequency_hz[rising], measured.drive_amplitude_m[rising])
+    compared = sweep_quantities(measured, analysis.collisions)
+    return SweepOverlay(
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=ensemble_curves(compared, drawn.quantities),
+        escape=escape_rate(sweep_endings(analysis.collisions), drawn.endings),
+        collisions=collisions(drawn.response),
+        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        prediction=predicted(specimen, grid, amplitude_m),
+    )
+
+
+_LEAST_BAND = 1e-3
+"""Rms of a band re the drive's line below which it holds noise of generator and amplifier alone."""
+
+
+def dwell_quantities(
+    response: DwellResponse, towards_hz: tuple[float, ...], endings: Sequence[Ending]
+) -> tuple[Quantity, ...]:
+    """Give what a draw of a dwell is compared by: both responses, and the bands that hold motion."""
+    at = np.array([response.drive.frequency_hz])
+    state = np.array([sum(each.ended for each in endings)], dtype=np.int64)
+    columns_hz, size = spectrum_columns(response)
+    bands = (
+        Quantity(
+            f"band around {each.towards_hz:.0f} Hz, re the drive's line",
+            np.array([each.towards_hz]),
+            np.array([ratio if (ratio := 10 ** (each.decibel / 20)) > _LEAST_BAND else np.nan]),
+            state,
+        )
+        for each in terminal_levels(response, towards_hz)
+    )
+    return (
+        Quantity(RESPONSE_I, at, np.array([response.response_i]), state),
+        Quantity(RESPONSE_II, at, np.array([response.response_ii]), state),
+        *bands,
+        Quantity(SPECTRUM, columns_hz, size, np.repeat(state, size.size)),
+    )
+
+
+def dwell_overlay(
+    analysis: DwellAnalysis, drawn: Drawn[DwellResponse], endings: Sequence[Ending]
+) -> DwellOverlay:
+    """Compare a dwell with those of the draws; ``endings`` are the measured ones."""
+    towards_hz = bound_frequencies_hz(analysis.facts)
+    measured = analysis.response
+    compared = dwell_quantities(measured, towards_hz, endings)
+    *ensemble, spectrum = ensemble_curves(compared, drawn.quantities)
+    return DwellOverlay(
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=tuple(ensemble),
+        spectrum=spectrum,
+        escape=escape_rate(endings, drawn.endings),
+        displacement=settled_envelope(drawn.response),
+        terminal=terminal_levels(drawn.response, towards_hz),
+        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        prediction=predicted(
+            drawn.run.specimen,
+            np.array([measured.drive.frequency_hz]),
+            measured.drive.amplitude_m,
+            Accuracy.STANDARD,
+        ),
+    )
+
+
+def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
+    """Give what a draw of a stepped sine is compared by."""
+    return (
+        Quantity(RESPONSE_I, response.frequency_hz, response.response_i),
+        Quantity(RESPONSE_II, response.frequency_hz, response.response_ii),
+    )
+
+
+def stepped_overlay(analysis: SteppedSineAnalysis, drawn: Drawn[SteppedResponse]) -> SteppedSineOverlay:
+    """Compare the responses of all steps with those of the draws."""
+    measured = analysis.response
+    compared = stepped_quantities(measured)
+    return SteppedSineOverlay(
+        run=drawn.run,
+        response=drawn.response,
+        ensemble=ensemble_curves(compared, drawn.quantities),
+        escape=None,
+        difference=_sine_difference(drawn, compared, measured, drawn.response),
+        prediction=predicted(drawn.run.specimen, measured.frequency_hz, measured.drive_amplitude_m),
+    )
+
+
+class Simulation(StrEnum):
+    """Whether measurements are compared with the model, and what moves it."""
+
+    UNDER_VOLTAGE = "rig and specimen under the recorded voltage"
+    """Rig and specimen together under the recorded voltage; the specimen under the recorded base motion where
+    nothing is known of the shaker."""
+    UNDER_BASE = "the specimen under the recorded base motion"
+    """The specimen alone under the recorded base motion: for linear and coherent motion."""
+    LEFT_OUT = "nothing"

@@ -1,0 +1,189 @@
+"""The shaker's numbers from weak noise: what the recorded voltage did to the loaded table."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.optimize import OptimizeResult, least_squares
+
+from vibench.acquisition.plan import StreamedNoise
+from vibench.acquisition.recording import Recording
+from vibench.sim import Specimen, base_transmissibility
+from vibench.sim.shaker.parts import Shaker
+
+from ..errors import UnusableData
+from ..frequency_response.noise_response import NoiseAnalysis, repeated_response, streamed_response
+from ..frequency_response.results import FrequencyResponse
+from ..recordings.channels import BASE, DRIVE, RecordedChannels, Stretch
+from ..recordings.sensor_gain import coupled_gain
+from ..signals.arrays import Complexes, Flags, Reals
+from ..tables import plus_minus
+from .driven_rig import AMPLIFIER
+
+LARGEST_CHI2 = 3.0
+"""Per degree of freedom, beyond which no shaker explains the base: it collides, or something else moves."""
+FEWEST_LINES = 30
+_TYPICAL = (0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
+"""Where the search begins: a small electrodynamic shaker, in the order of its numbers."""
+_REACH = np.log(300.0)
+"""How far each number may lie from there, as a natural logarithm."""
+_STARTS = 12
+_NUMBERS = tuple(each.name for each in fields(Shaker))[: len(_TYPICAL)]
+
+
+@dataclass(frozen=True, eq=False)
+class FittedShaker:
+    """A shaker with the uncertainty of its numbers."""
+
+    shaker: Shaker
+    covariance: Reals
+    """Of the logarithms of its first six numbers, shape (6, 6), widened by chi^2 where that is above 1."""
+    chi2: float
+    """Per degree of freedom."""
+    lines: int
+    source: str
+    """Name of the recording."""
+
+    @property
+    def relative_sd(self) -> dict[str, float]:
+        """Standard deviation of every number over its value."""
+        return dict(zip(_NUMBERS, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+    @property
+    def sentence(self) -> str:
+        """The numbers with two standard deviations."""
+        said = ", ".join(
+            f"{name} = {plus_minus(value := getattr(self.shaker, name), 2 * sd * value)}"
+            for name, sd in self.relative_sd.items()
+        )
+        return (
+            f"The shaker was fitted to {self.lines} lines of {self.source} (chi² {self.chi2:.2g} per degree "
+            f"of freedom): {said}"
+        )
+
+    def drawn(self, rng: np.random.Generator) -> Shaker:
+        """Give a shaker of this uncertainty."""
+        logarithms = rng.multivariate_normal(_logarithms(self.shaker), self.covariance, method="eigh")
+        return _shaker(logarithms)
+
+
+def fitted_shaker(
+    recording: Recording, analysis: NoiseAnalysis, specimen: Specimen, described: Shaker | None = None
+) -> FittedShaker:
+    """Fit coil, table and suspension to the transmission from recorded voltage to base, without impacts.
+
+    With D(s) = k + d s + (m + M(s)) s^2, M the specimen's mass as the base feels it, the base's acceleration
+    over the voltage is s^2 G / ((R + L s) D + s G^2) (Beranek, Acoustics, ch. 3). The search begins at the
+    shaker that is ``described``, else at several usual ones. Raises UnusableData when there are too few
+    lines, or no shaker explains them.
+    """
+    found = _over_voltage(recording, analysis)
+    known = found.is_significant & np.isfinite(found.relative_sd_magnitude) & (found.magnitude > 0)
+    lines = int(np.sum(known))
+    if lines < FEWEST_LINES:
+        raise UnusableData(
+            f"{analysis.facts.name} has {lines} lines at which the base follows the voltage; a shaker needs "
+            f"{FEWEST_LINES}"
+        )
+    frequency_hz = found.frequency_hz[known]
+    s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
+    measured = found.value[known] / s
+    carried = _carried_mass(specimen, frequency_hz)
+    # A line's scatter is the same for both parts of ln(measured / modelled).
+    sd = np.maximum(found.relative_sd_magnitude[known], 1e-6)
+
+    def misfit(logarithms: Reals) -> Reals:
+        ratio = np.log(_acceleration_per_volt(logarithms, s, carried) / measured) / sd
+        return np.concatenate([ratio.real, ratio.imag])
+
+    best = _best(misfit, described)
+    degrees = 2 * lines - len(_TYPICAL)
+    chi2 = float(2 * best.cost / degrees)
+    if chi2 > LARGEST_CHI2:
+        raise UnusableData(
+            f"no shaker explains how the base of {analysis.facts.name} follows the voltage (chi² {chi2:.3g} "
+            f"per degree of freedom, at most {LARGEST_CHI2:g} is allowed): it may collide; give weaker noise"
+        )
+    covariance = np.linalg.pinv(best.jac.T @ best.jac) * max(chi2, 1.0)
+    return FittedShaker(_shaker(best.x), covariance, chi2, lines, analysis.facts.name)
+
+
+def _best(misfit: Callable[[Reals], Reals], described: Shaker | None) -> OptimizeResult:
+    """Search from several starts: the products of coil and table are known better than each."""
+    rng = np.random.default_rng(0)
+    typical = np.log(_TYPICAL)
+    bounds = (typical - _REACH, typical + _REACH)
+    starts = [typical, *(typical + rng.uniform(-1.5, 1.5, (_STARTS, typical.size)))]
+    if described is not None:
+        starts = [np.clip(_logarithms(described), bounds[0] + 1e-6, bounds[1] - 1e-6)]
+    return min(
+        (least_squares(misfit, each, bounds=bounds, x_scale="jac") for each in starts),
+        key=lambda each: each.cost,
+    )
+
+
+def _logarithms(shaker: Shaker) -> Reals:
+    return np.log([getattr(shaker, name) for name in _NUMBERS])
+
+
+def _shaker(logarithms: Reals) -> Shaker:
+    return Shaker(*np.exp(logarithms).tolist())
+
+
+def _acceleration_per_volt(logarithms: Reals, s: Complexes, carried_kg: Complexes) -> Complexes:
+    mass, stiffness, damping, force_constant, resistance, inductance = np.exp(logarithms)
+    dynamic = stiffness + damping * s + (mass + carried_kg) * s**2
+    coupled = (resistance + inductance * s) * dynamic + s * force_constant**2
+    return np.asarray(force_constant * s**2 / coupled)
+
+
+def _carried_mass(specimen: Specimen, frequency_hz: Reals) -> Complexes:
+    """Mass that the base feels: what all masses' momentum is to the base's velocity, without contact."""
+    moved = base_transmissibility(specimen, frequency_hz)[:, :3]
+    return np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class _VoltageAndBase:
+    """The voltage in the base's place and the base in m0's, as the estimators of noise take them."""
+
+    recorded: RecordedChannels
+    role: str
+    response_delay_s: float = 0.0
+
+    @property
+    def sample_rate_hz(self) -> float:
+        return self.recorded.sample_rate_hz
+
+    @property
+    def samples(self) -> int:
+        return self.recorded.samples
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        return coupled_gain(
+            self.recorded.recording.bench, self.recorded.recording.channel(BASE), frequency_hz
+        )
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        return self.recorded.stretches(label)
+
+    def read(self, start: int, stop: int) -> Reals:
+        recording = self.recorded.recording
+        return np.stack([recording.read(each, start, stop) for each in (DRIVE, self.role, BASE)])
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        return self.recorded.overloaded(start, stop)
+
+    def bridged(self, start: int, stop: int) -> Flags:
+        return np.zeros(stop - start, dtype=np.bool_)
+
+
+def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
+    """Give s times the base's acceleration over the voltage: the estimators take it for displacements."""
+    role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
+    channels = _VoltageAndBase(RecordedChannels(recording), role)
+    match analysis.excitation:
+        case StreamedNoise() as plan:
+            return streamed_response(channels, plan, analysis.request).frequency_response
+        case plan:
+            return repeated_response(channels, plan, analysis.request).frequency_response

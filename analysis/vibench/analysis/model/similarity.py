@@ -1,0 +1,195 @@
+"""How alike two response curves are: the paper's difference of logarithms, and its rate of similar points."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals.arrays import Flags, Reals
+from ..tables import Labelled
+
+SIMILARITY_THRESHOLD = 0.1
+"""Points that differ by at most so much are similar (Gong et al. 2025, section 4)."""
+DRAWS = 2000
+"""Resamples of a bootstrap: its limits then scatter by about a fortieth of the interval's width."""
+CONFIDENCE = 0.95
+
+
+class LogarithmOf(StrEnum):
+    """What the logarithm of eq. 6 is taken of. The paper does not say, and the rates depend on it."""
+
+    NORMALISED = "normalised"
+    """Response over drive amplitude, x / A0."""
+    METRES = "m"
+    MILLIMETRES = "mm"
+    MICROMETRES = "um"
+
+
+_PER_METRE = {LogarithmOf.METRES: 1.0, LogarithmOf.MILLIMETRES: 1e3, LogarithmOf.MICROMETRES: 1e6}
+
+
+@dataclass(frozen=True, eq=False)
+class SimilarityCurve:
+    """A response curve, simulated or measured; arrays of shape (points,)."""
+
+    frequency_hz: Reals
+    response: Reals
+    """Response I or II, over the drive amplitude. NaN where there is none."""
+    amplitude_m: float
+    """Drive amplitude A0."""
+
+    def __post_init__(self) -> None:
+        if self.frequency_hz.ndim != 1 or self.frequency_hz.shape != self.response.shape:
+            raise InvalidRequest(
+                f"a curve has {self.frequency_hz.shape} frequencies and {self.response.shape} responses; "
+                "give one row of each, equally long"
+            )
+        if not np.all(np.diff(self.frequency_hz) > 0):
+            raise InvalidRequest("the frequencies of a curve do not ascend; sort them, and keep each once")
+        if not 0.0 < self.amplitude_m < np.inf:
+            raise InvalidRequest(
+                f"a drive amplitude of {self.amplitude_m} m is not allowed; give a positive one"
+            )
+
+    def at(self, frequency_hz: Reals) -> "SimilarityCurve":
+        """Read the curve at other frequencies, straight between its points in both logarithms.
+
+        Raises InvalidRequest for frequencies outside of the curve: nothing is extrapolated.
+        """
+        low, high = self.frequency_hz[0], self.frequency_hz[-1]
+        if frequency_hz[0] < low or frequency_hz[-1] > high:
+            raise InvalidRequest(
+                f"the curve holds {low:g} to {high:g} Hz and was asked for {frequency_hz[0]:g} to "
+                f"{frequency_hz[-1]:g}; compare within it"
+            )
+        between = np.interp(np.log(frequency_hz), np.log(self.frequency_hz), np.log(self.response))
+        return SimilarityCurve(frequency_hz, np.exp(between), self.amplitude_m)
+
+    def logarithm(self, of: LogarithmOf) -> Reals:
+        """Take log10 of the response in the unit named, shape (points,)."""
+        match of:
+            case LogarithmOf.NORMALISED:
+                value = self.response
+            case LogarithmOf.METRES | LogarithmOf.MILLIMETRES | LogarithmOf.MICROMETRES:
+                value = self.response * self.amplitude_m * _PER_METRE[of]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.log10(value))
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity(Labelled):
+    """How alike a model is to the reference; arrays of shape (points,)."""
+
+    frequency_hz: Reals
+    difference: Reals
+    """|log10(model) - log10(reference)| over |log10(reference)| (eq. 6); NaN where either is missing."""
+    logarithm_of: LogarithmOf
+    threshold: float
+    rate: float
+    """Part of the points that are similar (eq. 7)."""
+    low: float
+    high: float
+    """95 % interval of the rate, had other frequencies of the same band been chosen."""
+    block_points: int
+    """Neighbouring points resemble each other; so many were drawn together for the interval."""
+    left_out: int
+    """Points where either curve has no value."""
+
+    @property
+    def is_similar(self) -> Flags:
+        """Where the difference is at most the threshold."""
+        return np.asarray(self.difference <= self.threshold)
+
+
+def similarity(
+    reference: SimilarityCurve,
+    model: SimilarityCurve,
+    logarithm_of: LogarithmOf = LogarithmOf.MILLIMETRES,
+    threshold: float = SIMILARITY_THRESHOLD,
+    *,
+    seed: int = 0,
+) -> Similarity:
+    """Compare a model's response curve with the reference's (Gong et al. 2025, eqs. 6 and 7).
+
+    Parameters
+    ----------
+    reference, model
+        The piece-wise model (or a measurement) and what is to stand in for it, at the same frequencies;
+        `SimilarityCurve.at` brings one to the other's.
+    logarithm_of
+        The paper leaves it open. Where the reference is 1 in this unit its logarithm is zero and the
+        difference infinite: such points are dissimilar unless both are equal.
+    threshold
+        Largest difference of a similar point.
+    seed
+        Of the bootstrap (circular blocks; Politis and Romano 1992).
+
+    Raises
+    ------
+    InvalidRequest
+        When the frequencies differ, or a setting has no meaning.
+    NotEnoughData
+        When no point has a value in both curves.
+
+    """
+    if not np.array_equal(reference.frequency_hz, model.frequency_hz):
+        raise InvalidRequest(
+            "the two curves stand at different frequencies; bring one to the other's with Curve.at"
+        )
+    if not threshold > 0.0:
+        raise InvalidRequest(f"a threshold of {threshold} is not allowed; give a positive one, such as 0.1")
+    base, other = reference.logarithm(logarithm_of), model.logarithm(logarithm_of)
+    difference = _relative(base, other)
+    known = np.isfinite(base) & np.isfinite(other)
+    if not known.any():
+        raise NotEnoughData("no frequency has a value in both curves, so nothing can be compared")
+    flags = np.asarray(difference[known] <= threshold, dtype=np.float64)
+    block = _block_length(flags)
+    low, high = _interval(flags, block, np.random.default_rng(seed))
+    return Similarity(
+        frequency_hz=reference.frequency_hz,
+        difference=difference,
+        logarithm_of=logarithm_of,
+        threshold=threshold,
+        rate=float(np.mean(flags)),
+        low=low,
+        high=high,
+        block_points=block,
+        left_out=int(np.sum(~known)),
+    )
+
+
+def _relative(base: Reals, other: Reals) -> Reals:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.abs(other - base) / np.abs(base)
+    # Equal curves are similar even where the logarithm they are measured by is zero.
+    return np.where(other == base, 0.0, ratio)
+
+
+def _block_length(flags: Reals) -> int:
+    """Twice the correlation length of the flags, at least the cube root of their number."""
+    count = flags.size
+    usual = int(np.ceil(count ** (1 / 3)))
+    centred = flags - flags.mean()
+    power = float(np.mean(centred**2))
+    if power == 0.0:
+        return min(usual, count)
+    length = 1.0
+    for lag in range(1, count // 2):
+        correlation = float(np.mean(centred[lag:] * centred[:-lag])) / power
+        if correlation <= 0.0:
+            break
+        length += 2 * correlation
+    return min(max(usual, int(np.ceil(2 * length))), count)
+
+
+def _interval(flags: Reals, block: int, rng: np.random.Generator) -> tuple[float, float]:
+    count = flags.size
+    blocks = -(-count // block)
+    starts = rng.integers(0, count, size=(DRAWS, blocks, 1))
+    places = (starts + np.arange(block)).reshape(DRAWS, -1)[:, :count] % count
+    rates = flags[places].mean(axis=1)
+    tail = 0.5 * (1 - CONFIDENCE)
+    low, high = np.quantile(rates, (tail, 1 - tail))
+    return float(low), float(high)

@@ -1,0 +1,202 @@
+"""The specimen simulated under the base motion that was recorded, in the shape of a recording.
+
+The base's displacement from its recorded acceleration: what the simulated specimen is shaken by.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import Recording
+from vibench.sim import Accuracy, Sampled, Specimen, follow_samples
+
+from ..errors import UnusableData
+from ..recordings.channels import BASE, DRIVE, RecordedChannels, Stretch
+from ..signals.arrays import Complexes, Flags, Integers, Reals
+from ..signals.quantity import Quantity, converted_signal
+
+LOWEST_PART = 0.25
+"""The displacement is kept down to this part of the lowest frequency played: below it there is no drive,
+and double integration would turn a microvolt of drift into micrometres."""
+HIGHEST_PART = 0.33
+"""... and up to this part of the sample rate, above all motion that matters and within the converter's
+pass band, its cosine edge included."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedBaseMotion:
+    """Displacement of the base over a whole recording, on its sample grid."""
+
+    displacement_m: Reals
+    """Shape (samples,) [m]; zero mean, free of drift."""
+    sample_rate_hz: float
+    low_hz: float
+    high_hz: float
+    """The band that was kept."""
+    delay_s: float
+    """Delay of the accelerometer channel that was taken out: sample k is the motion at k / sample_rate_hz."""
+
+
+def recorded_base_motion(recording: Recording, measurement: Measurement) -> RecordedBaseMotion:
+    """Integrate the recorded acceleration twice, in the frequency domain, over the whole recording.
+
+    Whole, because it begins and ends in silence: there the missing past and future disturb nothing. Raises
+    UnusableData when samples were lost: a displacement cannot be followed across a hole.
+    """
+    acceleration = recording.read(BASE)
+    lost = int(np.count_nonzero(np.isnan(acceleration)))
+    if lost:
+        raise UnusableData(
+            f"{lost} samples of the base's acceleration were lost, and a displacement cannot be followed "
+            "across a hole; the measured result stands without a simulation of it"
+        )
+    rate = recording.sample_rate_hz
+    low_hz, high_hz = LOWEST_PART * lowest_frequency_hz(measurement), HIGHEST_PART * rate
+    displacement = converted_signal(
+        acceleration,
+        rate,
+        given=Quantity.ACCELERATION,
+        wanted=Quantity.DISPLACEMENT,
+        low_hz=low_hz,
+        high_hz=high_hz,
+    )
+    delay_s = recording.channel(BASE).delay_s
+    return RecordedBaseMotion(advanced(displacement.samples, delay_s * rate), rate, low_hz, high_hz, delay_s)
+
+
+def lowest_frequency_hz(measurement: Measurement) -> float:
+    """Lowest frequency that a plan plays, its bench check not counted [Hz]."""
+    plan = measurement.excitation.model_dump()
+    named = [plan[key] for key in ("band_start_hz", "start_hz", "stop_hz", "frequency_hz") if key in plan]
+    grid = plan.get("grid") or {}
+    named += [grid["start_hz"]] if grid else []
+    return float(min([*named, *(plan.get("frequencies_hz") or ())]))
+
+
+def advanced(samples: Reals, by_samples: float) -> Reals:
+    """Shift a signal forward in time by a fraction of a sample or more, by the phase of its spectrum."""
+    if by_samples == 0.0:
+        return samples
+    spectrum = np.fft.rfft(samples)
+    spectrum *= np.exp(2j * np.pi * np.fft.rfftfreq(samples.size) * by_samples)
+    return np.asarray(np.fft.irfft(spectrum, samples.size))
+
+
+_PIECE_S = 5.0
+"""Simulated at a time: bounds the memory of a long recording."""
+_OVERLAP = 48
+"""Samples on either side of a piece: a spline forgets its ends by a factor of 0.27 per sample (1e-27)."""
+_VX = 3
+_STATE = 6
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedChannels:
+    """A draw of what was recorded, in the shape of the recording: the same estimator takes both."""
+
+    recorded: RecordedChannels
+    velocity: Reals
+    """Of m0, shape (samples,) [m/s]."""
+    impacts_at_s: tuple[Reals, Reals]
+    """Times since the first sample [s], and contacts begun up to them."""
+    response_delay_s: float
+    """By how much the response channel lags the base channel."""
+    base_acceleration: Reals
+    """Of the simulated table, or as it was recorded where that drove, shape (samples,) [m/s2]."""
+    drive_v: Reals
+    """As it was recorded, shape (samples,) [V]."""
+    sensors: Callable[[Reals], Complexes]
+    """Gain of the response's sensor over that of the base's, without their delays."""
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+        return self.recorded.sample_rate_hz
+
+    @property
+    def samples(self) -> int:
+        """Samples per channel."""
+        return self.recorded.samples
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, without their delays."""
+        return self.sensors(frequency_hz)
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record."""
+        return self.recorded.stretches(label)
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give drive, base acceleration and simulated velocity, shape (3, samples)."""
+        return np.stack([each[start:stop] for each in (self.drive_v, self.base_acceleration, self.velocity)])
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Where the recording was overloaded: what is compared must rest on the same samples."""
+        return self.recorded.overloaded(start, stop)
+
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Where the recording was bridged: what is compared must rest on the same samples."""
+        return self.recorded.bridged(start, stop)
+
+    def played_impacts(self, label: str) -> tuple[float, float]:
+        """Count impacts inside the stretches of one label, and give the time those took [s]."""
+        rate = self.sample_rate_hz
+        ends = np.array([(each.start / rate, each.stop / rate) for each in self.stretches(label)])
+        if not ends.size:
+            return 0.0, 0.0
+        counted = np.interp(ends, *self.impacts_at_s)
+        return float(np.sum(np.diff(counted))), float(np.sum(np.diff(ends)))
+
+
+def under_base_motion(
+    recording: Recording,
+    measurement: Measurement,
+    specimen: Specimen,
+    accuracy: Accuracy = Accuracy.STANDARD,
+) -> SimulatedChannels:
+    """Shake a specimen, from rest, by the base motion of a whole recording, at its full sample rate.
+
+    Nothing is decimated: an interval between samples costs a fraction of a microsecond. Raises UnusableData
+    when samples were lost, or the simulation did not reach the end.
+    """
+    base = recorded_base_motion(recording, measurement)
+    velocity, impacts = shaken(specimen, base.displacement_m, base.sample_rate_hz, accuracy)
+    counted = np.arange(impacts.size) / base.sample_rate_hz, impacts.astype(np.float64)
+    # The simulated response has no delay; the recorded base may have one.
+    return SimulatedChannels(
+        RecordedChannels(recording),
+        velocity,
+        counted,
+        -base.delay_s,
+        recording.read(BASE),
+        recording.read(DRIVE),
+        # What the base's sensor did is taken for the base's motion, and the response has no sensor.
+        lambda frequency_hz: np.ones(frequency_hz.size, dtype=np.complex128),
+    )
+
+
+def shaken(
+    specimen: Specimen, displacement_m: Reals, sample_rate_hz: float, accuracy: Accuracy
+) -> tuple[Reals, Integers]:
+    """Give m0's velocity at every sample of the base's displacement, and the impacts up to every sample."""
+    count = displacement_m.size
+    velocity = np.zeros(count)
+    impacts = np.zeros(count, dtype=np.int64)
+    state = np.zeros(_STATE)
+    piece = round(_PIECE_S * sample_rate_hz)
+    for first in range(0, count - 1, piece):
+        last = min(first + piece, count - 1)
+        before, behind = min(_OVERLAP, first), min(_OVERLAP, count - 1 - last)
+        part = Sampled(displacement_m[first - before : last + 1 + behind], sample_rate_hz)
+        path = follow_samples(specimen, part, accuracy, state, first=before, last=before + last - first)
+        if not path.reached_end:
+            raise UnusableData(
+                f"the simulation under the recorded base motion became meaningless after "
+                f"{(first + len(path.states)) / sample_rate_hz:.3g} s: the base moves too much"
+            )
+        velocity[first : last + 1] = path.states[:, _VX]
+        impacts[first + 1 : last + 1] = path.impacts
+        state = path.states[-1]
+    return velocity, np.cumsum(impacts)

@@ -1,0 +1,239 @@
+"""What collisions tell of a specimen: the gap of each side, m1, c1 and the contact law.
+
+Tracked where the motion can be followed; else from statistics of its chaos.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from math import isnan
+from pathlib import Path
+
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import Recording, SegmentLabel
+from vibench.sim import Specimen
+
+from ..errors import AnalysisError
+from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, hidden_motion
+from ..model.driven_rig import says_shaker
+from ..model.shaker_fit import FittedShaker, fitted_shaker
+from ..recordings.channels import ProgressObserver
+from ..results.campaign_results import CampaignResults
+from ..sine.dwell_analysis import DwellAnalysis
+from .specimen_fit import SpecimenFit
+from .statistical_numbers import statistical_numbers
+
+CALM, COLLIDING = 1.01, 1.05
+"""Response I over Response II: 1 for a sine; between the two nothing is said."""
+_LENGTH_S = 3.0
+"""Of a tracked stretch: the bounds of what is found are those of four restarts over it."""
+_MOST_RECORDINGS = 3
+_JUDGED = (
+    Hidden.LOWER_GAP,
+    Hidden.UPPER_GAP,
+    Hidden.MEAN_GAP,
+    Hidden.M1,
+    Hidden.C1,
+    Hidden.FORCE,
+    Hidden.EXPONENT,
+    Hidden.LOSS,
+)
+"""What noise does not tell."""
+_SIDES = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
+
+
+class Way(StrEnum):
+    """How collisions tell numbers."""
+
+    TRACKED = "tracked"
+    STATISTICS = "statistics"
+
+
+@dataclass(frozen=True, eq=False)
+class CollisionNumbers:
+    """Numbers of a specimen from one recording that collides."""
+
+    way: Way
+    recording: str
+    parameters: tuple[FoundParameter, ...]
+    misfit: float
+    """Mean squared innovation of the track, or squared distance of the statistics: about 1."""
+
+    @property
+    def told(self) -> tuple[FoundParameter, ...]:
+        """Those that the motion determines."""
+        return tuple(each for each in self.parameters if each.is_determined)
+
+    @property
+    def gaps(self) -> tuple[FoundParameter, ...]:
+        """Of the lower and the upper side; empty unless both are told."""
+        found = tuple(each for each in self.told if each.what in _SIDES)
+        return found if len(found) == len(_SIDES) else ()
+
+    def on(self, specimen: Specimen) -> Specimen:
+        """Give a specimen the gaps that are told; a mean, which is told better, keeps their ratio."""
+        mean = next((each for each in self.told if each.what is Hidden.MEAN_GAP), None)
+        if mean is not None:
+            lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
+        elif self.gaps:
+            lower, upper = (each.value for each in self.gaps)
+        else:
+            return specimen
+        return replace(specimen, gap_m=upper, lower_gap_m=lower)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Say each number."""
+        how = {Way.TRACKED: "Tracked", Way.STATISTICS: "From statistics,"}[self.way]
+        rows = (each.row for each in self.parameters)
+        return tuple(f"{how} {label}: {said}; described as {known}." for label, said, known in rows)
+
+    @property
+    def gap_fields(self) -> tuple[str, ...]:
+        """What is told of gaps."""
+        return tuple(each.what.value for each in self.told if each.what in (*_SIDES, Hidden.MEAN_GAP))
+
+    @property
+    def contradicted(self) -> tuple[str, ...]:
+        """What of the description lies outside of its bounds by more than they are wide, worst first."""
+        apart = [
+            (abs(each.value - each.described) / (each.high - each.low), *each.row)
+            for each in self.told
+            if each.what in _JUDGED
+        ]
+        surely = sorted((each for each in apart if each[0] > 1.0), reverse=True)
+        return tuple(f"{label} of {said} instead of {described}" for _, label, said, described in surely)
+
+
+def peakedness(dwell: DwellAnalysis) -> float:
+    """Response I without its noise, where that is determined, over Response II: 1 for a sine."""
+    found = dwell.response
+    lift = 0.0 if isnan(found.noise_bias_i) else found.noise_bias_i
+    return (found.response_i - lift) / found.response_ii
+
+
+def tracked_numbers(results: CampaignResults, specimen: Specimen) -> tuple[CollisionNumbers | None, str]:
+    """Track the colliding recordings, and give the numbers of the one that tells the gaps best.
+
+    Returns
+    -------
+    The numbers, or None and a sentence that says why no recording tells them.
+
+    """
+    found: list[CollisionNumbers] = []
+    why: list[str] = []
+    for each in list(_colliding(results))[:_MOST_RECORDINGS]:
+        try:
+            with open_recording(each.path) as recording:
+                motion = hidden_motion(recording, specimen, *each.within(recording))
+        except AnalysisError as error:
+            why.append(f"{each.name}: {error}")
+            continue
+        refused = _refused(motion)
+        if refused:
+            why.append(f"{each.name}: {refused}")
+        else:
+            level = motion.tracked.innovation_level
+            found.append(CollisionNumbers(Way.TRACKED, each.name, motion.parameters, level))
+    if not found:
+        return None, "; ".join(why) or "no recording collides"
+    return min(found, key=_width), ""
+
+
+def numbers_from_statistics(
+    results: CampaignResults,
+    specimen: Specimen,
+    linear: SpecimenFit | None,
+    observer: ProgressObserver,
+) -> tuple[CollisionNumbers | None, str]:
+    """Compare statistics of the recording that tells most with those of simulated specimens.
+
+    Returns
+    -------
+    The numbers, or None and a sentence that says why they are not determined.
+
+    """
+    why: dict[str, list[str]] = {}
+    for each in list(_colliding(results))[:_MOST_RECORDINGS]:
+        observer.begin(each.name, "comparing its statistics with those of specimens drawn at random")
+        try:
+            with open_recording(each.path) as recording:
+                shaker = _fitted_shaker(recording, results, specimen)
+                found, distance = statistical_numbers(
+                    recording, specimen, each.within(recording), each.drive_hz, shaker, linear
+                )
+        except AnalysisError as error:
+            why.setdefault(str(error), []).append(each.name)
+            continue
+        numbers = CollisionNumbers(Way.STATISTICS, each.name, found, distance**2)
+        if numbers.told:
+            return numbers, ""
+        why.setdefault("its statistics tell nothing better than it was assumed", []).append(each.name)
+    return None, "; ".join(f"{reason} ({', '.join(names)})" for reason, names in why.items())
+
+
+def _fitted_shaker(recording: Recording, results: CampaignResults, specimen: Specimen) -> FittedShaker | None:
+    if says_shaker(recording) or not results.noise:
+        return None
+    weakest = results.noise[0].analysis
+    with open_recording(weakest.facts.path) as noise:
+        return fitted_shaker(noise, weakest, specimen)
+
+
+def _width(found: CollisionNumbers) -> float:
+    return max((each.high - each.low) / each.value for each in found.gaps)
+
+
+def _refused(motion: HiddenMotion) -> str:
+    """Say why a motion's numbers are none, or nothing."""
+    missing = [each for each in motion.parameters if each.what in _SIDES and not each.is_determined]
+    return missing[0].not_determined if missing else ""
+
+
+@dataclass(frozen=True)
+class _Colliding:
+    """A stretch of a recording in which m1 strikes its stops."""
+
+    name: str
+    path: Path
+    label: SegmentLabel
+    middle: float
+    """Of the stretch within the longest segment of that name, 0 to 1."""
+    drive_hz: float | None = None
+
+    def within(self, recording: Recording) -> tuple[float, float]:
+        """Give its begin and end [s]."""
+        rate = recording.sample_rate_hz
+        start_s, stop_s = max(
+            (
+                (each.start / rate, each.stop / rate)
+                for each in recording.segments
+                if each.label == self.label
+            ),
+            key=lambda each: each[1] - each[0],
+            default=(0.0, recording.samples / rate),
+        )
+        length_s = min(_LENGTH_S, stop_s - start_s)
+        begin_s = start_s + self.middle * (stop_s - start_s) - 0.5 * length_s
+        begin_s = min(max(begin_s, start_s), stop_s - length_s)
+        return begin_s, begin_s + length_s
+
+
+def _colliding(results: CampaignResults) -> Iterator[_Colliding]:
+    """Give what collides: dwells first, which stay where they are; the strongest of them first."""
+    for dwell in sorted(results.dwells, key=lambda each: -each.analysis.excitation.amplitude_vpp):
+        if peakedness(dwell.analysis) >= COLLIDING:
+            facts, drive = dwell.analysis.facts, dwell.analysis.response.drive
+            yield _Colliding(facts.name, facts.path, SegmentLabel.DWELL, 0.5, drive.frequency_hz)
+    for sweep in results.sweeps:
+        analysis = sweep.analysis
+        longest = max(
+            analysis.collisions.regions, key=lambda each: each.stop.time_s - each.start.time_s, default=None
+        )
+        if longest is not None:
+            length_s = analysis.response.time_s[-1] or 1.0
+            middle = 0.5 * (longest.start.time_s + longest.stop.time_s) / length_s
+            yield _Colliding(analysis.facts.name, analysis.facts.path, SegmentLabel.SWEEP, middle)
+    for noise in reversed(results.noise[1:]):
+        label = SegmentLabel.NOISE if noise.analysis.response.periodic is None else SegmentLabel.REALISATION
+        yield _Colliding(noise.analysis.facts.name, noise.analysis.facts.path, label, 0.5)

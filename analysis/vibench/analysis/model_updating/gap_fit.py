@@ -1,0 +1,169 @@
+"""The gap, from where collisions begin: there the relative motion of the linear specimen fills it."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import norm
+
+from vibench.sim import Specimen, base_transmissibility
+
+from ..errors import NotEnoughData
+from ..signals.arrays import Complexes, Reals
+from ..signals.confidence import DEFAULT_CONFIDENCE
+from ..sine.collision_region import Edge
+from ..sine.sweep import SweepResponse
+from ..sine.sweep_analysis import SweepAnalysis
+from .parameters import FittedValue, Parameter, parameter_value, with_values
+from .specimen_fit import SpecimenFit
+
+_RELATIVE = 3
+"""Column of p in `base_transmissibility`."""
+_STEP_HZ = 0.02
+"""For the curvature of the transmissibility: a hundredth of the narrowest resonance, far above rounding."""
+_STEP = 1e-4
+"""Of a logarithm, for how the relative motion depends on the linear parameters."""
+_EDGE_POINTS = 41
+_APPROACH_S = 1.0
+_LEAST_INTERVALS = 3
+"""For a line through A0 with something left to judge it by."""
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Where collisions began in a sweep, and the gap that follows."""
+
+    recording: str
+    frequency_hz: float
+    gap_m: float
+    low_m: float
+    high_m: float
+    """Bounds: those of the edge, widened by the uncertainties of drive and linear specimen."""
+
+
+def fit_gap(
+    sweeps: Sequence[SweepAnalysis],
+    linear: Specimen,
+    fit: SpecimenFit | None = None,
+    confidence: float = DEFAULT_CONFIDENCE,
+) -> FittedValue:
+    """Give the gap that explains the sharpest onset of collisions.
+
+    Raises NotEnoughData when no sweep enters a colliding region.
+
+    Parameters
+    ----------
+    sweeps
+        Measured sweeps; only a region that a sweep enters is an onset, for motion that collides goes on
+        colliding beyond where it would begin.
+    linear
+        Specimen whose linear motion is taken; its own gap plays no part but to be named as nominal.
+    fit
+        Where the linear specimen comes from, for its covariance.
+    confidence
+        Of drive and linear specimen within the bounds.
+
+    """
+    found = [each for sweep in sweeps for each in onsets(sweep, linear, fit, confidence)]
+    if not found:
+        raise NotEnoughData(
+            "no sweep enters a region in which the masses collide, so the gap cannot be told; sweep with "
+            "more drive, or begin outside of the region"
+        )
+    best = min(found, key=lambda each: each.high_m / each.low_m)
+    return FittedValue(
+        parameter=Parameter.GAP,
+        value=best.gap_m,
+        low=best.low_m,
+        high=best.high_m,
+        sd=float("nan"),
+        nominal=min(linear.gaps_m),
+    )
+
+
+def onsets(
+    sweep: SweepAnalysis,
+    linear: Specimen,
+    fit: SpecimenFit | None = None,
+    confidence: float = DEFAULT_CONFIDENCE,
+) -> Iterator[Onset]:
+    """Give every onset of a sweep with the gap that it implies."""
+    reach = float(norm.ppf(0.5 + 0.5 * confidence))
+    rate = sweep.response.sweep_rate_hz_per_s
+    for region in sweep.collisions.regions:
+        if region.reaches_start:
+            continue
+        edge = region.start
+        drive = _approach(sweep.response, edge)
+        near = np.linspace(edge.lower_hz, edge.upper_hz, _EDGE_POINTS)
+        filled = drive.at(near) * np.abs(swept_relative(linear, near, rate))
+        at_edge = np.array([edge.frequency_hz])
+        spread = reach * np.hypot(drive.relative_sd, _linear_spread(linear, fit, at_edge, rate))
+        yield Onset(
+            recording=sweep.facts.name,
+            frequency_hz=edge.frequency_hz,
+            gap_m=float(drive.at(at_edge)[0] * np.abs(swept_relative(linear, at_edge, rate))[0]),
+            low_m=float(np.min(filled) * np.exp(-spread)),
+            high_m=float(np.max(filled) * np.exp(spread)),
+        )
+
+
+@dataclass(frozen=True)
+class _Approach:
+    """A0 on the way to an onset, as a line over frequency: what collides pushes the base off its course."""
+
+    slope: float
+    offset_m: float
+    relative_sd: float
+
+    def at(self, frequency_hz: Reals) -> Reals:
+        return np.asarray(self.offset_m + self.slope * frequency_hz)
+
+
+def _approach(measured: SweepResponse, edge: Edge) -> _Approach:
+    """Take A0 from the last intervals before an onset, the very last one left out."""
+    last = int(np.argmin(np.abs(measured.time_s - edge.time_s))) - 1
+    first = max(0, last - round(_APPROACH_S / measured.interval_s))
+    if last - first < _LEAST_INTERVALS:
+        raise NotEnoughData(
+            f"the sweep begins {max(last, 0)} intervals before it collides, and A0 there needs "
+            f"{_LEAST_INTERVALS}; begin the sweep further away"
+        )
+    before = slice(first, last)
+    slope, offset = np.polyfit(measured.frequency_hz[before], measured.drive_amplitude_m[before], 1)
+    typical = float(np.median(measured.sd_drive_amplitude_m[before] / measured.drive_amplitude_m[before]))
+    return _Approach(float(slope), float(offset), typical)
+
+
+def swept_relative(specimen: Specimen, frequency_hz: Reals, rate_hz_per_s: float) -> Complexes:
+    """Phasor of p over the base's under a linear sweep, without contact, shape of ``frequency_hz``.
+
+    H - (i / 4 pi) (df/dt) d2H/df2: the steady answer and its lag, to the first order in the rate. (The
+    answer to exp(i phi(t)) is H at the rate of phi plus a series in its derivatives.)
+    """
+
+    def at(shift_hz: float) -> Complexes:
+        return np.asarray(base_transmissibility(specimen, frequency_hz + shift_hz)[:, _RELATIVE])
+
+    curvature = (at(_STEP_HZ) - 2.0 * at(0.0) + at(-_STEP_HZ)) / _STEP_HZ**2
+    return np.asarray(at(0.0) - 1j / (4.0 * np.pi) * rate_hz_per_s * curvature)
+
+
+def _linear_spread(linear: Specimen, fit: SpecimenFit | None, at_hz: Reals, rate_hz_per_s: float) -> float:
+    """Relative standard deviation of the relative amplitude that the linear fit's covariance leaves."""
+    if fit is None:
+        return 0.0
+    slopes = []
+    for each in fit.values:
+        value = parameter_value(linear, each.parameter)
+        shifted = [
+            abs(
+                swept_relative(
+                    with_values(linear, {each.parameter: value * np.exp(step)}), at_hz, rate_hz_per_s
+                )
+            )
+            for step in (_STEP, -_STEP)
+        ]
+        slopes.append(float(np.log(shifted[0] / shifted[1])[0]) / (2.0 * _STEP))
+    gradient = np.array(slopes)
+    return float(np.sqrt(gradient @ fit.covariance @ gradient))

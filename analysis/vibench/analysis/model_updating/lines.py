@@ -1,0 +1,309 @@
+"""The lines of a measured transmission, and how far a described specimen lies from them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.optimize import OptimizeResult, least_squares
+
+from vibench.sim import Specimen
+
+from ..errors import NotEnoughData
+from ..frequency_response.results import FrequencyResponse
+from ..signals.arrays import Complexes, Reals
+from ..signals.confidence import chi_square_limit, chi_square_of
+from ..signals.window import line_correlation
+from .parameters import LINEAR, Parameter, parameter_value, with_values
+
+LEAST_RELATIVE_SD = 1e-4
+"""No line counts for more than this scatter says: calibrations and clocks are no better."""
+_LEAST_CLEAR = 10.0
+"""Magnitude of a line over the scatter usual among its neighbours: the logarithm of less is not normal.
+
+Not over its own scatter, of few averages: lines whose scatter seems small by chance would be chosen, and a
+right model refused.
+"""
+_NEIGHBOURS = 31
+"""Lines whose median scatter is what is usual."""
+_MOST_OFF = np.log(1e4)
+"""Of a parameter from where the search begins, as a logarithm: further it runs away."""
+LEAST_DAMPING_TIME_S = 1e-8
+"""Where the search begins for a specimen that is described without damping."""
+CHANNEL_PHASES = 2
+PHASE_AT_HZ = 100.0
+"""Where the phases of the channels are named."""
+SCALES = (0.9, 0.95, 1.05, 1.1)
+"""Of all frequencies."""
+_STEP = 1e-6
+"""Of a logarithm, for a central difference: far above rounding, and far less than a resonance is wide."""
+
+_HOPELESS = 5.0
+"""Times the limit of chi square, beyond which no line's weight mends a fit."""
+_MOST_STEPS = 60
+"""A further mode that nothing asks for has no place where a search would end."""
+
+Model = Callable[[Specimen, Reals, Reals], Complexes]
+"""m0 over base at frequencies, of a specimen and of further numbers."""
+
+
+def chained(
+    specimen: Specimen, frequency_hz: Reals, extra_n_per_m: tuple[Complexes | float, ...]
+) -> Complexes:
+    """m0 over base of a specimen with more hung on its masses, shape (lines,).
+
+    m2 hangs on m0 and m1 on m2, so that each link is two springs in series: a dynamic stiffness P, and that
+    of all behind it, A, make P A / (P + A). ``extra_n_per_m`` is what else pulls at m0 and at m2.
+    """
+    s = 2j * np.pi * frequency_hz
+    (m0, m1, m2), springs, dampers = specimen.masses, specimen.stiffnesses, specimen.dampings
+    p0, p1, p2 = (k + c * s for k, c in zip(springs, dampers, strict=True))
+    at_m0, at_m2 = extra_n_per_m
+    behind = m2 * s**2 + at_m2 + p1 * m1 * s**2 / (p1 + m1 * s**2)
+    return np.asarray(p0 / (p0 + m0 * s**2 + at_m0 + p2 * behind / (p2 + behind)))
+
+
+def as_described(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes:
+    """Give the three masses alone."""
+    return chained(specimen, frequency_hz, (0.0, 0.0))
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """What beside the usual parameters a fit may change."""
+
+    parameters: tuple[Parameter, ...] = ()
+    model: Model = as_described
+    starts: tuple[tuple[float, ...], ...] = ((),)
+    """Of the model's further numbers."""
+    low: tuple[float, ...] = ()
+    high: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Descended:
+    """Where a fit ended."""
+
+    specimen: Specimen
+    logarithms: Reals
+    """Of the free parameters."""
+    covariance: Reals
+    """Of these, where the model is right."""
+    freedoms: Reals
+    """Of the scatter that each of their uncertainties rests on: few where few lines tell it."""
+    phases: tuple[float, float]
+    further: Reals
+    chi_square: float
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """The lines that are fitted, and what they are fitted by: logarithms of parameters, phases, a scale."""
+
+    frequency_hz: Reals
+    measured: Complexes
+    weights: Reals
+    """Of the magnitudes, then of the phases."""
+    averages: float
+    """Independent ones, from which each line's scatter was estimated."""
+    correlation: tuple[float, float]
+    """How many lines tell what one would, if all told it alone; of parameters, and of chi square."""
+    nominal: Specimen
+    free: tuple[Parameter, ...]
+    scale_sd: float
+    """Stated sd of ln(response's sensitivity over the base's); 0 where it is taken as exact."""
+
+    @property
+    def start(self) -> Reals:
+        """Where the search begins."""
+        named = [max(parameter_value(self.nominal, each), LEAST_DAMPING_TIME_S) for each in self.free]
+        return np.concatenate([np.log(named), np.zeros(CHANNEL_PHASES + (self.scale_sd > 0.0))])
+
+    @property
+    def freedom(self) -> int:
+        """Reals less what is fitted."""
+        return 2 * self.frequency_hz.size - len(self.free) - CHANNEL_PHASES
+
+    @property
+    def limit(self) -> float:
+        """Reduced chi square that one right model in a thousand exceeds."""
+        return chi_square_limit(self.freedom, self.correlation[1])
+
+    def specimen(self, logarithms: Reals) -> Specimen:
+        """Give the specimen of these parameters, which are not taken beyond `_MOST_OFF`."""
+        begun = self.start[: len(self.free)]
+        values = np.exp(np.clip(logarithms, begun - _MOST_OFF, begun + _MOST_OFF)).tolist()
+        return with_values(self.nominal, dict(zip(self.free, values, strict=True)))
+
+    def is_away(self, at: Reals) -> bool:
+        """Whether a search has run away with a parameter that the lines do not tell."""
+        count = len(self.free)
+        return bool(np.any(np.abs(at[:count] - self.start[:count]) > _MOST_OFF))
+
+    def residuals(self, at: Reals, model: Model) -> Reals:
+        """Measured less model in standard deviations: magnitudes, phases, and a stated scale's."""
+        count = len(self.free)
+        high_pass, delay = at[count : count + CHANNEL_PHASES]
+        rest = at[count + CHANNEL_PHASES :]
+        scale, further = (rest[:1], rest[1:]) if self.scale_sd > 0.0 else (np.zeros(0), rest)
+        modelled = model(self.specimen(at[:count]), self.frequency_hz, further)
+        apart = np.log(self.measured / modelled) - np.sum(scale)
+        channels = high_pass * PHASE_AT_HZ / self.frequency_hz + delay * self.frequency_hz / PHASE_AT_HZ
+        return np.concatenate(
+            [
+                self.weights * np.concatenate([apart.real, apart.imag - channels]),
+                scale / (self.scale_sd or 1.0),
+            ]
+        )
+
+    def squared(self, residuals: Reals) -> Reals:
+        """Add up the squares of magnitude and phase of each line."""
+        magnitudes, phases = np.split(residuals[: 2 * self.frequency_hz.size], 2)
+        return np.asarray(magnitudes**2 + phases**2)
+
+    def students(self, residuals: Reals) -> Reals:
+        """Turn residuals so that their squares follow chi square although the scatter was estimated too."""
+        count, squared = 2 * self.frequency_hz.size, self.squared(residuals)
+        factor = np.sqrt(chi_square_of(squared, self.averages) / np.maximum(squared, 1e-300))
+        return np.concatenate([residuals[:count] * np.tile(factor, 2), residuals[count:]])
+
+
+def lines_of(
+    frequency_response: FrequencyResponse,
+    nominal: Specimen,
+    free: tuple[Parameter, ...],
+    scale_sd: float,
+    fitted: Specimen | None = None,
+) -> Lines:
+    """Take the lines that stand clear of the scatter; NotEnoughData where they are too few.
+
+    By what was measured, or by what a fitted specimen shows there: noise then has no part in the choice.
+    """
+    measured = np.abs(frequency_response.value)
+    frequency_hz = frequency_response.frequency_hz
+    size = measured if fitted is None else np.abs(as_described(fitted, frequency_hz, np.zeros(0)))
+    scatter = frequency_response.relative_sd_magnitude * measured
+    usual = median_filter(np.where(np.isfinite(scatter), scatter, np.inf), _NEIGHBOURS, mode="nearest")
+    used = frequency_response.is_significant & np.isfinite(scatter) & (size > _LEAST_CLEAR * usual)
+    count, needed = int(np.count_nonzero(used)), 2 * (len(free) + CHANNEL_PHASES)
+    if count < needed:
+        raise NotEnoughData(
+            f"{count} lines of the transmission are {_LEAST_CLEAR:.2g} times as large as the scatter around "
+            f"them or more, and {len(free)} parameters need {needed}; measure longer or with more drive"
+        )
+    spreads = np.concatenate(
+        [frequency_response.relative_sd_magnitude[used], frequency_response.sd_phase_rad[used]]
+    )
+    return Lines(
+        frequency_hz=frequency_hz[used],
+        measured=frequency_response.value[used],
+        weights=1.0 / np.maximum(spreads, LEAST_RELATIVE_SD),
+        averages=frequency_response.n_eff,
+        correlation=line_correlation(frequency_response.settings.window),
+        nominal=nominal,
+        free=free,
+        scale_sd=scale_sd,
+    )
+
+
+def descended(lines: Lines) -> Descended:
+    """Fit from the description, and from stiffer and softer ones where that does not do."""
+    usual = Freedom()
+    best = _from(lines, usual, lines.start)
+    if 2.0 * best.cost > lines.limit * lines.freedom:
+        # A phase may lie on another branch: begin again from specimens that are stiffer or softer.
+        others = [_from(lines, usual, lines.start + _stiffer(lines, scale)) for scale in SCALES]
+        best = min([best, *others], key=lambda each: each.cost)
+    if np.isinf(best.cost):
+        raise NotEnoughData(
+            f"the {lines.frequency_hz.size} lines of the transmission that stand clear of the scatter do not "
+            f"tell {', '.join(lines.free)}; measure longer or with more drive"
+        )
+    return _described(lines, usual, best)
+
+
+def descended_further(lines: Lines, allowed: Freedom, usual: Descended) -> Descended:
+    """Fit with more freedom, from where a fit without it ended and from the description."""
+    opened = replace(lines, free=(*lines.free, *allowed.parameters))
+    begun = [np.concatenate([usual.logarithms, opened.start[len(lines.free) :]]), opened.start]
+    ways = [(start, further) for start in begun for further in allowed.starts]
+    found = [_from(opened, allowed, np.concatenate([start, further])) for start, further in ways]
+    return _described(opened, allowed, min(found, key=lambda each: each.cost))
+
+
+def _stiffer(lines: Lines, scale: float) -> Reals:
+    steps = [np.log(scale) if each in LINEAR[1:] else 0.0 for each in lines.free]
+    return np.array([*steps, *np.zeros(lines.start.size - len(lines.free))])
+
+
+@dataclass(frozen=True, eq=False)
+class _Ended:
+    x: Reals
+    cost: float
+
+
+def _from(lines: Lines, allowed: Freedom, start: Reals) -> _Ended:
+    """Least squares first, which finds its way from afar; then the likelihood."""
+    open_ended = np.full(start.size - len(allowed.low), np.inf)
+    bounds = (np.concatenate([-open_ended, allowed.low]), np.concatenate([open_ended, allowed.high]))
+
+    def plain(at: Reals) -> Reals:
+        return lines.residuals(at, allowed.model)
+
+    def likely(at: Reals) -> Reals:
+        return lines.students(plain(at))
+
+    near = _descent(plain, start, bounds)
+    if lines.is_away(near.x):
+        return _Ended(near.x, np.inf)
+    left = likely(near.x)
+    if left @ left > _HOPELESS * lines.limit * lines.freedom:
+        return _Ended(near.x, 0.5 * float(left @ left))
+    found = _descent(likely, near.x, bounds)
+    return _Ended(found.x, np.inf if lines.is_away(found.x) else float(found.cost))
+
+
+def _descent(
+    residuals: Callable[[Reals], Reals], start: Reals, bounds: tuple[Reals, Reals]
+) -> OptimizeResult:
+    return least_squares(
+        residuals,
+        start,
+        diff_step=[_STEP],
+        x_scale="jac",
+        bounds=bounds,
+        ftol=1e-9,
+        xtol=1e-10,
+        max_nfev=_MOST_STEPS,
+    )
+
+
+def _described(lines: Lines, allowed: Freedom, found: _Ended) -> Descended:
+    count = len(lines.free)
+    phases = found.x[count : count + CHANNEL_PHASES]
+    spread = 2.0 * max(lines.averages - 1.0, 0.5)
+    # Student's likelihood, of scatters that were estimated: its curvature as it is, and the variance of its
+    # slope, which is (spread + 2) / spread times as large (Huber 1967; for 8 degrees of freedom 1.25 times).
+    squared = lines.squared(lines.residuals(found.x, allowed.model))
+    slopes = _slopes(lambda at: lines.residuals(at, allowed.model), found.x)
+    slopes[: 2 * squared.size] *= np.tile(np.sqrt(spread * (spread + 2)) / (spread + squared), 2)[:, None]
+    wider = lines.correlation[0] * (spread + 2) / spread
+    whole = np.asarray(wider * np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True), np.float64)
+    # Welch and Satterthwaite (JCGM 100:2008, G.4): magnitude and phase of a line share its scatter.
+    told = (whole @ slopes.T)[:count, : 2 * lines.frequency_hz.size] ** 2
+    shares = told[:, : lines.frequency_hz.size] + told[:, lines.frequency_hz.size :]
+    shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
+    return Descended(
+        specimen=lines.specimen(found.x[:count]),
+        logarithms=found.x[:count],
+        covariance=whole[:count, :count],
+        freedoms=spread / np.maximum(np.sum(shares**2, axis=1), 1e-300),
+        phases=(float(phases[0]), float(phases[1])),
+        further=found.x[count + CHANNEL_PHASES + (lines.scale_sd > 0.0) :],
+        chi_square=float(2.0 * found.cost),
+    )
+
+
+def _slopes(residuals: Callable[[Reals], Reals], at: Reals) -> Reals:
+    steps = _STEP * np.eye(at.size)
+    return np.stack([(residuals(at + each) - residuals(at - each)) / (2 * _STEP) for each in steps], axis=1)

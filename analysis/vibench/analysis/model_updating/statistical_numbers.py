@@ -1,0 +1,180 @@
+"""What collisions tell of a specimen where their motion cannot be tracked: from statistics of its chaos."""
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+
+from vibench.acquisition.recording import Recording
+from vibench.sim import Hertz, HuntCrossley, LinearGap, Specimen
+
+from ..errors import InvalidRequest, NotEnoughData, UnusableData
+from ..hidden_motion import FoundParameter, Hidden, tracked_specimen, value_of, with_values
+from ..model.draws import StretchDraws, stretch_draws
+from ..model.shaker_fit import FittedShaker
+from ..signals.arrays import Flags, Reals
+from .chaos_statistics import chaos_statistics, heard
+from .posterior import ROUNDS, Posterior, posterior
+from .specimen_fit import SpecimenFit
+
+_AROUND = {Hidden.MEAN_GAP: 2.0, "apart": 1.5, Hidden.M1: 1.05, Hidden.C1: 2.0, Hidden.FORCE: 3.0}
+"""Factors about the description within which parameters are looked for; gaps by their geometric mean and
+the root of the upper over the lower."""
+_CONFIDENCE = 0.95
+_TOLD = 0.5
+"""Width of bounds, over what is looked through, above which the statistics say nothing new."""
+_LIKELY = 2.0
+"""Factor between the recorded base motion and those of first draws, beyond which nothing is drawn."""
+_LEAST_S, _LEAST_RATE_HZ = 0.5, 5_000.0
+_SEED = 29
+
+
+def statistical_numbers(
+    recording: Recording,
+    specimen: Specimen,
+    stretch_s: tuple[float, float],
+    drive_hz: float | None,
+    fitted: FittedShaker | None = None,
+    linear: SpecimenFit | None = None,
+    rounds: Sequence[int] = ROUNDS,
+) -> tuple[tuple[FoundParameter, ...], float]:
+    """Give gaps, m1, c1 and contact force with bounds of 95 %, or why each is not determined.
+
+    Rig and specimens are simulated together under the recorded voltage, and compared with the recording in
+    what does not depend on instants.
+
+    Parameters
+    ----------
+    recording
+        Of a motion that collides.
+    specimen
+        As described, its linear numbers fitted: numbers are looked for about its own.
+    stretch_s
+        Begin and end of what is looked at.
+    drive_hz
+        Of a sine; None for sweeps and noise.
+    fitted
+        A shaker, where the bench describes none.
+    linear
+        Where the specimen's linear numbers come from: each run takes others of that uncertainty.
+    rounds
+        Runs, each time in a narrower box.
+
+    Returns
+    -------
+    The numbers, and how far the statistics are from those of the furthest run, over that run.
+
+    Raises
+    ------
+    AnalysisError
+        When rig, law or samples forbid it, or no specimen gives these statistics.
+
+    """
+    rate_hz = recording.sample_rate_hz
+    start, stop = (round(each * rate_hz) for each in stretch_s)
+    if not np.isfinite(specimen.gaps_m).all():
+        raise InvalidRequest("the specimen is described with a stop on one side only; statistics need two")
+    draws = stretch_draws(recording, specimen, start, stop, fitted)
+    measured = draws.measured
+    if measured.shape[1] < _LEAST_S * rate_hz or rate_hz < _LEAST_RATE_HZ:
+        raise NotEnoughData(
+            f"{measured.shape[1] / rate_hz:.3g} s of it at {rate_hz:g} samples a second are no basis for "
+            f"statistics; record {_LEAST_S:g} s or more, at {_LEAST_RATE_HZ:g} or more"
+        )
+    if np.isnan(measured).any():
+        raise UnusableData("samples were lost, and statistics of what is left are those of another window")
+    observed = chaos_statistics(measured, rate_hz, drive_hz)
+    made = _Runs(draws, specimen, linear, drive_hz, heard(observed, draws.noise_rms, rate_hz))
+    _require_likely(made, measured)
+    reach = np.log(list(_AROUND.values()))
+    found = posterior(made, observed[made.heard], np.stack([-reach, reach], axis=1), _SEED, rounds)
+    if not found.fits:
+        raise UnusableData(
+            f"its statistics are {found.distance:.2g} times as far from those of any specimen that was "
+            "simulated as those are among themselves: something else of rig or specimen is not as described"
+        )
+    return tuple(_told(found, specimen)), found.distance
+
+
+class _Runs:
+    """Statistics of runs, each of parameters and of a start of its own."""
+
+    def __init__(
+        self,
+        draws: StretchDraws,
+        specimen: Specimen,
+        linear: SpecimenFit | None,
+        drive_hz: float | None,
+        heard: Flags,
+    ) -> None:
+        self.draws, self.specimen, self.linear = draws, specimen, linear
+        self.drive_hz, self.heard = drive_hz, heard
+        self.rng = np.random.default_rng(_SEED)
+
+    def __call__(self, parameters: Reals) -> Reals:
+        """Make a run of each row."""
+        seeds = self.rng.spawn(len(parameters))
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return np.array(list(pool.map(self._one, parameters, seeds)))
+
+    def _one(self, logarithms: Reals, rng: np.random.Generator) -> Reals:
+        specimen = self.specimen if self.linear is None else self.linear.drawn(rng)
+        motion = self.draws.draw(_specimen_of(specimen, logarithms), rng)
+        return chaos_statistics(motion, self.draws.recording.sample_rate_hz, self.drive_hz)[self.heard]
+
+
+def _relative(logarithms: Reals) -> dict[Hidden, Reals]:
+    """Turn parameters, shape (5,) or (5, draws), into logarithms of values over those described."""
+    mean, apart, m1, c1, force = logarithms
+    return {
+        Hidden.LOWER_GAP: mean - apart,
+        Hidden.UPPER_GAP: mean + apart,
+        Hidden.M1: m1,
+        Hidden.C1: c1,
+        Hidden.FORCE: force,
+    }
+
+
+def _specimen_of(specimen: Specimen, logarithms: Reals) -> Specimen:
+    tracked = tracked_specimen(specimen)
+    other = with_values(
+        tracked,
+        {what: value_of(tracked, what) * float(np.exp(part)) for what, part in _relative(logarithms).items()},
+    )
+    match specimen.contact:
+        case Hertz() | LinearGap() | HuntCrossley():
+            return replace(other.specimen, contact=replace(specimen.contact, stiffness=other.steepness))
+        case _:
+            raise InvalidRequest("the specimen is described without stops")
+
+
+def _require_likely(made: _Runs, measured: Reals) -> None:
+    """Refuse, after a few draws, a voltage that does not move this rig as it was moved."""
+    first = made.draws.draw(made.specimen, made.rng)
+    seen, drawn = (float(np.std(each[0])) for each in (measured, first))
+    if not 1 / _LIKELY < seen / drawn < _LIKELY:
+        raise UnusableData(
+            f"the recorded voltage would shake the described rig at {drawn:.3g} m/s2 rms and shook it at "
+            f"{seen:.3g}, so that nothing is simulated beside it; describe amplifier and shaker as they are"
+        )
+
+
+def _told(found: Posterior, specimen: Specimen) -> Iterator[FoundParameter]:
+    described = tracked_specimen(specimen)
+    parts = _relative(found.draws.T)
+    lower, upper = specimen.gaps_m
+    sides = lower * np.exp(parts[Hidden.LOWER_GAP]) + upper * np.exp(parts[Hidden.UPPER_GAP])
+    parts = {Hidden.MEAN_GAP: np.log(sides / (lower + upper)), **parts}
+    for what, each in parts.items():
+        low, high = np.quantile(each, [0.5 - 0.5 * _CONFIDENCE, 0.5 + 0.5 * _CONFIDENCE])
+        flat = high - low > _TOLD * _CONFIDENCE * 2 * np.log(_AROUND.get(what, _AROUND[Hidden.MEAN_GAP]))
+        value = value_of(described, what)
+        low, high = (value * float(np.exp(each)) for each in (low, high))
+        why = "the motion's statistics tell it no better than it was assumed" if flat else ""
+        # The middle of its bounds, for they are written as it and a half width.
+        yield FoundParameter(what, 0.5 * (low + high), low, high, value, why)
+    nan, why = float("nan"), "statistics are compared with runs of the described exponent and loss"
+    for untold in (Hidden.EXPONENT, Hidden.LOSS):
+        yield FoundParameter(untold, nan, nan, nan, value_of(described, untold), why)

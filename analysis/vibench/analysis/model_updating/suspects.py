@@ -1,0 +1,205 @@
+"""Which assumption of a model that does not fit would mend it: each is freed in turn, and ranked."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from vibench.sim import Specimen
+
+from ..signals.arrays import Complexes, Reals
+from .lines import Descended, Freedom, Lines, as_described, chained, descended_further
+from .parameters import DAMPERS, MASSES, SHOWN, Parameter, parameter_value
+
+TOLD_APART = 2.0 * float(np.log(20.0))
+"""Twice the logarithm of the likelihood ratio from which one of two explanations is named alone: 20 to 1."""
+_HIGHEST_HZ = 2e4
+_MODE_LOW, _MODE_HIGH = (1e-6, 1e-4), (1.0, 0.3)
+"""Of mass over that of what it hangs on, and damping ratio, of a further mode."""
+_MODE_START = (float(np.log(0.02)), float(np.log(0.01)))
+"""Where a search for one begins: the logarithms of both."""
+
+
+class Assumption(StrEnum):
+    """What a model takes for granted of specimen, sensors or rig."""
+
+    M0 = "m0"
+    M1 = "m1"
+    M2 = "m2"
+    C0 = "c0"
+    C1 = "c1"
+    C2 = "c2"
+    FRICTION = "friction"
+    SENSITIVITY = "sensitivity"
+    """Of the vibrometer over that of the accelerometer: a transmission tells no more."""
+    EXTRA_MODE = "extra mode"
+    TABLE_MASS = "table mass"
+    GAPS = "gaps"
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """An assumption that was dropped, and how well the model then fits."""
+
+    assumption: Assumption
+    sentence: str
+    """What would have to be otherwise, with its number."""
+    reduced_chi_square: float
+    mends: bool
+    """Whether the model then fits."""
+    behind: float
+    """Twice the log likelihood ratio to the best one, a parameter costing ln(reals): 0 is best."""
+
+    @property
+    def may_be_it(self) -> bool:
+        """Whether the data tell it not apart from the best one."""
+        return self.behind < TOLD_APART
+
+
+def suspects(lines: Lines, usual: Descended, *, is_nonlinear: bool | None) -> tuple[Suspect, ...]:
+    """Free one assumption after the other, and rank them by likelihood and number of parameters.
+
+    Parameters
+    ----------
+    lines
+        What the model as it was described does not fit.
+    usual
+        How near it comes.
+    is_nonlinear
+        Whether realisations scatter beyond noise; None where nobody can tell.
+
+    """
+    tried = []
+    for assumption, allowed, told in _ways(lines, is_nonlinear=is_nonlinear):
+        found = descended_further(lines, allowed, usual)
+        parameters = len(allowed.parameters) + len(allowed.low)
+        freedom = lines.freedom - parameters
+        sentence = told(found.specimen, found.further)
+        if sentence and np.isfinite(found.chi_square):
+            tried.append((assumption, sentence, found.chi_square, parameters, freedom))
+    if not tried:
+        return ()
+    # Where even the best leaves something, it is in the scatter: else every small difference would be sure.
+    left = max(1.0, min(chi / freedom for _, _, chi, _, freedom in tried)) * lines.correlation[0]
+    reals = 2 * lines.frequency_hz.size
+    scores = [chi / left + count * np.log(reals) for _, _, chi, count, _ in tried]
+    ranked = sorted(zip(scores, tried, strict=True), key=lambda each: each[0])
+    return tuple(
+        Suspect(
+            assumption,
+            sentence,
+            chi / freedom,
+            mends=chi / freedom <= lines.limit,
+            behind=float(score - ranked[0][0]),
+        )
+        for score, (assumption, sentence, chi, _, freedom) in ranked
+    )
+
+
+_Told = Callable[[Specimen, Reals], str]
+"""What would have to be otherwise; empty where that is impossible."""
+
+
+def _ways(lines: Lines, *, is_nonlinear: bool | None) -> Iterator[tuple[Assumption, Freedom, _Told]]:
+    for each in MASSES:
+        if each not in lines.free:
+            yield Assumption(each.value[:2]), Freedom((each,)), _otherwise(lines.nominal, each)
+    for each in DAMPERS:
+        if each in lines.free:
+            continue
+        link = each.value[:2]
+        if is_nonlinear is not True:
+            yield Assumption(link), Freedom((each,)), _otherwise(lines.nominal, each)
+        if is_nonlinear is not False:
+            yield Assumption.FRICTION, Freedom((each,)), _rubs(lines.nominal, each)
+    if not lines.scale_sd:
+        yield Assumption.SENSITIVITY, Freedom((), _scaled, ((0.0,),), (-1.0,), (1.0,)), _off
+    top_hz = float(lines.frequency_hz.max())
+    starts = (float(np.log(1.3 * top_hz)), float(np.log(2.5 * top_hz)))
+    low_hz = float(lines.frequency_hz.min())
+    for model, where in ((_on_m0, "on m0"), (_on_m2, "on m2")):
+        yield (
+            Assumption.EXTRA_MODE,
+            Freedom(
+                (),
+                model,
+                tuple((each, *_MODE_START) for each in starts),
+                (float(np.log(low_hz)), *np.log(_MODE_LOW)),
+                (float(np.log(_HIGHEST_HZ)), *np.log(_MODE_HIGH)),
+            ),
+            _resonates(where),
+        )
+    yield (
+        Assumption.EXTRA_MODE,
+        Freedom(
+            (),
+            _under_foot,
+            tuple((each, _MODE_START[1]) for each in starts),
+            (float(np.log(low_hz)), np.log(_MODE_LOW[1])),
+            (float(np.log(_HIGHEST_HZ)), np.log(_MODE_HIGH[1])),
+        ),
+        _resonates("between accelerometer and specimen"),
+    )
+
+
+def _otherwise(nominal: Specimen, parameter: Parameter) -> _Told:
+    name, factor, unit = SHOWN[parameter]
+    was = parameter_value(nominal, parameter)
+
+    def told(specimen: Specimen, _: Reals) -> str:
+        value = parameter_value(specimen, parameter)
+        change = f"{100 * (value / was - 1):+.3g} %" if was else "none was described"
+        return f"{name} of {factor * value:.4g} {unit} instead of {factor * was:.4g} ({change})"
+
+    return told
+
+
+def _rubs(nominal: Specimen, damper: Parameter) -> _Told:
+    link, was = damper.value[1], parameter_value(nominal, damper)
+
+    def told(specimen: Specimen, _: Reals) -> str:
+        more = parameter_value(specimen, damper) - was
+        return f"friction in link {link}, which at this level damps by {more:.3g} N s/m" if more > 0 else ""
+
+    return told
+
+
+def _scaled(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
+    return np.asarray(np.exp(further[0]) * as_described(specimen, frequency_hz, further))
+
+
+def _off(_: Specimen, further: Reals) -> str:
+    return (
+        f"the sensitivity of the vibrometer over that of the accelerometer "
+        f"{100 * np.expm1(further[0]):+.3g} % off (which of the two no transmission tells)"
+    )
+
+
+def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
+    """Give the dynamic stiffness of a small mass on a spring that hangs on a mass."""
+    own_hz, share, damping = np.exp(further)
+    ratio = frequency_hz / own_hz
+    spring = 1.0 + 2j * damping * ratio
+    return np.asarray(-share * mass * (2 * np.pi * frequency_hz) ** 2 * spring / (spring - ratio**2))
+
+
+def _on_m0(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
+    return chained(specimen, frequency_hz, (_absorber(specimen.masses[0], frequency_hz, further), 0.0))
+
+
+def _on_m2(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
+    return chained(specimen, frequency_hz, (0.0, _absorber(specimen.masses[2], frequency_hz, further)))
+
+
+def _under_foot(specimen: Specimen, frequency_hz: Reals, further: Reals) -> Complexes:
+    own_hz, damping = np.exp(further)
+    ratio = frequency_hz / own_hz
+    return np.asarray(as_described(specimen, frequency_hz, further) / (1 - ratio**2 + 2j * damping * ratio))
+
+
+def _resonates(where: str) -> _Told:
+    def told(_: Specimen, further: Reals) -> str:
+        return f"a further mode {where} near {np.exp(further[0]):.3g} Hz"
+
+    return told

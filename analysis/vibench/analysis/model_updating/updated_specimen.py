@@ -1,0 +1,330 @@
+"""The specimen that is really on the shaker, from the recordings of one campaign."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from vibench.sim import Specimen, SpecimenDescription, SpecimenTable
+
+from ..errors import AnalysisError, NotEnoughData
+from ..frequency_response.distortion import scatters_beyond_noise
+from ..kinds.analysis_kind import NoiseResult
+from ..recordings.channels import ProgressObserver
+from ..recordings.facts import described_specimen
+from ..results.campaign_results import CampaignResults
+from ..results.measurement_analysis import UNOBSERVED
+from ..tables import Labelled, named, plain, plus_minus
+from ..uncertainty.stated import stated_of
+from .bracketed_gap import bracketed_gap
+from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
+from .gap_fit import fit_gap
+from .parameters import LINEAR, SHOWN, FittedValue, Parameter, with_values
+from .specimen_fit import SpecimenFit, fit_specimen
+from .suspects import Assumption, Suspect
+from .table import TableFit, fitted_table
+
+_NOT_FITTED = ("masses_kg", "contact", "hertz_stiffness")
+
+
+@dataclass(frozen=True, eq=False)
+class UpdatedSpecimen(Labelled):
+    """A specimen fitted to recordings, with what could not be told and what does not fit."""
+
+    specimen: Specimen
+    values: tuple[FittedValue, ...]
+    """Of a model that fits; none where it does not."""
+    collisions: CollisionNumbers | None
+    """What collisions tell, tracked or from their statistics; None where neither can be."""
+    linear: SpecimenFit | None
+    """Of the weakest noise; None where there is none."""
+    linear_from: str
+    """Recording whose transmission told damping and frequencies; empty if none did."""
+    table: TableFit | None
+    not_told: tuple[str, ...]
+    """A sentence for everything that stays as the bench says, and why."""
+    nominal: SpecimenTable
+    """As the bench describes it."""
+
+    @property
+    def fitted(self) -> bool:
+        """Whether anything of it is more than the bench's description."""
+        return bool(self.values) or self.collisions is not None
+
+    @property
+    def fits(self) -> bool:
+        """Whether no recording contradicts what the bench says and the fit takes for granted."""
+        return not self.suspects
+
+    @property
+    def reduced_chi_square(self) -> float:
+        """Of the linear fit; NaN if there was none."""
+        return float("nan") if self.linear is None else self.linear.reduced_chi_square
+
+    @property
+    def suspects(self) -> tuple[Suspect, ...]:
+        """Assumptions that a recording contradicts, of each recording the likeliest first."""
+        linear = () if self.linear is None else self.linear.suspects
+        table = () if self.table is None else self.table.suspects
+        return (*linear, *table, *_contradicted(self.collisions))
+
+    @property
+    def description(self) -> SpecimenDescription:
+        """The fitted specimen as a file has it; what was not fitted is the bench's."""
+        lower, upper = self.specimen.gaps_m
+        fitted = {each.parameter.value for each in self.values}
+        if self.collisions is not None:
+            fitted |= set(self.collisions.gap_fields)
+        return SpecimenDescription(
+            name=f"{self.nominal.name}_fitted",
+            about=f"{self.nominal.name}, fitted to recordings: {', '.join(sorted(fitted))}",
+            masses_kg=self.specimen.masses,
+            stiffnesses_n_per_m=self.specimen.stiffnesses,
+            dampings_ns_per_m=self.specimen.dampings,
+            gap_m=upper if lower == upper else (lower, upper),
+            contact=self.nominal.contact,
+            hertz_stiffness=self.nominal.hertz_stiffness,
+            sources={
+                **{key: source for key, source in self.nominal.sources.items() if key in _NOT_FITTED},
+                **(
+                    {"stiffnesses_n_per_m": self.linear_from, "dampings_ns_per_m": self.linear_from}
+                    if self.linear is not None and self.linear.fits
+                    else {}
+                ),
+            },
+        )
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """Say every value with its interval, what does not fit, and what is to be known of it."""
+        return tuple(_sentences(self))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values for JSON."""
+        linear, table = self.linear, self.table
+        return {
+            "fits": self.fits,
+            "values": {
+                each.parameter.value: {
+                    **named(each, "value", "low", "high"),
+                    "sd": plain(each.sd),
+                    "bench": each.nominal,
+                }
+                for each in self.values
+            },
+            **{key: value for way in Way for key, value in self._told(way).items()},
+            "linear_from": self.linear_from or None,
+            "lines": 0 if linear is None else linear.lines,
+            "reduced_chi_square": None if linear is None else linear.reduced_chi_square,
+            "chi_square_limit": None if linear is None else linear.limit,
+            "table_mass_kg": None if table is None else table.mass_kg,
+            "sd_table_mass_kg": None if table is None else table.sd_kg,
+            "suspects": [
+                {
+                    "assumption": each.assumption.value,
+                    "would_mend_it": each.sentence,
+                    **named(each, "reduced_chi_square", "mends"),
+                    "behind_the_likeliest": each.behind,
+                }
+                for each in self.suspects
+            ],
+            "not_told": list(self.not_told),
+            "specimen": self.description.model_dump(mode="json", exclude_none=True),
+        }
+
+    def _told(self, way: Way) -> dict[str, object]:
+        """Plain values of what collisions tell in one way."""
+        found = self.collisions if self.collisions is not None and self.collisions.way is way else None
+        return {
+            f"{way}_from": None if found is None else found.recording,
+            f"{way}": {
+                each.what.value: {**named(each, "value", "low", "high"), "bench": each.described}
+                for each in (() if found is None else found.told)
+            },
+        }
+
+
+def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
+    yield from (_said(each) for each in updated.values)
+    if updated.collisions is not None:
+        yield from updated.collisions.sentences
+    linear, table = updated.linear, updated.table
+    if linear is not None and not linear.fits:
+        yield (
+            f"The model does not fit {updated.linear_from}: chi² is {linear.reduced_chi_square:.3g} per "
+            f"degree of freedom, and one right model in a thousand exceeds {linear.limit:.3g}. No value "
+            f"of it is given; {culprits_text(linear.suspects)}."
+        )
+    if table is not None:
+        yield table.sentence
+        if table.suspects:
+            yield f"The table does not fit: {culprits_text(table.suspects)}."
+    contradicted = _contradicted(updated.collisions)
+    if contradicted:
+        yield f"Collisions contradict the description: {culprits_text(contradicted)}."
+    yield from updated.not_told
+
+
+def culprits_text(suspects: Sequence[Suspect]) -> str:
+    """Say what would mend a model, as far as the data tell one explanation from another."""
+    best = suspects[0]
+    alike = list(dict.fromkeys(each.sentence for each in suspects if each.may_be_it))
+    named = ", or ".join(alike)
+    if not best.mends:
+        return (
+            "no single assumption that was tried mends it; the nearest, which leaves chi² at "
+            f"{best.reduced_chi_square:.3g}, is {named}"
+        )
+    choice = "either of these would mend it, and the data do not tell them apart: " if len(alike) > 1 else ""
+    return f"{choice}{named}" if choice else f"what would mend it is {named}"
+
+
+def _contradicted(found: CollisionNumbers | None) -> tuple[Suspect, ...]:
+    if found is None or not found.contradicted:
+        return ()
+    sentence = " and ".join(found.contradicted)
+    return (Suspect(Assumption.GAPS, sentence, found.misfit, mends=True, behind=0.0),)
+
+
+def _said(found: FittedValue) -> str:
+    name, scale, unit = SHOWN[found.parameter]
+    half = 0.5 * (found.high - found.low)
+    # Two digits of the interval, so that it is an interval on paper too.
+    places = len(plus_minus(scale * found.value, scale * half).partition(" ")[0].partition(".")[2])
+    value, low, high, nominal = (
+        f"{scale * each:.{places}f}" for each in (found.value, found.low, found.high, found.nominal)
+    )
+    return f"Fitted {name} = {value} {unit} ({low} to {high} {unit}, 95 %); the bench says {nominal} {unit}."
+
+
+def update_model(
+    results: CampaignResults,
+    also_free: Sequence[Parameter | str] = (),
+    observer: ProgressObserver = UNOBSERVED,
+) -> UpdatedSpecimen:
+    """Fit a specimen to recordings, or say which assumption of the model they contradict.
+
+    Damping and frequencies come from the weakest noise; the gap of each side, m1, c1 and the contact law from
+    tracking a motion that collides, or, where none can be tracked, from statistics of its chaos (minutes of
+    simulation); failing both, the gap of the nearer side from where sweeps begin to collide or from two
+    dwells. The table's mass comes from how the base follows the voltage.
+
+    Parameters
+    ----------
+    results
+        Of recordings of one specimen; their simulation is not needed. Noise in displacement over
+        displacement.
+    also_free
+        What is fitted to noise beside damping and frequencies: masses (one at a time) and single dampers.
+    observer
+        Told what takes long.
+
+    Raises
+    ------
+    NotEnoughData
+        When nothing could be fitted: no noise, no motion that can be tracked, and no sweep or pair of
+        dwells that tells the gap.
+
+    """
+    if not results.results:
+        raise NotEnoughData(f"{results.name!r} has no result to which a specimen could be fitted")
+    described = described_specimen(results.facts[0].bench)
+    nominal = described.specimen()
+    not_told: list[str] = []
+    free = (*LINEAR, *(Parameter(each) for each in also_free))
+    linear = _linear(results, nominal, free, not_told)
+    table = _table(results.noise[0], linear, not_told) if linear is not None and linear.fits else None
+    updated = UpdatedSpecimen(
+        specimen=nominal if linear is None else linear.specimen,
+        values=() if linear is None else linear.values,
+        collisions=None,
+        linear=linear,
+        linear_from="" if linear is None else Path(results.noise[0].analysis.facts.name).name,
+        table=table,
+        not_told=(),
+        nominal=described,
+    )
+    if linear is not None and not linear.fits:
+        not_told.append("Gaps and contacts stay as the bench says: the linear model does not fit.")
+    else:
+        updated = _with_gaps(updated, results, not_told, observer)
+        if not updated.fitted:
+            raise NotEnoughData(f"no specimen can be fitted to {results.name!r}: {' '.join(not_told)}")
+    return replace(updated, not_told=tuple(not_told))
+
+
+def _linear(
+    results: CampaignResults, nominal: Specimen, free: Sequence[Parameter], not_told: list[str]
+) -> SpecimenFit | None:
+    if not results.noise:
+        not_told.append("Damping and frequencies stay as the bench says: no noise was recorded.")
+        return None
+    weakest = results.noise[0].analysis.response
+    is_nonlinear = None if weakest.periodic is None else scatters_beyond_noise(weakest.periodic)
+    try:
+        return fit_specimen(
+            weakest.frequency_response,
+            nominal,
+            free,
+            scale_sd=stated_of(results.noise[0].analysis.facts.bench).scale_sd,
+            is_nonlinear=is_nonlinear,
+        )
+    except NotEnoughData as error:
+        not_told.append(f"Damping and frequencies stay as the bench says: {error}.")
+        return None
+
+
+def _table(weakest: NoiseResult, linear: SpecimenFit, not_told: list[str]) -> TableFit | None:
+    try:
+        return fitted_table(weakest.analysis, linear.specimen)
+    except AnalysisError as error:
+        not_told.append(f"The table's mass stays as the bench says: {error}.")
+        return None
+
+
+def _with_gaps(
+    updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str], observer: ProgressObserver
+) -> UpdatedSpecimen:
+    """Give each side's gap by tracking, else by statistics; else the nearer one by where collisions begin."""
+    found, why = tracked_numbers(results, updated.specimen)
+    if found is None:
+        found, why_not = numbers_from_statistics(results, updated.specimen, updated.linear, observer)
+        both = f"{why}; by statistics: {why_not}" if why_not else why
+        not_told.append(
+            f"Each side's gap, m1, c1 and the contact law are not determined: {both}."
+            if found is None
+            else f"No motion could be tracked: {why}."
+        )
+    if found is not None:
+        updated = replace(updated, collisions=found, specimen=found.on(updated.specimen))
+        if found.gap_fields:
+            return updated
+    gap = _onset_gap(results, updated.specimen, updated.linear, not_told)
+    if gap is None:
+        return updated
+    return replace(
+        updated,
+        specimen=with_values(updated.specimen, {Parameter.GAP: gap.value}),
+        values=(*updated.values, gap),
+    )
+
+
+def _onset_gap(
+    results: CampaignResults, model: Specimen, linear: SpecimenFit | None, not_told: list[str]
+) -> FittedValue | None:
+    """Give the narrower of what sweeps and dwells tell."""
+    sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
+    ways: tuple[Callable[[], FittedValue], ...] = (
+        lambda: fit_gap(sweeps, model, linear),
+        lambda: bracketed_gap(dwells, model),
+    )
+    found: list[FittedValue] = []
+    why: list[str] = []
+    for tell in ways:
+        try:
+            found.append(tell())
+        except NotEnoughData as error:
+            why.append(str(error))
+    if not found:
+        not_told.append(f"The gap stays as the bench says: {'; '.join(why)}.")
+        return None
+    return min(found, key=lambda each: each.high / each.low)

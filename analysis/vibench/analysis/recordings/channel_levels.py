@@ -1,0 +1,203 @@
+"""How large each channel of a recording was, and how much of its range it used.
+
+What makes a channel useless for any analysis: it never moved, or it was cut off throughout.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vibench.acquisition.recording import ChannelHeader, Recording
+
+from ..errors import NotEnoughData, UnusableData
+from ..signals.arrays import Integers, Reals
+from ..signals.envelope import DEFAULT_BINS, Envelope
+from .channels import BASE, DRIVE, RESPONSE
+
+_BLOCK_S = 2.0
+OnRead = Callable[[int, int], None]
+"""Told (samples per channel read, of how many)."""
+_AT_FULL_SCALE = 0.999
+"""Converters cut off a few counts to either side of their nominal range."""
+
+
+@dataclass(frozen=True)
+class ChannelLevel:
+    """One channel over the whole recording."""
+
+    OWN_UNITS: ClassVar = {
+        "envelope": "{0.header.unit}",
+        "rms": "{0.header.unit}",
+        "peak": "{0.header.unit}",
+        "full_scale": "{0.header.unit}",
+        "flat_tops": "{0.header.unit}",
+    }
+
+    header: ChannelHeader
+    envelope: Envelope
+    rms: float
+    """Over the whole recording, ramps and waits included [unit of the channel]."""
+    peak: float
+    """Largest magnitude [unit of the channel]."""
+    full_scale: float
+    """Of the converter's input [unit of the channel]."""
+    share_at_full_scale: float
+    """Share of the samples within a thousandth of the full scale, or beyond."""
+    flat_tops: tuple[float, ...] = ()
+    """Values at which its peaks are cut, above, below or on both sides [unit of the channel]."""
+
+    @property
+    def share_of_range(self) -> float:
+        """Peak over full scale."""
+        return self.peak / self.full_scale
+
+    @property
+    def span(self) -> float:
+        """Largest minus smallest value; zero when the channel never moved."""
+        return float(np.nanmax(self.envelope.upper) - np.nanmin(self.envelope.lower))
+
+
+def ignore_reading(samples: int, of: int) -> None:
+    """Watch nothing."""
+
+
+def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tuple[ChannelLevel, ...]:
+    """Go once through all samples; NotEnoughData when there are none."""
+    if recording.samples == 0:
+        why = f": {recording.reason}" if recording.reason else ""
+        raise NotEnoughData(
+            f"{recording.path.name} holds no samples ({recording.state.value}{why}); "
+            "there is nothing to analyse"
+        )
+    length = max(1, -(-recording.samples // DEFAULT_BINS))
+    block = length * max(1, round(_BLOCK_S * recording.sample_rate_hz / length))
+    offset = np.array([[each.physical_offset] for each in recording.channels])
+    full_scale = np.array([[abs(each.physical_per_volt) * each.range_v] for each in recording.channels])
+    parts, cut = [], np.zeros(len(recording.channels), dtype=np.int64)
+    counts = np.zeros((len(recording.channels), _COUNTED), dtype=np.int64)
+    for each in recording.blocks(recording.roles, block):
+        parts.append(_extremes(each.values, length))
+        cut += _cut_off(each.values, offset, _AT_FULL_SCALE * full_scale)
+        for row, shares in enumerate((each.values - offset) / full_scale):
+            bins = np.rint((np.clip(shares[np.isfinite(shares)], -1, 1) + 1) / 2 * (_COUNTED - 1))
+            counts[row] += np.bincount(bins.astype(np.int64), minlength=_COUNTED)
+        on_read(each.first_sample + each.values.shape[1], recording.samples)
+    lower, upper, power = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
+    if np.isnan(lower).all():
+        raise NotEnoughData(f"all samples of {recording.path.name} were lost; there is nothing to analyse")
+    bins = lower.shape[1]
+    time_s = np.minimum((np.arange(bins) + 0.5) * length, recording.samples) / recording.sample_rate_hz
+    return tuple(
+        ChannelLevel(
+            header=header,
+            envelope=Envelope(time_s, lower[row], upper[row]),
+            rms=float(np.sqrt(np.nansum(power[row]) / recording.samples)),
+            peak=float(np.nanmax(np.maximum(np.abs(lower[row]), np.abs(upper[row])))),
+            full_scale=float(full_scale[row, 0]),
+            share_at_full_scale=int(cut[row]) / recording.samples,
+            flat_tops=tuple(
+                float(offset[row, 0] + side * (2 * top / (_COUNTED - 1) - 1) * full_scale[row, 0])
+                for side in (1, -1)
+                if (top := _flat_top(counts[row, ::side], header, full_scale[row, 0])) is not None
+            ),
+        )
+        for row, header in enumerate(recording.channels)
+    )
+
+
+_COUNTED = 2**16 + 1
+"""Values, evenly over the range, whose samples are counted to find flat tops."""
+_TOPS = (0.1, 0.03, 0.01)
+"""Heights of a top that are looked at, over that of the peak."""
+_FLAT = 0.88
+"""Share of a top's samples in its upper half: 0.71 of a smooth peak, 0.84 without curvature, 1 if cut."""
+_FLAT_VALUE = 0.4
+"""Share of the upper half of a peak's samples at one value that no smooth peak has."""
+_FEWEST_AT_TOP, _FEWEST_VALUES = 40, 12
+_FEWEST_STEPS = 40
+"""Steps of the converter to a peak: a sine of 16 of them has 0.42 of its samples at two values."""
+
+
+def _flat_top(counts: Integers, header: ChannelHeader, full_scale: float) -> int | None:
+    """Return the counted value at which the upper peaks are cut; None where they are not."""
+    filled = np.flatnonzero(counts)
+    if filled.size < 2:
+        return None
+    total = np.cumsum(counts)
+    top, middle = int(filled[-1]), int(np.searchsorted(total, total[-1] / 2))
+    height = top - middle
+
+    def above(value: float) -> int:
+        return int(total[-1] - total[max(0, int(value))])
+
+    if height < _LEAST_HEIGHT * (top - filled[0]) or counts[top - 1 :].sum() == total[-1]:
+        return None
+    step = 0.0 if header.volts_per_count is None else header.volts_per_count * abs(header.physical_per_volt)
+    resolution = max(1.0, step / full_scale * _COUNTED / 2)
+    if height > _FEWEST_STEPS * resolution and counts[top - 1 :].sum() >= max(
+        _FEWEST_AT_TOP, _FLAT_VALUE * above(top - height / 2)
+    ):
+        return top
+    for share in _TOPS:
+        whole = above(top - share * height)
+        values = int(np.count_nonzero(counts[int(top - share * height) :]))
+        is_resolved = share * height > _FEWEST_VALUES * resolution
+        is_counted = whole >= _FEWEST_AT_TOP and values >= _FEWEST_VALUES
+        if is_resolved and is_counted and above(top - share * height / 2) > _FLAT * whole:
+            return top
+    return None
+
+
+_LEAST_HEIGHT = 0.1
+"""Of a peak above the median, over the whole span: less is a channel that rests at its lowest value."""
+
+
+def _cut_off(values: Reals, offset: Reals, limit: Reals) -> Integers:
+    """Count the samples of each channel at or beyond a limit; lost ones (NaN) are at none."""
+    return np.asarray(np.count_nonzero(np.abs(values - offset) >= limit, axis=1))
+
+
+def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:
+    """Smallest, largest and summed squares of each bin, shape (channels, bins)."""
+    starts = np.arange(0, values.shape[1], length)
+    low = np.minimum.reduceat(np.nan_to_num(values, nan=np.inf), starts, axis=1)
+    high = np.maximum.reduceat(np.nan_to_num(values, nan=-np.inf), starts, axis=1)
+    power = np.add.reduceat(np.nan_to_num(values) ** 2, starts, axis=1)
+    return np.where(np.isfinite(low), low, np.nan), np.where(np.isfinite(high), high, np.nan), power
+
+
+_CLIPPED_SHARE = 0.2
+"""A sine that just fills its range spends 3 % of its time within a thousandth of it; this is no sine."""
+
+
+def require_moving_channels(levels: Sequence[ChannelLevel]) -> None:
+    """Refuse channels that hold nothing to analyse.
+
+    Raises
+    ------
+    UnusableData
+        One sentence that names every such channel and what to look at.
+
+    """
+    faults = [
+        each for level in levels if level.header.role in (DRIVE, BASE, RESPONSE) for each in _faults(level)
+    ]
+    if faults:
+        raise UnusableData("; ".join(faults))
+
+
+def _faults(level: ChannelLevel) -> Iterator[str]:
+    role = level.header.role
+    if level.span == 0:
+        yield (
+            f"{role} holds the same value throughout, so its sensor or its cable gave nothing; "
+            "check it and measure again"
+        )
+    elif level.share_at_full_scale > _CLIPPED_SHARE:
+        yield (
+            f"{role} lay at its full scale of {level.full_scale:.3g} {level.header.unit} for "
+            f"{100 * level.share_at_full_scale:.0f} % of the time, so its waveform is cut off throughout; "
+            "choose a larger range or a smaller drive and measure again"
+        )

@@ -1,0 +1,236 @@
+"""The three channels that every analysis uses: drive, base and response, from a recording or a simulation.
+
+Who is told how far an analysis is: a progress bar, or nobody.
+"""
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from vibench.acquisition.recording import REJECTED, BridgedChannel, Recording, SegmentLabel
+
+from ..errors import NotEnoughData, UnusableData
+from ..signals.arrays import Complexes, Flags, Reals
+from .sensor_gain import coupled_gain
+
+DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Consecutive samples that belong together in an analysis."""
+
+    start: int
+    stop: int
+    """One past the last sample."""
+    numbers: dict[str, int | float | str]
+    """What the plan says of it: ``realisation``, ``frequency_hz`` ..."""
+    is_complete: bool
+
+    @property
+    def samples(self) -> int:
+        """How many."""
+        return self.stop - self.start
+
+
+class Channels(Protocol):
+    """What an estimator needs to know, whoever made the samples."""
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+
+    @property
+    def samples(self) -> int:
+        """Valid samples per channel."""
+
+    @property
+    def response_delay_s(self) -> float:
+        """By how much the response channel lags the base channel."""
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, without their delays; shape (lines,)."""
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record, in the order of time."""
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedChannels:
+    """The channels of a recording; lost samples read as NaN, and the vibrometer's drop-outs are bridged."""
+
+    recording: Recording
+    _response: BridgedChannel = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_response", BridgedChannel(self.recording, RESPONSE))
+        missing = [role for role in (DRIVE, BASE, RESPONSE) if role not in self.recording.roles]
+        if missing:
+            raise UnusableData(
+                f"there is no channel {', '.join(missing)}; the recording has "
+                f"{', '.join(self.recording.roles)}, and an analysis needs {DRIVE}, {BASE} and {RESPONSE}"
+            )
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+        return self.recording.sample_rate_hz
+
+    @property
+    def samples(self) -> int:
+        """Valid samples per channel."""
+        return self.recording.samples
+
+    @property
+    def response_delay_s(self) -> float:
+        """By how much the response channel lags the base channel."""
+        return self.recording.channel(RESPONSE).delay_s - self.recording.channel(BASE).delay_s
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, couplings included and delays left out."""
+        response, base = (
+            coupled_gain(self.recording.bench, self.recording.channel(role), frequency_hz)
+            for role in (RESPONSE, BASE)
+        )
+        delay = np.exp(2j * np.pi * frequency_hz * self.response_delay_s)
+        return np.asarray(response / base * delay)
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record that hold samples, without averages that somebody rejected."""
+        found = tuple(
+            Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
+            for each in self.recording.segments
+            if each.label == label and each.stop > each.start
+        )
+        if label != SegmentLabel.REALISATION:
+            return found
+        marks = (each.sample for each in self.recording.events if each.text == REJECTED)
+        rejected = {max((each.start for each in found if each.start <= mark), default=-1) for mark in marks}
+        return tuple(each for each in found if each.start not in rejected)
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
+        drive, base = (self.recording.read(role, start, stop) for role in (DRIVE, BASE))
+        return np.stack([drive, base, self._response.read(start, stop)])
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+        marks = np.zeros(stop - start, dtype=np.bool_)
+        for each in self.recording.overloads:
+            if each.channel in (DRIVE, BASE, RESPONSE):
+                marks[max(0, each.first_sample - start) : max(0, each.last_sample + 1 - start)] = True
+        for dropout in self._response.between(start, stop):
+            marks[max(0, dropout.first - start) : dropout.stop - start] = False
+        return marks
+
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
+        marks = np.zeros(stop - start, dtype=np.bool_)
+        for dropout in self._response.between(start, stop):
+            marks[max(0, dropout.first - start) : dropout.stop - start] = True
+        return marks
+
+
+def far_from(marks: Flags, reach: int) -> Flags:
+    """Return which samples lie more than ``reach`` samples from any that is marked, shape (samples,)."""
+    total = np.concatenate(([0], np.cumsum(marks)))
+    places = np.arange(marks.size)
+    low, high = np.maximum(places - reach, 0), np.minimum(places + reach + 1, marks.size)
+    return np.asarray(total[high] == total[low])
+
+
+def only_stretch(channels: Channels, label: str) -> Stretch:
+    """Give the one stretch that a sweep or dwell was recorded as; NotEnoughData when there is none."""
+    found = channels.stretches(label)
+    if not found:
+        raise NotEnoughData(
+            f"the recording ended before its {label} began, so there is nothing to analyse; measure again"
+        )
+    return found[0]
+
+
+def read_whole(channels: Channels, stretch: Stretch) -> Reals:
+    """Read a stretch that must have no hole; UnusableData when samples were lost inside it."""
+    data = channels.read(stretch.start, stretch.stop)
+    lost = int(np.count_nonzero(np.isnan(data[0])))
+    if lost:
+        raise UnusableData(
+            f"{lost} of {stretch.samples} samples were lost inside this stretch, and its motion cannot be "
+            "followed across a hole; measure again"
+        )
+    return data
+
+
+class ProgressObserver(Protocol):
+    """Told what is computed and how much of the recording was read."""
+
+    def begin(self, recording: str, stage: str) -> None:
+        """Hear that a stage of one recording begins, ``"averaging spectra"`` for example."""
+
+    def read(self, samples: int, of: int) -> None:
+        """Hear how many samples per channel of the stage are read."""
+
+
+class Unobserved:
+    """Tells nobody."""
+
+    def begin(self, recording: str, stage: str) -> None:
+        """Ignore it."""
+
+    def read(self, samples: int, of: int) -> None:
+        """Ignore it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ObservedChannels:
+    """Channels whose reading is watched."""
+
+    channels: Channels
+    observer: ProgressObserver
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Of all channels."""
+        return self.channels.sample_rate_hz
+
+    @property
+    def samples(self) -> int:
+        """Valid samples per channel."""
+        return self.channels.samples
+
+    @property
+    def response_delay_s(self) -> float:
+        """By how much the response channel lags the base channel."""
+        return self.channels.response_delay_s
+
+    def response_gain(self, frequency_hz: Reals) -> Complexes:
+        """Gain of the response's sensor over that of the base's, without their delays."""
+        return self.channels.response_gain(frequency_hz)
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give the named parts of the record."""
+        return self.channels.stretches(label)
+
+    def read(self, start: int, stop: int) -> Reals:
+        """Give drive, base and response, shape (3, samples), and say how far the record is read."""
+        data = self.channels.read(start, stop)
+        self.observer.read(stop, self.samples)
+        return data
+
+    def overloaded(self, start: int, stop: int) -> Flags:
+        """Say at which samples one of the channels was near its full scale."""
+        return self.channels.overloaded(start, stop)
+
+    def bridged(self, start: int, stop: int) -> Flags:
+        """Return at which samples the response is a bridge over a drop-out."""
+        return self.channels.bridged(start, stop)

@@ -1,0 +1,236 @@
+"""What to know before trusting a recording: each check passes, or says what to look at."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+from enum import StrEnum
+from math import cos, pi
+from typing import Generic, TypeVar
+
+from pydantic import ValidationError
+
+from vibench.acquisition.plan import EXCITATION_KINDS, StreamedNoise
+from vibench.acquisition.recording import RecordingState, SealState
+from vibench.acquisition.rig import GeneratorConfig
+
+from ..tables import Labelled
+from .channels import DRIVE, RESPONSE
+from .facts import RecordingFacts
+
+
+class Verdict(StrEnum):
+    """How a check came out."""
+
+    PASSED = "passed"
+    NOTE = "note"
+    """Nothing is wrong, but a reader should know."""
+    WARNING = "warning"
+    """The result may be wrong, or is less than was planned."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was looked at."""
+
+    what: str
+    verdict: Verdict
+    text: str
+
+
+_LEAST_SHARE_OF_RANGE = 1e-3
+"""A channel below a thousandth of its range is recorded with little of the converter."""
+_OFTEN_DARK = 0.01
+"""Share of a recording without light beyond which its results deserve a second look."""
+_SAME_RATE = 1e-9
+_LEVEL_TOLERANCE = 0.05
+"""Overshoot of the recorded drive over its setting that noise and the converter's filter explain."""
+_SHORTFALL = 0.15
+"""Of its peak below the setting: as much as a bench check refuses."""
+
+
+P = TypeVar("P")
+R = TypeVar("R")
+
+
+@dataclass(frozen=True, eq=False)
+class AbstractAnalysis(Labelled, Generic[P, R]):
+    """What was found in a recording: of a plan, a response."""
+
+    facts: RecordingFacts
+    checks: tuple[Check, ...]
+    excitation: P
+    response: R
+
+
+def measurement_checks(facts: RecordingFacts) -> tuple[Check, ...]:
+    """Look at how a recording ended, at overloads, lost samples, levels, rates and calibrations."""
+    return (
+        _ending(facts),
+        _seal(facts),
+        _stretches(facts),
+        _overloads(facts),
+        *_dropouts(facts),
+        _lost(facts),
+        *_drive(facts),
+        *_late(facts),
+        *_ranges(facts),
+        _rates(facts),
+        *_imported_time(facts),
+        _calibrations(facts),
+        _bench_check(facts),
+    )
+
+
+def _ending(facts: RecordingFacts) -> Check:
+    planned = "" if facts.planned_s is None else f" of {facts.planned_s:.1f} s planned"
+    why = f": {facts.reason}" if facts.reason else ""
+    text = f"{facts.state.value}{why}; {facts.duration_s:.1f} s recorded{planned}"
+    verdict = Verdict.PASSED if facts.state is RecordingState.COMPLETE else Verdict.WARNING
+    return Check("How it ended", verdict, text)
+
+
+def _seal(facts: RecordingFacts) -> Check:
+    match facts.seal.state:
+        case SealState.INTACT:
+            verdict = Verdict.PASSED
+        case SealState.UNFINISHED:
+            verdict = Verdict.NOTE
+        case _:
+            verdict = Verdict.WARNING
+    return Check("Seal", verdict, facts.seal.sentence)
+
+
+def _stretches(facts: RecordingFacts) -> Check:
+    text = f"{facts.whole_stretches} of {facts.planned_stretches} planned parts were recorded whole"
+    if facts.whole_stretches > facts.planned_stretches:
+        text = f"{facts.whole_stretches} parts were recorded whole; feedback decided how many"
+    whole = facts.whole_stretches >= facts.planned_stretches
+    return Check("Parts", Verdict.PASSED if whole else Verdict.WARNING, text)
+
+
+def _overloads(facts: RecordingFacts) -> Check:
+    flat = [
+        f"{each.header.role} at {' and '.join(f'{value:.4g}' for value in each.flat_tops)} {each.header.unit}"
+        for each in facts.channels
+        if each.flat_tops and not (facts.dropouts and each.header.role == RESPONSE)
+    ]
+    if flat:
+        text = f"flat tops: {', '.join(flat)}; peaks are cut, so Responses I and II are wrong; measure again"
+        return Check("Overloads", Verdict.WARNING, text)
+    if not facts.overload_s:
+        imported = facts.bench.get("imported", {})
+        mapped = imported.get("mapping", {}).get("channels", ())
+        both = zip(mapped, imported.get("channels", ()), strict=False)
+        unknown = [one["role"] for one, other in both if not (one["full_scale"] or other["full_scale"])]
+        if unknown:
+            text = f"the full scale of {', '.join(unknown)} is not known; no flat tops were found"
+            return Check("Overloads", Verdict.NOTE, text)
+        return Check("Overloads", Verdict.PASSED, "no input came near its full scale")
+    parts = [f"{role} for {seconds:.3g} s" for role, seconds in facts.overload_s.items()]
+    what = "peaks may be cut, so Response I is a lower bound and Response II may be wrong"
+    if facts.dropouts and RESPONSE in facts.overload_s:
+        what = (
+            "the vibrometer lost its light for longer than is bridged, or peaks were cut: look at the "
+            "velocity there, and do not trust Response I"
+        )
+    return Check("Overloads", Verdict.WARNING, f"near full scale: {', '.join(parts)}; {what}")
+
+
+def _dropouts(facts: RecordingFacts) -> Iterator[Check]:
+    if facts.dropouts:
+        times = "once" if facts.dropouts == 1 else f"{facts.dropouts} times"
+        text = (
+            f"the vibrometer lost its light {times}, for {facts.dropout_s:.2g} s in all; m0's motion was "
+            "bridged there from both sides, which misses what impacts did there. Refocus the laser, or stick "
+            "on reflective tape"
+        )
+        often = facts.dropout_s > _OFTEN_DARK * facts.duration_s
+        yield Check("Drop-outs", Verdict.WARNING if often else Verdict.NOTE, text)
+
+
+def _lost(facts: RecordingFacts) -> Check:
+    if facts.lost_samples == 0:
+        return Check("Lost samples", Verdict.PASSED, "none")
+    text = f"{facts.lost_samples} samples were lost; what touches them is left out"
+    return Check("Lost samples", Verdict.WARNING, text)
+
+
+def _drive(facts: RecordingFacts) -> Iterator[Check]:
+    setting_v = facts.measurement.excitation.highest_amplitude_vpp / 2
+    reached_v = facts.level(DRIVE).peak
+    text = f"peak {reached_v:.4g} V recorded for a setting of {2 * setting_v:g} V peak to peak"
+    if reached_v < _least_peak_v(facts):
+        text += "; the drive was quieter than its plan: levels are those recorded, not those planned"
+        yield Check("Drive level", Verdict.WARNING, text)
+        return
+    is_high = reached_v > setting_v * (1 + _LEVEL_TOLERANCE)
+    yield Check("Drive level", Verdict.NOTE if is_high else Verdict.PASSED, text)
+
+
+def _least_peak_v(facts: RecordingFacts) -> float:
+    """Give the lowest peak of the drive of a plan that was carried out; nothing, where it is not known.
+
+    Feedback is quieter than its setting allows, the peak of streamed noise is a draw, and a few samples a
+    period need not meet the peak of a sine.
+    """
+    excitation = facts.measurement.excitation
+    is_open_ended = EXCITATION_KINDS[excitation.kind].is_feedback or isinstance(excitation, StreamedNoise)
+    if facts.state is not RecordingState.COMPLETE or is_open_ended:
+        return 0.0
+    try:
+        generator = GeneratorConfig.model_validate(facts.bench.get("generator"))
+    except ValidationError:  # imported, or written by another version
+        return 0.0
+    terminal_v = excitation.highest_amplitude_vpp / 2 * generator.terminal_factor()
+    missed = cos(pi * min(0.5, excitation.band_hz[1] / facts.sample_rate_hz))
+    return terminal_v * (1 - _SHORTFALL) * missed
+
+
+def _late(facts: RecordingFacts) -> Iterator[Check]:
+    if facts.late:
+        text = f"{facts.late[0]}; {len(facts.late)} such {'moment' if len(facts.late) == 1 else 'moments'}"
+        yield Check("Drive in time", Verdict.WARNING, text)
+
+
+def _ranges(facts: RecordingFacts) -> Iterator[Check]:
+    weak = [each for each in facts.channels if each.share_of_range < _LEAST_SHARE_OF_RANGE]
+    for each in weak:
+        text = f"{each.header.role} used {100 * each.share_of_range:.2g} % of its range; a smaller range fits"
+        yield Check("Range", Verdict.NOTE, text)
+
+
+def _rates(facts: RecordingFacts) -> Check:
+    actual, wanted = facts.sample_rate_hz, facts.requested_sample_rate_hz
+    same = abs(actual - wanted) <= _SAME_RATE * wanted
+    text = f"{actual:.6g} samples/s" + ("" if same else f", where {wanted:.6g} were asked for")
+    return Check("Sample rate", Verdict.PASSED if same else Verdict.NOTE, text)
+
+
+def _imported_time(facts: RecordingFacts) -> Iterator[Check]:
+    remarks = facts.bench.get("imported", {}).get("time", ())
+    if remarks:
+        yield Check("Time of the imported file", Verdict.NOTE, "; ".join(remarks))
+
+
+def _calibrations(facts: RecordingFacts) -> Check:
+    valid_days = int(facts.bench.get("calibration_valid_days", 0))
+    measured = date.fromisoformat(facts.started_utc[:10])
+    dated = [each.header for each in facts.channels if each.header.calibration_date]
+    if not dated or not valid_days:
+        return Check("Calibration", Verdict.NOTE, "the recording names no calibration dates")
+    ages = {each.role: (measured - date.fromisoformat(each.calibration_date)).days for each in dated}
+    later = [f"{each.role} ({each.calibration_date})" for each in dated if ages[each.role] < 0]
+    if later:
+        text = f"dated after the measurement, on {measured}: {', '.join(later)}; look at the certificates"
+        return Check("Calibration", Verdict.WARNING, text)
+    stale = [f"{role} ({days} days)" for role, days in ages.items() if days > valid_days]
+    if stale:
+        text = f"run out on the day of the measurement: {', '.join(stale)}; {valid_days} days are allowed"
+        return Check("Calibration", Verdict.WARNING, text)
+    return Check("Calibration", Verdict.PASSED, f"all channels within {valid_days} days")
+
+
+def _bench_check(facts: RecordingFacts) -> Check:
+    if not facts.check:
+        return Check("Bench check", Verdict.NOTE, "the recording holds no check of the bench")
+    return Check("Bench check", Verdict.PASSED, facts.check)

@@ -1,0 +1,209 @@
+"""What a recording says about itself: what was measured, with what, and how it ended."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Annotated, Any
+
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
+
+from vibench.acquisition.plan import Measurement
+from vibench.acquisition.recording import (
+    BridgedChannel,
+    Dropout,
+    EventKind,
+    FeedbackNote,
+    Origin,
+    Recording,
+    RecordingDescription,
+    SealCheck,
+    feedback_note,
+)
+from vibench.sim import Specimen, SpecimenTable
+
+from ..errors import UnusableData
+from ..tables import named
+from .channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
+from .channels import RESPONSE
+from .intact import require_intact, require_measured_size
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RecordingFacts(RecordingDescription):
+    """Everything but the result."""
+
+    name: str
+    duration_s: float
+    planned_s: float | None
+    measurement: Measurement
+    channels: tuple[ChannelLevel, ...]
+    overload_s: Mapping[str, float]
+    """Time each channel spent near its full scale, by role; channels that never did are left out."""
+    dropouts: int
+    """Moments in which the vibrometer lost its light, bridged in every analysis."""
+    dropout_s: float
+    lost_samples: int
+    planned_stretches: int
+    whole_stretches: int
+    late: tuple[str, ...]
+    """When the drive fell behind its plan, a sentence each."""
+    check: str
+    """What the check of the bench found before the run; empty when it was left out."""
+    seal: SealCheck
+    feedback: tuple[FeedbackNote, ...] = ()
+    """What a measurement with feedback found while it ran; empty for any other."""
+    feedback_s: tuple[float, ...] = ()
+    """When each of it was noted, from the beginning of the recording [s]."""
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the instruments were simulated."""
+        return self.origin is Origin.SIMULATED
+
+    def level(self, role: str) -> ChannelLevel:
+        """Give one channel's level."""
+        return next(each for each in self.channels if each.header.role == role)
+
+
+def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingFacts:
+    """Collect what a recording says about itself; ``on_read`` is told how far its samples are read.
+
+    Raises UnusableData when it is not as it was sealed, or says of plan or bench what this version does not
+    know, and NotEnoughData when it holds no samples.
+    """
+    require_measured_size(recording)
+    seal = require_intact(recording)
+    measurement = plan_of(recording)
+    _require_bench(recording)
+    rate = recording.sample_rate_hz
+    overload_s: dict[str, float] = {}
+    dropouts = _dropouts(recording)
+    for each in recording.overloads:
+        if each.channel == RESPONSE and any(
+            one.first <= each.first_sample and each.last_sample < one.stop for one in dropouts
+        ):
+            continue
+        seconds = (each.last_sample - each.first_sample + 1) / rate
+        overload_s[each.channel] = overload_s.get(each.channel, 0.0) + seconds
+    steps = {id(step.segment): step.segment for step in measurement.excitation.steps()}
+    labels = {segment.label for segment in steps.values()}
+    played = [each for each in recording.segments if each.label in labels]
+    noted = [(each.sample / rate, note) for each in recording.events if (note := feedback_note(each))]
+    return RecordingFacts(
+        **named(recording, *(each.name for each in fields(RecordingDescription))),
+        name=recording.path.name.removesuffix(".part").removesuffix(".h5"),
+        duration_s=recording.duration_s,
+        planned_s=None if recording.expected_samples is None else recording.expected_samples / rate,
+        measurement=measurement,
+        channels=channel_levels(recording, on_read),
+        overload_s=overload_s,
+        dropouts=len(dropouts),
+        dropout_s=sum(each.stop - each.first for each in dropouts) / rate,
+        lost_samples=sum(each.last_sample - each.first_sample + 1 for each in recording.gaps),
+        planned_stretches=len(steps),
+        whole_stretches=sum(each.is_complete for each in played),
+        late=tuple(each.text for each in recording.events if each.kind == EventKind.LATE),
+        check=recording.check_text,
+        seal=seal,
+        feedback=tuple(note for _, note in noted),
+        feedback_s=tuple(time_s for time_s, _ in noted),
+    )
+
+
+def _dropouts(recording: Recording) -> tuple[Dropout, ...]:
+    if RESPONSE not in recording.roles:
+        return ()
+    return BridgedChannel(recording, RESPONSE).between(0, recording.samples)
+
+
+def plan_of(recording: Recording) -> Measurement:
+    """Read the plan that stands in a recording; UnusableData when this version does not know it."""
+    try:
+        return Measurement.model_validate(recording.plan)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UnusableData(
+            f"the plan in {recording.path.name} is not one this version of vibench can read "
+            f"({place or 'plan'}: {first['msg']}); read the samples with h5py, or update vibench"
+        ) from error
+
+
+def specimen_of(bench: Mapping[str, Any]) -> Specimen:
+    """Build the specimen that the bench configuration describes; as `described_specimen`."""
+    return described_specimen(bench).specimen()
+
+
+def known_specimen(bench: Mapping[str, Any]) -> Specimen | None:
+    """Build the specimen that the bench configuration describes; None where it says nothing."""
+    return specimen_of(bench) if bench.get("specimen") else None
+
+
+def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
+    """Give the specimen that the bench configuration describes; the paper's where it says nothing.
+
+    Raises UnusableData when what it says is no specimen.
+    """
+    said = bench.get("specimen", {})
+    known = {key: said[key] for key in said if key in SpecimenTable.model_fields or key == "model"}
+    try:
+        return SpecimenTable.model_validate(known)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise UnusableData(
+            f"the specimen that the recording describes is not allowed ({'.'.join(map(str, first['loc']))}: "
+            f"{first['msg']}); its samples can be read with h5py"
+        ) from error
+
+
+class _Finding(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    name: str
+    value: JsonValue
+    verdict: str
+    expected: JsonValue
+
+
+class _BenchCheck(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    checked: AwareDatetime
+    verdict: str
+    findings: tuple[_Finding, ...]
+
+
+class _Bench(BaseModel):
+    """What analysis reads of a bench configuration, whatever version wrote it; the rest is left alone."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: str = ""
+    calibration_valid_days: Annotated[int, Field(ge=0, le=1_000_000)] = 0
+    specimen: dict[str, JsonValue] | None = None
+    amplifier: dict[str, JsonValue] | None = None
+    shaker: dict[str, JsonValue] | None = None
+    vibrometer: dict[str, JsonValue] | None = None
+    accelerometer: dict[str, JsonValue] | None = None
+
+
+class _Provenance(BaseModel):
+    model_config = ConfigDict(extra="allow")
+
+    packages: dict[str, str] = Field(default_factory=dict)
+
+
+def _require_bench(recording: Recording) -> None:
+    """Refuse a bench, its check, or a provenance that later steps could not read; raises UnusableData."""
+    try:
+        _Bench.model_validate(recording.bench)
+        _Provenance.model_validate(recording.provenance)
+        if recording.bench_check:
+            _BenchCheck.model_validate(recording.bench_check)
+        described_specimen(recording.bench)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UnusableData(
+            f"what {recording.path.name} says of its bench cannot be read ({place}: {first['msg']}); "
+            "read the samples with h5py, or update vibench"
+        ) from error

@@ -1,0 +1,320 @@
+"""All recordings of a campaign, analysed; one that cannot be analysed says why and stops no other."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.plan import present_word
+from vibench.acquisition.recording import Recording
+from vibench.sim import Accuracy, Specimen
+
+from ..errors import AnalysisError, NotEnoughData, UnusableData
+from ..frequency_response.noise_response import DEFAULT_REQUEST, NoiseAnalysis
+from ..frequency_response.request import FrequencyResponseRequest
+from ..kinds.analyses import ANALYSES
+from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult, Result, SweepResult
+from ..kinds.noise import NOISE_FAMILY
+from ..model.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
+from ..model.driven_rig import says_shaker
+from ..model.overlay import AbstractOverlay, Simulation
+from ..model.shaker_fit import FittedShaker, fitted_shaker
+from ..recordings.channels import ProgressObserver
+from ..recordings.checks import AbstractAnalysis
+from ..recordings.facts import RecordingFacts, specimen_of
+from ..sine.dwell_analysis import DwellAnalysis
+from ..sine.sweep_analysis import SweepAnalysis
+from .measurement_analysis import UNOBSERVED, analyse
+
+Stage = Callable[[str], None]
+"""Told, in a few words, what is being computed."""
+
+
+def ignore_stage(stage: str) -> None:
+    """Watch nothing."""
+
+
+def overlay(
+    recording: Recording,
+    analysis: AbstractAnalysis[Any, Any],
+    *,
+    specimen: Specimen | None = None,
+    accuracy: Accuracy = Accuracy.STANDARD,
+    simulation: Simulation = Simulation.UNDER_VOLTAGE,
+    shaker: FittedShaker | None = None,
+    draws: int = DRAWS,
+    stage: Stage = ignore_stage,
+) -> AbstractOverlay[Any]:
+    """Simulate what was measured and compare.
+
+    Raises UnusableData when the samples have holes, or the simulation did not reach its end.
+
+    Parameters
+    ----------
+    recording, analysis
+        The recording and what `analyse` made of it.
+    specimen
+        The model; by default what the recording's bench configuration says is on the shaker.
+    accuracy
+        Of the contacts in the simulation under the recorded base motion.
+    simulation
+        What moves the model: rig and specimen together under the recorded voltage, or the specimen alone
+        under the recorded base motion. Where nothing is known of the shaker, one is fitted
+        to weak noise, and the base drives where that is not possible either: ``run.driven`` and ``run.why``
+        of the result say so.
+    shaker
+        As `fitted_shaker` found it in another recording; taken where the bench configuration describes none.
+    draws
+        How many runs of a colliding motion are made from slightly different starts under the voltage.
+    stage
+        Told what is being computed.
+
+    """
+    model = specimen_of(analysis.facts.bench) if specimen is None else specimen
+    stage(f"simulating {simulation.value}")
+    source = _source(recording, analysis, model, accuracy, simulation, shaker, draws)
+    row = ANALYSES[analysis.excitation.kind]
+    found = drawn(source, lambda channels: row.draw(analysis, channels), row.compared(analysis))
+    stage("predicting the response to sines")
+    laid: AbstractOverlay[Any] = row.lay(analysis, found)
+    return laid
+
+
+def _source(
+    recording: Recording,
+    analysis: AbstractAnalysis[Any, Any],
+    model: Specimen,
+    accuracy: Accuracy,
+    simulation: Simulation,
+    shaker: FittedShaker | None,
+    draws: int,
+) -> DrawSource:
+    measurement, why = analysis.facts.measurement, ""
+    if simulation is Simulation.UNDER_VOLTAGE:
+        try:
+            if shaker is None and isinstance(analysis, NoiseAnalysis) and not says_shaker(recording):
+                shaker = fitted_shaker(recording, analysis, model)
+            return voltage_source(recording, model, None if says_shaker(recording) else shaker, draws)
+        except UnusableData as error:
+            why = str(error)
+    return base_source(recording, measurement, model, accuracy, why)
+
+
+class FailedStep(StrEnum):
+    """What a recording has no result of."""
+
+    ANALYSIS = "analysis"
+    SIMULATION = "simulation"
+
+
+@dataclass(frozen=True)
+class AnalysisFailure:
+    """A recording without a result, or a result without its simulation, and why."""
+
+    name: str
+    what: FailedStep
+    sentence: str
+
+
+@dataclass(frozen=True, eq=False)
+class CampaignResults:
+    """What a report is made of."""
+
+    name: str
+    results: tuple[AnyResult, ...]
+    failures: tuple[AnalysisFailure, ...]
+    model_said: tuple[str, ...] = ()
+    """What is to be known of the model that was laid over: a sentence for each fitted value."""
+
+    @property
+    def facts(self) -> tuple[RecordingFacts, ...]:
+        """Of every recording that has a result."""
+        return tuple(each.analysis.facts for each in self.results)
+
+    @property
+    def in_order(self) -> tuple[AnyResult, ...]:
+        """Family by family, each weak to strong or in the order given."""
+        families = tuple(dict.fromkeys(row.family for row in ANALYSES.values()))
+
+        def place(each: AnyResult) -> tuple[float, ...]:
+            row = ANALYSES[each.kind]
+            return families.index(row.family), *row.place(each.analysis.excitation)
+
+        return tuple(sorted(self.results, key=place))
+
+    @property
+    def noise(self) -> tuple[NoiseResult, ...]:
+        """Noise measurements, weak to strong."""
+        return self._with(NoiseAnalysis)
+
+    @property
+    def sweeps(self) -> tuple[SweepResult, ...]:
+        """Sweeps, in the order given."""
+        return self._with(SweepAnalysis)
+
+    @property
+    def dwells(self) -> tuple[DwellResult, ...]:
+        """Dwells by frequency, weak to strong."""
+        return self._with(DwellAnalysis)
+
+    def _with(self, analysis: type[AbstractAnalysis[Any, Any]]) -> tuple[AnyResult, ...]:
+        return tuple(each for each in self.in_order if isinstance(each.analysis, analysis))
+
+
+def analyse_files(
+    paths: Sequence[Path],
+    name: str,
+    simulation: Simulation = Simulation.UNDER_VOLTAGE,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    observer: ProgressObserver = UNOBSERVED,
+    specimen: Specimen | None = None,
+    draws: int = DRAWS,
+) -> CampaignResults:
+    """Analyse recordings one after the other, each with the model laid over it, as `analyse` does.
+
+    The model is the ``specimen`` given; by default what each recording's bench configuration says. Where one
+    describes no shaker, the shaker fitted to the weakest noise among the recordings takes its place.
+
+    Parameters
+    ----------
+    paths
+        Recordings.
+    name
+        What results and report are called.
+    simulation
+        What is laid over each, if anything.
+    request
+        Estimator, lines and quantities of noise.
+    observer
+        Told how far it is.
+    specimen
+        In place of the described one.
+    draws
+        Simulated runs of each test.
+
+    Raises
+    ------
+    NotEnoughData
+        When no path is given.
+
+    """
+    if not paths:
+        raise NotEnoughData(f"no recording was given for {name!r}; give the paths of one or more .h5 files")
+    shaker = _shared_shaker(paths, specimen) if simulation is Simulation.UNDER_VOLTAGE else None
+    results: list[AnyResult] = []
+    failures: list[AnalysisFailure] = []
+    for path in paths:
+        try:
+            with open_recording(path) as recording:
+                result, failed = result_of(
+                    recording, simulation, request, observer, specimen, shaker=shaker, draws=draws
+                )
+        except (AnalysisError, RecordingError) as error:
+            failures.append(AnalysisFailure(path.name, FailedStep.ANALYSIS, str(error)))
+            continue
+        results.append(result)
+        failures.extend(failed)
+    return CampaignResults(name, tuple(results), tuple(failures))
+
+
+def _shared_shaker(paths: Sequence[Path], specimen: Specimen | None) -> FittedShaker | None:
+    """Fit a shaker to the weakest noise that allows it, if any recording needs one; else None."""
+    unknown: list[tuple[float, Path]] = []
+    needed = False
+    for path in paths:
+        try:
+            with open_recording(path) as recording:
+                if says_shaker(recording):
+                    continue
+                needed = True
+                plan = recording.plan.get("excitation") or {}
+                if ANALYSES[present_word(plan["kind"])].family == NOISE_FAMILY:
+                    unknown.append((float(plan["amplitude_vpp"]), path))
+        except (RecordingError, LookupError, TypeError, ValueError, AttributeError):
+            continue  # its own analysis says what is wrong with it
+    for _, path in sorted(unknown) if needed and len(paths) > 1 else ():
+        try:
+            with open_recording(path) as recording:
+                analysis: NoiseAnalysis = analyse(recording)  # type: ignore[assignment]
+                return fitted_shaker(recording, analysis, specimen or specimen_of(recording.bench))
+        except (AnalysisError, RecordingError):
+            continue
+    return None
+
+
+def merged_results(name: str, parts: Sequence[CampaignResults]) -> CampaignResults:
+    """Put results that were made one by one together as one campaign's.
+
+    Parameters
+    ----------
+    name
+        Of the whole.
+    parts
+        Results of one recording or more each.
+
+    """
+    return CampaignResults(
+        name,
+        tuple(result for part in parts for result in part.results),
+        tuple(failure for part in parts for failure in part.failures),
+    )
+
+
+def result_of(
+    recording: Recording,
+    simulation: Simulation = Simulation.UNDER_VOLTAGE,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    observer: ProgressObserver = UNOBSERVED,
+    specimen: Specimen | None = None,
+    *,
+    shaker: FittedShaker | None = None,
+    draws: int = DRAWS,
+) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
+    """Analyse one recording; a simulation that fails leaves the measured result standing.
+
+    Raises AnalysisError when nothing in the recording is usable.
+    """
+    name = recording.path.name
+    analysis = analyse(recording, request, observer)
+    if simulation is Simulation.LEFT_OUT:
+        return Result(analysis, None), ()
+    try:
+        laid = overlay(
+            recording,
+            analysis,
+            specimen=specimen,
+            simulation=simulation,
+            shaker=shaker,
+            draws=draws,
+            stage=lambda stage: observer.begin(name, stage),
+        )
+    except AnalysisError as error:
+        return Result(analysis, None), (AnalysisFailure(name, FailedStep.SIMULATION, str(error)),)
+    return Result(analysis, laid), ()
+
+
+def recordings_in(folder: Path) -> tuple[Path, ...]:
+    """List the recordings in a folder, finished or interrupted, in the order they were begun.
+
+    Raises
+    ------
+    NotEnoughData
+        When there are none.
+
+    """
+    found = [*folder.glob("*.h5"), *folder.glob("*.h5.part")]
+    if not found:
+        raise NotEnoughData(f"{folder} holds no recording (.h5 or .h5.part); give a folder that does")
+    return tuple(sorted(found, key=lambda path: (_started(path), path.name)))
+
+
+def _started(path: Path) -> str:
+    """Start of a recording; one that cannot be opened comes last and is named as a failure later."""
+    last = "~"
+    try:
+        with open_recording(path) as recording:
+            return recording.started_utc
+    except RecordingError:
+        return last

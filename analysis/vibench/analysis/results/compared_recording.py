@@ -1,0 +1,155 @@
+"""The curves of one recording, and of what the model says of it, as a comparison shows them."""
+
+import pickle
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vibench.acquisition import open_recording
+
+from ..comparison.curve import Curve, CurveKind, CurveOrigin, sorted_curve
+from ..comparison.recording_curves import predicted_curves
+from ..dynamics import RecordedLevel, recorded_level
+from ..errors import NotEnoughData
+from ..frequency_response.request import FrequencyResponseRequest
+from ..kinds.analyses import ANALYSES
+from ..kinds.analysis_kind import AnyResult
+from ..model.overlay import AbstractOverlay, Simulation
+from ..recordings.checks import Verdict
+from ..sine.stepped_response import SteppedResponse
+from ..sine.sweep import SweepResponse
+from ..tables import Labelled
+from .campaign_results import AnalysisFailure, result_of
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedRecording(Labelled):
+    """What a comparison keeps of a recording; small, so that it crosses from the process that made it."""
+
+    path: Path
+    name: str
+    curves: tuple[Curve, ...]
+    failures: tuple[str, ...]
+    """Sentences on what could not be analysed or simulated."""
+    warnings: tuple[str, ...]
+    """What the checks of the recording found."""
+    kept: bytes
+    """The whole result, for reports: only they open it, with `kept_result`."""
+
+
+def compare_recording(
+    path: Path, request: FrequencyResponseRequest, simulation: Simulation
+) -> ComparedRecording:
+    """Analyse a recording for a comparison.
+
+    Parameters
+    ----------
+    simulation
+        What is laid over it, if anything.
+
+    Raises
+    ------
+    AnalysisError, RecordingError
+        When nothing in it is usable, in one sentence.
+
+    """
+    with open_recording(path) as recording:
+        result, failures = result_of(recording, simulation, request)
+    name = result.analysis.facts.name
+    return ComparedRecording(
+        path=path,
+        name=name,
+        curves=tuple(sorted_curve(each) for each in _curves(result, name)),
+        failures=tuple(each.sentence for each in failures),
+        warnings=tuple(each.text for each in result.analysis.checks if each.verdict is Verdict.WARNING),
+        kept=pickle.dumps((result, failures)),
+    )
+
+
+def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisFailure, ...]]:
+    """Open the whole result again; the bytes were made by this program a moment ago, never by a file."""
+    result, failures = pickle.loads(compared.kept)  # noqa: S301
+    return result, failures
+
+
+def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
+    """Give the base amplitude [m] over frequency [Hz] of a stepped sine or a sweep, as pairs that ascend.
+
+    Raises
+    ------
+    NotEnoughData
+        When the recording is of another kind, or of one frequency.
+
+    """
+    result, _ = kept_result(compared)
+    found = drive_level(result)
+    if not found:
+        raise NotEnoughData(
+            f"{compared.name} has no level over a range of frequencies; take a stepped sine or a sweep"
+        )
+    return found
+
+
+def recorded_response(path: Path) -> RecordedLevel:
+    """Give the level of a stepped sine or a sweep, and Response I as measured: a line on a map.
+
+    Raises
+    ------
+    NotEnoughData
+        When the recording is of another kind, or of one frequency.
+    RecordingError
+        When the file is no recording.
+
+    """
+    found = compare_recording(path, FrequencyResponseRequest(), Simulation.LEFT_OUT)
+    measured = [
+        each
+        for each in found.curves
+        if each.origin is CurveOrigin.MEASURED and each.response is CurveKind.RESPONSE_I
+    ]
+    return RecordedLevel(path.stem, level_of_drive(found), measured)
+
+
+def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
+    """Give the same of an analysed recording; nothing where it is of another kind, or of one frequency."""
+    match result.analysis.response:
+        case (SweepResponse() | SteppedResponse()) as found:
+            try:
+                return recorded_level(found.frequency_hz, found.drive_amplitude_m)
+            except NotEnoughData:
+                return ()
+        case _:
+            return ()
+
+
+def _of_draws(curve: Curve, laid: AbstractOverlay[Any]) -> Curve:
+    """Put the middle and the scatter of all draws in the place of the first one's values."""
+    note = f"{curve.note}; under the {laid.run.driven.value}"
+    found = laid.quantity(curve.response.value)
+    if found is None or laid.run.draws == 1:
+        return replace(curve, note=note)
+    order = np.argsort(found.frequency_hz)
+    at = np.searchsorted(found.frequency_hz[order], curve.frequency_hz)
+    place = order[np.minimum(at, order.size - 1)]
+    if not np.array_equal(found.frequency_hz[place], curve.frequency_hz):
+        return replace(curve, note=note)
+    return replace(
+        curve,
+        magnitude=found.median[place],
+        relative_sd=found.relative_sd[place],
+        note=f"median of {laid.run.draws} draws under the {laid.run.driven.value}",
+    )
+
+
+def _curves(result: AnyResult, name: str) -> Iterator[Curve]:
+    curves = ANALYSES[result.kind].curves
+    yield from curves(name, CurveOrigin.MEASURED, result.analysis.response)
+    if result.laid is None:
+        return
+    for each in curves(name, CurveOrigin.SIMULATED, result.laid.response):
+        yield _of_draws(each, result.laid)
+    if result.laid.prediction.frequency_hz.size > 1:
+        yield from predicted_curves(name, result.laid.prediction)

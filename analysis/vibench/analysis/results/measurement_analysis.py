@@ -1,0 +1,65 @@
+"""From one recording to its result, by what was played."""
+
+from pathlib import Path
+from typing import Any
+
+from vibench.acquisition.recording import Recording, open_recording
+
+from ..errors import AnalysisError, UnusableData
+from ..frequency_response.noise_response import DEFAULT_REQUEST
+from ..frequency_response.request import FrequencyResponseRequest
+from ..kinds.analyses import ANALYSES
+from ..recordings.channel_levels import require_moving_channels
+from ..recordings.channels import ObservedChannels, ProgressObserver, RecordedChannels, Unobserved
+from ..recordings.checks import AbstractAnalysis
+from ..recordings.facts import recording_facts
+
+UNOBSERVED = Unobserved()
+CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
+"""What a calculation raises over a recording that is well formed, and whose parts do not go together."""
+
+
+def analyse(
+    recording: Recording | Path | str,
+    request: FrequencyResponseRequest = DEFAULT_REQUEST,
+    observer: ProgressObserver = UNOBSERVED,
+) -> AbstractAnalysis[Any, Any]:
+    """Analyse a recording, complete or not, by the excitation that its plan names.
+
+    Parameters
+    ----------
+    recording
+        Open, or the path of its file. Finished, interrupted or still growing: what it held when it was opened
+        is analysed.
+    request
+        How the transmission of noise is estimated; other excitations take no notice.
+    observer
+        Told how far it is.
+
+    Raises
+    ------
+    AnalysisError
+        With one sentence that names the file, when nothing in it is usable.
+
+    """
+    if isinstance(recording, Path | str):
+        with open_recording(Path(recording)) as opened:
+            return analyse(opened, request, observer)
+    name = recording.path.name
+    observer.begin(name, "looking at every channel")
+    facts = recording_facts(recording, observer.read)
+    observer.begin(name, "analysing")
+    try:
+        channels = ObservedChannels(RecordedChannels(recording), observer)
+        require_moving_channels(facts.channels)
+        plan = facts.measurement.excitation
+        found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
+    except AnalysisError as error:
+        ended = f"{facts.state.value}" + (f": {facts.reason}" if facts.reason else "")
+        raise type(error)(f"{recording.path.name} ({ended}): {error}") from error
+    except CONTRADICTIONS as error:
+        raise UnusableData(
+            f"{recording.path.name} cannot be analysed: its samples and tables are not what its plan says "
+            f"({type(error).__name__}: {error}); read them with h5py"
+        ) from error
+    return found

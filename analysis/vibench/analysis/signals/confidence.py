@@ -1,0 +1,105 @@
+"""How far an averaged estimate can be trusted: standard deviations, bounds and significance levels."""
+
+import numpy as np
+import scipy
+
+from .arrays import Complexes, Reals
+
+DEFAULT_CONFIDENCE = 0.95
+_SMALLEST_DEGREES_OF_FREEDOM = 1e-3
+"""Keeps the quantile finite where averages are worth hardly more than one."""
+
+
+def relative_sd(coherence: Reals, n_eff: float) -> Reals:
+    """Give the standard deviation of ln(magnitude), equal to that of the phase in radians.
+
+    sqrt((1 - g2) / (2 g2 n_eff)) for h1 and h2 (Bendat & Piersol, Random Data, 4th ed., section 9.2)
+    and for hv too: Fuller's variance of a regression with errors in both variables comes to the same
+    expression. Infinite where the coherence is zero.
+    """
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.sqrt((1 - coherence) / (2 * coherence * n_eff)))
+
+
+def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Reals:
+    """Half width of the two-sided bounds of a relative error whose spread was estimated from the data.
+
+    Given the drive, h1 is a regression with 2 (n - 1) real degrees of freedom left over, so each of
+    its components is Student-distributed; the unbiased variance divides by n - 1.
+    """
+    freedom = max(2 * (n_eff - 1), _SMALLEST_DEGREES_OF_FREEDOM)
+    quantile = float(scipy.stats.t.ppf((1 + confidence) / 2, freedom))
+    return np.asarray(quantile * relative * np.sqrt(n_eff / max(n_eff - 1, _SMALLEST_DEGREES_OF_FREEDOM)))
+
+
+def standard_uncertainty(values: Reals | Complexes) -> float:
+    """Give that of the mean of few equal values, so that twice it holds the truth in 95 of 100 cases.
+
+    Their standard error by Student's t over the normal deviate (JCGM 100:2008, G.3.2); of complex values that
+    of either part.
+    """
+    count, parts = values.size, 2 if np.iscomplexobj(values) else 1
+    error = float(np.std(values, ddof=1)) / np.sqrt(parts * count)
+    beyond = (1 - DEFAULT_CONFIDENCE) / 2
+    return float(error * scipy.stats.t.isf(beyond, parts * (count - 1)) / scipy.stats.norm.isf(beyond))
+
+
+def magnitude_bounds(magnitude: Reals, half_width: Reals) -> tuple[Reals, Reals]:
+    """Bounds of a magnitude, symmetric on a logarithmic scale.
+
+    ln(magnitude) is unbiased to second order in the error (the radial and the tangential part cancel),
+    which the magnitude itself is not.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        lower = magnitude * np.exp(-half_width)
+        upper = magnitude * np.exp(half_width)
+    return np.asarray(lower), np.asarray(np.where(np.isfinite(upper), upper, np.inf))
+
+
+def phase_half_width(half_width: Reals) -> Reals:
+    """Half width of the bounds of a phase [rad]: arcsin of the relative half width, pi past 1.
+
+    Fieller's argument: the part of the estimate perpendicular to the true direction is
+    Student-distributed whatever the magnitude is, so the arcsine is exact, not a linearisation.
+    """
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(half_width < 1, np.arcsin(np.minimum(half_width, 1)), np.pi))
+
+
+def coherence_significance(n_eff: float, confidence: float) -> float:
+    """Coherence that independent noises exceed with probability 1 - ``confidence``: 1 - a^(1/(n - 1)).
+
+    (Carter, Knapp & Nuttall 1973, IEEE Trans. Audio Electroacoust. 21, 337-344.)
+    """
+    if n_eff <= 1:
+        return 1.0
+    return float(-np.expm1(np.log1p(-confidence) / (n_eff - 1)))
+
+
+def chi_square_bounds(density: Reals, n_eff: float, confidence: float) -> tuple[Reals, Reals]:
+    """Bounds of an averaged spectral density: chi-square with 2 n_eff degrees of freedom."""
+    freedom = 2 * n_eff
+    high = float(scipy.stats.chi2.ppf((1 + confidence) / 2, freedom))
+    low = float(scipy.stats.chi2.ppf((1 - confidence) / 2, freedom))
+    return np.asarray(density * freedom / high), np.asarray(density * freedom / low)
+
+
+_ONE_IN = 1e-3
+"""Right models that exceed the limit of their chi square."""
+
+
+def chi_square_of(squared: Reals, n_eff: float) -> Reals:
+    """Chi square with 2 degrees of freedom of a line's squared residual over its estimated scatter.
+
+    The two parts of a residual, over a standard deviation from n averages, follow F(2, 2 (n - 1)) and not
+    chi square; what exceeds either with the same probability corresponds: nu ln(1 + squared / nu), nu =
+    2 (n - 1). It is twice the negative logarithm of Student's likelihood, but for a factor (nu + 2) / nu.
+    """
+    freedom = max(2 * (n_eff - 1), 1.0)
+    return np.asarray(freedom * np.log1p(squared / freedom))
+
+
+def chi_square_limit(freedom: int, lines_like_one: float = 1.0) -> float:
+    """Chi square per degree of freedom that one right model in a thousand exceeds."""
+    independent = max(freedom / lines_like_one, 1.0)
+    return float(scipy.stats.chi2.isf(_ONE_IN, independent) / independent)

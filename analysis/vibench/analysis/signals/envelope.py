@@ -1,0 +1,36 @@
+"""Smallest and largest values of a long signal, bin by bin: all that a plot of it can show."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ..tables import Labelled
+from .arrays import Reals
+
+DEFAULT_BINS = 1500
+"""More than a figure has pixels across."""
+
+
+@dataclass(frozen=True)
+class Envelope(Labelled):
+    """Extremes of a signal in equal stretches of time; arrays of shape (bins,)."""
+
+    OWN_UNITS: ClassVar = {"lower": "{unit}", "upper": "{unit}"}
+
+    time_s: Reals
+    """Middle of each stretch."""
+    lower: Reals
+    upper: Reals
+
+
+def envelope(
+    samples: Reals, sample_rate_hz: float, *, bins: int = DEFAULT_BINS, start_s: float = 0.0
+) -> Envelope:
+    """Reduce a signal, shape (samples,), to its extremes in at most ``bins`` stretches."""
+    length = max(1, -(-samples.size // bins))
+    starts = np.arange(0, samples.size, length)
+    middle = np.minimum(starts + 0.5 * length, samples.size) / sample_rate_hz
+    return Envelope(
+        start_s + middle, np.minimum.reduceat(samples, starts), np.maximum.reduceat(samples, starts)
+    )

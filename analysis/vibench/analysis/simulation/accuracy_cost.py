@@ -1,0 +1,72 @@
+"""What each accuracy costs and errs, as docs/accuracy.md has measured it, for whoever chooses one."""
+
+from dataclasses import dataclass
+
+from vibench.sim import Accuracy, PowerLaw
+
+from .request import Exponent, SimulationRequest
+
+MACHINE = "one core of a 2-core AMD EPYC"
+"""Where it was measured; `vibench tradeoff` measures it anew on any machine."""
+
+
+@dataclass(frozen=True)
+class MeasuredLevel:
+    """One level, on the paper's specimen; simulated seconds per second of one core."""
+
+    free: float
+    """Hertz's contact, 260 Hz and 1 um: no impact."""
+    periodic: float
+    """130 Hz and 20 um: impacts that repeat."""
+    chaos: float
+    """260 Hz and 5 um."""
+    power: float
+    """A force at every p, as of power:3 at 150 Hz and 10 um."""
+    state_error: float
+    """Of a periodic state after 2 s, in units of 100 um and 0.1 m/s."""
+    response_i_error: float
+    """Relative, of a periodic motion, against reference."""
+
+
+MEASURED = {
+    Accuracy.QUICK: MeasuredLevel(21015.0, 3603.0, 3084.0, 3368.0, 4.9e-10, 2.9e-10),
+    Accuracy.STANDARD: MeasuredLevel(21501.0, 4182.0, 3077.0, 2902.0, 4.9e-10, 2.9e-10),
+    Accuracy.REFERENCE: MeasuredLevel(22280.0, 675.0, 542.0, 1650.0, 6.3e-12, 0.0),
+}
+CHAOS_SCATTER = 0.03
+"""Response I in chaos scatters by so much from start to start, at every level."""
+
+
+def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
+    """Say what a request's accuracy costs and errs, and how long it takes on so many idle cores."""
+    level = MEASURED[request.accuracy]
+    each_s = request.simulated_s / len(request.models)
+    laws = [request.specimen_under(model).contact for model in request.models]
+    powers = [isinstance(law, PowerLaw) for law in laws]
+    shortest_s = sum(each_s / (level.power if is_power else level.free) for is_power in powers)
+    longest_s = sum(each_s / (level.power if is_power else level.chaos) for is_power in powers)
+    on_top = "; the exponent about doubles that" if request.exponent is Exponent.COMPUTED else ""
+    if request.budget_s > 0.0:
+        on_top += f"; a point whose start is forgotten takes {request.budget_s:g} s of a core more, at most"
+    error = f"{level.response_i_error:.0e}" if level.response_i_error else "none"
+    shortest, longest = _time(shortest_s / cores), _time(longest_s / cores)
+    return (
+        (
+            f"{request.points} points of {request.duration_s:g} s on {cores} idle cores: "
+            f"{shortest} without impacts to {longest} in chaos{on_top}."
+        ),
+        (
+            f"A second simulates {level.free:.0f} s without impacts, {level.periodic:.0f} s of impacts that "
+            f"repeat, {level.chaos:.0f} s of chaos, {level.power:.0f} s of a power law."
+        ),
+        (
+            f"Error of a periodic state {level.state_error:.0e}, of Response I against reference {error}; "
+            f"in chaos Response I scatters by {CHAOS_SCATTER:.0%} at every level."
+        ),
+        f"Measured on {MACHINE}.",
+    )
+
+
+def _time(seconds: float) -> str:
+    minute = 60.0
+    return f"{seconds:.2g} s" if seconds < minute else f"{seconds / minute:.2g} min"

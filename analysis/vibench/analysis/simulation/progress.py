@@ -1,0 +1,166 @@
+"""A simulation as far as it has come: curves, exponents and similarity of what is there."""
+
+import numpy as np
+
+from vibench.sim import FoundMotion, StartMemory
+
+from ..comparison.curve import Curve, CurveKind, CurveOrigin
+from ..errors import AnalysisError
+from ..model.similarity import Similarity, SimilarityCurve, similarity
+from ..signals.arrays import Reals
+from .request import PartialResult, SimulatedPoint, SimulatedSignal, Trouble
+
+MOTION_COLUMNS = ("Model", "f (Hz)", "Response I", "Response II", "Error", "Share of starts", "Motion")
+
+
+def _motion_words(motion: FoundMotion) -> tuple[str, ...]:
+    """Say the numbers of a motion, its share and what it is."""
+    share, period = motion.share, "" if motion.period is None else f", {motion.period} drive periods"
+    return (
+        "–" if motion.response_i is None else f"{motion.response_i:.4g}",
+        "–" if motion.response_ii is None else f"{motion.response_ii:.4g}",
+        "–" if motion.error_estimate is None else f"{motion.error_estimate:.1g}",
+        f"{100 * share.share:.0f} % ({100 * share.low:.0f} to {100 * share.high:.0f} %)",
+        f"{motion.motion}{period}",
+    )
+
+
+class SimulationProgress:
+    """Takes the pieces as they come, in any order."""
+
+    def __init__(self, amplitude_m: float, points: int, note: str) -> None:
+        self._amplitude_m = amplitude_m
+        self._points = points
+        self._note = note
+        self._found: dict[str, dict[float, SimulatedPoint]] = {}
+        self._signals: dict[str, SimulatedSignal] = {}
+        self._troubles: list[str] = []
+
+    def add(self, parts: tuple[PartialResult, ...]) -> None:
+        """Take what has come."""
+        for part in parts:
+            match part:
+                case SimulatedPoint():
+                    self._found.setdefault(part.model, {})[part.frequency_hz] = part
+                case SimulatedSignal():
+                    self._signals[part.model] = part
+                case Trouble():
+                    self._troubles.append(part.sentence)
+
+    @property
+    def asked(self) -> int:
+        """Points that were asked for."""
+        return self._points
+
+    @property
+    def done(self) -> int:
+        """Points that have an answer, good or bad."""
+        return sum(len(each) for each in self._found.values()) + len(self._troubles)
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Those of which something is known."""
+        return tuple(dict.fromkeys((*self._signals, *self._found)))
+
+    @property
+    def signals(self) -> tuple[SimulatedSignal, ...]:
+        """Time signals, one a model."""
+        return tuple(self._signals.values())
+
+    @property
+    def largest_signal_m(self) -> float:
+        """Furthest that a time signal goes from rest."""
+        reached = [np.max(np.abs((each.displacement_m, each.relative_m))) for each in self.signals]
+        return float(max(reached, default=0.0))
+
+    @property
+    def smallest_and_largest_response(self) -> tuple[float, float]:
+        """Range of all responses so far; zeros before the first."""
+        points = [point for found in self._found.values() for point in found.values()]
+        known = [v for p in points for v in (p.response_i, p.response_ii) if v is not None and v > 0]
+        return (min(known), max(known)) if known else (0.0, 0.0)
+
+    @property
+    def troubles(self) -> tuple[str, ...]:
+        """What could not be computed."""
+        return tuple(self._troubles)
+
+    def column(self, model: str, name: str) -> tuple[Reals, Reals]:
+        """Give frequencies and one quantity of a model, NaN where it is not known."""
+        points = [self._found[model][key] for key in sorted(self._found.get(model, {}))]
+        values = [getattr(point, name) for point in points]
+        frequency_hz = np.array([point.frequency_hz for point in points], dtype=np.float64)
+        return frequency_hz, np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+
+    def other_motions(self, model: str) -> tuple[Reals, Reals]:
+        """Give frequencies, and Response I of each motion that other starts came to there."""
+        found = [
+            (point.frequency_hz, motion.response_i)
+            for point in self._found.get(model, {}).values()
+            if point.ensemble is not None
+            for place, motion in enumerate(point.ensemble.motions)
+            if place != point.ensemble.asked and motion.response_i is not None
+        ]
+        columns = np.array(sorted(found), dtype=np.float64).reshape(-1, 2)
+        return columns[:, 0], columns[:, 1]
+
+    @property
+    def motion_rows(self) -> tuple[tuple[str, ...], ...]:
+        """Words for every motion at every point that came to more than one, by `MOTION_COLUMNS`."""
+        return tuple(
+            (model, f"{point.frequency_hz:g}", *_motion_words(motion))
+            for model, points in self._found.items()
+            for point in (points[key] for key in sorted(points))
+            if point.ensemble is not None and len(point.ensemble.motions) > 1
+            for motion in point.ensemble.motions
+        )
+
+    @property
+    def forgotten(self) -> int:
+        """Points whose start is forgotten: which motion they come to is chance."""
+        points = (point for found in self._found.values() for point in found.values())
+        return sum(point.memory is StartMemory.LOST for point in points)
+
+    def collision_bands_hz(self, model: str) -> tuple[tuple[float, float], ...]:
+        """Stretches of neighbouring points at which the masses strike."""
+        frequency_hz, impacts = self.column(model, "impacts")
+        striking = np.flatnonzero(impacts > 0)
+        groups = np.split(striking, np.flatnonzero(np.diff(striking) > 1) + 1) if striking.size else []
+        return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
+
+    def curves(self) -> tuple[Curve, ...]:
+        """Give Responses I and II of every model, to be laid over recordings."""
+        return tuple(
+            Curve(
+                f"model {model}, {1e6 * self._amplitude_m:.4g} µm",
+                CurveOrigin.PREDICTED,
+                response,
+                *self.column(model, name),
+                np.full(len(self._found[model]), np.nan),
+                self._note,
+                self._amplitude_m,
+            )
+            for model in self.models
+            if model in self._found
+            for response, name in (
+                (CurveKind.RESPONSE_I, "response_i"),
+                (CurveKind.RESPONSE_II, "response_ii"),
+            )
+        )
+
+    def similarity(self) -> Similarity | None:
+        """Compare Response I of the second model with the first's, where both are known; None before."""
+        if len(self._found) < 2:
+            return None
+        first, second = (model for model in self.models if model in self._found)
+        both = sorted(self._found[first].keys() & self._found[second].keys())
+        frequency_hz = np.array(both, dtype=np.float64)
+        curves = []
+        for model in (first, second):
+            values = [self._found[model][key].response_i for key in both]
+            response = np.array([np.nan if v is None else v for v in values], dtype=np.float64)
+            curves.append(SimilarityCurve(frequency_hz, response, self._amplitude_m))
+        try:
+            return similarity(curves[0], curves[1])
+        except AnalysisError:
+            return None

@@ -1,0 +1,237 @@
+"""The process that simulates for a window: it computes one request after another, and can be told to stop.
+
+A simulation that tells its answers as they come, and stops when it is told to.
+"""
+
+import signal
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+import numpy as np
+
+from vibench.acquisition import AcquisitionError
+from vibench.sim import Harmonic, Outcome, ScenePrediction, integrate
+from vibench.sim.operating_system.this import lower_priority
+from vibench.sim.study import (
+    MESSAGE,
+    MemoryStore,
+    PointAnswer,
+    PointState,
+    Start,
+    Study,
+    ThreadExecutor,
+    prediction_at,
+    run_study,
+)
+
+from ..dynamics import (
+    BranchRequest,
+    ChainRequest,
+    SpectrumRequest,
+    branch_lines,
+    chain_runs,
+    spectrum_points,
+)
+from .map_request import MapRequest, MotionRequest, map_pictures, settled_motion
+from .request import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+
+Tell = Callable[[tuple[PartialResult, ...]], None]
+Cancelled = Callable[[], bool]
+SIGNAL_PERIODS = 12
+SAMPLES_PER_PERIOD = 400
+
+
+class _TellingStore(MemoryStore):
+    """Keeps answers in memory, and tells each one once."""
+
+    def __init__(self, study: Study, tell: Tell) -> None:
+        super().__init__(study)
+        self._study = study
+        self._tell = tell
+
+    def keep(self, answers: Sequence[PointAnswer]) -> None:
+        """Keep and tell."""
+        super().keep(answers)
+        self._tell(tuple(self._pieces(answers)))
+
+    def _pieces(self, answers: Sequence[PointAnswer]) -> Iterator[PartialResult]:
+        study = self._study
+        for answer in answers:
+            place = study.grid.place(answer.number)
+            model, frequency_hz = study.models[place[0]], study.frequencies_hz[place[-1]]
+            if answer.state is PointState.FAILED:
+                said = bytes(self.arrays[MESSAGE][answer.number]).decode()
+                yield Trouble(f"{model} at {frequency_hz:g} Hz: {said}")
+                continue
+            amplitude_m = study.amplitudes_m[place[-3]]
+            found = prediction_at(
+                self.arrays, answer.number, frequency_hz, amplitude_m, study.accuracy, Start.REST.value
+            )
+            yield simulated_point(model, found)
+
+
+def simulate(
+    request: SimulationRequest, tell: Tell, cancelled: Cancelled, workers: int | None = None
+) -> None:
+    """Compute what is asked for, the time signals first; returns early when cancelled.
+
+    ``cancelled`` is asked several times a second; scenes under way, parts of a second each, are ended.
+    """
+    for model in request.models if request.signal_hz is not None else ():
+        if cancelled():
+            return
+        tell((simulated_signal(request, model, request.signal_hz or 0.0),))
+    study = request.study
+    executor = ThreadExecutor(workers)
+    try:
+        run_study(study, executor, _TellingStore(study, tell), cancelled=cancelled)
+    finally:
+        executor.close()
+
+
+def simulated_signal(
+    request: SimulationRequest, model: str, frequency_hz: float
+) -> SimulatedSignal | Trouble:
+    """Follow the specimen from rest, and give the last periods."""
+    specimen = request.specimen_under(model)
+    drive = Harmonic(frequency_hz, request.amplitude_m)
+    shown_s = min(SIGNAL_PERIODS / frequency_hz, 0.5 * request.duration_s)
+    lead_s = request.duration_s - shown_s
+    lead = integrate(specimen, drive, lead_s, request.accuracy)
+    if lead.outcome is not Outcome.REACHED_END:
+        return Trouble(f"{model} at {frequency_hz:g} Hz: {lead.outcome.text}")
+    end = integrate(
+        specimen,
+        drive,
+        shown_s,
+        request.accuracy,
+        lead.final_state,
+        SAMPLES_PER_PERIOD * frequency_hz,
+        start_time_s=lead_s,
+    )
+    states = np.asarray(end.states)
+    return SimulatedSignal(
+        model=model,
+        frequency_hz=frequency_hz,
+        time_s=np.asarray(end.time_s),
+        displacement_m=states[:, 0],
+        relative_m=states[:, 1] - states[:, 2],
+        gaps_m=specimen.gaps_m,
+    )
+
+
+def simulated_point(model: str, found: ScenePrediction) -> SimulatedPoint:
+    """Take from a prediction what a picture shows."""
+    return SimulatedPoint(
+        model=model,
+        frequency_hz=found.frequency_hz,
+        response_i=found.response_i,
+        response_ii=found.response_ii,
+        impacts=found.impacts,
+        motion=str(found.motion),
+        lyapunov_per_s=found.lyapunov_per_s,
+        error_estimate=found.error_estimate,
+        memory=found.memory,
+        ensemble=found.ensemble,
+    )
+
+
+Asked = SimulationRequest | BranchRequest | SpectrumRequest | ChainRequest | MapRequest | MotionRequest
+"""What the process answers."""
+
+
+def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
+    """Compute whatever is asked for, telling it piece by piece; returns early when cancelled."""
+    match request:
+        case SimulationRequest():
+            simulate(request, tell, cancelled)
+        case BranchRequest():
+            _tell_each(branch_lines(request), tell, cancelled)
+        case SpectrumRequest():
+            _tell_each(spectrum_points(request), tell, cancelled)
+        case ChainRequest():
+            _tell_each(chain_runs(request), tell, cancelled)
+        case MapRequest():
+            map_pictures(request, lambda picture: tell((picture,)), cancelled)
+        case MotionRequest():
+            tell((settled_motion(request),))
+
+
+def _tell_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled) -> None:
+    for part in parts:
+        if cancelled():
+            return
+        tell((part,))
+
+
+@dataclass(frozen=True)
+class Begin:
+    """Compute this; what was being computed is dropped."""
+
+    number: int
+    request: Asked
+
+
+@dataclass(frozen=True)
+class Cancel:
+    """Compute nothing any more."""
+
+
+@dataclass(frozen=True)
+class Grown:
+    """More of an answer."""
+
+    number: int
+    parts: tuple[PartialResult, ...]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """There is no more of an answer; it was cancelled, or it is complete."""
+
+    number: int
+
+
+Order = Begin | Cancel
+
+
+def serve(connection: "Connection[Grown | Ended, Order]") -> None:
+    """Obey until the other end is closed."""
+    # Ctrl-C belongs to whoever began this process, and ends it by closing the connection.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(OSError):
+        lower_priority(5)  # A window, and a measurement, come first.
+    waiting: Begin | None = None
+    with suppress(EOFError, BrokenPipeError):
+        while True:
+            match waiting or connection.recv():
+                case Begin() as begin:
+                    waiting = _computed(connection, begin)
+                case Cancel():
+                    waiting = None
+
+
+def _computed(connection: "Connection[Grown | Ended, Order]", begin: Begin) -> Begin | None:
+    """Compute one request; gives the next, when it came meanwhile."""
+    following: Begin | None = None
+    is_over = False
+
+    def is_cancelled() -> bool:
+        nonlocal following, is_over
+        while connection.poll():
+            order = connection.recv()
+            following = order if isinstance(order, Begin) else None
+            is_over = True
+        return is_over
+
+    def tell(parts: tuple[PartialResult, ...]) -> None:
+        connection.send(Grown(begin.number, parts))
+
+    try:
+        answer(begin.request, tell, is_cancelled)
+    except (ValueError, AcquisitionError) as error:
+        tell((Trouble(str(error)),))
+    connection.send(Ended(begin.number))
+    return following

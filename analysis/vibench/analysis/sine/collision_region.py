@@ -1,0 +1,219 @@
+"""Where in a sweep the masses collide: found from what no order of the drive explains."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from ..errors import InvalidRequest
+from ..signals.arrays import Flags, Reals
+from ..tables import Labelled
+from .sweep import SweepResponse
+
+_NOISE_FACTOR = 4.0
+"""Residual over noise: an interval's rms of hundreds of samples scatters by a few percent only."""
+_DISTORTION = 0.02
+"""Residual over order 1 that a smooth motion may have: harmonics above the third of amplifier and shaker."""
+_RINGING = 2.0
+"""Residual over that of the specimen without contact in the same sweep, which its description may miss."""
+_TOO_FAST = 0.5
+"""Residual over order 1 that collisions exceed in most intervals: ringing that may be more can hide them."""
+_IMPACTS = 0.1
+"""Orders 2 and 3 over order 1 of impacts; ringing leaves at most 0.05."""
+_ENOUGH = 0.25
+"""Part of a run in which impacts show themselves so, where no specimen tells how it rings."""
+_SMOOTH_AT_MOST = 0.1
+"""A tenth of order 1 unexplained is no smooth motion, whatever the quietest intervals of a sweep show."""
+_QUIET_QUANTILE = 0.1
+_CLEARLY = 2.0
+"""Residual over threshold that leaves no doubt."""
+_VOTE_S = 1.0
+"""A collision lasts: an interval counts when most of its neighbourhood of this length agrees."""
+_MERGE_S = 3.0
+"""Quiet stretches shorter than this do not part a region: motion between impacts may settle briefly."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """One end of a collision region, between two bounds."""
+
+    frequency_hz: float
+    time_s: float
+    lower_hz: float
+    upper_hz: float
+    """The edge lies between these: between the last interval that is clearly the one and the first
+    that is clearly the other. Ring-down after the last impact widens it."""
+
+
+@dataclass(frozen=True)
+class CollisionRegion:
+    """A stretch of the sweep in which the masses collide."""
+
+    start: Edge
+    """In the order of time; its frequency is the higher one in a sweep downwards."""
+    stop: Edge
+    reaches_start: bool
+    """Whether the sweep began inside the region, so that ``start`` is the sweep's end and no edge."""
+    reaches_stop: bool
+
+    @property
+    def low_hz(self) -> float:
+        """Lower end [Hz]."""
+        return min(self.start.frequency_hz, self.stop.frequency_hz)
+
+    @property
+    def high_hz(self) -> float:
+        """Upper end [Hz]."""
+        return max(self.start.frequency_hz, self.stop.frequency_hz)
+
+
+@dataclass(frozen=True)
+class Collisions(Labelled):
+    """All collision regions of a sweep, in the order of time, and what they were judged by."""
+
+    OWN_UNITS: ClassVar = {"residual_rms": "m s-1", "threshold": "m s-1", "noise_rms": "m s-1"}
+
+    regions: tuple[CollisionRegion, ...]
+    residual_rms: Reals
+    """Velocity that no order explains, shape (intervals,) [m/s]."""
+    threshold: Reals
+    """What a smooth motion may leave, shape (intervals,) [m/s]."""
+    is_colliding: Flags
+    """Intervals that lie in a region, shape (intervals,)."""
+    is_unexplained: Flags
+    """Intervals that leave more than the sensors' noise and distortion explain, shape (intervals,): what
+    rattles from a sweep's beginning to its end passes for the bench's own noise."""
+    too_fast_hz: tuple[tuple[float, float], ...]
+    """Ends of stretches, in the order of time, in which the specimen may ring as much as collisions would:
+    whether the masses collide there is not determined."""
+    noise_rms: float
+    """Noise that the threshold allows for [m/s]."""
+
+
+def collisions(sweep: SweepResponse) -> Collisions:
+    """Find where the motion stops being a smooth, slowly varying sine.
+
+    Impacts break the motion: they leave velocity that no order of the drive explains. So does a fast sweep,
+    because resonances that it has passed ring on. An interval collides when this residual is above 4 times
+    the noise, above 2 % of order 1, and above twice that of the specimen without contact under the recorded
+    base motion. The noise is the larger of what the sixth difference of the samples shows and of the quietest
+    tenth of the sweep (as far as that may be smooth at all). Single intervals are outvoted by their
+    neighbourhood, and those with drop-outs of the laser are taken as their neighbours. Orders 2 and 3 above
+    a tenth of order 1 show impacts, not ringing; where no specimen is known, they must be seen.
+    """
+    whole = np.flatnonzero(sweep.is_clear)
+    residual = np.interp(sweep.time_s, sweep.time_s[whole], sweep.velocity.residual_rms[whole])
+    fundamental = np.abs(sweep.velocity.order(1.0))
+    noise = _noise(sweep, residual, fundamental)
+    votes = max(1, round(_VOTE_S / sweep.interval_s))
+    if votes >= residual.size:
+        raise InvalidRequest(
+            f"the sweep has {residual.size} intervals of {sweep.interval_s:g} s; finding collisions needs "
+            f"more than {votes}"
+        )
+    ringing = _RINGING * np.nan_to_num(sweep.linear_residual)
+    impacts = np.hypot(*(np.abs(sweep.velocity.order(each)) for each in (2.0, 3.0))) > _IMPACTS * fundamental
+    # Within a vote: resonances may lie a little beside where the specimen's description puts them.
+    most = np.where(impacts, 0.0, maximum_filter1d(ringing, votes))
+    smooth = np.maximum(_DISTORTION, most) * fundamental
+    threshold = np.hypot(_NOISE_FACTOR * noise, smooth)
+    above = residual > threshold
+    is_known = bool(np.isfinite(sweep.linear_residual).all())
+    inside = np.zeros(above.size, dtype=np.bool_)
+    regions = []
+    for run in _merged(_runs(_majority(above, votes)), round(_MERGE_S / sweep.interval_s)):
+        first, last = _trimmed(above, *run, votes)
+        if is_known or np.mean(impacts[first : last + 1]) >= _ENOUGH:
+            regions.append(_region(sweep, residual / threshold, first, last))
+            inside[first : last + 1] = True
+    hz, is_unclear = sweep.frequency_hz, _majority(above | (ringing > _TOO_FAST), votes) & ~inside
+    return Collisions(
+        regions=tuple(regions),
+        residual_rms=residual,
+        threshold=threshold,
+        is_colliding=inside,
+        is_unexplained=residual > np.hypot(_NOISE_FACTOR * sweep.noise_rms, smooth),
+        too_fast_hz=tuple((float(hz[first]), float(hz[last])) for first, last in _runs(is_unclear)),
+        noise_rms=noise,
+    )
+
+
+def _noise(sweep: SweepResponse, residual: Reals, fundamental: Reals) -> float:
+    quiet = float(np.quantile(residual, _QUIET_QUANTILE))
+    smooth = _SMOOTH_AT_MOST * float(np.median(fundamental))
+    return max(sweep.noise_rms, min(quiet, smooth / _NOISE_FACTOR))
+
+
+def _majority(above: Flags, votes: int) -> Flags:
+    """Ask each interval's neighbourhood; at the ends of the sweep it is one-sided."""
+    total = np.concatenate(([0], np.cumsum(above)))
+    place = np.arange(above.size)
+    low, high = np.maximum(place - votes // 2, 0), np.minimum(place + votes // 2 + 1, above.size)
+    return np.asarray(2 * (total[high] - total[low]) > high - low)
+
+
+def _runs(flags: Flags) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], flags.astype(np.int8), [0]))))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _merged(runs: list[tuple[int, int]], gap: int) -> list[tuple[int, int]]:
+    merged: list[tuple[int, int]] = []
+    for first, last in runs:
+        if merged and first - merged[-1][1] <= gap:
+            merged[-1] = (merged[-1][0], last)
+        else:
+            merged.append((first, last))
+    return merged
+
+
+def _trimmed(above: Flags, first: int, last: int, votes: int) -> tuple[int, int]:
+    """Move the ends of a run, which the vote blurs, to the split that misjudges the fewest intervals."""
+    half = votes // 2 + 1
+    begin = _best_split(above, max(0, first - half), min(first + half, last))
+    end = (
+        above.size
+        - 1
+        - _best_split(
+            above[::-1],
+            above.size - 1 - min(above.size - 1, last + half),
+            above.size - 1 - max(last - half, begin),
+        )
+    )
+    return begin, max(begin, end)
+
+
+def _best_split(above: Flags, low: int, high: int) -> int:
+    """First interval of a region: as few flags before it and as few gaps after it as possible."""
+    part = above[low : high + 1]
+    before = np.concatenate(([0], np.cumsum(part)[:-1]))
+    after = np.cumsum(~part[::-1])[::-1]
+    return low + int(np.argmin(before + after))
+
+
+def _region(sweep: SweepResponse, excess: Reals, first: int, last: int) -> CollisionRegion:
+    clear = np.flatnonzero(excess[first : last + 1] > _CLEARLY) + first
+    if clear.size == 0:
+        clear = np.array([(first + last) // 2])
+    end = excess.size - 1
+    return CollisionRegion(
+        start=_edge(sweep, first, first - 1, int(clear[0])),
+        stop=_edge(sweep, last, last + 1, int(clear[-1])),
+        reaches_start=first == 0,
+        reaches_stop=last == end,
+    )
+
+
+def _edge(sweep: SweepResponse, edge: int, outside: int, inside: int) -> Edge:
+    """Bounds from the middle of the nearest quiet interval to that of the nearest clearly colliding one."""
+    end = sweep.frequency_hz.size - 1
+    quiet_hz = float(sweep.frequency_hz[min(max(outside, 0), end)])
+    clear_hz = float(sweep.frequency_hz[inside])
+    half_hz = 0.5 * abs(sweep.sweep_rate_hz_per_s) * sweep.interval_s
+    return Edge(
+        frequency_hz=float(sweep.frequency_hz[edge]),
+        time_s=float(sweep.time_s[edge]),
+        lower_hz=min(quiet_hz, clear_hz) - half_hz,
+        upper_hz=max(quiet_hz, clear_hz) + half_hz,
+    )

@@ -1,0 +1,343 @@
+"""What a dwell shows at one frequency: Responses I and II, spectrum, lines, and how the motion repeats."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from ..chaos.verdict import LARGEST_NOISE
+from ..errors import InvalidRequest, NotEnoughData, UnusableData
+from ..recordings.channels import far_from
+from ..signals.arrays import Complexes, Flags, Reals
+from ..signals.confidence import standard_uncertainty
+from ..signals.quantity import ConvertedSignal, Quantity, converted_signal
+from ..spectra.spectra import AmplitudeSpectrum, amplitude_spectrum, spectral_density
+from ..tables import Labelled
+from ..tones.drive_level import DriveLevel, drive_level
+from ..tones.noise_lift import noise_lift
+from ..tones.order_tracking import (
+    ALL_ORDERS,
+    TrackedOrders,
+    cycles_needed,
+    order_label,
+    order_turns,
+    tracked_orders,
+)
+from ..tones.peaks import peaks
+from ..tones.sine_fit import steady_phase
+from .background import (
+    BETWEEN,
+    NOTHING,
+    OVERHEARD,
+    Background,
+    background_of,
+    heard_in,
+    left_between,
+    louder,
+)
+from .slow_change import demodulated, slow_change
+
+_LOWEST_ORDER = 0.1
+"""Displacement is kept down to this part of the drive frequency, where drift and hum begin to matter."""
+_BAND_ABOVE = 0.33
+"""... and up to this part of the sample rate."""
+_SCATTER_BLOCKS = 10
+_NOISE_BAND = (0.2, 0.4)
+"""Part of the sample rate where a vibrometer shows its own noise: no mode and no impact reaches there."""
+_NOISE_SEGMENT = 4096
+LEAST_CLEAR = 0.2
+"""Part of a window that must lie clear of drop-outs."""
+_NONE: Flags = np.zeros(0, dtype=np.bool_)
+
+
+@dataclass(frozen=True)
+class Line:
+    """One line of a displacement spectrum."""
+
+    label: str
+    """``"order 1"``, ``"order 3/2"``, ``"peak towards 201 Hz"``."""
+    frequency_hz: float
+    amplitude_m: float
+    sd_amplitude_m: float
+    """Spread over tenths of the window for orders, floor of the spectrum for peaks."""
+    decibel: float
+    """Re the line at the drive frequency."""
+
+
+@dataclass(frozen=True)
+class DwellResponse(Labelled):
+    """One dwell, analysed over its window."""
+
+    OWN_UNITS: ClassVar = {
+        "order_displacement": "m",
+        "noise_density": "m s-1 Hz-0.5",
+        "displacement": "m",
+        "spectrum": "m",
+    }
+
+    drive: DriveLevel
+    window_s: float
+    response_i: float
+    """Largest |x| over the window, divided by the drive amplitude."""
+    noise_bias_i: float
+    """By how much noise is expected to have lifted it; NaN where the noise is not determined."""
+    noise_error_i: float
+    """Root mean square error that noise makes of it, the lift included; NaN likewise."""
+    noise_source: str
+    """What tells that noise, or why it is not determined."""
+    rest_bias_i: float
+    """The same lift, if all that does not repeat with the drive were noise; NaN where it is surely more."""
+    rest_error_i: float
+    rest_displacement_m: float
+    """Root mean square of what does not repeat with the drive [m]."""
+    response_ii: float
+    """Amplitude of x at the drive frequency, divided by the drive amplitude."""
+    sd_response_ii: float
+    """NaN where the response still changes and nothing tells how far."""
+    slow_change: float
+    """Relative standard uncertainty that slow change of base or response adds to Response I; NaN likewise."""
+    phase_rad: float
+    """Of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    sd_phase_rad: float
+    orders: tuple[float, ...]
+    order_displacement: Complexes
+    """Complex amplitudes of x at the orders; phase re the drive voltage's cosine [m]."""
+    noise_density: float
+    """Of the velocity channel [m/s per root hertz]."""
+    noise_displacement_m: float
+    """What that is in displacement, root mean square within its band; or what was heard in silence [m]."""
+    displacement: ConvertedSignal
+    """x over the record [m]; its settled part holds the window."""
+    is_clear: Flags
+    """Samples of the window that are far from any drop-out, shape (samples,)."""
+    spectrum: AmplitudeSpectrum
+    """Displacement amplitudes over the window [m]."""
+    lines: tuple[Line, ...]
+
+    def with_rest_as_noise(self, *, is_known_to_repeat: bool) -> Self:
+        """Give the same, what does not repeat taken as noise, for a motion that is not known to be irregular.
+
+        Of one that is not known to repeat either it is, up to `OVERHEARD` times what was heard.
+        """
+        heard_m = self.noise_displacement_m
+        if not (is_known_to_repeat or self.rest_displacement_m <= OVERHEARD * heard_m):
+            return self
+        if np.isnan(self.rest_error_i) or self.rest_error_i <= self.noise_error_i:
+            return self
+        return replace(
+            self, noise_bias_i=self.rest_bias_i, noise_error_i=self.rest_error_i, noise_source=BETWEEN
+        )
+
+
+def dwell_response(
+    drive: Reals,
+    base: Reals,
+    response: Reals,
+    sample_rate_hz: float,
+    *,
+    near_hz: float,
+    window_s: float = 5.0,
+    towards_hz: tuple[float, ...] = (),
+    orders: tuple[float, ...] = ALL_ORDERS,
+    delay_s: float = 0.0,
+    sensors: complex = 1.0,
+    silence: Reals = NOTHING,
+    bridged: Flags = _NONE,
+) -> DwellResponse:
+    """Analyse the last seconds of a dwell.
+
+    Raises NotEnoughData when the record without its disturbed ends is shorter than the window, and
+    UnusableData when the drive channel holds no sine there.
+
+    Parameters
+    ----------
+    drive, base, response
+        Drive voltage, base acceleration [m/s2], response velocity [m/s], shape (samples,). Give more than
+        the window, if there is more: integration disturbs about a quarter of a second at each end.
+    near_hz
+        Drive frequency, within 20 %; the true one is measured on the drive.
+    window_s
+        Length of the window, ending where the settled part of the displacement ends [s].
+    towards_hz
+        Frequencies, such as those of the bound modes, near which (10 %) the largest peak is listed.
+    delay_s
+        By how much the response channel lags the base channel [s].
+    sensors
+        Gain of the response's sensor over that of the base's at the drive frequency, without their delays.
+    silence
+        Response velocity before anything played, where it was recorded [m/s].
+    bridged
+        Samples at which the response is a bridge over a drop-out; empty where there is none.
+
+    """
+    displacement = converted_signal(
+        response,
+        sample_rate_hz,
+        given=Quantity.VELOCITY,
+        wanted=Quantity.DISPLACEMENT,
+        low_hz=_LOWEST_ORDER * near_hz,
+        high_hz=_BAND_ABOVE * sample_rate_hz,
+    )
+    window = _window(displacement, window_s)
+    is_clear = _clear(bridged, displacement, near_hz, window)
+    level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
+    phase = steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
+    motion = displacement.samples[window]
+    whole, parts = _whole_and_parts(response[window], phase, orders)
+    base_whole, base_parts = _whole_and_parts(base[window], phase, orders)
+    omega = 2 * np.pi * level.frequency_hz
+    turn = 1j * omega * np.exp(1j * omega * delay_s) / sensors
+    ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
+    each = turn * parts.order(1.0) / base_parts.order(1.0) / ratio
+    base_change, change = _slow_changes(base, response, displacement, level.frequency_hz, window_s)
+    scatter = float(np.hypot(standard_uncertainty(each), change))
+    of_base_m = float(np.hypot(level.sd_amplitude_m, base_change * level.amplitude_m))
+    level = replace(level, sd_amplitude_m=of_base_m)
+    noise_density, sensor = _sensor_noise(response, displacement)
+    silent = heard_in(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
+    repeated = _repeated(motion, phase, orders)
+    rest = left_between(motion - repeated, sample_rate_hz)
+    noise = background_of(rest, float(np.std(motion)), sensor, silent)
+    most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * louder(silent, sensor).rms_m)
+    rest_m = rest.rms_m if rest.rms_m <= most_m else np.nan
+    rest_lift = noise_lift(repeated, rest_m, 2 * rest.frequency_hz * window_s)
+    lift = noise_lift(repeated if noise.is_rest else motion, noise.rms_m, 2 * noise.frequency_hz * window_s)
+    spectrum = amplitude_spectrum(response[window], sample_rate_hz)
+    spectrum = spectrum.converted(Quantity.VELOCITY, Quantity.DISPLACEMENT)
+    return DwellResponse(
+        drive=level,
+        window_s=window_s,
+        response_i=float(np.max(np.abs(motion[is_clear]))) / level.amplitude_m,
+        noise_bias_i=lift.bias / level.amplitude_m,
+        noise_error_i=lift.error / level.amplitude_m,
+        noise_source=noise.source,
+        rest_bias_i=rest_lift.bias / level.amplitude_m,
+        rest_error_i=rest_lift.error / level.amplitude_m,
+        rest_displacement_m=rest.rms_m,
+        response_ii=abs(ratio),
+        sd_response_ii=abs(ratio) * scatter,
+        slow_change=float(np.hypot(change, base_change)),
+        phase_rad=float(np.angle(ratio)),
+        sd_phase_rad=scatter,
+        orders=orders,
+        order_displacement=whole.value[:, 0] / (1j * omega * np.asarray(orders)),
+        noise_density=noise_density,
+        noise_displacement_m=louder(silent, sensor).rms_m,
+        displacement=displacement,
+        is_clear=is_clear,
+        spectrum=spectrum,
+        lines=_order_lines(whole, parts, level.frequency_hz)
+        + _peak_lines(spectrum, towards_hz, abs(whole.order(1.0)[0]) / omega),
+    )
+
+
+def _window(displacement: ConvertedSignal, window_s: float) -> slice:
+    length = round(window_s * displacement.sample_rate_hz)
+    stop = displacement.samples.size - displacement.edge_samples
+    if length < 1:
+        raise InvalidRequest(f"window_s is {window_s:g}; it is more than 0")
+    if stop - length < displacement.edge_samples:
+        have_s = displacement.settled.size / displacement.sample_rate_hz
+        raise NotEnoughData(
+            f"a window of {window_s:g} s was asked for, but without the ends that integration disturbs "
+            f"{have_s:.3g} s are left; ask for less or record longer"
+        )
+    return slice(stop - length, stop)
+
+
+def clear_of_dropouts(bridged: Flags, sample_rate_hz: float, near_hz: float) -> Flags:
+    """Return which samples no bridge reaches: what it misses decays within the slowest period kept."""
+    return far_from(bridged, round(sample_rate_hz / (_LOWEST_ORDER * near_hz)))
+
+
+def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window: slice) -> Flags:
+    """Return which samples of the window no bridge reaches; raises UnusableData where they are too few."""
+    if not bridged.any():
+        return np.ones(window.stop - window.start, dtype=np.bool_)
+    clear = clear_of_dropouts(bridged, displacement.sample_rate_hz, near_hz)[window]
+    if np.mean(clear) < LEAST_CLEAR:
+        raise UnusableData(
+            f"the vibrometer lost its light too often: {100 * np.mean(clear):.0f} % of the window is clear "
+            f"of drop-outs, and {100 * LEAST_CLEAR:.0f} % is needed; refocus the laser and measure again"
+        )
+    return clear
+
+
+def _whole_and_parts(
+    samples: Reals, phase: Reals, orders: tuple[float, ...]
+) -> tuple[TrackedOrders, TrackedOrders]:
+    """Fit over the window, and over its tenths, whose scatter holds all that moves, chaos included.
+
+    A window that is too short for ten parts is cut into fewer.
+    """
+    cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
+    blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
+    whole = tracked_orders(samples, phase, interval_samples=samples.size, orders=orders)
+    parts = tracked_orders(samples, phase, interval_samples=samples.size // blocks, orders=orders)
+    return whole, parts
+
+
+def _slow_changes(
+    base: Reals, response: Reals, displacement: ConvertedSignal, drive_hz: float, window_s: float
+) -> tuple[float, float]:
+    """Return what slow change of the base, and of the response over it, adds over the whole record."""
+    settled = slice(displacement.edge_samples, response.size - displacement.edge_samples)
+    rate = displacement.sample_rate_hz
+    moved, shook = (
+        demodulated(each[settled], drive_hz / rate, round(window_s * rate)) for each in (response, base)
+    )
+    return slow_change(np.abs(shook)), slow_change(moved / shook)
+
+
+def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float, Background]:
+    """Density of the velocity's noise, where nothing else reaches, and what it is in displacement."""
+    rate = displacement.sample_rate_hz
+    density = spectral_density(response, rate, segment_samples=min(_NOISE_SEGMENT, response.size // 2))
+    quiet = (density.frequency_hz > _NOISE_BAND[0] * rate) & (density.frequency_hz < _NOISE_BAND[1] * rate)
+    level = float(np.sqrt(np.median(density.density[quiet])))
+    low, high = displacement.low_hz, displacement.high_hz
+    # White velocity noise integrated once: density ~ 1/f^2, with rms frequency sqrt(low high).
+    rms_m = level / (2 * np.pi) * np.sqrt(1 / low - 1 / high)
+    return level, Background(float(rms_m), float(np.sqrt(low * high)), "velocity channel")
+
+
+def _repeated(motion: Reals, phase: Reals, orders: tuple[float, ...]) -> Reals:
+    """Give what of a motion repeats with the drive."""
+    fit = tracked_orders(motion, phase, interval_samples=motion.size, orders=orders)
+    return np.asarray(np.real(fit.value[:, 0] @ order_turns(phase, orders)))
+
+
+def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) -> tuple[Line, ...]:
+    reference = abs(whole.order(1.0)[0])
+    lines = []
+    for index, order in enumerate(whole.orders):
+        omega = 2 * np.pi * drive_hz * order
+        size = float(whole.amplitude[index, 0])
+        spread = standard_uncertainty(parts.value[index])
+        lines.append(
+            Line(
+                order_label(order),
+                drive_hz * order,
+                size / omega,
+                spread / omega,
+                _decibel(size / order, reference),
+            )
+        )
+    return tuple(lines)
+
+
+def _peak_lines(
+    spectrum: AmplitudeSpectrum, towards_hz: tuple[float, ...], reference_m: float
+) -> tuple[Line, ...]:
+    lines = []
+    for target in towards_hz:
+        for peak in peaks(spectrum, low_hz=0.9 * target, high_hz=1.1 * target, count=1):
+            label = f"peak towards {target:g} Hz"
+            level = _decibel(peak.amplitude, reference_m)
+            lines.append(Line(label, peak.frequency_hz, peak.amplitude, peak.floor, level))
+    return tuple(lines)
+
+
+def _decibel(amplitude: float, reference: float) -> float:
+    with np.errstate(divide="ignore"):
+        return float(20 * np.log10(amplitude / reference))

@@ -1,0 +1,100 @@
+"""From a recorded dwell to its responses over the last seconds."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vibench.acquisition.plan import Dwell, HeldDwell
+from vibench.acquisition.recording import SegmentLabel
+
+from ..errors import NotEnoughData
+from ..recordings.channels import Channels, only_stretch, read_whole
+from ..recordings.checks import AbstractAnalysis
+from ..recordings.facts import RecordingFacts, specimen_of
+from ..signals.arrays import Reals
+from ..signals.envelope import Envelope, envelope
+from .background import silence_before
+from .dwell import DwellResponse, dwell_response
+from .dwell_motion import DwellMotion, IrregularMotion
+from .terminal_level import TerminalLevel
+
+DwellPlan = Dwell | HeldDwell
+WINDOW_S = 5.0
+"""The paper's window: the last 5 s of a dwell."""
+_DWELL_EDGE_PERIODS = 121
+"""Drive periods that integration disturbs, both ends together."""
+_SHORTEST_WINDOW_PERIODS = 50
+_TIME_BINS = 1200
+
+
+@dataclass(frozen=True, eq=False)
+class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
+    """A dwell: time signal, spectrum, responses and lines."""
+
+    OWN_UNITS: ClassVar = {"displacement": "m"}
+
+    displacement: Envelope
+    """x over the dwell [m], without the ends that integration disturbs."""
+    terminal: tuple[TerminalLevel, ...]
+    """How much of the motion went to the bands of the bound modes."""
+    motion: DwellMotion
+    """How it repeats."""
+    irregular: IrregularMotion | None
+    """How long it did not repeat; None where all of it does."""
+
+
+def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
+    """Frequencies of the specimen with m1 stuck to m2: where strong collisions move the motion to."""
+    return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
+
+
+def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float, ...]) -> DwellResponse:
+    """Analyse the last 5 s of a dwell, or what there is of them."""
+    stretch = only_stretch(channels, SegmentLabel.DWELL)
+    drive, base, response = read_whole(channels, stretch)
+    rate = channels.sample_rate_hz
+    clear_s = stretch.samples / rate - _DWELL_EDGE_PERIODS / dwell.frequency_hz
+    if clear_s < _SHORTEST_WINDOW_PERIODS / dwell.frequency_hz:
+        raise NotEnoughData(
+            f"{stretch.samples / rate:.3g} s of the dwell were recorded; without the ends that integration "
+            f"disturbs too little is left at {dwell.frequency_hz:g} Hz: measure longer"
+        )
+    return dwell_response(
+        drive,
+        base,
+        response,
+        rate,
+        near_hz=dwell.frequency_hz,
+        window_s=min(WINDOW_S, clear_s),
+        towards_hz=towards_hz,
+        delay_s=channels.response_delay_s,
+        sensors=complex(channels.response_gain(np.array([dwell.frequency_hz]))[0]),
+        silence=silence_before(channels),
+        bridged=channels.bridged(stretch.start, stretch.stop),
+    )
+
+
+def settled_envelope(response: DwellResponse) -> Envelope:
+    """Give x over the dwell as a plot shows it."""
+    motion = response.displacement
+    start_s = motion.edge_samples / motion.sample_rate_hz
+    return envelope(motion.settled, motion.sample_rate_hz, bins=_TIME_BINS, start_s=start_s)
+
+
+_HIGHEST_ORDER = 2.4
+"""A spectrum is shown up to this multiple of the drive frequency."""
+COLUMN_HZ = 1.0
+"""A spectrum is drawn as its largest line in each column of this width: a figure has no more pixels."""
+
+
+def spectrum_columns(response: DwellResponse) -> tuple[Reals, Reals]:
+    """Middle [Hz] and largest amplitude over A0 of each column of the spectrum."""
+    spectrum = response.spectrum
+    width = max(1, round(COLUMN_HZ / spectrum.spacing_hz))
+    first = max(1, round(5.0 / spectrum.spacing_hz))
+    last = round(_HIGHEST_ORDER * response.drive.frequency_hz / spectrum.spacing_hz)
+    starts = np.arange(first, last, width)
+    largest = np.maximum.reduceat(spectrum.amplitude[:last], starts)
+    middle: Reals = np.asarray((starts + 0.5 * (width - 1)) * spectrum.spacing_hz, dtype=np.float64)
+    return middle, largest / response.drive.amplitude_m

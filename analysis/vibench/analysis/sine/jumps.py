@@ -1,0 +1,150 @@
+"""Where a response jumps along a sweep, up or down, and how well its frequency is known."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InvalidRequest
+from ..signals.arrays import Flags, Reals
+
+_SIDE = 12
+"""Intervals on either side that a straight line is laid through."""
+_SMALLEST_DB = 1.5
+_CLEAR = 8.0
+"""A step of so many standard errors stands out among thousands of candidates even if its errors are rough."""
+_LIKELY = 3.84
+"""Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
+_TRANSITION = 3
+"""Intervals that the motion may take from one state to the other; they belong to neither side."""
+_PER_NEPER_DB = 20 / np.log(10)
+
+
+@dataclass(frozen=True)
+class Jump:
+    """One jump of a response."""
+
+    frequency_hz: float
+    lower_hz: float
+    upper_hz: float
+    """It lies between these at 95 %, the neighbouring intervals included."""
+    time_s: float
+    before: float
+    after: float
+    """Response on either side of it, in the order of time."""
+    standard_errors: float
+    """Size of the step over its uncertainty."""
+
+    @property
+    def decibel(self) -> float:
+        """Size of the step; positive where the response grows in time."""
+        return float(20 * np.log10(self.after / self.before))
+
+
+def jumps(
+    time_s: Reals, frequency_hz: Reals, response: Reals, smooth: Flags | None = None
+) -> tuple[Jump, ...]:
+    """Find the jumps of a response against time.
+
+    At each interval a straight line is laid through the logarithm of the response before, and another
+    through that after; a jump is where the two miss each other by at least 1.5 dB and 8 standard errors, more
+    than at any place nearby. The place of a jump is the one with the largest likelihood, its bounds those of
+    the likelihood ratio.
+
+    Parameters
+    ----------
+    time_s, frequency_hz, response
+        In the order of time, shape (intervals,); the response positive.
+    smooth
+        Where the motion is smooth: a jump has one such side at least. A chaotic response leaps about
+        without jumping from one state to another. All, when absent.
+
+    """
+    if not time_s.shape == frequency_hz.shape == response.shape:
+        raise InvalidRequest(
+            f"times {time_s.shape}, frequencies {frequency_hz.shape} and responses {response.shape} "
+            "must be equally long"
+        )
+    allowed = np.ones(time_s.shape, dtype=np.bool_) if smooth is None else smooth
+    logarithm = np.log(np.maximum(response, np.finfo(np.float64).tiny))
+    size, error = _steps(logarithm)
+    clear = (np.abs(size) * _PER_NEPER_DB >= _SMALLEST_DB) & (np.abs(size) >= _CLEAR * error)
+    found = []
+    for place in _peaks(np.where(clear, np.abs(size), 0.0)):
+        near = slice(max(0, place - _SIDE), place + _SIDE)
+        if not _one_side(allowed, place):
+            continue
+        low, best, high = _likely(logarithm[near])
+        first = near.start
+        found.append(_jump((first + low, first + best, first + high), time_s, frequency_hz, logarithm))
+    return tuple(found)
+
+
+def _steps(logarithm: Reals) -> tuple[Reals, Reals]:
+    """Step at each boundary before interval i, between lines through both sides, and its standard error."""
+    count = logarithm.size
+    size, error = np.zeros(count), np.full(count, np.inf)
+    ahead = np.arange(_SIDE) + _TRANSITION / 2
+    # Value at zero of a line through (ahead, y): weights and their variance.
+    basis = np.column_stack((np.ones(_SIDE), ahead))
+    solver = np.linalg.pinv(basis)
+    variance = float(np.linalg.inv(basis.T @ basis)[0, 0])
+    for place in range(_SIDE + _TRANSITION, count - _SIDE - _TRANSITION):
+        after = logarithm[place + _TRANSITION // 2 : place + _TRANSITION // 2 + _SIDE]
+        stop = place - _TRANSITION // 2
+        before = logarithm[stop - _SIDE : stop][::-1]
+        lines = solver @ np.column_stack((after, before))
+        left = np.column_stack((after, before)) - basis @ lines
+        scatter = np.sum(left**2, axis=0) / (_SIDE - 2)
+        size[place] = lines[0, 0] - lines[0, 1]
+        error[place] = np.sqrt(variance * scatter.sum()) + np.finfo(np.float64).eps
+    return size, error
+
+
+def _peaks(size: Reals) -> list[int]:
+    """Largest place of each neighbourhood in which a step was seen."""
+    left = size.copy()
+    found = []
+    while left.max(initial=0.0) > 0.0:
+        place = int(np.argmax(left))
+        found.append(place)
+        left[max(0, place - _SIDE) : place + _SIDE + 1] = 0.0
+    return sorted(found)
+
+
+def _one_side(smooth: Flags, place: int) -> bool:
+    before = smooth[max(0, place - _SIDE) : max(0, place - _TRANSITION)]
+    after = smooth[place + _TRANSITION : place + _SIDE]
+    return bool(before.all() or after.all())
+
+
+def _likely(logarithm: Reals) -> tuple[int, int, int]:
+    """Lowest, best and highest boundary of one step in a short row, by the likelihood of two levels."""
+    count = logarithm.size
+    misfit = np.full(count, np.inf)
+    for place in range(2, count - 1):
+        before, after = logarithm[:place], logarithm[place:]
+        misfit[place] = before.size * before.var() + after.size * after.var()
+    best = int(np.argmin(misfit))
+    ratio = count * np.log(misfit / max(misfit[best], np.finfo(np.float64).tiny))
+    likely = np.flatnonzero(ratio <= _LIKELY)
+    return int(likely[0]), best, int(likely[-1])
+
+
+def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, logarithm: Reals) -> Jump:
+    best = places[1]
+    between = [0.5 * float(frequency_hz[each - 1] + frequency_hz[each]) for each in places]
+    # The step lies somewhere within the interval before or after its boundary.
+    half = 0.5 * abs(float(frequency_hz[best] - frequency_hz[best - 1]))
+    size, error = _steps(logarithm[max(0, best - 2 * _SIDE) : best + 2 * _SIDE])
+    at = best - max(0, best - 2 * _SIDE)
+    before = float(np.exp(np.median(logarithm[max(0, best - 1 - _TRANSITION) : best - 1])))
+    after = float(np.exp(np.median(logarithm[best + 1 : best + 1 + _TRANSITION])))
+    return Jump(
+        frequency_hz=between[1],
+        lower_hz=min(between) - half,
+        upper_hz=max(between) + half,
+        time_s=0.5 * float(time_s[best - 1] + time_s[best]),
+        before=before,
+        after=after,
+        standard_errors=float(abs(size[at]) / error[at]) if 0 < at < size.size else 0.0,
+    )

@@ -1,0 +1,412 @@
+"""What a sine sweep shows: envelope, responses and phase against the frequency really played.
+
+The phase of a recorded sine drive: the clock that a sweep and a dwell are analysed by.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from math import ceil
+from typing import ClassVar
+
+import numpy as np
+from scipy import fft
+
+from ..errors import InvalidRequest, NotEnoughData, UnusableData
+from ..recordings.channels import far_from
+from ..signals.arrays import Complexes, Flags, Reals
+from ..signals.decimation import Decimator, decimation_factor
+from ..signals.quantity import Quantity, converted_signal, disturbed_samples
+from ..tables import Labelled
+from ..tones.noise_lift import noise_lift
+from ..tones.order_tracking import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, tracked_orders
+from .dwell import LEAST_CLEAR
+
+_MARGIN = 0.5
+"""Kept around the drive's band, as a fraction of its ends; the outer half is the filter's edge."""
+_EDGE_CYCLES = 8
+"""Cycles at the lowest frequency after which the filter's ringing is below 1e-5 of a radian."""
+_LEAST_CYCLES = 10
+_LEAST_SHARE = 0.5
+"""Part of the channel's power that the drive's band must hold to be a drive."""
+
+
+@dataclass(frozen=True)
+class DrivePhase:
+    """Unwrapped phase of a drive; the drive is cos(phase). Arrays of shape (samples,)."""
+
+    phase_rad: Reals
+    frequency_hz: Reals
+    """Instantaneous, by the converter's clock."""
+
+
+def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: float) -> DrivePhase:
+    """Measure the phase of a sine drive, steady or sweeping, from its analytic signal.
+
+    Nothing nominal enters: 10 ppm between the clocks of generator and converter would turn the phase
+    of a nominal 150 to 350 Hz sweep by 250 degrees at its end.
+
+    Parameters
+    ----------
+    drive
+        The recorded generator voltage, shape (samples,).
+    low_hz, high_hz
+        Between these the drive frequency stays; components well outside are ignored.
+
+    """
+    if drive.size < _LEAST_CYCLES * sample_rate_hz / low_hz:
+        raise NotEnoughData(
+            f"the drive holds {drive.size * low_hz / sample_rate_hz:.1f} cycles at {low_hz:g} Hz; "
+            f"its phase needs at least {_LEAST_CYCLES}"
+        )
+    padded = fft.next_fast_len(drive.size)
+    edge = min(int(_EDGE_CYCLES * sample_rate_hz / low_hz), drive.size // 8)
+    padded = fft.next_fast_len(drive.size + edge)
+    spectrum = fft.fft(drive - np.mean(drive), padded)
+    band = _band(fft.fftfreq(padded, 1 / sample_rate_hz), low_hz, high_hz)
+    power = np.sum(np.abs(spectrum) ** 2)
+    kept = 2 * spectrum * band
+    if not np.sum(np.abs(kept) ** 2) / 2 > _LEAST_SHARE * power:
+        raise UnusableData(
+            f"the drive channel holds no sine between {low_hz:g} and {high_hz:g} Hz; "
+            "check the channel and the frequencies"
+        )
+    analytic = fft.ifft(kept, overwrite_x=True)[: drive.size]
+    phase = _continued(np.unwrap(np.angle(analytic)), edge)
+    return DrivePhase(
+        phase_rad=phase,
+        frequency_hz=np.gradient(phase) * (sample_rate_hz / (2 * np.pi)),
+    )
+
+
+def _band(frequency_hz: Reals, low_hz: float, high_hz: float) -> Reals:
+    """Positive frequencies around the drive, with cosine edges: their ringing dies within a few cycles."""
+    rise = (frequency_hz / low_hz - (1 - _MARGIN)) / (_MARGIN / 2)
+    fall = ((1 + _MARGIN) - frequency_hz / high_hz) / (_MARGIN / 2)
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.clip(np.minimum(rise, fall), 0.0, 1.0)))
+
+
+def _continued(phase: Reals, edge: int) -> Reals:
+    """Replace the ends, where the filter misses past or future, by the parabola of what lies next to them."""
+    if edge == 0:
+        return phase
+    place = np.arange(3 * edge, dtype=np.float64) / edge - 2
+    result = phase.copy()
+    for ends in (slice(None), slice(None, None, -1)):
+        side = result[ends]
+        parabola = np.polynomial.Polynomial.fit(place, side[edge : 4 * edge], 2)
+        side[:edge] = parabola(np.arange(-edge, 0) / edge - 2)
+    return result
+
+
+_SAMPLES_PER_CYCLE = 24
+"""At the highest drive frequency: a maximum read from samples is then at most 0.9 % low in one cycle."""
+_BAND_BELOW = 0.25
+"""Displacement is kept down to this part of the lowest drive frequency: half orders pass, drift does not."""
+_BAND_ABOVE = 0.3
+"""... and up to this part of the decimated rate, where the decimation is still flat at the band's edge."""
+_LINEAR_ABOVE = 5.5
+"""Linear motion is computed up to this part of the highest drive frequency: its order 5 is within."""
+_STEADY_POINTS = 10_001
+_BRIDGE_PERIODS = 3.0
+"""Periods of the band's lower edge after which a bridge of three times the motion's size is below 2 %."""
+_ROOM = 1.1
+"""Intervals are longer than orders need by this much: the first one may begin a little below the band."""
+_DRIVE, _BASE, _RESPONSE = range(3)
+_NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqrt(924.0)
+"""Sixth difference, of unit gain for white noise: it removes what is smooth and leaves the noise."""
+
+
+@dataclass(frozen=True)
+class SweepResponse(Labelled):
+    """A sweep, interval by interval; arrays of shape (intervals,) unless said otherwise."""
+
+    OWN_UNITS: ClassVar = {
+        "upper": "m s-1",
+        "lower": "m s-1",
+        "velocity": "m s-1",
+        "harmonics": "m",
+        "noise_rms": "m s-1",
+    }
+
+    time_s: Reals
+    """Middle of each interval, from the first sample of the sweep."""
+    frequency_hz: Reals
+    """Instantaneous drive frequency there, measured on the recorded drive."""
+    upper: Reals
+    lower: Reals
+    """Largest and smallest value of the recorded response at the full sample rate [m/s]."""
+    drive_amplitude_m: Reals
+    """Base displacement A0 at the drive frequency, from the recorded acceleration [m]."""
+    sd_drive_amplitude_m: Reals
+    velocity: TrackedOrders
+    """The response's velocity at orders of the drive [m/s]."""
+    harmonics: TrackedOrders
+    """Displacement at orders 1/3 to 5 [m], in longer intervals: `harmonics_hz` says where."""
+    harmonics_hz: Reals
+    """Drive frequency in the middle of each of these, shape (longer intervals,)."""
+    peak_displacement_m: Reals
+    """Largest |x| in the interval [m]."""
+    response_i: Reals
+    """Largest |x| over the drive amplitude, clear of drop-outs; NaN where they leave too little."""
+    noise_bias_i: Reals
+    noise_error_i: Reals
+    """By how much noise is expected to have lifted Response I."""
+    response_ii: Reals
+    """Amplitude of x at the drive frequency over the drive amplitude."""
+    sd_response_ii: Reals
+    phase_rad: Reals
+    """Phase of x ahead of the base displacement at the drive frequency, the channels' delay removed."""
+    is_clear: Flags
+    """Intervals without a drop-out, shape (intervals,)."""
+    noise_rms: float
+    """Noise of the velocity channel within the band of ``velocity.residual_rms`` [m/s]."""
+    linear_residual: Reals
+    """Residual over order 1 of the specimen without contact in this sweep, NaN where no specimen is known."""
+    steady_over_swept: float
+    """Largest Response II of the specimen without contact, under steady sines over in this sweep; or NaN."""
+    interval_s: float
+
+    def largest(self, response: Reals) -> int:
+        """Return the place of the largest value among the intervals without a drop-out."""
+        return int(np.nanargmax(np.where(self.is_clear, response, np.nan)))
+
+    @property
+    def sweep_rate_hz_per_s(self) -> float:
+        """Mean rate of the sweep; negative downwards."""
+        return float(np.polyfit(self.time_s, self.frequency_hz, 1)[0])
+
+
+Transmission = Callable[[Reals], Complexes]
+"""Displacement of m0 over that of the base against frequency [Hz], both of shape (lines,)."""
+
+
+class SweepSums:
+    """Takes a sweep block by block; keeps decimated channels and extremes, a sixth or so of the record.
+
+    Parameters
+    ----------
+    sample_rate_hz
+        Of the blocks.
+    low_hz, high_hz
+        Ends of the sweep, in this order whichever way it ran.
+    interval_s
+        Length of one interval; half orders need two cycles of half the drive frequency.
+
+    """
+
+    def __init__(
+        self,
+        sample_rate_hz: float,
+        *,
+        low_hz: float,
+        high_hz: float,
+        interval_s: float = 0.1,
+    ) -> None:
+        if not 0 < low_hz < high_hz < sample_rate_hz / 4:
+            raise InvalidRequest(
+                f"the sweep is said to span {low_hz:g} to {high_hz:g} Hz; give them in ascending order, "
+                f"above 0 and below {sample_rate_hz / 4:g} Hz, a quarter of the sample rate"
+            )
+        self._factor = decimation_factor(sample_rate_hz, _SAMPLES_PER_CYCLE * high_hz)
+        self._rate_hz = sample_rate_hz / self._factor
+        self._interval = max(1, round(interval_s * self._rate_hz))
+        self._low_hz, self._high_hz = low_hz, high_hz
+        self._before = self._after = 0
+        """Samples that were added beside the sweep."""
+        self._decimator = Decimator(3, self._factor)
+        self._parts: list[Reals] = []
+        self._carry = np.empty((2, 0))
+        self._bridged: list[Flags] = []
+        self._extremes: list[Reals] = []
+
+    @property
+    def neighbour_samples(self) -> int:
+        """Samples, whole intervals, before and after the sweep that its displacement wants."""
+        disturbed = disturbed_samples(self._rate_hz, _BAND_BELOW * self._low_hz)
+        return self._factor * self._interval * ceil(disturbed / self._interval)
+
+    def add_neighbour(self, block: Reals, bridged: Flags | None = None) -> None:
+        """Take what was recorded right before the sweep, or right after it.
+
+        Velocity becomes displacement with what was before it and came after it: without them the largest |x|
+        of the first and of the last intervals is off by up to a third.
+        """
+        if self._extremes:
+            self._after += block.shape[1]
+        else:
+            self._before += block.shape[1]
+        self._parts.append(self._decimator.add(block))
+        self._bridged.append(np.zeros(block.shape[1], dtype=np.bool_) if bridged is None else bridged)
+
+    def add(self, block: Reals, bridged: Flags | None = None) -> None:
+        """Take the next samples of the sweep: rows drive voltage, base acceleration, response velocity.
+
+        ``bridged`` are those at which the response is a bridge over a drop-out; none by default.
+        """
+        if block.shape[0] != 3:
+            raise InvalidRequest(f"a block has {block.shape[0]} rows; a sweep takes drive, base and response")
+        self._parts.append(self._decimator.add(block))
+        self._bridged.append(np.zeros(block.shape[1], dtype=np.bool_) if bridged is None else bridged)
+        full = self._interval * self._factor
+        seen = np.where(self._bridged[-1], 0.0, block[_RESPONSE])
+        data = np.concatenate((self._carry, np.stack((block[_RESPONSE], seen))), axis=1)
+        count = data.shape[1] // full
+        whole, seen = data[:, : count * full].reshape(2, count, full)
+        noise = np.zeros((count, full - _NOISE_DIFFERENCE.size + 1))
+        for tap, weight in enumerate(_NOISE_DIFFERENCE):
+            noise += weight * whole[:, tap : tap + noise.shape[1]]
+        self._extremes.append(
+            np.stack((seen.max(axis=1), seen.min(axis=1), np.sqrt(np.mean(noise**2, axis=1))))
+        )
+        self._carry = data[:, count * full :].copy()
+
+    def response(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweepResponse:
+        """Analyse everything added; the sums take no more blocks afterwards.
+
+        Parameters
+        ----------
+        delay_s
+            By how much the response channel lags the base channel [s].
+        linear
+            Transmission of the specimen without contact, which is swept in the same way for comparison.
+
+        """
+        self._parts.append(self._decimator.finish())
+        whole = np.concatenate(self._parts, axis=1)
+        inside = slice(self._before // self._factor, whole.shape[1] - self._after // self._factor)
+        data = whole[:, inside]
+        count = data.shape[1] // self._interval
+        extremes = np.concatenate(self._extremes or [np.empty((3, 0))], axis=1)
+        upper, lower, noise = extremes[:, :count]
+        if upper.size == 0:
+            raise NotEnoughData("the sweep is shorter than one interval; use shorter intervals")
+        phase = drive_phase(data[_DRIVE], self._rate_hz, low_hz=self._low_hz, high_hz=self._high_hz)
+        track = partial(tracked_orders, phase_rad=phase.phase_rad, interval_samples=self._interval)
+        velocity, base = track(data[_RESPONSE]), track(data[_BASE])
+        frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
+        noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
+        residual, ratio = np.full(upper.size, np.nan), np.nan
+        if linear is not None:
+            # Order 1 alone: noise of the accelerometer would ring in a linear specimen too.
+            middles = (np.arange(upper.size) + 0.5) * self._interval
+            smooth = np.interp(np.arange(data.shape[1]), middles, base.order(1.0)) * np.exp(
+                1j * phase.phase_rad
+            )
+            moved = np.concatenate((whole[_BASE, : inside.start], smooth.real, whole[_BASE, inside.stop :]))
+            swept = track(self._linear_velocity(moved, linear)[inside])
+            residual = swept.residual_rms / np.abs(swept.order(1.0))
+            played_hz = np.linspace(frequency_hz.min(), frequency_hz.max(), _STEADY_POINTS)
+            of_base = np.abs(swept.order(1.0) / base.order(1.0))
+            ratio = float(np.max(np.abs(linear(played_hz))) / np.max(2 * np.pi * frequency_hz * of_base))
+        return self._scaled(
+            whole[_RESPONSE],
+            velocity,
+            base,
+            (upper, lower),
+            frequency_hz,
+            self._harmonics(data[_RESPONSE], phase),
+            noise_density,
+            delay_s,
+            (residual, ratio),
+            self._bridges()[inside][: upper.size * self._interval].reshape(-1, self._interval),
+        )
+
+    def _bridges(self) -> Flags:
+        """Return which decimated samples hold some of a bridge over a drop-out."""
+        bridged = np.concatenate(self._bridged)
+        bridged = np.append(bridged, np.zeros(-bridged.size % self._factor, dtype=np.bool_))
+        return np.asarray(bridged.reshape(-1, self._factor).any(axis=1))
+
+    def _linear_velocity(self, base: Reals, linear: Transmission) -> Reals:
+        """Return the velocity [m/s] without contact under the recorded acceleration of the base [m/s2]."""
+        # Padded, so that what rings after the end does not come before the beginning.
+        padded = fft.next_fast_len(2 * base.size, real=True)
+        frequency_hz = fft.rfftfreq(padded, 1 / self._rate_hz)
+        low_hz, high_hz = _BAND_BELOW * self._low_hz, _LINEAR_ABOVE * self._high_hz
+        kept = np.flatnonzero((frequency_hz > low_hz) & (frequency_hz < high_hz))
+        spectrum = fft.rfft(base, padded)
+        moved = np.zeros_like(spectrum)
+        moved[kept] = spectrum[kept] * linear(frequency_hz[kept]) / (2j * np.pi * frequency_hz[kept])
+        return np.asarray(fft.irfft(moved, padded)[: base.size])
+
+    def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
+        """Displacement at many orders, in intervals that are long enough to tell them apart."""
+        cycles = self._low_hz * self._interval / self._rate_hz
+        longer = self._interval * max(1, ceil(_ROOM * cycles_needed(ALL_ORDERS) / cycles))
+        longer = min(longer, response.size)
+        tracked = tracked_orders(response, phase.phase_rad, interval_samples=longer, orders=ALL_ORDERS)
+        count = tracked.residual_rms.size
+        frequency_hz = _means(phase.frequency_hz[: count * longer], longer)
+        omega = 2 * np.pi * frequency_hz * np.asarray(ALL_ORDERS)[:, np.newaxis]
+        scaled = replace(tracked, value=tracked.value / (1j * omega), sd=tracked.sd / omega)
+        return scaled, frequency_hz
+
+    def _scaled(
+        self,
+        response: Reals,
+        velocity: TrackedOrders,
+        base: TrackedOrders,
+        extremes: tuple[Reals, Reals],
+        frequency_hz: Reals,
+        harmonics: tuple[TrackedOrders, Reals],
+        noise_density: float,
+        delay_s: float,
+        linear: tuple[Reals, float],
+        bridged: Flags,
+    ) -> SweepResponse:
+        omega = 2 * np.pi * frequency_hz
+        fundamental = ORDERS.index(1.0)
+        amplitude_m = np.abs(base.order(1.0)) / omega**2
+        low_hz, high_hz = _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
+        displacement = converted_signal(
+            response,
+            self._rate_hz,
+            given=Quantity.VELOCITY,
+            wanted=Quantity.DISPLACEMENT,
+            low_hz=low_hz,
+            high_hz=high_hz,
+        )
+        count = frequency_hz.size
+        swept = displacement.samples[self._before // self._factor :][: count * self._interval]
+        intervals = swept.reshape(count, self._interval)
+        clear = far_from(bridged.ravel(), round(_BRIDGE_PERIODS * self._rate_hz / low_hz)).reshape(
+            bridged.shape
+        )
+        peak_m = np.max(np.abs(intervals), axis=1, where=clear, initial=0.0)
+        peak_m[np.mean(clear, axis=1) < LEAST_CLEAR] = np.nan
+        noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
+        independent = 2 * np.sqrt(low_hz * high_hz) * self._interval / self._rate_hz
+        bias_m, error_m = np.transpose([noise_lift(each, noise_m, independent) for each in intervals])
+        ratio = 1j * omega * velocity.order(1.0) / base.order(1.0) * np.exp(1j * omega * delay_s)
+        relative = np.hypot(
+            velocity.sd[fundamental] / velocity.amplitude[fundamental],
+            base.sd[fundamental] / base.amplitude[fundamental],
+        )
+        return SweepResponse(
+            time_s=(np.arange(count, dtype=np.float64) + 0.5) * (self._interval / self._rate_hz),
+            frequency_hz=frequency_hz,
+            upper=extremes[0],
+            lower=extremes[1],
+            drive_amplitude_m=amplitude_m,
+            sd_drive_amplitude_m=base.sd[fundamental] / omega**2,
+            velocity=velocity,
+            harmonics=harmonics[0],
+            harmonics_hz=harmonics[1],
+            peak_displacement_m=peak_m,
+            response_i=peak_m / amplitude_m,
+            noise_bias_i=bias_m / amplitude_m,
+            noise_error_i=error_m / amplitude_m,
+            response_ii=np.abs(ratio),
+            sd_response_ii=np.abs(ratio) * relative,
+            phase_rad=np.angle(ratio),
+            noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
+            is_clear=np.asarray(~bridged.any(axis=1)),
+            linear_residual=linear[0],
+            steady_over_swept=linear[1],
+            interval_s=self._interval / self._rate_hz,
+        )
+
+
+def _means(values: Reals, length: int) -> Reals:
+    return np.asarray(values.reshape(-1, length).mean(axis=1))

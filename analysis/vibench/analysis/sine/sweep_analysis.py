@@ -1,0 +1,135 @@
+"""From a recorded sweep to its responses and a picture of its velocity."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from vibench.acquisition.plan import HeldSweep, SineSweep
+from vibench.acquisition.recording import SegmentLabel
+from vibench.sim import Specimen, base_transmissibility
+
+from ..errors import NotEnoughData, UnusableData
+from ..recordings.channels import Channels, only_stretch
+from ..recordings.checks import AbstractAnalysis, Check, Verdict
+from ..spectra.spectrogram import Spectrogram, SpectrogramSums
+from .collision_region import Collisions
+from .dwell import LEAST_CLEAR
+from .jumps import Jump, jumps
+from .sweep import SweepResponse, SweepSums
+
+Sweep = SineSweep | HeldSweep
+_BLOCK = 1 << 20
+_RESPONSE = 2
+_LEAD_S = 5.0
+_SPECTROGRAM_ORDER = 3.2
+"""A spectrogram shows the drive's third harmonic at the sweep's end."""
+
+
+@dataclass(frozen=True, eq=False)
+class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
+    """A sweep: envelope, responses and where the masses collide."""
+
+    OWN_UNITS: ClassVar = {"spectrogram": "m s-1"}
+
+    collisions: Collisions
+    jumps: tuple[Jump, ...]
+    """Of Response II, between a smooth motion and another."""
+    spectrogram: Spectrogram
+    """Of the recorded velocity."""
+
+    @property
+    def rate_text(self) -> str:
+        """How fast the sweep was, and how far its responses are from steady ones where that is known."""
+        text = f"swept at {abs(self.response.sweep_rate_hz_per_s):.3g} Hz/s"
+        more = self.response.steady_over_swept - 1
+        if np.isnan(more) or self.collisions.regions:
+            return text
+        beside = f"{100 * abs(more):.2g} % {'above' if more > 0 else 'below'} the largest of this sweep"
+        return f"{text}; the largest steady Response II of the described linear specimen lies {beside}"
+
+
+def smooth_jumps(response: SweepResponse, colliding: Collisions) -> tuple[Jump, ...]:
+    """Find the jumps of Response II that have a smooth motion on one side."""
+    return jumps(response.time_s, response.frequency_hz, response.response_ii, ~colliding.is_colliding)
+
+
+_BEHIND_STEPS = 1.5
+"""A sweep in steps is behind its ideal course by half a step at most, and measured to within as much."""
+_LAST = 5
+"""Intervals at the end that are looked at."""
+
+
+def played_check(response: SweepResponse, sweep: Sweep) -> Check:
+    """Compare the end of a sweep, as its drive was recorded, with the plan at that time."""
+    last = slice(-_LAST, None)
+    found_hz, time_s = float(np.median(response.frequency_hz[last])), float(np.median(response.time_s[last]))
+    half_s = 0.5 * sweep.step_s
+    planned_hz = (sweep.cycles(time_s + half_s) - sweep.cycles(time_s - half_s)) / sweep.step_s
+    behind_s = (planned_hz - found_hz) / response.sweep_rate_hz_per_s
+    if abs(behind_s) <= _BEHIND_STEPS * sweep.step_s + response.interval_s:
+        return Check("Sweep as planned", Verdict.PASSED, "the drive kept to the course of the plan")
+    text = (
+        f"the drive was at {found_hz:.4g} Hz where {planned_hz:.4g} Hz were planned, {abs(behind_s):.2g} s "
+        f"{'behind' if behind_s > 0 else 'ahead'}; frequencies below are those that were played"
+    )
+    return Check("Sweep as planned", Verdict.WARNING, text)
+
+
+def _is_whole(channels: Channels, first: int, last: int) -> bool:
+    """Whether samples were recorded there, none of them lost."""
+    return first >= 0 and last <= channels.samples and not np.isnan(channels.read(first, last)).any()
+
+
+def measured_sweep(
+    channels: Channels, sweep: Sweep, specimen: Specimen | None = None
+) -> tuple[SweepResponse, Spectrogram]:
+    """Analyse what there is of a sweep, whichever way it ran, and picture its velocity.
+
+    The ``specimen``, where one is known, is swept without contact for comparison.
+    """
+    stretch = only_stretch(channels, SegmentLabel.SWEEP)
+    ends = sorted((sweep.start_hz, sweep.stop_hz))
+    rate = channels.sample_rate_hz
+    sums = SweepSums(rate, low_hz=ends[0], high_hz=ends[1])
+    highest_hz = min(_SPECTROGRAM_ORDER * ends[1], 0.5 * rate)
+    # Where nothing whole was recorded beside the sweep, its own end stands for it.
+    reach = min(sums.neighbour_samples, stretch.samples // 4)
+    start = stretch.start + (0 if _is_whole(channels, stretch.start - reach, stretch.start) else reach)
+    stop = stretch.stop - (0 if _is_whole(channels, stretch.stop, stretch.stop + reach) else reach)
+    # What the specimen still rings of began before the sweep.
+    lead = reach * max(1, min(round(_LEAD_S * rate), start) // max(reach, 1))
+    lead = lead if _is_whole(channels, start - lead, start - reach) else reach
+    picture = SpectrogramSums(rate, stretch.samples, highest_hz=highest_hz)
+    for begin, end, add in (
+        (start - lead, start, sums.add_neighbour),
+        (start, stop, sums.add),
+        (stop, stop + reach, sums.add_neighbour),
+    ):
+        for first in range(begin, end, _BLOCK):
+            block = channels.read(first, min(first + _BLOCK, end))
+            if np.isnan(block).any():
+                lost_s = (first - stretch.start) / rate
+                raise NotEnoughData(
+                    f"samples were lost after {lost_s:.3g} s of the sweep, and its phase cannot be followed "
+                    "across a hole; measure again"
+                )
+            add(block, channels.bridged(first, min(first + _BLOCK, end)))
+            picture.add(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
+    linear = None if specimen is None else lambda at_hz: base_transmissibility(specimen, at_hz)[:, 0]
+    found = sums.response(delay_s=channels.response_delay_s, linear=linear)
+    if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
+        raise UnusableData(
+            f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
+            f"intervals are without a drop-out, and {100 * LEAST_CLEAR:.0f} % are needed; refocus the laser "
+            "and measure again"
+        )
+    sensors = channels.response_gain(found.frequency_hz)
+    corrected = replace(
+        found,
+        time_s=found.time_s + (start - stretch.start) / rate,
+        response_ii=found.response_ii / np.abs(sensors),
+        sd_response_ii=found.sd_response_ii / np.abs(sensors),
+        phase_rad=np.angle(np.exp(1j * found.phase_rad) / sensors),
+    )
+    return corrected, picture.spectrogram()

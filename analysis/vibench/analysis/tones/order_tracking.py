@@ -1,0 +1,144 @@
+"""Amplitude and phase of a signal at multiples of the drive frequency, interval by interval."""
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import lcm
+from typing import ClassVar
+
+import numpy as np
+
+from ..errors import InvalidRequest, UnusableData
+from ..signals.arrays import Complexes, Reals
+from ..tables import Labelled
+
+ORDERS = (0.5, 1.0, 1.5, 2.0, 3.0)
+"""Impacting systems answer at half orders as well as at whole ones."""
+ALL_ORDERS = (1 / 3, 0.5, 2 / 3, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0)
+"""With thirds and high harmonics: they need intervals of twelve drive cycles."""
+_LARGEST_DENOMINATOR = 12
+_BATCH_INTERVALS = 256
+"""Intervals solved at once: some ten megabytes."""
+
+
+def order_label(order: float) -> str:
+    """Write an order as a reader says it: ``"order 1/3"``, ``"order 2"``."""
+    return f"order {Fraction(order).limit_denominator(_LARGEST_DENOMINATOR)}"
+
+
+def cycles_needed(orders: tuple[float, ...]) -> float:
+    """Drive cycles that an interval must hold to tell these orders apart."""
+    return 2 / float(min(np.diff((0.0, *sorted(orders)))))
+
+
+@dataclass(frozen=True)
+class TrackedOrders(Labelled):
+    """Components of a signal at orders of the drive; signal = Re(sum value_k exp(i k phase)) + residual."""
+
+    OWN_UNITS: ClassVar = {"value": "{unit}", "sd": "{unit}", "residual_rms": "{unit}", "amplitude": "{unit}"}
+
+    orders: tuple[float, ...]
+    value: Complexes
+    """Complex amplitude (peak) at the middle of each interval, shape (orders, intervals)."""
+    sd: Reals
+    """Standard deviation of the magnitude from the residual, taken as white; shape (orders, intervals)."""
+    residual_rms: Reals
+    """Root mean square of what no order explains, shape (intervals,)."""
+
+    @property
+    def amplitude(self) -> Reals:
+        """|value|, shape (orders, intervals)."""
+        return np.abs(self.value)
+
+    def order(self, number: float) -> Complexes:
+        """Complex amplitudes of one order, shape (intervals,)."""
+        if number not in self.orders:
+            raise InvalidRequest(f"order {number:g} was not tracked; tracked are {self.orders}")
+        chosen: Complexes = self.value[self.orders.index(number)]
+        return chosen
+
+
+def tracked_orders(
+    samples: Reals, phase_rad: Reals, *, interval_samples: int, orders: tuple[float, ...] = ORDERS
+) -> TrackedOrders:
+    """Fit all orders at once to each interval of a signal, by least squares.
+
+    One order at a time would be biased by the others whenever an interval is not a whole number of
+    *subharmonic* periods. A constant and a linear change of order 1 are fitted too, so that a sweep
+    through a resonance leaves no residual.
+
+    Parameters
+    ----------
+    samples, phase_rad
+        The signal and the drive's phase at the same instants, shape (samples,); what is left over
+        after the last whole interval is not used.
+    interval_samples
+        Must hold at least two periods of the smallest distance between orders.
+
+    """
+    count = samples.size // interval_samples
+    if count == 0:
+        raise InvalidRequest(
+            f"the signal has {samples.size} samples, less than one interval of {interval_samples}"
+        )
+    turns = abs(float(phase_rad[count * interval_samples - 1] - phase_rad[0])) / (2 * np.pi) / count
+    needed = cycles_needed(orders)
+    if turns < needed:
+        raise InvalidRequest(
+            f"an interval of {interval_samples} samples holds {turns:.1f} drive cycles; orders "
+            f"{2 / needed:g} apart need at least {needed:g}: use longer intervals or fewer orders"
+        )
+    signal = samples[: count * interval_samples].reshape(count, interval_samples)
+    phase = phase_rad[: count * interval_samples].reshape(count, interval_samples)
+    parts = [
+        _fit(signal[first : first + _BATCH_INTERVALS], phase[first : first + _BATCH_INTERVALS], orders)
+        for first in range(0, count, _BATCH_INTERVALS)
+    ]
+    value, sd, residual = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
+    return TrackedOrders(orders, value, sd, residual)
+
+
+def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> Complexes:
+    """Give exp(i order phase) for each order, shape (orders, ...).
+
+    Orders that are fractions of small numbers are powers of one turning number: a product costs a tenth of
+    a sine and a cosine.
+    """
+    fractions = [Fraction(order).limit_denominator(_LARGEST_DENOMINATOR) for order in orders]
+    if min(orders) <= 0 or not np.allclose([float(each) for each in fractions], orders, rtol=1e-15, atol=0.0):
+        return np.asarray(np.exp(1j * np.multiply.outer(np.asarray(orders), phase_rad)))
+    together = lcm(*(each.denominator for each in fractions))
+    powers = {1: np.exp(1j / together * phase_rad)}
+    return np.stack([_power(int(each * together), powers) for each in fractions])
+
+
+def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
+    """Give a power of ``powers[1]``, by its halves; what was made is kept."""
+    if exponent not in powers:
+        half = exponent // 2
+        powers[exponent] = _power(half, powers) * _power(exponent - half, powers)
+    return powers[exponent]
+
+
+def _fit(signal: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Complexes, Reals, Reals]:
+    samples = signal.shape[1]
+    turned = order_turns(phase, (*orders, 1.0))
+    changing = np.linspace(-1.0, 1.0, samples) * turned[-1]
+    first = np.stack((changing.real, changing.imag, np.ones_like(phase)))
+    basis = np.concatenate((turned[:-1].real, turned[:-1].imag, first)).transpose(1, 0, 2)
+    normal = basis @ basis.transpose(0, 2, 1)
+    target = basis @ signal[:, :, np.newaxis]
+    try:
+        inverse = np.linalg.inv(normal)
+    except np.linalg.LinAlgError as singular:
+        raise UnusableData(
+            "the drive phase stands still in an interval, so orders cannot be told apart there; "
+            "cut the record to where the drive runs"
+        ) from singular
+    solution = (inverse @ target)[:, :, 0]
+    residual = signal - np.einsum("ik,iks->is", solution, basis)
+    variance = np.sum(residual**2, axis=1) / max(1, samples - basis.shape[1])
+    count = len(orders)
+    value = solution[:, :count] - 1j * solution[:, count : 2 * count]
+    diagonal = np.einsum("ikk->ik", inverse)
+    spread = np.sqrt(variance[:, np.newaxis] * (diagonal[:, :count] + diagonal[:, count : 2 * count]) / 2)
+    return value.T, spread.T, np.sqrt(np.mean(residual**2, axis=1))

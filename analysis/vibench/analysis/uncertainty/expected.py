@@ -1,0 +1,236 @@
+"""What a plan will be able to tell: uncertainty over recording time, before anything moves."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vibench.acquisition.plan import (
+    Dwell,
+    Family,
+    HeldDwell,
+    HeldNoise,
+    Measurement,
+    base_motion,
+    preview_measurement,
+)
+from vibench.acquisition.rig import BaseQuantity, Rig, RigModel
+from vibench.sim import Specimen, base_transmissibility
+
+from ..model.overlay import RESPONSE_I, RESPONSE_II
+from ..signals.arrays import Reals
+from .budget import COVERAGE, Cause, Contribution
+from .simulated_dwell import STEADY, simulated_dwell
+from .stated import Stated, stated_of
+
+_WINDOW_S, _TENTHS = 5.0, 10
+_GRID_HZ = 0.25
+_HIGHEST_TURN = 4.0
+"""Largest value of Gaussian noise over its rms, within some ten thousand turns."""
+_TIMES = (0.25, 1.0, 4.0, 16.0)
+_HALF_BAND_HZ = 25_600.0
+"""What the white noise of a virtual accelerometer fills."""
+
+
+@dataclass(frozen=True)
+class Expected:
+    """One quantity that a plan wants to know, and how well it will."""
+
+    quantity: str
+    time_s: float
+    """Recorded, as planned; of a sine, the window that is looked at."""
+    scatter: float | None
+    """Relative standard uncertainty by noise or chance after that time; None where it is not stated."""
+    cause: Cause
+    lasting: float
+    """By what time does not lessen: calibrations, alignment, clock, as far as they are stated."""
+    not_stated: tuple[Cause, ...]
+
+    def after(self, time_s: float) -> float | None:
+        """Relative expanded uncertainty after that time, of what is stated; None where noise is not."""
+        if self.scatter is None:
+            return None
+        return COVERAGE * float(np.hypot(self.scatter * np.sqrt(self.time_s / time_s), self.lasting))
+
+    @property
+    def curve(self) -> tuple[tuple[float, float | None], ...]:
+        """Recording times [s], from a quarter to sixteen times the planned, and `after` each."""
+        return tuple((factor * self.time_s, self.after(factor * self.time_s)) for factor in _TIMES)
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        missing = ", ".join(self.not_stated)
+        return f"{self.quantity}: {self._how}" + (f"; not stated: {missing}" if missing else "")
+
+    @property
+    def _how(self) -> str:
+        if self.scatter is None:
+            return f"not known beforehand, for {self._hindrance}"
+        if self.scatter == 0.0:
+            return f"± {100 * COVERAGE * self.lasting:.2g} % ({self.cause.value}, whatever the time; k = 2)"
+        told = ", ".join(
+            f"{100 * half:.2g} % after {time_s:.3g} s" + (" as planned" if time_s == self.time_s else "")
+            for time_s, half in self.curve
+            if half
+        )
+        return f"± {told} ({self.cause.value}; k = 2)"
+
+    @property
+    def _hindrance(self) -> str:
+        match self.cause, self.quantity:
+            case Cause.NOISE, name if name == RESPONSE_I:
+                return "noise in the motion lifts the largest value, and only a recording tells it"
+            case Cause.NOISE, _:
+                return "the sensors' noise is not stated"
+            case Cause.CHANCE, name if name in {RESPONSE_I, RESPONSE_II}:
+                return "this drive has several motions, and how it is begun decides which one is measured"
+            case _:
+                return "the masses may collide under this noise"
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values for JSON."""
+        return {
+            "quantity": self.quantity,
+            "cause": self.cause.value,
+            "planned_s": self.time_s,
+            "relative_expanded_over_s": [list(each) for each in self.curve],
+            "coverage_factor": COVERAGE,
+            "not_stated": [each.value for each in self.not_stated],
+        }
+
+
+def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
+    """Say how well a plan will tell what it is made for; opens no instrument.
+
+    Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
+    Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
+    runs of the described rig under its voltage, analysed like a recording; where these settle on different
+    motions nothing is told. Scatter falls with the root of the time. Other kinds of plan give nothing.
+
+    Parameters
+    ----------
+    measurement
+        The plan.
+    rig
+        What it is played on: its specimen, and what it states of sensors and noise.
+
+    """
+    stated = stated_of(rig.model_dump(mode="json"))
+    match measurement.excitation:
+        case Dwell(frequency_hz=at_hz) | HeldDwell(frequency_hz=at_hz):
+            return tuple(_of_sine(measurement, rig, stated, at_hz))
+        case HeldNoise():
+            return ()
+        case excitation if excitation.family is Family.NOISE:
+            return tuple(_of_noise(measurement, rig, stated))
+        case _:
+            return ()
+
+
+def _missing(*parts: tuple[Contribution, ...]) -> tuple[Cause, ...]:
+    return tuple(dict.fromkeys(each.cause for part in parts for each in part if each.relative is None))
+
+
+def _densities(rig: Rig) -> tuple[float, float] | None:
+    """White noise of velocity [(m/s)^2/Hz] and acceleration [(m/s2)^2/Hz], one-sided; None if not stated."""
+    virtual = rig.virtual
+    velocity, acceleration = rig.vibrometer.noise_per_rthz, rig.accelerometer.noise_per_rthz
+    if velocity is not None and acceleration is not None:
+        return velocity.value**2, acceleration.value**2
+    if virtual is None:
+        return None
+    white = virtual.accelerometer_noise_m_per_s2**2 / _HALF_BAND_HZ
+    return virtual.vibrometer_noise_m_per_s_per_rthz**2, white
+
+
+def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Expected]:
+    """Scatter by noise over signal at each mode: of a line, and of a pole from the lines of its bandwidth.
+
+    For H = a / (1 + i x), x = (f - f0) / (zeta f0), with unknown complex a, the Fisher information of f0 in
+    lines of relative variance v, one every d Hz, is (pi / 4) (zeta f0 / d) / (zeta f0)^2 / v; v d does not
+    depend on d.
+    """
+    time_s = sum(each.record_s for each in measurement.excitation.steps())
+    specimen = rig.specimen.specimen()
+    low_hz, high_hz = measurement.excitation.band_hz
+    rms_v = preview_measurement(measurement, rig).rms_v * rig.generator.terminal_factor()
+    noise = _densities(rig)
+    own_hz = np.asarray(specimen.natural_frequencies_hz, dtype=np.float64)
+    moved = np.abs(base_transmissibility(specimen, own_hz)[:, 0])
+    per_volt = np.abs(RigModel(rig).transfer(BaseQuantity.ACCELERATION, own_hz))
+    base = (rms_v * per_volt) ** 2 / (high_hz - low_hz)
+    response = base * (moved / (2 * np.pi * own_hz)) ** 2
+    if _fills_gap(specimen, rig, rms_v, low_hz, high_hz):
+        yield Expected("resonances and transmissibility", time_s, None, Cause.CHANCE, 0.0, ())
+        return
+    for hz, damping, x, u in zip(own_hz, specimen.damping_ratios, response, base, strict=True):
+        if not low_hz <= hz <= high_hz:
+            continue
+        half_hz = float(damping * hz)
+        pole = None
+        if noise is not None:
+            # Relative variance of a line times its width and the recording time.
+            line = (noise[0] / x + noise[1] / u) / 2.0
+            pole = float(np.sqrt(line / time_s / half_hz / (np.pi / 4)))
+        ratio = None if pole is None else pole * float(np.sqrt(np.pi / 4))
+        clock = stated.timed(1)
+        lasting = float(stated.clock.relative or 0.0)
+        where = f"{hz:.0f} Hz"
+        scaled = None if pole is None else pole * float(damping)
+        yield Expected(
+            f"resonance at {where}, frequency", time_s, scaled, Cause.NOISE, lasting, _missing(clock)
+        )
+        yield Expected(f"resonance at {where}, damping ratio", time_s, pole, Cause.NOISE, 0.0, ())
+        yield Expected(
+            f"transmissibility at {where}",
+            time_s,
+            ratio,
+            Cause.NOISE,
+            float(np.hypot(stated.scale_sd, lasting)),
+            _missing(stated.response, stated.base, clock),
+        )
+
+
+def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
+    """Say whether p of the linear specimen reaches a stop: Gaussian, some thousand turns long."""
+    grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
+    p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
+    rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
+    return _HIGHEST_TURN * rms_m > min(specimen.gaps_m)
+
+
+def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -> Iterator[Expected]:
+    """Say what is to be expected of a sine.
+
+    Nothing where a window has no period for each of its tenths, or the motion cannot be simulated.
+    """
+    window_s = min(_WINDOW_S, sum(each.record_s for each in measurement.excitation.steps()))
+    if at_hz * window_s < _TENTHS:
+        return
+    specimen = rig.specimen.specimen()
+    amplitude_m = float(base_motion(measurement.excitation, rig, np.array([at_hz])).amplitude_m[0])
+    chance = simulated_dwell(measurement, rig, at_hz, window_s)
+    if chance is None:
+        return
+    noise = _densities(rig)
+    omega = 2 * np.pi * at_hz
+    size_m = float(abs(base_transmissibility(specimen, [at_hz])[0, 0])) * amplitude_m
+    by_noise = None
+    if noise is not None:
+        shares = noise[0] / (omega * size_m) ** 2 + noise[1] / (omega**2 * amplitude_m) ** 2
+        by_noise = float(np.sqrt(shares / window_s))
+    lasting = float(np.hypot(stated.scale_sd, stated.clock.relative or 0.0))
+    missing = _missing(stated.response, stated.base, stated.timed(1))
+    for name, scatter in ((RESPONSE_I, chance.sd_largest), (RESPONSE_II, chance.sd_second)):
+        if chance.has_several_motions:
+            yield Expected(name, window_s, None, Cause.CHANCE, lasting, missing)
+        elif scatter > STEADY and name == RESPONSE_I:
+            # The largest of a window of its own: no time makes it another's.
+            yield Expected(name, window_s, 0.0, Cause.CHANCE, float(np.hypot(scatter, lasting)), missing)
+        elif scatter > STEADY:
+            yield Expected(name, window_s, scatter, Cause.CHANCE, lasting, missing)
+        else:
+            # What generator and amplifier hiss moves the masses, and no rig states it.
+            told = None if name == RESPONSE_I else by_noise
+            yield Expected(name, window_s, told, Cause.NOISE, lasting, missing)

@@ -1,0 +1,253 @@
+"""The budgets of each kind of measurement: which causes act on its numbers, and how strongly."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..chaos.verdict import MotionKind
+from ..frequency_response.mode import Resonance
+from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
+from ..model.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOverlay
+from ..recordings.facts import RecordingFacts
+from ..signals.arrays import Flags, Reals
+from ..sine.dwell import DwellResponse
+from ..sine.dwell_analysis import DwellAnalysis
+from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
+from ..sine.sweep import SweepResponse
+from ..sine.sweep_analysis import SweepAnalysis
+from .budget import Budget, Cause, Contribution, scattered
+from .stated import Stated, stated_of
+
+_BLOCKS, _FEWEST_BLOCKS = 50, 10
+"""Parts of a window whose maxima tell how that of a whole one scatters."""
+_ALIKE = 1e-12
+"""Differences of maxima over their size that are roundings."""
+_FEWEST_DRAWS = 5
+_UNTOLD = Contribution(Cause.CHANCE, None, "no draws of the twin tell it")
+"""Of a maximum, and of all that a sweep shows in a tenth of a second."""
+_ENDS = 2
+"""Intervals at either end of a sweep, where the largest value is no peak: it depends on where they begin."""
+_PEAKED = 1.05
+"""Response I over Response II above which a step is no sine."""
+_FEWEST_PERIODS = 20.0
+"""Of the drive in a part: its maximum is then one of many turns."""
+
+
+def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Give frequency, damping ratio and transmissibility of every resonance."""
+    stated = stated_of(analysis.facts.bench)
+    found = analysis.response
+    chance = _chance_share(found)
+    return tuple(each for one in found.resonances for each in _of_resonance(one, stated, chance))
+
+
+def _of_resonance(found: Resonance, stated: Stated, chance: float) -> Iterator[Budget]:
+    where = f"{found.frequency_hz:.0f} Hz"
+
+    def scatter(sd: float, value: float) -> tuple[Contribution, ...]:
+        parts = ((Cause.NOISE, 1.0 - chance), (Cause.CHANCE, chance))
+        return tuple(
+            scattered(cause, sd * float(np.sqrt(part)), value, "scatter of the lines")
+            for cause, part in parts
+            if part > 0.0
+        )
+
+    yield Budget(
+        f"resonance at {where}, frequency",
+        found.frequency_hz,
+        "Hz",
+        (*stated.timed(1), *scatter(found.sd_frequency_hz, found.frequency_hz)),
+    )
+    yield Budget(
+        f"resonance at {where}, damping ratio",
+        100 * found.damping_ratio,
+        "%",
+        scatter(found.sd_damping_ratio, found.damping_ratio),
+    )
+    yield Budget(
+        f"transmissibility at {where}",
+        found.peak_magnitude,
+        "",
+        (
+            *stated.response,
+            *stated.base,
+            *stated.timed(1),
+            *scatter(found.sd_peak_magnitude, found.peak_magnitude),
+        ),
+    )
+
+
+def _chance_share(found: NoiseResponse) -> float:
+    """Part of the lines' variance that the periods' noise does not explain; 0 where nothing tells it."""
+    if found.periodic is None or found.periodic.distortion_variance is None:
+        return 0.0
+    more = float(np.median(found.periodic.distortion_variance))
+    least = float(np.median(found.periodic.noise_variance))
+    return more / (more + least) if more > 0.0 else 0.0
+
+
+def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
+    """Give base amplitude and both responses of a dwell."""
+    stated, found = stated_of(analysis.facts.bench), analysis.response
+    is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
+    scatter = Cause.NOISE if is_steady else Cause.CHANCE
+    drive = found.drive
+    of_base = scattered(scatter, drive.sd_amplitude_m, drive.amplitude_m, "parts of the window")
+    noise = scattered(Cause.NOISE, found.noise_error_i, found.response_i, found.noise_source)
+    return (
+        _amplitude(drive.amplitude_m, stated, of_base),
+        Budget(
+            RESPONSE_I,
+            found.response_i,
+            "",
+            (
+                *_ratio(stated),
+                noise,
+                *_of_change(found.slow_change),
+                *((_of_base(drive.sd_amplitude_m, drive.amplitude_m),) if is_steady else ()),
+                *(() if is_steady or np.isnan(found.slow_change) else _one_draw(analysis, laid)),
+            ),
+        ),
+        Budget(
+            RESPONSE_II,
+            found.response_ii,
+            "",
+            (
+                *_ratio(stated),
+                scattered(scatter, found.sd_response_ii, found.response_ii, "tenths of the window"),
+            ),
+        ),
+    )
+
+
+def _ratio(stated: Stated) -> tuple[Contribution, ...]:
+    """Displacement over displacement, from velocity over acceleration: once by the frequency."""
+    return (*stated.response, *stated.base, *stated.timed(1))
+
+
+def _amplitude(value_m: float, stated: Stated, scatter: Contribution, where: str = "") -> Budget:
+    return Budget(f"base amplitude A0{where}", 1e6 * value_m, "µm", (*stated.base, *stated.timed(2), scatter))
+
+
+def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
+    """Give what the scatter of A0 adds to a maximum that is held against it."""
+    return scattered(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
+
+
+def _of_change(relative: float) -> tuple[Contribution, ...]:
+    """Give what slow change over the record adds to a maximum; nothing where there is none."""
+    if relative == 0.0:
+        return ()
+    return (scattered(Cause.CHANCE, relative, 1.0, "slow change over the record"),)
+
+
+def _one_draw(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Contribution, ...]:
+    """Scatter of the largest |x| over equal windows: that of the draws, else of the window's parts."""
+    drawn = _drawn(laid, RESPONSE_I, 0)
+    return (of_one_draw(analysis.response) if drawn is None else drawn,)
+
+
+def of_one_draw(found: DwellResponse) -> Contribution:
+    """Scatter of the largest |x| of a window, as its parts tell it."""
+    motion = found.displacement.settled
+    window = np.where(found.is_clear, np.abs(motion[-found.is_clear.size :]), 0.0)
+    blocks = int(min(_BLOCKS, found.window_s * found.drive.frequency_hz / _FEWEST_PERIODS))
+    if blocks < _FEWEST_BLOCKS:
+        return Contribution(Cause.CHANCE, None, "the window is too short to tell")
+    largest = np.max(window[: window.size // blocks * blocks].reshape(blocks, -1), axis=1)
+    largest = largest[largest > 0.0]
+    if largest.size < _FEWEST_BLOCKS:
+        return Contribution(Cause.CHANCE, None, "drop-outs leave too little of the window to tell")
+    source = f"largest |x| of {largest.size} parts of the window"
+    return scattered(Cause.CHANCE, sd_of_largest(largest), float(np.max(largest)), source)
+
+
+def sd_of_largest(maxima: Reals) -> float:
+    """Tell how the largest of as many maxima scatters, as generalised extreme values.
+
+    With their shape k, from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
+    largest of n is n^-k of that of one: less where the motion is bounded, the same where it is not.
+    """
+    if np.ptp(maxima) <= _ALIKE * float(np.mean(maxima)):
+        return 0.0
+    # Of their largest: sums of the smallest numbers there are have no digits left.
+    ordered, count = np.sort(maxima) / np.max(maxima), maxima.size
+    place = np.arange(count)
+    first, second, third = (
+        float(np.mean(ordered * weight))
+        for weight in (
+            np.ones(count),
+            place / (count - 1),
+            place * (place - 1) / ((count - 1) * (count - 2)),
+        )
+    )
+    skewness = (6 * third - 6 * second + first) / (2 * second - first)
+    off = 2 / (3 + skewness) - np.log(2) / np.log(3)
+    shape = float(np.clip(7.8590 * off + 2.9554 * off**2, 0.0, 0.5))
+    return float(np.std(maxima, ddof=1) * count**-shape)
+
+
+def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Give base amplitude and largest Responses of a sweep, with where they are."""
+    found = analysis.response
+    top = found.largest(found.response_ii)
+    # What no noise of a sensor explains may be chaos, of which one sweep shows one draw.
+    collides = analysis.collisions.is_colliding | analysis.collisions.is_unexplained
+    stated = stated_of(analysis.facts.bench)
+    value_m, sd_m = float(found.drive_amplitude_m[top]), float(found.sd_drive_amplitude_m[top])
+    scatter = _UNTOLD if collides[top] else scattered(Cause.NOISE, sd_m, value_m, "parts of the window")
+    amplitude = _amplitude(value_m, stated, scatter, f", at {found.frequency_hz[top]:.4g} Hz")
+    return amplitude, *_largest(analysis.facts, found, collides, laid)
+
+
+def stepped_budgets(analysis: SteppedSineAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
+    """Give the largest Responses of the steps, with where they are."""
+    found = analysis.response
+    if not found.response_ii.size:
+        return ()
+    collides = found.response_i - np.nan_to_num(found.noise_bias_i) > _PEAKED * found.response_ii
+    return tuple(_largest(analysis.facts, found, collides, laid))
+
+
+def _largest(
+    facts: RecordingFacts,
+    found: SweepResponse | SteppedResponse,
+    collides: Flags,
+    laid: AbstractOverlay[Any] | None,
+) -> Iterator[Budget]:
+    stated = stated_of(facts.bench)
+    rate = f", swept at {abs(found.sweep_rate_hz_per_s):.3g} Hz/s" if isinstance(found, SweepResponse) else ""
+    error, sd = found.noise_error_i, found.sd_response_ii
+    for name, values, scatter, source in (
+        (RESPONSE_I, found.response_i, error, "noise that lifts a maximum"),
+        (RESPONSE_II, found.response_ii, sd, "parts of the interval"),
+    ):
+        top = found.largest(values) if isinstance(found, SweepResponse) else int(np.argmax(values))
+        value, at = float(values[top]), f"{found.frequency_hz[top]:.4g} Hz"
+        own = [scattered(Cause.NOISE, float(scatter[top]), value, source)]
+        if isinstance(found, SweepResponse):
+            is_hidden = ~found.is_clear | np.isnan(found.response_i)
+            if np.any(found.response_ii[is_hidden] > found.response_ii[top]):
+                own.append(Contribution(Cause.CHANCE, None, "drop-outs may hide the largest value"))
+        if collides[top]:
+            is_long = name == RESPONSE_II and isinstance(found, SteppedResponse)
+            of_window = replace(own[0], cause=Cause.CHANCE) if is_long else _UNTOLD
+            own = [_drawn(laid, name, top) or of_window]
+        elif name == RESPONSE_I and isinstance(found, SteppedResponse):
+            own += _of_change(float(found.slow_change[top]))
+        if not collides[top] and name == RESPONSE_I:
+            own.append(_of_base(float(found.sd_drive_amplitude_m[top]), float(found.drive_amplitude_m[top])))
+            if isinstance(found, SweepResponse) and not _ENDS <= top < values.size - _ENDS:
+                own.append(Contribution(Cause.CHANCE, None, "where intervals begin decides at a sweep's end"))
+        yield Budget(f"largest {name}, at {at}{rate}", value, "", (*_ratio(stated), *own))
+
+
+def _drawn(laid: AbstractOverlay[Any] | None, name: str, place: int) -> Contribution | None:
+    """Give how one value scatters over draws of the twin of the measured kind of motion; None below five."""
+    curve = None if laid is None else laid.quantity(name)
+    if curve is None or int(curve.count[place]) < _FEWEST_DRAWS:
+        return None
+    source = f"{int(curve.count[place])} simulated draws"
+    return scattered(Cause.CHANCE, float(curve.relative_sd[place]), 1.0, source)

@@ -1,5 +1,0 @@
-from ._background import (
-    Background as Background,
-    Job as Job,
-    LatestRequest as LatestRequest,
-)

@@ -1,0 +1,283 @@
+"""One editor for every kind of value that a plan may hold."""
+
+import json
+from collections.abc import Callable, Mapping
+from enum import Enum
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Protocol, Union, get_args, get_origin
+
+from PySide6.QtCore import QModelIndex, QPersistentModelIndex, Qt
+from PySide6.QtGui import QKeyEvent, QPaintEvent, QStandardItemModel, QWheelEvent
+from PySide6.QtWidgets import QComboBox, QStyledItemDelegate, QStyleOptionViewItem, QWidget
+
+from vibench.acquisition import ConfigurationError
+
+from ..widgets.units import CHOICES
+from .field_edge import LineField, draw_edge
+from .field_facts import FieldFacts
+from .quantity_edit import QuantityEdit, parsed_quantity, quantity_text, unit_of
+
+
+class Editor(Protocol):
+    """A widget that holds one value of a plan, in the plain types of a file."""
+
+    @property
+    def widget(self) -> QWidget:
+        """What is put into the form."""
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong before the plan is even asked."""
+
+    def content(self) -> Any:
+        """Say what a file would say; None for nothing."""
+
+    def show_content(self, content: Any) -> None:
+        """Show what a file says."""
+
+
+_LEFT_OPEN = "left open"
+"""Stands in a field that may be empty, while it is."""
+
+
+class QuantityEditor:
+    """A number with its unit."""
+
+    def __init__(
+        self, facts: FieldFacts, kind: type[float] | type[int], changed: Callable[..., None], empty: str
+    ) -> None:
+        self._edit = QuantityEdit(facts.unit, kind, empty)
+        self._edit.changed.connect(changed)
+        self.widget = self._edit
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong with the text."""
+        return self._edit.complaint
+
+    def content(self) -> float | int | None:
+        """Give the number."""
+        return self._edit.value()
+
+    def show_content(self, content: Any) -> None:
+        """Show a number."""
+        self._edit.set_value(content)
+
+
+class Choice(QComboBox):
+    """A choice that a turning wheel changes only while it has the focus, and that Space leaves alone.
+
+    Space belongs to the page: the Run page freezes its picture. F4 and Alt+Down open the list.
+    Its width does not follow its longest entry.
+    """
+
+    LETTERS = 10
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.setMinimumContentsLength(self.LETTERS)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Hand Space on."""
+        if event.key() == Qt.Key.Key_Space:
+            event.ignore()
+        else:
+            super().keyPressEvent(event)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the box, then its edge."""
+        super().paintEvent(event)
+        draw_edge(self)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Scrolling a form must change nothing."""
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+
+class _LineOnEach(QStyledItemDelegate):
+    """Writes the line on an entry beside it, where the list is open."""
+
+    def initStyleOption(
+        self, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
+        """Add the line."""
+        super().initStyleOption(option, index)
+        line = index.data(Qt.ItemDataRole.ToolTipRole)
+        option.text = f"    {option.text}:  {line}" if line else option.text
+
+
+class ChoiceEditor:
+    """One of a few values: nothing can be wrong."""
+
+    complaint = ""
+
+    def __init__(self, values: tuple[Any, ...], changed: Callable[..., None]) -> None:
+        self._box = Choice()
+        self._box.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        for value in values:
+            self._box.addItem(str(value).replace("_", " "), value)
+        self._box.currentIndexChanged.connect(changed)
+        self.widget = self._box
+
+    def content(self) -> Any:
+        """Give the chosen value."""
+        return self._box.currentData()
+
+    def show_content(self, content: Any) -> None:
+        """Choose a value."""
+        place = self._box.findData(content)
+        if place >= 0 and content is not None:
+            self._box.setCurrentIndex(place)
+
+    def explain(self, lines: Mapping[str, tuple[str, str]]) -> None:
+        """List the values below headings, each with a line on it: heading and line by value."""
+        blocked, chosen = self._box.blockSignals(True), self.content()
+        self._box.clear()
+        model = self._box.model()
+        assert isinstance(model, QStandardItemModel)
+        for heading in dict.fromkeys(heading for heading, _ in lines.values()):
+            self._box.addItem(heading.upper())
+            model.item(model.rowCount() - 1).setEnabled(False)
+            for value, (_, line) in (each for each in lines.items() if each[1][0] == heading):
+                self._box.addItem(value.replace("_", " "), value)
+                self._box.setItemData(self._box.count() - 1, line, Qt.ItemDataRole.ToolTipRole)
+        view = self._box.view()
+        view.setItemDelegate(_LineOnEach(self._box))
+        view.setMinimumWidth(view.sizeHintForColumn(0) + view.verticalScrollBar().sizeHint().width())
+        self.show_content(chosen)
+        self._box.blockSignals(blocked)
+
+
+class TextEditor:
+    """A word or a sentence; the plan itself judges it."""
+
+    complaint = ""
+
+    def __init__(self, changed: Callable[..., None]) -> None:
+        self._line = LineField()
+        self._line.editingFinished.connect(changed)
+        self.widget = self._line
+
+    def content(self) -> str:
+        """Give the text."""
+        return self._line.text()
+
+    def show_content(self, content: Any) -> None:
+        """Show a text."""
+        self._line.setText("" if content is None else str(content))
+
+
+class SuggestionEditor:
+    """A text that is chosen from a list, or typed; the plan itself judges it."""
+
+    complaint = ""
+
+    def __init__(self, examples: tuple[str, ...], changed: Callable[..., None]) -> None:
+        self._box = Choice()
+        self._box.setEditable(True)
+        self._box.setInsertPolicy(Choice.InsertPolicy.NoInsert)
+        self._box.addItems(examples)
+        self._shown = self._box.currentText()
+        self._changed = changed
+        self._box.activated.connect(self._tell)
+        line = self._box.lineEdit()
+        if line is not None:
+            line.setPlaceholderText(_LEFT_OPEN)
+            line.editingFinished.connect(self._tell)
+        self.widget = self._box
+
+    def content(self) -> str:
+        """Give the text."""
+        return self._box.currentText()
+
+    def show_content(self, content: Any) -> None:
+        """Show a text."""
+        self._shown = "" if content is None else str(content)
+        self._box.setCurrentText(self._shown)
+
+    def _tell(self, *_: object) -> None:
+        if self._box.currentText() != self._shown:
+            self._shown = self._box.currentText()
+            self._changed()
+
+
+class ListEditor:
+    """Numbers or anything else that a file would hold, as a line of text: ``95, 266, 500``.
+
+    Numbers with a unit that may be chosen are read as in a field of one.
+    """
+
+    def __init__(self, unit: str, changed: Callable[..., None]) -> None:
+        self._unit = unit if unit in CHOICES else ""
+        self._line = LineField()
+        self._line.setPlaceholderText("none; or for example 95, 266, 500")
+        self._line.editingFinished.connect(changed)
+        self._complaint = ""
+        self._shown: tuple[str, list[Any]] = ("", [])
+        """What was last shown, and its values with every digit."""
+        self.widget = self._line
+
+    @property
+    def complaint(self) -> str:
+        """What cannot be read."""
+        self.content()
+        return self._complaint
+
+    def content(self) -> Any:
+        """Give the values."""
+        self._complaint, text = "", self._line.text()
+        if text == self._shown[0]:
+            return self._shown[1]
+        try:
+            if self._unit:
+                shown = self._shown[0].split(",")
+                return [
+                    parsed_quantity(each, self._unit, unit_of(shown[min(place, len(shown) - 1)], self._unit))
+                    for place, each in enumerate(text.split(","))
+                    if text.strip()
+                ]
+            return json.loads(f"[{text}]")
+        except json.JSONDecodeError as error:
+            self._complaint = f"{text!r} is not a list ({error.msg}); write for example 95, 266, 500"
+        except ConfigurationError as error:
+            self._complaint = str(error)
+        return []
+
+    def show_content(self, content: Any) -> None:
+        """Show values."""
+        values = list(content or ())
+        texts = (quantity_text(each, self._unit) for each in values)
+        text = ", ".join(texts) if self._unit else json.dumps(values)[1:-1]
+        self._shown = (text, values)
+        self._line.setText(text)
+
+
+def unwrapped(annotation: Any) -> tuple[Any, bool]:
+    """Take ``Annotated`` and ``| None`` off a type; says whether None is allowed."""
+    while get_origin(annotation) is Annotated:
+        annotation = get_args(annotation)[0]
+    if get_origin(annotation) in (Union, UnionType):
+        parts = [part for part in get_args(annotation) if part is not NoneType]
+        if len(parts) == 1 and len(parts) < len(get_args(annotation)):
+            return unwrapped(parts[0])[0], True
+    return annotation, False
+
+
+def value_editor(annotation: Any, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
+    """Choose the editor for a plain value."""
+    plain, may_be_missing = unwrapped(annotation)
+    if plain in (float, int):
+        return QuantityEditor(facts, plain, changed, _LEFT_OPEN if may_be_missing else "")
+    if get_origin(plain) is Literal:
+        return ChoiceEditor(get_args(plain), changed)
+    if isinstance(plain, type) and issubclass(plain, Enum):
+        return ChoiceEditor(tuple(member.value for member in plain), changed)
+    if get_origin(plain) in (tuple, list):
+        return ListEditor(facts.unit, changed)
+    if plain is str:
+        return SuggestionEditor(facts.examples, changed) if facts.examples else TextEditor(changed)
+    raise TypeError(f"{facts.name} is a {annotation}, and no form can edit that; add an editor for it")

@@ -1,0 +1,400 @@
+"""A form for a plan model: a row a field, groups for models inside, judged by the model at every change."""
+
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QFormLayout, QGroupBox, QLabel, QVBoxLayout, QWidget
+
+from vibench.sim import SpecimenWarning
+
+from ..widgets.boxes import filled
+from ..widgets.units import CHOICES, UNITS, SentenceLabel
+from .editor import Choice, ChoiceEditor, Editor, unwrapped, value_editor
+from .field_facts import FieldFacts, field_facts
+
+Loc = tuple[int | str, ...]
+
+
+@dataclass(eq=False)
+class _Row:
+    facts: FieldFacts
+    editor: Editor
+    complaint: QLabel
+    label: QLabel | None
+
+    def explain(self) -> None:
+        """Say what the field is and takes, in the units that are shown."""
+        for each in (self.editor.widget, self.label):
+            if each is not None:
+                each.setToolTip(self.facts.tooltip)
+        self.editor.widget.setAccessibleName(self.facts.spoken)
+        self.editor.widget.setAccessibleDescription(self.facts.tooltip)
+
+
+def complaints_of(error: ValidationError) -> dict[Loc, str]:
+    """Give what a model refuses, place by place, without what only follows from something else."""
+    return {
+        detail["loc"]: detail["msg"].removeprefix("Value error, ")
+        for detail in error.errors()
+        if detail["type"] != "default_factory_not_called"
+    }
+
+
+class ModelForm(QWidget):
+    """Holds the content of a plan as a file would; the plan itself judges it."""
+
+    changed = Signal()
+
+    def __init__(self, model: type[BaseModel], hidden: frozenset[str] = frozenset()) -> None:
+        super().__init__()
+        self.model = model
+        self._fixed: dict[str, Any] = {}
+        self._rows: dict[str, _Row] = {}
+        self.edited = ""
+        """Label and unit of the field that was changed last."""
+        self._layout = QFormLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setRowWrapPolicy(QFormLayout.RowWrapPolicy.DontWrapRows)
+        self._layout.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        for name, field in model.model_fields.items():
+            if name in hidden:
+                continue
+            plain, _ = unwrapped(field.annotation)
+            if get_origin(plain) is Literal and (name == "kind" or len(get_args(plain)) == 1):
+                self._fixed[name] = get_args(plain)[0]
+            else:
+                self._add(name, field)
+        UNITS.on_change(self._explain)
+
+    @property
+    def editors(self) -> dict[str, Editor]:
+        """The editor of every field, by its name."""
+        return {name: row.editor for name, row in self._rows.items()}
+
+    def content(self) -> dict[str, Any]:
+        """Say what a file would say; what is not given is left out, or None where that has a meaning."""
+        given = {name: row.editor.content() for name, row in self._rows.items()}
+        said = {
+            name: value
+            for name, value in given.items()
+            if value is not None or _may_be_emptied(self.model.model_fields[name])
+        }
+        return {**self._fixed, **said}
+
+    def show_content(self, content: Mapping[str, Any]) -> None:
+        """Show what a file says; what it does not say is shown as the plan's own default."""
+        blocked = self.blockSignals(True)
+        for name, row in self._rows.items():
+            row.editor.show_content(content.get(name, _default(self.model.model_fields[name])))
+        self.blockSignals(blocked)
+        self.edited = ""
+        self.changed.emit()
+
+    def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
+        """Put complaints at their fields, those of models inside further in; gives all, each with its field.
+
+        What belongs to no field, but to several together, is told with the field that was changed last.
+        """
+        said: list[str] = []
+        for name, row in self._rows.items():
+            inner = {
+                _after_kind(row.editor, loc[1:]): text
+                for loc, text in complaints.items()
+                if loc and loc[0] == name
+            }
+            if isinstance(row.editor, GroupEditor):
+                said += row.editor.complain(inner)
+                continue
+            text = row.editor.complaint or "; ".join(inner.values())
+            text = f"{row.facts.named}: {_sentence(text, row.facts)}" if text else ""
+            row.complaint.setText(text)
+            row.complaint.setVisible(bool(text))
+            said += [text] if text else []
+        placed = {*self._rows}
+        about = f"{self.edited}: " if self.edited else ""
+        said += [about + text for loc, text in complaints.items() if not loc or loc[0] not in placed]
+        return tuple(said)
+
+    @property
+    def is_read(self) -> bool:
+        """Whether everything that was typed can at least be read, in this form and those inside."""
+        return all(
+            row.editor.form.is_read if isinstance(row.editor, GroupEditor) else not row.editor.complaint
+            for row in self._rows.values()
+        )
+
+    def _add(self, name: str, field: FieldInfo) -> None:
+        facts = field_facts(self.model, name, field)
+        editor = editor_for(field, facts, lambda *_: self._changed(name))
+        complaint = SentenceLabel(rank="complaint")
+        complaint.hide()
+        complaint.setAccessibleName(f"Complaint about {facts.label}")
+        widget = editor.widget
+        label = None if isinstance(editor, GroupEditor) else QLabel(facts.label)
+        if label is None:
+            self._layout.addRow(widget)
+        else:
+            label.setBuddy(widget)
+            self._layout.addRow(label, widget)
+        self._layout.addRow(complaint)
+        self._rows[name] = _Row(facts, editor, complaint, label)
+        self._rows[name].explain()
+
+    def _explain(self) -> None:
+        """Write values and what is said of them in other units; what cannot be read stays as it was typed."""
+        for row in self._rows.values():
+            row.explain()
+            if row.facts.unit in CHOICES and not row.editor.complaint:
+                row.editor.show_content(row.editor.content())
+
+    def _changed(self, name: str) -> None:
+        row = self._rows.get(name)
+        if row is not None:
+            inside = row.editor.form.edited if isinstance(row.editor, GroupEditor) else ""
+            self.edited = inside or row.facts.named
+            self.changed.emit()
+
+
+class GroupEditor:
+    """A model inside a model; where it may be missing, a tick says whether it is there."""
+
+    def __init__(
+        self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
+    ) -> None:
+        self._box = QGroupBox(facts.label)
+        self._changed = changed
+        self._layout = QVBoxLayout(self._box)
+        self._kinds = kinds
+        self._kind: ChoiceEditor | None = None
+        self._memory: dict[str, Any] = {}
+        self._memories: dict[str, dict[str, Any]] = {}
+        """What each kind was left with."""
+        self._usual: Mapping[str, Any] = {}
+        self._fresh: Mapping[str, Mapping[str, Any]] = {}
+        if len(kinds) > 1:
+            self._kind = ChoiceEditor(tuple(_kind_of(kind) for kind in kinds), self._turn)
+            self._kind.widget.setAccessibleName(f"Kind of {facts.label.lower()}")
+            self._kind.widget.setToolTip(f"What kind of {facts.label.lower()} it is")
+            self._layout.addWidget(self._kind.widget)
+        self._form = self._new_form(kinds[0])
+
+    @property
+    def widget(self) -> QWidget:
+        """The box around the fields."""
+        return self._box
+
+    @property
+    def form(self) -> ModelForm:
+        """The fields."""
+        return self._form
+
+    @property
+    def kind_choice(self) -> Choice | None:
+        """Where the kind is chosen, when there are several."""
+        return None if self._kind is None else self._kind.widget
+
+    @property
+    def complaint(self) -> str:
+        """Complaints stand at the fields."""
+        return ""
+
+    def content(self) -> Any:
+        """Say what a file would say."""
+        return self._form.content()
+
+    def show_content(self, content: Any) -> None:
+        """Show what a file says, in the form of its kind."""
+        values = _as_content(content) or {}
+        if self._kind is not None and "kind" in values:
+            self._kind.show_content(values["kind"])
+        self._form.show_content(values)
+
+    def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
+        """Hand complaints on."""
+        return self._form.complain(complaints)
+
+    def know(
+        self,
+        usual: Mapping[str, Any],
+        fresh: Mapping[str, Mapping[str, Any]],
+        lines: Mapping[str, tuple[str, str]],
+    ) -> None:
+        """Give the fields of a new kind these values, by their names, where they would be empty.
+
+        Those that are fresh of a kind stand in place of what another kind was left with. The kinds are listed
+        below headings, each with a line on it.
+        """
+        self._usual, self._fresh = usual, fresh
+        assert self._kind is not None
+        self._kind.explain(lines)
+
+    def _turn(self, *_: object) -> None:
+        """Change the kind; fields of the same name keep their values."""
+        assert self._kind is not None
+        left = self._form.content()
+        self._memories[left["kind"]] = left
+        chosen = self._kind.content()
+        known_of = self._memories.get(chosen, self._fresh.get(chosen, {}))
+        self._memory = {**self._usual, **self._memory, **left}
+        model = next(kind for kind in self._kinds if _kind_of(kind) == chosen)
+        self._layout.removeWidget(self._form)
+        self._form.hide()
+        self._form.deleteLater()
+        self._form = self._new_form(model)
+        begun = {**self._memory, **known_of}
+        known = {name: value for name, value in begun.items() if name in model.model_fields}
+        self._form.show_content({name: value for name, value in known.items() if name not in _DRAWN})
+        self._changed()
+
+    def _new_form(self, model: type[BaseModel]) -> ModelForm:
+        form = ModelForm(model)
+        form.changed.connect(self._changed)
+        self._layout.addWidget(form)
+        return form
+
+
+class OptionalGroupEditor(GroupEditor):
+    """A model that may be missing."""
+
+    def __init__(
+        self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
+    ) -> None:
+        super().__init__(facts, kinds, changed)
+        self._there = QCheckBox(f"Give {facts.label.lower()}")
+        self._there.setAccessibleName(f"Give {facts.label.lower()}")
+        self._there.setToolTip(facts.tooltip)
+        self._layout.insertWidget(0, self._there)
+        self._there.toggled.connect(self._form.setVisible)
+        self._there.toggled.connect(lambda _there: changed())
+        self._form.hide()
+
+    def content(self) -> Any:
+        """Say what a file would say, None when it is not there."""
+        return super().content() if self._there.isChecked() else None
+
+    def show_content(self, content: Any) -> None:
+        """Show it, or that it is missing."""
+        self._there.setChecked(content is not None)
+        if content is not None:
+            super().show_content(content)
+
+
+_DRAWN = frozenset({"excited_lines", "detection_lines"})
+"""Values that a plan fills in for itself; they do not outlive the values they were drawn from."""
+
+
+def editor_for(field: FieldInfo, facts: FieldFacts, changed: Callable[..., None]) -> Editor:
+    """Choose the editor of a field, models included."""
+    plain, may_be_missing = unwrapped(field.annotation)
+    kinds = tuple(unwrapped(part)[0] for part in get_args(plain)) or (plain,)
+    if all(isinstance(kind, type) and issubclass(kind, BaseModel) for kind in kinds):
+        make = OptionalGroupEditor if may_be_missing else GroupEditor
+        return make(facts, kinds, changed)
+    return value_editor(field.annotation, facts, changed)
+
+
+def _kind_of(model: type[BaseModel]) -> str:
+    return str(model.model_fields["kind"].default)
+
+
+def _may_be_emptied(field: FieldInfo) -> bool:
+    """Say whether an empty field means something else than the default."""
+    return unwrapped(field.annotation)[1] and not field.is_required() and _default(field) is not None
+
+
+def _default(field: FieldInfo) -> Any:
+    if field.is_required():
+        return None
+    return _as_content(field.get_default(call_default_factory=True, validated_data={}))
+
+
+def _as_content(value: Any) -> Any:
+    return value.model_dump(mode="json", exclude_none=True) if isinstance(value, BaseModel) else value
+
+
+def _after_kind(editor: Editor, loc: Loc) -> Loc:
+    """Pydantic names the kind inside the place of an error; a form does not."""
+    if isinstance(editor, GroupEditor) and editor.kind_choice is not None and loc:
+        return loc[1:]
+    return loc
+
+
+def _sentence(text: str, facts: FieldFacts) -> str:
+    """Say a complaint of the model's in words of a form."""
+    unit = f" in {facts.shown_unit}" if facts.unit else ""
+    if text == "Field required":
+        return f"nothing is given; type a value{unit}"
+    allowed = f"; allowed is {facts.limits}" if facts.limits else unit and f"; give it{unit}"
+    return text.replace("Input should be", "must be") + (allowed if text.startswith("Input should") else "")
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class JudgedForm(QWidget, Generic[Model]):
+    """Fields, and below them what does not fit together."""
+
+    changed = Signal()
+
+    def __init__(
+        self,
+        model: type[Model],
+        name: str,
+        hidden: frozenset[str] = frozenset(),
+    ) -> None:
+        super().__init__()
+        self._model = model
+        self._value: Model | None = None
+        self.form = ModelForm(model, hidden)
+        self._complaint = SentenceLabel(rank="complaint")
+        self._complaint.setAccessibleName(f"Complaint about the {name}")
+        self._warning = SentenceLabel()
+        self._warning.setAccessibleName(f"Warning about the {name}")
+        filled(QVBoxLayout(self), self.form, self._complaint, self._warning, margin=0)
+        self.form.changed.connect(self._take)
+        UNITS.on_change(self._judge)
+        self.form.show_content({})
+
+    @property
+    def value(self) -> Model | None:
+        """What the form says; None while that is not allowed."""
+        return self._value
+
+    @property
+    def complaint(self) -> str:
+        """What is not allowed, all of it."""
+        return self._complaint.text()
+
+    @property
+    def warning(self) -> str:
+        """What is allowed, but may not be meant: springs that follow from another mass."""
+        return self._warning.text()
+
+    def show_value(self, value: Model) -> None:
+        """Show other content."""
+        self.form.show_content(value.model_dump(mode="json"))
+
+    def _take(self) -> None:
+        self._judge()
+        self.changed.emit()
+
+    def _judge(self) -> None:
+        """Say what is not allowed, in the units that are shown."""
+        complaints: dict[Loc, str] = {}
+        self._value = None
+        with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:
+            try:
+                value = self._model.model_validate(self.form.content())
+            except ValidationError as error:
+                complaints = complaints_of(error)
+            else:
+                self._value = value if self.form.is_read else None
+        self._warning.setText("; ".join(f"⚠ {each.message}" for each in warned))
+        self._warning.setVisible(bool(warned))
+        self._complaint.setText("; ".join(self.form.complain(complaints)))
+        self._complaint.setVisible(bool(self._complaint.text()))

@@ -1,0 +1,225 @@
+"""A field for one quantity as people type it: "12,5", "5 ms", "45 µm"; its limits stand in the tooltip."""
+
+import re
+from decimal import Decimal
+from math import isfinite, log10
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QFocusEvent, QKeyEvent, QPaintEvent, QValidator, QWheelEvent
+from PySide6.QtWidgets import QAbstractSpinBox
+
+from vibench.acquisition import ConfigurationError
+
+from ..widgets.units import AUTOMATIC, CHOICES, POWERS, STANDARD_GRAVITY, UNITS
+from .field_edge import draw_edge
+
+_NUMBER = re.compile(r"^\s*([+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(\S*)\s*$")
+
+
+def quantity_text(value: float, unit: str) -> str:
+    """Write a value given in SI in the unit of its field, with every digit it has."""
+    shown = UNITS.of(unit, value if abs(value) < _SMALL else 1.0)
+    if shown.per_si != 1.0:
+        # Twelve digits hide that 4.5e-05 / 1e-06 is not quite 45; parsing must give the same value back.
+        text = shown.text(value, 12)
+        if parsed_quantity(text, unit, shown.name) == value:
+            return text
+        if UNITS.chosen.get(unit, AUTOMATIC) != AUTOMATIC:
+            return shown.text(value, _DIGITS)
+        if unit in CHOICES:
+            # Never in the SI unit: a plain number typed over it would be metres.
+            return f"{Decimal(repr(value)).scaleb(round(log10(shown.per_si))):f} {shown.name}"
+    number = f"{value:.15g}" if float(f"{value:.15g}") == value else repr(value)
+    return f"{number} {unit}".strip()
+
+
+def unit_of(text: str, unit: str) -> str:
+    """Give the unit that a text of a field shows; that of an empty field where it shows none."""
+    match = _NUMBER.match(text)
+    return (match[2] if match else "") or UNITS.in_field(unit)
+
+
+def parsed_quantity(text: str, unit: str, shown: str = "", example: str = "") -> float:
+    """Read a value in SI; a comma is a decimal point, a unit may carry a prefix.
+
+    A plain number is in the unit ``shown``; without one, in that of an empty field.
+
+    Raises ConfigurationError when it is no number, or its unit is another one.
+    """
+    match, shown = _NUMBER.match(text), shown or UNITS.in_field(unit)
+    if match is None:
+        example = example or f"12.5 {shown}".strip()
+        raise ConfigurationError(f"{_short(text)} is not a number; write for example {example}")
+    number, given = match[1].replace(",", "."), match[2] or shown
+    if given == unit:
+        return float(number)
+    if given == "g" and unit in CHOICES and "g" in CHOICES[unit]:
+        return float(number) * STANDARD_GRAVITY
+    if unit and given.endswith(unit) and given.removesuffix(unit) in POWERS:
+        return _scaled(number, given.removesuffix(unit))
+    raise ConfigurationError(
+        f"{_short(given)} is not a unit of this field; give {shown or 'a plain number'}"
+        + (f", for example {example}" if example else "")
+    )
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…")
+
+
+def _scaled(number: str, prefix: str) -> float:
+    """Move the decimal point in the text, so that 45 µm is the same number as 45e-6."""
+    mantissa, _, exponent = number.lower().partition("e")
+    return float(f"{mantissa}e{int(exponent or 0) + POWERS[prefix]}")
+
+
+_LONGEST_SHOWN = 40
+_SMALL = 1e-2
+"""Larger ones are written without a prefix."""
+_DIGITS = 6
+"""Of a value that is no short number in the unit that was chosen; the value itself keeps all."""
+MOST_WHOLE = 1 << 53
+"""Larger whole numbers cannot be told from their neighbours."""
+MOST_TIMES = 1000.0
+"""A value so many times the old one, or such a part of it, is often a mistaken unit: it is asked about."""
+STEP = 0.05
+"""Share by which one step changes a quantity: small beside what matters, and never past zero."""
+
+
+class QuantityEdit(QAbstractSpinBox):
+    """Holds a number with every digit, or nothing where nothing is allowed.
+
+    The value changes when the typing is finished, not at every key.
+    """
+
+    changed = Signal()
+
+    def __init__(self, unit: str, kind: type[float] | type[int], empty: str = "") -> None:
+        super().__init__()
+        self._unit, self._kind, self._empty = unit, kind, empty
+        self._shown_unit = ""
+        self._value: float | int | None = None
+        self._complaint = ""
+        self._asked_about: float | int | None = None
+        """A value that waits for a second Return."""
+        self._is_confirmed = False
+        self.setKeyboardTracking(False)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.set_value(None)
+        self.editingFinished.connect(self._take)
+
+    @property
+    def complaint(self) -> str:
+        """What is wrong with the text; empty when it can be read."""
+        return self._complaint
+
+    def value(self) -> float | int | None:
+        """Give the number, None when the field is empty."""
+        return self._value
+
+    def set_value(self, value: float | int | None) -> None:
+        """Show a number."""
+        self._value, self._complaint, self._asked_about = value, "", None
+        text = "" if value is None else quantity_text(value, self._unit)
+        self._shown_unit = unit_of(text, self._unit)
+        in_unit = f"in {UNITS.in_field(self._unit)}" if self._unit else ""
+        self.lineEdit().setPlaceholderText(", ".join(part for part in (self._empty, in_unit) if part))
+        self.lineEdit().setText(text)
+
+    def show_unit(self, unit: str) -> None:
+        """Hold another quantity from now on."""
+        self._unit = unit
+        self.set_value(None)
+
+    def stepBy(self, steps: int) -> None:
+        """Change by five per cent a step, or by one where numbers are whole."""
+        self._take()
+        if self._value is None:
+            return
+        if self._kind is int:
+            self.set_value(int(self._value) + steps)
+        else:
+            self.set_value(float(f"{self._value * (1 + STEP) ** steps:.4g}"))
+        self.changed.emit()
+
+    def stepEnabled(self) -> QAbstractSpinBox.StepEnabledFlag:
+        """Both ways; the plan itself knows what is allowed."""
+        flag = QAbstractSpinBox.StepEnabledFlag
+        return flag.StepUpEnabled | flag.StepDownEnabled
+
+    def validate(self, text: str, position: int) -> tuple[QValidator.State, str, int]:
+        """Let everything be typed; it is read when the typing is finished."""
+        return QValidator.State.Acceptable, text, position
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the field, then its edge."""
+        super().paintEvent(event)
+        draw_edge(self)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        """Turn only in the field that has the focus: scrolling a form must change nothing."""
+        if self.hasFocus():
+            super().wheelEvent(event)
+        else:
+            event.ignore()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Take a second Return for a yes; to leave the field is none."""
+        self._is_confirmed = event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
+        super().keyPressEvent(event)
+        self._is_confirmed = False
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """Select the number, to be typed over."""
+        super().focusInEvent(event)
+        self.selectAll()
+
+    def _take(self) -> None:
+        before = (self._value, self._complaint)
+        text = self.lineEdit().text()
+        try:
+            value = self._read(text)
+        except ConfigurationError as error:
+            self._complaint, self._asked_about = str(error), None
+        else:
+            if self._is_far(value) and not (self._is_confirmed and value == self._asked_about):
+                self._ask_about(value)
+            else:
+                self.set_value(value)
+        if (self._value, self._complaint) != before:
+            self.changed.emit()
+
+    def _is_far(self, value: float | int | None) -> bool:
+        if not value or not self._value:
+            return False
+        times = abs(value / self._value)
+        return not 1.0 / MOST_TIMES < times < MOST_TIMES
+
+    def _ask_about(self, value: float | int | None) -> None:
+        assert value is not None
+        assert self._value is not None
+        self._asked_about = value
+        self._complaint = (
+            f"{quantity_text(value, self._unit)} is {abs(value / self._value):.3g} times the last value, "
+            f"{quantity_text(self._value, self._unit)}; press Return again to accept it, or type another"
+        )
+
+    def _read(self, text: str) -> float | int | None:
+        if not text.strip():
+            return None
+        example = "" if self._value is None else quantity_text(self._value, self._unit)
+        value = parsed_quantity(text, self._unit, self._shown_unit, example)
+        if not isfinite(value):
+            raise ConfigurationError(
+                f"{_short(text)} is too large a number; write for example {example or 12}"
+            )
+        if self._kind is int:
+            if value != int(value) or abs(value) > MOST_WHOLE:
+                raise ConfigurationError(f"{_short(text)} is not a whole number below 2^53; give one")
+            return int(value)
+        # What is shown is what was typed: the same text must not change a value by rounding.
+        return (
+            self._value
+            if self._value is not None and text == quantity_text(self._value, self._unit)
+            else value
+        )

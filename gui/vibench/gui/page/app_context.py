@@ -1,0 +1,111 @@
+"""What all pages share: the bridge, what is meant, settings, background work, and the way to the window."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Signal
+
+from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, start_engine
+
+from ..background.background import Background
+from ..engine_link.bridge import Bridge
+from ..engine_link.engine_line import Starter
+from ..widgets.notice import Notice
+from ..widgets.theme import LIGHT, THEMES, Theme
+from ..widgets.units import CHOICES, UNITS
+from .selection import Selection
+from .settings import Remembered, Settings
+
+USUAL_PATIENCE_S = 2.0
+MOST_RECENT = 12
+WORKERS = 2
+"""For whatever takes long: predictions, analyses, overviews, exports."""
+
+
+class AppContext(QObject):
+    """Handed to every page; pages know each other by name only."""
+
+    folder_chosen = Signal(object)
+    """Recordings go to another folder."""
+    noticed = Signal(object)
+    """A `Notice` for the message strip."""
+    page_wanted = Signal(str)
+    """Name of a page to show."""
+    recording_wanted = Signal(object)
+    """Path of a recording that somebody wants to look at; Files opens it."""
+    recording_made = Signal(object)
+    """Path of a recording that has just been finished."""
+    comparison_wanted = Signal(object)
+    """Paths of recordings to lay over one another; Compare takes them."""
+    prediction_made = Signal(object)
+    """Curves of a prediction to lay over recordings; Compare takes them."""
+    scene_wanted = Signal(float, float)
+    """Drive frequency [Hz] and base amplitude [m] of a scene to simulate; Simulate takes them."""
+    theme_changed = Signal(object)
+    """The `Theme` from now on."""
+
+    def __init__(
+        self, settings: Settings, start: Starter = start_engine, parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self.settings = settings
+        self.first_bench: Path | None = None
+        """Named on the command line; remembered only when it can be used."""
+        self.is_armed_read: Callable[[], bool] = lambda: True
+        """Whether somebody could read to the end what is armed; the page that shows it answers."""
+        self.selection = Selection(self)
+        self.bridge = Bridge(start, self)
+        self.bridge.noticed.connect(self.noticed)
+        self.bridge.recording_ended.connect(self.recording_made)
+        self.background = Background(WORKERS, self)
+        self.looks = Background(1, self.background)
+        """For what must come at once, whatever takes long beside it: previews."""
+        UNITS.choose(dict(zip(CHOICES, settings.text(Remembered.UNITS).split(), strict=False)))
+        self._theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
+
+    @property
+    def theme(self) -> Theme:
+        """Colours to draw in."""
+        return self._theme
+
+    def choose_theme(self, theme: Theme) -> None:
+        """Draw in other colours from now on, and next time."""
+        self._theme = theme
+        self.settings.keep_text(Remembered.THEME, theme.name)
+        self.theme_changed.emit(theme)
+
+    def choose_units(self, chosen: Mapping[str, str]) -> None:
+        """Show quantities in these units from now on, and next time; by the SI unit of each."""
+        UNITS.choose(chosen)
+        self.settings.keep_text(Remembered.UNITS, " ".join(UNITS.chosen.values()))
+
+    @property
+    def patience_s(self) -> float:
+        """How long a drive far from every limit may go on while the window does not answer [s]."""
+        return self.settings.number(
+            Remembered.PATIENCE, USUAL_PATIENCE_S, VIEWER_PATIENCE_S, LONGEST_PATIENCE_S
+        )
+
+    @property
+    def folder(self) -> Path:
+        """Where recordings go and are looked for."""
+        return Path(self.settings.text(Remembered.FOLDER, str(Path.home() / "vibench")))
+
+    def choose_folder(self, folder: Path) -> None:
+        """Put recordings elsewhere from now on."""
+        self.settings.keep_text(Remembered.FOLDER, str(folder))
+        self.folder_chosen.emit(folder)
+
+    @property
+    def recent_files(self) -> tuple[Path, ...]:
+        """What was opened or saved last, the newest first."""
+        return tuple(Path(each) for each in self.settings.text(Remembered.RECENT).split("\n") if each)
+
+    def note_file(self, path: Path) -> None:
+        """Remember a file that somebody opened or saved."""
+        known = [str(each) for each in self.recent_files if each != path]
+        self.settings.keep_text(Remembered.RECENT, "\n".join([str(path), *known][:MOST_RECENT]))
+
+    def say(self, notice: Notice) -> None:
+        """Put a message on the strip."""
+        self.noticed.emit(notice)

@@ -1,0 +1,155 @@
+"""What keys, menus and buttons ask for: each action once, wherever it comes from."""
+
+from pathlib import Path
+
+from PySide6.QtCore import QObject
+
+from vibench.acquisition import StopLevel
+from vibench.acquisition.campaign import ExistingRecordings
+from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState, Supervision
+from vibench.acquisition.plan import Campaign, Measurement
+
+from ..widgets.notice import Notice, NoticeKind
+from ..widgets.page_names import RUN
+from .app_context import AppContext
+
+OPERATOR_STOP = "stopped by the operator, in the window"
+ABORT_KEY = "aborted by the key, in the window"
+LONGEST_NAME = 60
+
+
+class UserActions(QObject):
+    """Carries out what a person wants, or says why not."""
+
+    def __init__(self, context: AppContext, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._context = context
+
+    def check(self, *, new_reference: bool = False) -> None:
+        """Check the bench; as a new reference, where what has changed was meant."""
+        if not self._may("check the bench", EngineState.READY):
+            return
+        folder = self._context.folder
+        folder.mkdir(parents=True, exist_ok=True)
+        self._context.bridge.order(EngineClient.check, folder, new_reference=new_reference)
+
+    def arm_test(self) -> None:
+        """Arm the test of the Test page, under a name that is free."""
+        measurement = self._context.selection.measurement
+        if measurement is None:
+            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
+            return
+        if not self._may("arm", EngineState.READY, EngineState.ARMED):
+            return
+        folder = self._context.folder
+        named = measurement.model_copy(update={"name": free_name(folder, measurement)})
+        self._context.bridge.arm(
+            CampaignRequest(
+                campaign=Campaign(name=named.name, measurements=(named,)),
+                folder=folder,
+                longest_patience_s=self._context.patience_s,
+            )
+        )
+
+    def arm_campaign(
+        self,
+        existing: ExistingRecordings = ExistingRecordings.REFUSE,
+        attendance: Supervision | None = None,
+    ) -> None:
+        """Arm the campaign of the Queue page, in a folder of its name."""
+        campaign = self._context.selection.campaign
+        if campaign is None:
+            self._warn("There is no campaign.", "Open or make one on the Queue page.")
+            return
+        if not self._may("arm", EngineState.READY, EngineState.ARMED):
+            return
+        self._context.bridge.arm(
+            CampaignRequest(
+                campaign=campaign,
+                folder=self._context.folder / campaign.name,
+                existing=existing,
+                attendance=attendance,
+                longest_patience_s=self._context.patience_s,
+            )
+        )
+
+    def disarm(self) -> None:
+        """Take back what is armed."""
+        self._context.bridge.order(EngineClient.disarm)
+
+    def start(self) -> None:
+        """Start what is armed."""
+        if not self._may("start", EngineState.ARMED):
+            return
+        if self._context.is_armed_read():
+            self._context.bridge.order(EngineClient.start)
+        else:
+            self._warn(
+                "Cannot start: the description of the test has not been shown to its end.",
+                "Read it on the Run page (Ctrl+3); PgDn scrolls.",
+            )
+            self._context.page_wanted.emit(RUN)
+
+    def stop(self) -> None:
+        """Ramp down as planned; asked again while ramping down: as fast as the shaker bears."""
+        is_ramping = self._context.bridge.state is EngineState.RAMPING_DOWN
+        self._context.bridge.stop(StopLevel.ABORT if is_ramping else StopLevel.RAMP, OPERATOR_STOP)
+
+    def abort(self) -> None:
+        """Ramp down as fast as the shaker bears."""
+        self._context.bridge.stop(StopLevel.ABORT, ABORT_KEY)
+
+    def hold_or_resume(self) -> None:
+        """Stay where the run is, drive included; or go on."""
+        if self._context.bridge.state is EngineState.HELD:
+            self._context.bridge.order(EngineClient.resume)
+        else:
+            self._context.bridge.stop(StopLevel.HOLD, "held by the operator, in the window")
+
+    def _may(self, verb: str, *states: EngineState) -> bool:
+        """Say what stands in the way of an order, if anything does: the engine would refuse it in red."""
+        bridge = self._context.bridge
+        if bridge.is_ordering:
+            self._warn(f"Cannot {verb} yet: {_BUSY}.", "Try again when the state above has changed.")
+        elif bridge.state not in states:
+            self._warn(f"Cannot {verb}: {_STANDS[bridge.state]}.", _NEXT[bridge.state])
+        else:
+            return True
+        return False
+
+    def _warn(self, what: str, next_step: str) -> None:
+        self._context.say(Notice(NoticeKind.WARNING, what, next_step=next_step))
+
+
+_BUSY = "the last order is still being carried out"
+_STANDS = {
+    EngineState.CLOSED: "no bench is open",
+    EngineState.OPENING: "the bench is being opened",
+    EngineState.READY: "nothing is armed",
+    EngineState.CHECKING: "the bench is being checked",
+    EngineState.ARMED: "a plan is armed",
+    EngineState.RUNNING: "a measurement is running",
+    EngineState.HELD: "a measurement is held, its drive is on",
+    EngineState.RAMPING_DOWN: "the drive is ramping down",
+    EngineState.FAULT: "the bench has a fault and is closed",
+}
+_NEXT = {
+    EngineState.CLOSED: "Open one on the Rig page (Ctrl+1).",
+    EngineState.OPENING: "Wait for READY.",
+    EngineState.READY: "Arm the test first (Ctrl+Return).",
+    EngineState.CHECKING: "Wait for READY.",
+    EngineState.ARMED: "Start it (F5), or disarm it (Cancel on the Run page).",
+    EngineState.RUNNING: "Wait for its end, or stop it (STOP, Esc).",
+    EngineState.HELD: "Go on (Run page), or stop it (STOP, Esc).",
+    EngineState.RAMPING_DOWN: "Wait for READY.",
+    EngineState.FAULT: "Look at the cause in Details, and open the bench again on the Rig page (Ctrl+1).",
+}
+
+
+def free_name(folder: Path, measurement: Measurement) -> str:
+    """Give a test a number, so that nothing of that name lies in the folder: ``dwell_003``."""
+    stem = measurement.name[:LONGEST_NAME]
+    number = 1
+    while any(folder.glob(f"{stem}_{number:03}*")):
+        number += 1
+    return f"{stem}_{number:03}"

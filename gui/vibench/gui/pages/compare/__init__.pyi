@@ -1,3 +1,0 @@
-from ._compare_page import (
-    ComparePage as ComparePage,
-)

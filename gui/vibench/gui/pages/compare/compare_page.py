@@ -1,0 +1,240 @@
+"""Compare: recordings and predictions laid over one another, with peaks, differences and exports."""
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QSplitter,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.analysis import ComparedRecording, Curve, compare_recording
+from vibench.analysis.dynamics import branch_curves
+
+from ...background.background import Job
+from ...page.app_context import AppContext
+from ...page.file_kind import FileKind
+from ...page.page import Page, SideAndPicture
+from ...widgets.boxes import column, filled, row
+from ...widgets.new_path import new_path
+from ...widgets.notice import Notice, NoticeKind, notice_of
+from ...widgets.page_names import COMPARE
+from ...widgets.push_button import push_button
+from .analysis_panel import AnalysisPanel
+from .curve_list import CurveList, PairBox
+from .curve_plots import CurvePlots
+from .export_elsewhere import exported_elsewhere
+from .number_tables import PEAK_HEADINGS, NumberTable, marker_headings, marker_rows, peak_rows
+
+REPORT = "Report (*.html)"
+FILTERS = f"SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;{REPORT}"
+
+
+class ComparePage(Page):
+    """Curves on the left, their picture on the right, numbers below."""
+
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
+        self.curves = CurveList(context.theme)
+        self.plots = CurvePlots(context.theme)
+        self.panel = AnalysisPanel()
+        self.pair_box = PairBox()
+        self.peaks = NumberTable("Peaks of the curves", "Peaks of the ticked curves: place, height, damping.")
+        self.readings = NumberTable(
+            "Curves at the markers", "Show the markers (Alt+M) to read the ticked curves at two frequencies."
+        )
+        self._recordings: dict[Path, ComparedRecording | None] = {}
+        self._jobs: list[Job] = []
+        self._asked = 0
+        self._build()
+        self.curves.changed.connect(self._draw)
+        self.pair_box.changed.connect(self._draw)
+        self.plots.markers_moved.connect(self._read)
+        self.panel.wanted.connect(self.analyse_again)
+        self.panel.cancelled.connect(self.cancel)
+        context.comparison_wanted.connect(self.add_recordings)
+        context.prediction_made.connect(self.add_prediction)
+
+    @property
+    def is_done(self) -> bool:
+        """Ticked once two curves are laid over one another."""
+        return len(self.curves.shown()) > 1
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether recordings are being analysed."""
+        return bool(self._jobs)
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Branches."""
+        return {FileKind.BRANCHES: lambda path: self.add_branches((path,))}
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
+
+    def add_recordings(self, paths: tuple[Path, ...]) -> None:
+        """Analyse recordings, elsewhere, and lay their curves over those that are there."""
+        options = self.panel.options()
+        if options is None:
+            return
+        for path in paths:
+            self._recordings.setdefault(path, None)
+            self._asked += 1
+            self._jobs.append(
+                self.context.background.ask(
+                    compare_recording,
+                    self._compared,
+                    self._failed,
+                    path,
+                    options.request,
+                    options.simulation,
+                )
+            )
+        self._say_progress()
+
+    def add_prediction(self, curves: tuple[Curve, ...]) -> None:
+        """Lay a prediction over what is there."""
+        for source in dict.fromkeys(each.source for each in curves):
+            self.curves.replace_source(source, tuple(each for each in curves if each.source == source))
+
+    def analyse_again(self) -> None:
+        """Analyse every recording with the options as they are now."""
+        self.cancel()
+        self.add_recordings(tuple(self._recordings))
+
+    def cancel(self) -> None:
+        """Want no analysis any more that has not ended."""
+        for job in self._jobs:
+            job.drop()
+        self._jobs.clear()
+        self._asked = 0
+        self._say_progress()
+
+    def export_to(self, path: Path) -> None:
+        """Write the comparison as what the path's ending says, elsewhere."""
+        shown = tuple(each for each, _ in self.curves.shown())
+        recordings = tuple(each for each in self._recordings.values() if each is not None)
+        pair = None if self.pair_box.difference() is None else self.pair_box.pair()
+        marked = self.plots.markers_hz
+        ask = self.context.background.ask
+        ask(exported_elsewhere, self._exported, self._refused, path, shown, recordings, pair, marked)
+
+    def _compared(self, found: ComparedRecording) -> None:
+        self._recordings[found.path] = found
+        self.curves.replace_source(found.name, found.curves)
+        for sentence in found.failures:
+            self.context.say(
+                Notice(NoticeKind.WARNING, sentence, "The measured curves are shown without it.")
+            )
+        self._end_job()
+
+    def _failed(self, error: BaseException) -> None:
+        self._recordings = {path: each for path, each in self._recordings.items() if each is not None}
+        self.context.say(notice_of(error))
+        self._end_job()
+
+    def _end_job(self) -> None:
+        self._jobs = [job for job in self._jobs if not job.is_over]
+        self._say_progress()
+
+    def _say_progress(self) -> None:
+        if not self._jobs:
+            self._asked = 0
+        self.panel.show_progress(self._asked - len(self._jobs), self._asked)
+
+    def _exported(self, path: Path) -> None:
+        self.context.say(Notice(NoticeKind.INFO, f"Written: {path}"))
+
+    def _refused(self, error: BaseException) -> None:
+        self.context.say(notice_of(error))
+
+    def _draw(self) -> None:
+        shown = self.curves.shown()
+        self.pair_box.offer(self.curves.curves, tuple(each for each, _ in shown))
+        self.plots.show_curves(shown, self.pair_box.difference())
+        self.peaks.show_numbers(PEAK_HEADINGS, peak_rows(tuple(each for each, _ in shown)))
+        self._export.setEnabled(bool(shown))
+        self._report.setEnabled(bool(shown))
+        self._read()
+
+    def _read(self) -> None:
+        markers_hz = self.plots.markers_hz
+        curves = tuple(each for each, _ in self.curves.shown()) if markers_hz else ()
+        self.readings.show_numbers(marker_headings(markers_hz), marker_rows(curves, markers_hz))
+
+    def _choose_recordings(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileNames(
+            self, "Recordings to compare", str(self.context.folder), "Recordings (*.h5 *.h5.part)"
+        )
+        if chosen:
+            self.add_recordings(tuple(Path(each) for each in chosen))
+
+    def _choose_branches(self) -> None:
+        chosen, _ = QFileDialog.getOpenFileNames(
+            self, "Branches to lay over recordings", str(self.context.folder), "Branches (*.h5)"
+        )
+        self.add_branches(tuple(Path(each) for each in chosen))
+
+    def add_branches(self, paths: tuple[Path, ...]) -> None:
+        """Read what `vibench branches` found, elsewhere, and lay it over the curves that are there."""
+        for path in paths:
+            self.context.background.ask(branch_curves, self.add_prediction, self._refused, path)
+
+    def _remove(self) -> None:
+        gone = set(self.curves.remove_chosen())
+        self._recordings = {
+            path: each for path, each in self._recordings.items() if each is None or each.name not in gone
+        }
+
+    def _choose_export(self, filters: str = FILTERS) -> None:
+        wish = self.context.folder / ("comparison.html" if filters == REPORT else "comparison.svg")
+        if (path := new_path(self, "Export", wish, filters)) is not None:
+            self.export_to(path)
+
+    def _build(self) -> None:
+        self._parts = SideAndPicture(self.context, COMPARE, self._side(), self._picture())
+        filled(QVBoxLayout(self), self._parts)
+
+    def _side(self) -> QWidget:
+        add = push_button("&Add recordings…", "Choose recordings to compare", self._choose_recordings)
+        branches = push_button(
+            "&Branches…", "Choose files that vibench branches wrote", self._choose_branches
+        )
+        remove = push_button("&Remove", "Take the chosen curves away", self._remove)
+        self.curves.setMinimumHeight(6 * self.fontMetrics().height())
+        return column(row(add, branches, remove), (self.curves, 1), self.pair_box, self.panel)
+
+    def _picture(self) -> QWidget:
+        tabs = QTabWidget()
+        tabs.setAccessibleName("Numbers")
+        tabs.addTab(self.peaks, "&Peaks")
+        tabs.addTab(self.readings, "At the mar&kers")
+        vertical = QSplitter(Qt.Orientation.Vertical)
+        vertical.setAccessibleName("Picture and numbers")
+        vertical.addWidget(self.plots)
+        vertical.addWidget(tabs)
+        vertical.setSizes([560, 170])
+        vertical.setStretchFactor(0, 1)
+        self._markers = push_button("&Markers", "Show two markers to read the curves at", lambda: None)
+        self._markers.setCheckable(True)
+        self._markers.toggled.connect(self.plots.show_markers)
+        self._markers.toggled.connect(lambda is_on: tabs.setCurrentIndex(int(is_on)))
+        show_all = push_button(
+            "Sho&w all", "Let the axes follow the curves", self.plots.magnitudes.show_everything
+        )
+        self._export = push_button("E&xport…", "Write picture, numbers or report", self._choose_export)
+        self._report = push_button(
+            "Report…",
+            "Write one page with curves, peaks and recordings",
+            partial(self._choose_export, REPORT),
+        )
+        self._export.setEnabled(False)
+        self._report.setEnabled(False)
+        return column((vertical, 1), row(1, self._markers, show_all, self._report, self._export))

@@ -1,3 +1,0 @@
-from ._files_page import (
-    FilesPage as FilesPage,
-)

@@ -1,0 +1,354 @@
+"""Files: recordings of a folder, listed with state and picture, and opened at any zoom."""
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from time import monotonic
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QInputDialog,
+    QLabel,
+    QSplitter,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.acquisition import RecordingError, open_recording, printable
+from vibench.acquisition.recording import Recording, name_now
+from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
+
+from ...background.background import Job
+from ...forms.field_edge import LineField
+from ...page.app_context import AppContext
+from ...page.file_kind import FileKind
+from ...page.page import Page, Shown
+from ...page.settings import Remembered
+from ...widgets.boxes import Scrolled, column, filled, row
+from ...widgets.elided_label import ElidedLabel
+from ...widgets.new_path import new_path
+from ...widgets.notice import Notice, NoticeKind, notice_of
+from ...widgets.page_names import COMPARE, FILES
+from ...widgets.push_button import push_button
+from ...widgets.units import SentenceLabel
+from .file_words import facts_text
+from .listing import Levels, Listing, exported, listed, made_levels, noted, thumbnails
+from .recording_table import CampaignChoice, RecordingTable
+from .spectrogram_view import Pictures
+
+EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"
+LOOK_S = 2.0
+"""From one look for files that have gone to the next."""
+
+
+class FilesPage(Page):
+    """A browser above, the chosen recording below."""
+
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
+        self.table = RecordingTable(context.theme)
+        self.pictures = Pictures(context.theme, context.background)
+        self.time_histories = self.pictures.time_histories
+        self.campaigns = CampaignChoice()
+        self.campaigns.chosen.connect(self.table.show_only)
+        self._opened: Recording | None = None
+        self._pictured_path: Path | None = None
+        """Of the recording that the pictures show."""
+        self._listing: Job | None = None
+        self._making: Job | None = None
+        self._wanted: Path | None = None
+        self._folder = context.folder
+        self._looked_s = 0.0
+        self._build()
+        self.table.selectionModel().selectionChanged.connect(lambda *_: self._open_chosen())
+        context.recording_wanted.connect(self.open_path)
+        context.recording_made.connect(lambda _path: self.list_folder())
+        context.folder_chosen.connect(self._go_to)
+
+    @property
+    def is_done(self) -> bool:
+        """Ticked once a recording is open."""
+        return self._opened is not None
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The pictures, of the recording that is named above them."""
+        wanted = None if self._opened is None else self._opened.path
+        inside = self.pictures.spectrogram.shown, self.pictures.hidden_motion.shown
+        return Shown(self.pictures, self._pictured_path, wanted), *inside
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Recordings, and folders of them."""
+        return {FileKind.RECORDING: self.open_path, FileKind.FOLDER: self._go_to}
+
+    def entered(self) -> None:
+        """List the folder anew, for files may have come; arrows choose among them."""
+        self.list_folder()
+        self.table.setFocus()
+
+    def refresh(self) -> None:
+        """List anew when a listed file has gone."""
+        now_s = monotonic()
+        if now_s - self._looked_s > LOOK_S:
+            self._looked_s = now_s
+            if not all(each.path.exists() for each in self.table.recordings.entries):
+                self.list_folder()
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self.context.settings.keep_state(Remembered.SPLITTERS, self._splitter.saveState(), FILES)
+
+    def list_folder(self) -> None:
+        """Look at the files of the folder, elsewhere."""
+        folder = self._folder
+        self._folder_line.setText(str(folder))
+        elsewhere = folder != self.context.folder
+        self._goes_to.setText(f"new recordings go to {self.context.folder}" if elsewhere else "")
+        if self._listing is not None:
+            self._listing.drop()
+        self.table.is_listing = True
+        self._listing = self.context.background.ask(listed, self._listed, self._failed, folder)
+
+    def open_path(self, path: Path) -> None:
+        """Show a recording, whatever folder it lies in."""
+        self.context.page_wanted.emit(FILES)
+        self._wanted = path
+        if path.parent != self._folder and self._folder not in path.parents:
+            self._go_to(path.parent)
+        # The page comes into sight first: both at once would hold the window up.
+        QTimer.singleShot(0, self, lambda: self._choose(path))
+
+    def _choose(self, path: Path) -> None:
+        """Open a recording, anew if it is open; where it is listed, to choose it opens it."""
+        before = self._opened
+        self.table.choose(path)
+        if self._opened is before:
+            self._open(path)
+
+    def _listed(self, found: Listing) -> None:
+        entries = found.recordings
+        self.table.is_listing = False
+        self.campaigns.offer(found.campaigns)
+        # A list that comes late must not take back what somebody has chosen meanwhile.
+        chosen = self.table.chosen_paths() if self._wanted is None else (self._wanted,)
+        self._wanted = None
+        self.table.recordings.show_entries(entries)
+        count = f"{len(entries)} recording{'s' if len(entries) != 1 else ''}"
+        self._count.setText(count)
+        missing = self.table.recordings.missing_pictures()
+        if missing:
+            self.context.background.ask(thumbnails, self._pictured, self._failed, missing)
+        if chosen:
+            # What grew when it was chosen may have got its final name since.
+            self.table.choose(*map(name_now, chosen))
+        elif entries and self._opened is None:
+            self.table.selectRow(0)
+
+    def _pictured(self, found: dict[Path, Thumbnail | None]) -> None:
+        self.table.recordings.show_thumbnails(found)
+
+    def _failed(self, error: BaseException) -> None:
+        self.context.say(notice_of(error))
+
+    def _open_chosen(self) -> None:
+        paths = self.table.chosen_paths()
+        for button in (self._compare, self._export, self._note):
+            button.setEnabled(bool(paths))
+        if paths and (self._opened is None or self._opened.path != paths[0]):
+            self._open(paths[0])
+
+    def _open(self, path: Path) -> None:
+        """Open a recording; one without an overview is read elsewhere first."""
+        if self._making is not None:
+            self._making.drop()
+            self._making = None
+        self._close()
+        try:
+            recording = open_recording(path)
+        except RecordingError as error:
+            self._title.setText(path.name)
+            self._facts.setText(str(error))
+            self.pictures.show_recording(None, printable(str(error)))
+            self.context.say(notice_of(error))
+            return
+        self._opened = recording
+        self._title.setText(recording.path.name)
+        if recording.path != path:
+            # It was finished since it was listed.
+            self._wanted = recording.path
+            self.list_folder()
+        if recording.samples == 0:
+            self._show({})
+        elif has_overview(recording):
+            self._take_next(recording, {})
+        else:
+            self._facts.setText("Reading all samples, for this file keeps no overview…")
+            self._making = self.context.background.ask(made_levels, self._show, self._failed, path)
+
+    def _take_next(self, recording: Recording, levels: Levels) -> None:
+        """Take one channel's overview at a time: all of a long recording's would hold the window up."""
+        if recording is not self._opened:
+            return
+        role = recording.roles[len(levels)]
+        levels[role] = kept_levels(recording, role)
+        self.time_histories.prepare(recording.channel(role))
+        if len(levels) == len(recording.roles):
+            self._show(levels)
+        else:
+            QTimer.singleShot(0, lambda: self._take_next(recording, levels))
+
+    def _show(self, levels: Levels) -> None:
+        self._making = None
+        if self._opened is None:
+            return
+        self._facts.setText(facts_text(self._opened))
+        hint = "Working it out…" if self._opened.samples else "This recording holds no samples."
+        self.pictures.show_recording(RecordingOverview(self._opened, levels), hint)
+        self._pictured_path = self._opened.path
+        self._say_view()
+
+    def _close(self) -> None:
+        self.pictures.show_recording(None, "Reading the recording…")
+        self._pictured_path = None
+        if self._opened is not None:
+            self._opened.close()
+            self._opened = None
+
+    def _say_view(self) -> None:
+        if self._opened is None:
+            return
+        low_s, high_s = self.time_histories.view_s
+        text = f"In sight: {low_s:.6g} to {high_s:.6g} s"
+        if self._markers.isChecked():
+            early_s, late_s = self.time_histories.markers_s
+            between_s = late_s - early_s
+            rate = f" = 1 / {1 / between_s:.5g} Hz" if between_s > 0 else ""
+            text += f"      Markers: {early_s:.6g} s, {late_s:.6g} s, {between_s:.6g} s apart{rate}"
+        self._view.setText(text)
+
+    def _choose_folder(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Folder with recordings", str(self._folder))
+        if chosen:
+            self._go_to(Path(chosen))
+
+    def _typed_folder(self) -> None:
+        # Of os.path: those of pathlib raise on names that no system allows.
+        folder = Path(os.path.expanduser(self._folder_line.text()))  # noqa: PTH111
+        if folder == self._folder:
+            return
+        if os.path.isdir(folder):  # noqa: PTH112
+            self._go_to(folder)
+        else:
+            self.context.say(
+                Notice(
+                    NoticeKind.WARNING,
+                    f"{folder} is no folder.",
+                    "The list is as it was.",
+                    "Type another one, or choose it.",
+                )
+            )
+            self._folder_line.setText(str(self._folder))
+
+    def _go_to(self, folder: Path) -> None:
+        """Look into a folder; where recordings go is the menu's business."""
+        self._folder = folder
+        self.table.recordings.show_entries(())
+        self._count.setText("◌ reading…")
+        self.list_folder()
+
+    def _choose_export(self) -> None:
+        path = self.table.chosen_paths()[0]
+        if (target := new_path(self, "Export", path.with_suffix(".uff"), EXPORTS)) is not None:
+            self.context.background.ask(exported, self._exported, self._failed, path, target)
+
+    def _exported(self, files: tuple[Path, ...]) -> None:
+        self.context.say(Notice(NoticeKind.INFO, f"Written: {', '.join(map(str, files))}"))
+
+    def _write_note(self) -> None:
+        text, is_given = QInputDialog.getMultiLineText(self, "Add a note", "It is stored in the recording.")
+        if is_given and text.strip():
+            self.context.background.ask(
+                noted, self._choose, self._failed, self.table.chosen_paths()[0], text.strip()
+            )
+
+    def _hand_to_compare(self) -> None:
+        paths = self.table.chosen_paths()
+        if paths:
+            self.context.comparison_wanted.emit(paths)
+            self.context.page_wanted.emit(COMPARE)
+
+    def _build(self) -> None:
+        self._splitter = QSplitter(Qt.Orientation.Vertical)
+        self._splitter.setAccessibleName("List and recording")
+        for name, part in (("List of recordings", self._browser()), ("Recording in sight", self._viewer())):
+            self._splitter.addWidget(Scrolled(name, part))
+        self._splitter.setSizes([200, 600])
+        self._splitter.setStretchFactor(1, 1)
+        self._splitter.setChildrenCollapsible(False)
+        filled(QVBoxLayout(self), self._splitter)
+        kept = self.context.settings.state(Remembered.SPLITTERS, FILES)
+        if not kept.isEmpty():
+            self._splitter.restoreState(kept)
+        self.time_histories.range_changed.connect(self._say_view)
+        self.time_histories.markers_moved.connect(self._say_view)
+
+    def _browser(self) -> QWidget:
+        label = QLabel("F&older")
+        self._folder_line = LineField(str(self._folder))
+        self._folder_line.setAccessibleName("Folder of the recordings")
+        self._folder_line.editingFinished.connect(self._typed_folder)
+        label.setBuddy(self._folder_line)
+        search_label = QLabel("Sea&rch")
+        search = LineField()
+        search.setAccessibleName("Search in the list")
+        search.setPlaceholderText("name, state, excitation…")
+        search.setClearButtonEnabled(True)
+        search.textChanged.connect(self.table.search)
+        search_label.setBuddy(search)
+        self._goes_to = ElidedLabel()
+        self._goes_to.setProperty("rank", "second")
+        self._count = ElidedLabel()
+        self._count.setProperty("rank", "second")
+        self._compare = push_button(
+            "Co&mpare", "Lay the chosen recordings over others", self._hand_to_compare
+        )
+        self._export = push_button("E&xport…", "Write it for other programs", self._choose_export)
+        self._note = push_button("Add a &note…", "Store a note in the recording", self._write_note)
+        for button in (self._compare, self._export, self._note):
+            button.setEnabled(False)
+        bar = row(
+            label,
+            (self._folder_line, 3),
+            push_button("&Choose…", "Choose another folder", self._choose_folder),
+            (self.campaigns, 1),
+            search_label,
+            (search, 1),
+            self._count,
+            self._compare,
+            self._export,
+            self._note,
+        )
+        browser = column(bar, self._goes_to, self.table)
+        browser.setAccessibleName("Browser")
+        return browser
+
+    def _viewer(self) -> QWidget:
+        self._title = ElidedLabel("No recording is open")
+        self._title.setProperty("rank", "title")
+        self._facts = SentenceLabel("Choose one in the list above.", rank="second")
+        self._view = ElidedLabel()
+        self._markers = push_button("Mar&kers", "Show two markers to measure between", lambda: None)
+        self._markers.setCheckable(True)
+        self._markers.toggled.connect(self.time_histories.show_markers)
+        bar = row(
+            (self._view, 1),
+            self._markers,
+            push_button("Show &all", "Show the whole recording (Home)", self.time_histories.show_all),
+            push_button("Zoom &in", "Show less, closer (+)", lambda: self.time_histories.zoom(0.5)),
+            push_button("Zoom o&ut", "Show more (-)", lambda: self.time_histories.zoom(2.0)),
+        )
+        viewer = column(self._title, self._facts, (self.pictures, 1), bar)
+        viewer.setAccessibleName("Recording")
+        return viewer

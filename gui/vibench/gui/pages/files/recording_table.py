@@ -1,0 +1,326 @@
+"""The list of recordings: one row a file, with its state in words and a small picture, by campaign."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import (
+    QAbstractTableModel,
+    QItemSelectionModel,
+    QModelIndex,
+    QPersistentModelIndex,
+    QPointF,
+    QSize,
+    QSortFilterProxyModel,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPen, QPixmap
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
+
+from vibench.acquisition import printable
+from vibench.analysis.live import THUMBNAIL_COLUMNS, Thumbnail
+
+from ...forms.editor import Choice
+from ...widgets.clock import moment_text
+from ...widgets.elided_label import plain_tip
+from ...widgets.hint import paint_hint
+from ...widgets.table_copy import offer_copies
+from ...widgets.theme import Theme
+from .file_words import duration_text, size_text, state_text
+from .listing import ListedCampaign, ListedRecording
+
+ALL = "All recordings"
+
+
+class CampaignChoice(Choice):
+    """All recordings, or those of one campaign; hidden in a folder without campaigns."""
+
+    chosen = Signal(object)
+    """Files of the campaign as a set, None for all."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setAccessibleName("Campaign")
+        self.setToolTip("List the recordings of one campaign")
+        self.setMinimumContentsLength(22)
+        self._campaigns: tuple[ListedCampaign, ...] = ()
+        self.currentIndexChanged.connect(lambda _index: self._choose())
+        self.hide()
+
+    def offer(self, campaigns: tuple[ListedCampaign, ...]) -> None:
+        """Offer what was found; the one that was chosen stays so."""
+        before = self.currentIndex()
+        name = self._campaigns[before - 1].name if before > 0 else ""
+        self._campaigns = campaigns
+        blocked = self.blockSignals(True)
+        self.clear()
+        self.addItems([ALL, *(printable(each.text) for each in campaigns)])
+        names = [each.name for each in campaigns]
+        self.setCurrentIndex(names.index(name) + 1 if name in names else 0)
+        self.blockSignals(blocked)
+        self.setVisible(bool(campaigns))
+        self._choose()
+
+    def _choose(self) -> None:
+        place = self.currentIndex()
+        self.chosen.emit(self._campaigns[place - 1].files if place > 0 else None)
+
+
+Index = QModelIndex | QPersistentModelIndex
+_NOWHERE = QModelIndex()
+HEADINGS = ("Response", "Name", "State", "Verdict", "Began", "Excitation", "Level", "Length", "Size")
+PICTURE, NAME = 0, 1
+_NUMBERS = tuple(HEADINGS.index(each) for each in ("Level", "Length", "Size"))
+_THIS_ROW_ALONE = QItemSelectionModel.SelectionFlag.ClearAndSelect | QItemSelectionModel.SelectionFlag.Rows
+_THIS_ROW_TOO = QItemSelectionModel.SelectionFlag.Select | QItemSelectionModel.SelectionFlag.Rows
+_WIDE = HEADINGS.index("Excitation")
+PATH_ROLE = Qt.ItemDataRole.UserRole
+SORT_ROLE = Qt.ItemDataRole.UserRole + 1
+_MEASURED_ROWS = 24
+"""Rows whose cells say how wide their columns are: more than a page shows, and few, for the loop waits."""
+THUMBNAIL_SIZE = QSize(THUMBNAIL_COLUMNS, 30)
+
+
+@dataclass(frozen=True)
+class _Row:
+    """What the cells of a row say, and what they are sorted by."""
+
+    texts: tuple[str, ...]
+    sorting: tuple[str | float, ...]
+
+
+class RecordingModel(QAbstractTableModel):
+    """Rows of what was found in a folder; pictures come later."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._entries: tuple[ListedRecording, ...] = ()
+        self._rows: tuple[_Row, ...] = ()
+        self._thumbnails: dict[Path, Thumbnail | None] = {}
+        self._pictures: dict[Path, QPixmap] = {}
+
+    @property
+    def entries(self) -> tuple[ListedRecording, ...]:
+        """In the order they were found."""
+        return self._entries
+
+    def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
+        """List other files; pictures of those that stay are kept. The same list anew changes nothing."""
+        if entries == self._entries:
+            return
+        self.beginResetModel()
+        self._entries = entries
+        self._rows = tuple(_Row(_texts(entry), _sorting(entry)) for entry in entries)
+        kept = {entry.path for entry in entries}
+        self._thumbnails = {path: each for path, each in self._thumbnails.items() if path in kept}
+        self._pictures = {path: each for path, each in self._pictures.items() if path in kept}
+        self.endResetModel()
+
+    def missing_pictures(self) -> tuple[Path, ...]:
+        """Files whose picture nobody has made yet."""
+        return tuple(e.path for e in self._entries if e.is_readable and e.path not in self._thumbnails)
+
+    def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
+        """Put pictures into the rows."""
+        self._thumbnails |= found
+        if self._entries:
+            self.dataChanged.emit(self.index(0, PICTURE), self.index(len(self._entries) - 1, PICTURE))
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw the pictures in other colours."""
+        self._theme = theme
+        self._pictures.clear()
+        self.show_thumbnails({})
+
+    def rowCount(self, parent: Index = _NOWHERE) -> int:
+        """One for each file."""
+        return 0 if parent.isValid() else len(self._entries)
+
+    def columnCount(self, parent: Index = _NOWHERE) -> int:
+        """One for each heading."""
+        return 0 if parent.isValid() else len(HEADINGS)
+
+    def headerData(
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        """Headings above, nothing beside."""
+        if orientation is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            return HEADINGS[section]
+        return None
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
+        """Text, picture, tooltip and sorting value of a cell."""
+        entry, row, column = self._entries[index.row()], self._rows[index.row()], index.column()
+        content: Any = None
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                content = row.texts[column]
+            case Qt.ItemDataRole.DecorationRole if column == PICTURE:
+                content = self._picture(entry.path)
+            case Qt.ItemDataRole.ToolTipRole:
+                said = (str(entry.path), entry.said.reason, entry.said.notes)
+                content = plain_tip("\n".join(map(printable, filter(None, said))))
+            case Qt.ItemDataRole.TextAlignmentRole if column in _NUMBERS:
+                content = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            case Qt.ItemDataRole.AccessibleTextRole:
+                content = f"{HEADINGS[column]}: {row.texts[column] or 'picture'}"
+            case Qt.ItemDataRole.UserRole:
+                content = entry.path
+            case _ if role == SORT_ROLE:
+                content = row.sorting[column]
+        return content
+
+    def _picture(self, path: Path) -> QPixmap | None:
+        """Draw the picture of a row when it comes into sight: those of a whole night take a while."""
+        found = self._thumbnails.get(path)
+        if found is not None and path not in self._pictures:
+            self._pictures[path] = _drawn(found, self._theme)
+        return self._pictures.get(path)
+
+
+class _ChosenRows(QSortFilterProxyModel):
+    """Rows that hold the words, and belong to the campaign that was chosen."""
+
+    _only: frozenset[Path] | None = None
+
+    def show_only(self, paths: frozenset[Path] | None) -> None:
+        """Let rows of these files pass; of all when None."""
+        self.beginFilterChange()
+        self._only = paths
+        self.endFilterChange()
+
+    def filterAcceptsRow(self, row: int, parent: Index) -> bool:
+        """Ask both."""
+        if not super().filterAcceptsRow(row, parent):
+            return False
+        return self._only is None or self.sourceModel().index(row, NAME).data(PATH_ROLE) in self._only
+
+
+class RecordingTable(QTableView):
+    """The table itself: sorted by any column, several rows may be chosen."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.setAccessibleName("Recordings")
+        self.is_listing = False
+        """Whether somebody is still looking at what the folder holds."""
+        self.recordings = RecordingModel(theme)
+        self._sorted = _ChosenRows(self)
+        self._sorted.setSourceModel(self.recordings)
+        self._sorted.setSortRole(SORT_ROLE)
+        self._sorted.setFilterKeyColumn(-1)
+        self._sorted.setFilterCaseSensitivity(Qt.CaseSensitivity.CaseInsensitive)
+        self.setModel(self._sorted)
+        self.setSortingEnabled(True)
+        self.sortByColumn(HEADINGS.index("Began"), Qt.SortOrder.DescendingOrder)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setAlternatingRowColors(True)
+        offer_copies(self)
+        self.setShowGrid(False)
+        self.setTabKeyNavigation(False)
+        self.setIconSize(THUMBNAIL_SIZE)
+        self.verticalHeader().hide()
+        self.verticalHeader().setDefaultSectionSize(THUMBNAIL_SIZE.height() + 6)
+        self.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        self.horizontalHeader().setResizeContentsPrecision(_MEASURED_ROWS)
+        self.horizontalHeader().setHighlightSections(False)
+        self.horizontalHeader().setSectionResizeMode(_WIDE, QHeaderView.ResizeMode.Stretch)
+        self.horizontalHeader().setDefaultAlignment(
+            Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
+        )
+        self.setColumnWidth(PICTURE, THUMBNAIL_SIZE.width() + 10)
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say how recordings come here."""
+        super().paintEvent(event)
+        if self._sorted.rowCount() == 0:
+            words = (
+                "No recording fits the search and the campaign that are chosen."
+                if self.recordings.entries
+                else "The folder is being read."
+                if self.is_listing
+                else "No recordings in this folder yet: choose another folder, or run a test (Ctrl+3)."
+            )
+            colour = self.palette().placeholderText().color()
+            paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, colour)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw the pictures in other colours."""
+        self.recordings.retheme(theme)
+
+    def search(self, text: str) -> None:
+        """Show rows that hold a text anywhere."""
+        self._sorted.setFilterFixedString(text)
+
+    def show_only(self, paths: frozenset[Path] | None) -> None:
+        """Show rows of these files; of all when None."""
+        self._sorted.show_only(paths)
+
+    def chosen_paths(self) -> tuple[Path, ...]:
+        """Files of the chosen rows, from above."""
+        rows = sorted(self.selectionModel().selectedRows(NAME), key=lambda index: index.row())
+        return tuple(index.data(PATH_ROLE) for index in rows)
+
+    def choose(self, *paths: Path) -> None:
+        """Choose the rows of these files and no others; none of them there changes nothing."""
+        indices = [self._sorted.index(row, NAME) for row in range(self._sorted.rowCount())]
+        wanted = [index for index in indices if index.data(PATH_ROLE) in paths]
+        if not wanted:
+            return
+        # Not selectRow: that one adds the row to others while somebody holds Ctrl.
+        self.selectionModel().setCurrentIndex(wanted[0], _THIS_ROW_ALONE)
+        for index in wanted[1:]:
+            self.selectionModel().select(index, _THIS_ROW_TOO)
+        self.scrollTo(wanted[0])
+
+
+def _texts(entry: ListedRecording) -> tuple[str, ...]:
+    said = entry.said
+    return (
+        "",
+        printable(entry.name),
+        state_text(said.state),
+        printable(said.verdict),
+        moment_text(said.started_utc),
+        printable(entry.played),
+        "" if said.amplitude_vpp is None else f"{said.amplitude_vpp:g} Vpp",
+        "" if said.duration_s is None else duration_text(said.duration_s),
+        size_text(said.size_bytes),
+    )
+
+
+def _sorting(entry: ListedRecording) -> tuple[str | float, ...]:
+    said = entry.said
+    return (
+        entry.name,
+        entry.name,
+        said.state,
+        said.verdict,
+        said.started_utc,
+        entry.played,
+        said.amplitude_vpp or 0.0,
+        said.duration_s or 0.0,
+        float(said.size_bytes),
+    )
+
+
+def _drawn(found: Thumbnail, theme: Theme) -> QPixmap:
+    """Paint each column from its lowest to its highest value."""
+    ratio = QGuiApplication.primaryScreen().devicePixelRatio()
+    picture = QPixmap(THUMBNAIL_SIZE * ratio)
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(QColor(theme.base))
+    painter = QPainter(picture)
+    painter.setPen(QPen(QColor(theme.traces[0]), 1))
+    middle, reach = 0.5 * THUMBNAIL_SIZE.height(), 0.5 * THUMBNAIL_SIZE.height() - 1
+    for column, (low, high) in enumerate(zip(found.low, found.high, strict=True)):
+        if np.isfinite(low) and np.isfinite(high):
+            top, bottom = middle - reach * float(high), middle - reach * float(low)
+            painter.drawLine(QPointF(column, top), QPointF(column, max(bottom, top + 1)))
+    painter.end()
+    return picture

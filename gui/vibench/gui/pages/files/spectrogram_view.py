@@ -1,0 +1,282 @@
+"""The pictures of a recording: its channels over time, the spectrogram and the hidden motion in sight."""
+
+from math import log10
+from pathlib import Path
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QRectF, Signal
+from PySide6.QtGui import QShowEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QTabWidget, QVBoxLayout, QWidget
+
+from vibench.acquisition.recording import Recording
+from vibench.analysis.live import (
+    RESPONSE,
+    DensityPicture,
+    RecordingOverview,
+    RowSpacing,
+    SpectrogramRequest,
+    recording_spectrogram,
+)
+
+from ...background.background import Background, LatestRequest
+from ...forms.editor import Choice
+from ...page.page import Shown
+from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME
+from ...plots.plot import Plot
+from ...widgets.boxes import filled
+from ...widgets.elided_label import ElidedLabel
+from ...widgets.theme import Theme
+from ...widgets.units import plain_unit
+from .file_words import role_text
+from .hidden_motion_view import CHOOSE, HiddenMotionView
+from .time_histories import RecordingTimeHistories
+
+_WAIT_MS = 250
+"""How long a view stands still before it is worked out."""
+_HIGHEST_HZ = (500.0, 1000.0, 2000.0, 5000.0, 20_000.0)
+_USUAL = 2
+_WIDTHS_HZ = (None, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Of the spectrogram's lines; None lets the stretch in sight choose."""
+_BAR_EM = 4
+"""Room for the numbers and the label of the scale of colours."""
+_SHOWN_DB = 80.0
+"""From the strongest line down: the range of colours."""
+
+
+class SpectrogramView(QWidget):
+    """Frequency over time; colours are spectral densities in decibels."""
+
+    zoomed = Signal(float, float)
+    """The stretch that the wheel or the mouse has brought into sight [s]."""
+
+    def __init__(self, theme: Theme, background: Background) -> None:
+        super().__init__()
+        self.setAccessibleName("Spectrogram")
+        self.channel, self.spacing, self.highest = Choice(), Choice(), Choice()
+        for spacing in RowSpacing:
+            self.spacing.addItem(spacing.value)
+        for highest_hz in _HIGHEST_HZ:
+            self.highest.addItem(f"{highest_hz:g} Hz")
+        self.highest.setCurrentIndex(_USUAL)
+        self.line_width = Choice()
+        for width_hz in _WIDTHS_HZ:
+            self.line_width.addItem("by the view" if width_hz is None else f"{width_hz:g} Hz", width_hz)
+        self.said = ElidedLabel()
+        self.said.setProperty("rank", "second")
+        self._theme = theme
+        self._view_s = (0.0, 0.0)
+        self._recording: Recording | None = None
+        self._asked: SpectrogramRequest | None = None
+        self._of: SpectrogramRequest | None = None
+        """What the picture is of; None while there is none."""
+        self._latest_request = LatestRequest(
+            background, recording_spectrogram, self._show, self._fail, _WAIT_MS, self
+        )
+        self._plots = {
+            RowSpacing.LINEAR: Plot("Spectrogram", TIME, FREQUENCY, theme),
+            RowSpacing.LOGARITHMIC: Plot("Spectrogram, logarithmic", TIME, LOG_FREQUENCY, theme),
+        }
+        self._images = {spacing: _Image(plot) for spacing, plot in self._plots.items()}
+        for plot in self._plots.values():
+            plot.getViewBox().sigRangeChangedManually.connect(self._zoom)
+        self._lay_out()
+        for choice in (self.channel, self.spacing, self.highest, self.line_width):
+            choice.currentIndexChanged.connect(lambda _index: self._ask())
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a picture is still to come."""
+        return self._latest_request.is_busy
+
+    @property
+    def plot(self) -> Plot:
+        """The axes in use."""
+        return self._plots[self._spacing]
+
+    @property
+    def image(self) -> "_Image":
+        """The picture in use."""
+        return self._images[self._spacing]
+
+    @property
+    def shown(self) -> Shown:
+        """The picture, of what the choices above it say."""
+        return Shown(self.plot, self._of, self._asked)
+
+    def show_recording(self, recording: Recording | None, hint: str) -> None:
+        """Picture another recording from now on, or none; until then the hint is shown."""
+        self._recording = recording
+        self._latest_request.drop()
+        self._asked = self._of = None
+        for image in self._images.values():
+            image.clear(hint)
+        roles = () if recording is None else recording.roles
+        if roles != tuple(self.channel.itemData(row) for row in range(self.channel.count())):
+            blocked = self.channel.blockSignals(True)
+            self.channel.clear()
+            for role in roles:
+                self.channel.addItem(role_text(role), role)
+            self.channel.setCurrentIndex(roles.index(RESPONSE) if RESPONSE in roles else len(roles) - 1)
+            self.channel.blockSignals(blocked)
+
+    def show_view(self, low_s: float, high_s: float) -> None:
+        """Picture this stretch, when the picture is in sight."""
+        self._view_s = (low_s, high_s)
+        self._ask()
+
+    def retheme(self, theme: Theme) -> None:
+        """Write the scales in other colours."""
+        for image in self._images.values():
+            image.retheme(theme)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Work out what nobody wanted while it was out of sight."""
+        super().showEvent(event)
+        self._ask()
+
+    def _zoom(self, *_: object) -> None:
+        low_s, high_s = self.plot.getViewBox().viewRange()[0]
+        self.zoomed.emit(float(low_s), float(high_s))
+
+    @property
+    def _spacing(self) -> RowSpacing:
+        return list(RowSpacing)[self.spacing.currentIndex()]
+
+    def _ask(self) -> None:
+        for spacing, plot in self._plots.items():
+            plot.setVisible(spacing is self._spacing)
+        recording = self._recording
+        low_s, high_s = self._view_s
+        if not self.isVisible() or recording is None or not high_s > low_s or self.channel.count() == 0:
+            return
+        rate_hz = recording.sample_rate_hz
+        asked = SpectrogramRequest(
+            path=Path(recording.path),
+            role=str(self.channel.currentData()),
+            start=int(low_s * rate_hz),
+            stop=int(np.ceil(high_s * rate_hz)),
+            highest_hz=_HIGHEST_HZ[self.highest.currentIndex()],
+            spacing=self._spacing,
+            resolution_hz=self.line_width.currentData(),
+        )
+        self._asked = asked
+        self.plot.setEnabled(self._of in (None, asked))
+        self.said.setText("working it out…")
+        self._latest_request.ask(asked)
+
+    def _show(self, found: DensityPicture) -> None:
+        self._of = found.request
+        self.plot.setEnabled(self._of == self._asked)
+        self._images[found.request.spacing].show_picture(found)
+        self.said.setText(
+            f"Hann windows of {1e3 * found.segment_s:.3g} ms, lines {found.resolution_hz:.3g} Hz wide, "
+            f"every sample used"
+        )
+
+    def _fail(self, error: BaseException) -> None:
+        self._of = None
+        self.plot.setEnabled(True)
+        self.image.clear(str(error))
+        self.said.setText("")
+
+    def _lay_out(self) -> None:
+        bar = QHBoxLayout()
+        for text, choice, tip in (
+            ("Channel", self.channel, "The channel whose frequencies are shown"),
+            ("Frequencies", self.spacing, "How the upright axis is laid out"),
+            ("up to", self.highest, "Where the upright axis ends"),
+            ("lines", self.line_width, "Width of a line: narrow ones tell tones apart, wide ones moments"),
+        ):
+            label = QLabel(text)
+            label.setBuddy(choice)
+            choice.setAccessibleName(f"Spectrogram: {text.lower()}")
+            choice.setToolTip(tip)
+            filled(bar, label, choice)
+        bar.addWidget(self.said, 1)
+        plots = ((plot, 1) for plot in self._plots.values())
+        filled(QVBoxLayout(self), bar, *plots).setContentsMargins(0, 4, 0, 0)
+
+
+class _Image:
+    """A picture in a plot, with its scale of colours beside it."""
+
+    def __init__(self, plot: Plot) -> None:
+        self._plot = plot
+        self.item = pg.ImageItem(axisOrder="row-major")
+        plot.addItem(self.item)
+        plot.setMouseEnabled(x=True, y=False)
+        plot.read_more = self._level_at
+        self.bar = pg.ColorBarItem(colorMap=pg.colormap.get("viridis"), interactive=False, width=14)
+        self.bar.setImageItem(self.item, insert_in=plot.getPlotItem())
+        self.bar.axis.setWidth(_BAR_EM * plot.fontMetrics().height())
+        self.clear(CHOOSE)
+
+    def clear(self, hint: str) -> None:
+        """Show nothing, and say why."""
+        self.item.clear()
+        self.bar.hide()
+        self._plot.with_hint(hint)
+        self._plot.viewport().update()
+
+    def _level_at(self, across: float, up: float) -> str:
+        """Give the level of the pixel at a place, as it is drawn."""
+        if self.item.image is None:
+            return ""
+        place = self.item.mapFromParent(QPointF(across, up))
+        rows, columns = self.item.image.shape
+        row, column = int(np.floor(place.y())), int(np.floor(place.x()))
+        if not (0 <= row < rows and 0 <= column < columns):
+            return ""
+        return f"{self.item.image[row, column]:.1f} {self.bar.axis.labelText}"
+
+    def show_picture(self, found: DensityPicture) -> None:
+        """Draw it, in colours from the strongest line down."""
+        low, high = found.frequency_hz
+        is_log = found.request.spacing is RowSpacing.LOGARITHMIC
+        bottom, top = (log10(low), log10(high)) if is_log else (low, high)
+        left, right = found.time_s
+        self.item.setImage(found.decibel, autoLevels=False)
+        self.item.setRect(QRectF(left, bottom, right - left, top - bottom))
+        known = found.decibel[np.isfinite(found.decibel)]
+        strongest = float(np.max(known)) if known.size else 0.0
+        self.bar.setLevels((strongest - _SHOWN_DB, strongest))
+        self.bar.axis.setLabel(f"dB re 1 ({plain_unit(found.unit)})²/Hz")
+        self.bar.show()
+        self._plot.with_hint("")
+        self._plot.setXRange(left, right, padding=0.0)
+        self._plot.setYRange(max(bottom, 0.0), top, padding=0.0)
+
+    def retheme(self, theme: Theme) -> None:
+        """Write the scale in other colours."""
+        self.bar.axis.setPen(pg.mkPen(theme.line))
+        self.bar.axis.setTextPen(pg.mkPen(theme.text))
+
+
+class Pictures(QTabWidget):
+    """All show the same stretch of the same recording."""
+
+    def __init__(self, theme: Theme, background: Background) -> None:
+        super().__init__()
+        self.setAccessibleName("Pictures of the recording")
+        self.setDocumentMode(True)
+        self.time_histories = RecordingTimeHistories(theme)
+        self.spectrogram = SpectrogramView(theme, background)
+        self.addTab(self.time_histories, "Tim&e")
+        self.addTab(self.spectrogram, "&Spectrogram")
+        self.hidden_motion = HiddenMotionView(theme, background)
+        self.addTab(self.hidden_motion, "Hi&dden motion")
+        self.time_histories.range_changed.connect(self._show_view)
+        self.spectrogram.zoomed.connect(self.time_histories.show_range)
+
+    def show_recording(self, overview: RecordingOverview | None, hint: str) -> None:
+        """Show another recording, or none; the hint says what comes, or why nothing does."""
+        recording = None if overview is None else overview.recording
+        for picture in (self.spectrogram, self.hidden_motion):
+            picture.show_recording(recording, hint)
+        self.time_histories.show_recording(overview)
+        self._show_view()
+
+    def _show_view(self) -> None:
+        for picture in (self.spectrogram, self.hidden_motion):
+            picture.show_view(*self.time_histories.view_s)

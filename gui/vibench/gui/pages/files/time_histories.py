@@ -1,0 +1,291 @@
+"""A recording as time histories, one a channel: any zoom, drawn from what is in sight."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtGui import QKeyEvent, QPalette, QResizeEvent
+from PySide6.QtWidgets import QLabel, QVBoxLayout, QWidget
+
+from vibench.acquisition.recording import ChannelHeader, Recording
+from vibench.analysis.live import RecordingOverview, zigzag
+
+from ...plots.axis import TIME, PlotAxis
+from ...plots.line_style import LIMIT, Dash, LineStyle, curve_style
+from ...plots.plot import Plot
+from ...widgets.theme import Theme
+from ...widgets.units import plain_unit
+from .file_words import role_text
+
+LEAST_SAMPLES = 8
+"""The closest look."""
+_STEP, _ZOOM = 0.2, 0.6
+_TIME_AXIS_EM, _LEAST_EM = 3, 3
+MARKER = LineStyle(lambda theme: theme.accent)
+SEGMENT = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
+_MOST_KEPT = 12
+"""Plots: to make one takes as long as to draw ten."""
+_LABEL_AT = 0.1
+"""Names of segments stand at the foot of the first plot: above is the name of the channel."""
+_NAMED_SHARE = 0.08
+"""Part of the recording that a segment must fill for its name to find room."""
+
+
+@dataclass(eq=False)
+class _TimeHistory:
+    role: str
+    plot: Plot
+    curve: pg.PlotDataItem
+    markers: tuple[pg.InfiniteLine, ...] = ()
+
+
+class RecordingTimeHistories(QWidget):
+    """Plots over one time axis. Wheel and + - zoom, arrows move, Home shows all, drag moves."""
+
+    range_changed = Signal()
+    markers_moved = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.setAccessibleName("Time histories of the recording")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._theme = theme
+        self._overview: RecordingOverview | None = None
+        self._histories: list[_TimeHistory] = []
+        self._kept: dict[tuple[str, str], _TimeHistory] = {}
+        self._marker_s = [0.0, 0.0]
+        self._are_marked = False
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(2)
+        # Several changes of the range come with one move: the picture is made once, after them.
+        self._later = QTimer(self, interval=0, singleShot=True)
+        self._later.timeout.connect(self._draw)
+
+    def prepare(self, channel: ChannelHeader) -> None:
+        """Have a plot for a channel ready: to make all plots at once would hold the window up."""
+        self._history_of(channel)
+
+    def show_recording(self, overview: RecordingOverview | None) -> None:
+        """Show another recording whole, or none."""
+        for history in self._histories:
+            self._layout.removeWidget(history.plot)
+            history.plot.hide()
+        self._histories = []
+        self._overview = overview
+        if overview is None or overview.recording.samples == 0:
+            return
+        self._histories = [self._history_of(channel) for channel in overview.recording.channels]
+        for number, history in enumerate(self._histories):
+            self._begin(history, number, overview.recording)
+        self._forget_others()
+        self._mark_segments(overview)
+        self._mark_overloads(overview)
+        duration_s = overview.recording.duration_s
+        self._marker_s = [duration_s / 3, 2 * duration_s / 3]
+        self.show_markers(self._are_marked)
+        self._share_height()
+        self.show_all()
+        self._draw()
+
+    @property
+    def view_s(self) -> tuple[float, float]:
+        """What is in sight, in seconds since the first sample."""
+        if not self._histories or self._overview is None:
+            return (0.0, 0.0)
+        low, high = self._histories[0].plot.getViewBox().viewRange()[0]
+        return (max(0.0, float(low)), min(float(high), self._overview.recording.duration_s))
+
+    @property
+    def markers_s(self) -> tuple[float, float]:
+        """Moments of the two markers, the earlier first."""
+        early, late = sorted(self._marker_s)
+        return early, late
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        """One for each channel."""
+        return tuple(history.plot for history in self._histories)
+
+    def show_all(self) -> None:
+        """Show the whole recording."""
+        if self._overview is not None:
+            self.show_range(0.0, self._overview.recording.duration_s)
+
+    def show_range(self, low_s: float, high_s: float) -> None:
+        """Show a stretch."""
+        if self._histories:
+            self._histories[0].plot.setXRange(low_s, high_s, padding=0.0)
+
+    def zoom(self, factor: float) -> None:
+        """Show ``factor`` times as much, around the middle."""
+        low_s, high_s = self.view_s
+        half_s = 0.5 * factor * (high_s - low_s)
+        middle_s = 0.5 * (low_s + high_s)
+        self.show_range(middle_s - half_s, middle_s + half_s)
+
+    def move(self, share: float) -> None:  # type: ignore[override] # a view moves in time
+        """Show what is a share of the view later."""
+        low_s, high_s = self.view_s
+        step_s = share * (high_s - low_s)
+        self.show_range(low_s + step_s, high_s + step_s)
+
+    def show_markers(self, are_shown: bool) -> None:  # noqa: FBT001 - as Qt's own toggled(bool)
+        """Show or hide the two markers."""
+        self._are_marked = are_shown
+        low_s, high_s = self.view_s
+        if are_shown and not all(low_s <= each <= high_s for each in self._marker_s) and high_s > low_s:
+            self._marker_s = [low_s + (high_s - low_s) / 3, low_s + 2 * (high_s - low_s) / 3]
+        for history in self._histories:
+            for marker, moment_s in zip(history.markers, self._marker_s, strict=True):
+                marker.setVisible(are_shown)
+                marker.setValue(moment_s)
+        self.markers_moved.emit()
+
+    def retheme(self, theme: Theme) -> None:
+        """Make further plots in other colours."""
+        self._theme = theme
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Draw for the new width."""
+        super().resizeEvent(event)
+        self._share_height()
+        self._later.start()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Move and zoom by keys."""
+        match event.key():
+            case Qt.Key.Key_Left:
+                self.move(-_STEP)
+            case Qt.Key.Key_Right:
+                self.move(_STEP)
+            case Qt.Key.Key_Plus | Qt.Key.Key_Equal | Qt.Key.Key_Up:
+                self.zoom(_ZOOM)
+            case Qt.Key.Key_Minus | Qt.Key.Key_Down:
+                self.zoom(1 / _ZOOM)
+            case Qt.Key.Key_Home | Qt.Key.Key_A:
+                self.show_all()
+            case _:
+                super().keyPressEvent(event)
+                return
+        event.accept()
+
+    def _history_of(self, channel: ChannelHeader) -> _TimeHistory:
+        """Give the plot of a channel, as it was left by another recording, or a new one."""
+        kind = (channel.role, channel.unit)
+        if kind not in self._kept:
+            up = PlotAxis("", plain_unit(channel.unit))
+            plot = Plot(f"{role_text(channel.role)} over time", TIME, up, self._theme, self)
+            plot.setMouseEnabled(x=True, y=False)
+            plot.setFocusProxy(self)
+            title = QLabel(role_text(channel.role), plot)
+            title.setTextFormat(Qt.TextFormat.PlainText)
+            title.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+            title.setBackgroundRole(QPalette.ColorRole.Base)
+            title.setAutoFillBackground(True)
+            title.move(round((plot.up_em + 1) * self.fontMetrics().height()), 2)
+            plot.getViewBox().sigXRangeChanged.connect(self._ranged)
+            self._kept[kind] = _TimeHistory(channel.role, plot, plot.curve(curve_style(0)))
+        return self._kept[kind]
+
+    def _begin(self, history: _TimeHistory, number: int, recording: Recording) -> None:
+        """Make a plot ready for a recording: its place, its limits, nothing drawn yet."""
+        plot, is_last = history.plot, number == len(recording.channels) - 1
+        plot.wipe()
+        history.curve = plot.curve(curve_style(number))
+        history.markers = self._new_markers(plot)
+        em = self.fontMetrics().height()
+        plot.setMinimumHeight(_LEAST_EM * em + (_TIME_AXIS_EM * em if is_last else 0))
+        plot.across.setStyle(showValues=is_last)
+        plot.across.showLabel(is_last)
+        box = plot.getViewBox()
+        box.setXLink(None)
+        least_s = LEAST_SAMPLES / recording.sample_rate_hz
+        box.setLimits(xMin=0.0, xMax=recording.duration_s, minXRange=least_s)
+        box.enableAutoRange(x=False, y=False)
+        if number:
+            box.setXLink(self._histories[0].plot.getViewBox())
+        self._layout.addWidget(plot, 1)
+        plot.show()
+
+    def _forget_others(self) -> None:
+        """Let plots go that neither this recording nor, perhaps, the next one needs."""
+        for kind, history in list(self._kept.items()):
+            if len(self._kept) > _MOST_KEPT and history not in self._histories:
+                del self._kept[kind]
+                history.plot.deleteLater()
+
+    def _new_markers(self, plot: Plot) -> tuple[pg.InfiniteLine, ...]:
+        made = []
+        for number in range(2):
+            marker = plot.upright(MARKER, 0.0)
+            marker.setMovable(True)
+            marker.setVisible(False)
+            marker.sigPositionChanged.connect(lambda line, number=number: self._moved(number, line.value()))
+            made.append(marker)
+        return tuple(made)
+
+    def _moved(self, number: int, moment_s: float) -> None:
+        if not self._are_marked or self._marker_s[number] == moment_s:
+            return
+        self._marker_s[number] = moment_s
+        for history in self._histories:
+            history.markers[number].setValue(moment_s)
+        self.markers_moved.emit()
+
+    def _mark_segments(self, overview: RecordingOverview) -> None:
+        """Draw a line where each segment begins; long ones are named in the first plot."""
+        recording = overview.recording
+        begun_s = [each.first_sample / recording.sample_rate_hz for each in recording.segments]
+        for history in self._histories:
+            history.plot.rules(SEGMENT).show_at(begun_s)
+        for segment, at_s in zip(recording.segments, begun_s, strict=True):
+            if segment.stop - segment.start > _NAMED_SHARE * recording.samples:
+                label = segment.label.replace("_", " ")
+                self._histories[0].plot.upright(SEGMENT, at_s, label, _LABEL_AT)
+
+    def _mark_overloads(self, overview: RecordingOverview) -> None:
+        rate_hz = overview.recording.sample_rate_hz
+        for history in self._histories:
+            history.plot.stripes(LIMIT).show_bands(
+                (each.first_sample / rate_hz, (each.last_sample + 1) / rate_hz)
+                for each in overview.recording.overloads
+                if each.channel == history.role
+            )
+
+    def _share_height(self) -> None:
+        """Give all plots the same height; the last has the time axis on top of it."""
+        axis = _TIME_AXIS_EM * self.fontMetrics().height()
+        history = max(1, (self.height() - axis) // max(1, len(self._histories)))
+        for place in range(len(self._histories)):
+            self._layout.setStretch(place, history + (axis if place == len(self._histories) - 1 else 0))
+        # At once: a layout that comes after the first picture has everything painted twice.
+        self._layout.activate()
+
+    def _ranged(self, view: pg.ViewBox, _range: object) -> None:
+        if not self._histories or view is not self._histories[0].plot.getViewBox():
+            return
+        self._later.start()
+        self.range_changed.emit()
+
+    def _draw(self) -> None:
+        if self._overview is None or not self._histories:
+            return
+        rate_hz = self._overview.recording.sample_rate_hz
+        low_s, high_s = self.view_s
+        start, stop = int(low_s * rate_hz), int(np.ceil(high_s * rate_hz)) + 1
+        columns = max(100, self._histories[0].plot.columns)
+        picture = self._overview.picture([history.role for history in self._histories], start, stop, columns)
+        for row, history in enumerate(self._histories):
+            low, high = picture.low[row], picture.high[row]
+            if picture.samples_per_column > 1:
+                history.curve.setData(np.repeat(picture.time_s, 2), zigzag(low, high), connect="finite")
+            else:
+                history.curve.setData(picture.time_s, low, connect="finite")
+            known = low[np.isfinite(low)], high[np.isfinite(high)]
+            if known[0].size:
+                bottom, top = float(known[0].min()), float(known[1].max())
+                height = (top - bottom) or 1e-9
+                # Room above for the plot's name, which must not lie on the signal.
+                history.plot.setYRange(bottom - 0.06 * height, top + 0.3 * height, padding=0.0)

@@ -1,3 +1,0 @@
-from ._maps_page import (
-    MapsPage as MapsPage,
-)

@@ -1,3 +1,0 @@
-from ._queue_page import (
-    QueuePage as QueuePage,
-)

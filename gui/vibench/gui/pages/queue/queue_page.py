@@ -1,0 +1,338 @@
+"""The Queue page: a campaign as a table, its estimated end, and how each of its recordings stands."""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFileDialog,
+    QGridLayout,
+    QVBoxLayout,
+)
+
+from vibench.acquisition import (
+    ConfigurationError,
+    all_shipped,
+    load_campaign,
+    save_toml,
+    toml_text,
+    validated,
+)
+from vibench.acquisition.campaign import ExistingRecordings
+from vibench.acquisition.engine import EngineState, EngineStatus, Supervision
+from vibench.acquisition.plan import Campaign, Range, SweepAxis
+from vibench.acquisition.rig import Rig
+
+from ...background.background import LatestRequest
+from ...forms.editor import Choice
+from ...page.app_context import AppContext
+from ...page.file_kind import FileKind
+from ...page.history import History
+from ...page.page import Page, Shown, SideAndPicture
+from ...page.settings import Remembered
+from ...page.user_actions import UserActions
+from ...widgets.boxes import boxed, column, filled, row
+from ...widgets.clock import clock
+from ...widgets.notice import Notice, NoticeKind, notice_of
+from ...widgets.page_names import QUEUE
+from ...widgets.push_button import push_button
+from ...widgets.read_table import ReadTable
+from ...widgets.timed_bar import ProgressBar
+from ...widgets.units import SentenceLabel
+from .draft import moved_up, with_measurement, with_sweep, without
+from .row_words import CampaignPreview, point_rows, preview_campaign
+from .sweep_form import SweepForm
+
+LOOK_MS = 50
+"""How long a campaign stands unchanged before it is looked at."""
+
+
+class QueuePage(Page):
+    """Edits the campaign that is armed here, and shows the one that runs."""
+
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
+        self._actions = UserActions(context, self)
+        self._history: History[Campaign] = History()
+        self._seen: CampaignPreview | None = None
+        self._of: tuple[Campaign, Rig | None] | None = None
+        """Campaign and rig that the summary is of; None while it is none."""
+        self.choice = Choice()
+        self.entries = ReadTable(
+            "Entries of the campaign",
+            ("entry", "what", "recordings", "takes"),
+            "Take over a campaign above, or add the test of the Test page, once or as a sweep.",
+            wide=1,
+        )
+        # Else the column of excitations, which takes what is left, has room for a few letters only.
+        self.entries.setMinimumWidth(28 * self.fontMetrics().height())
+        self.rows = ReadTable(
+            "Recordings of the campaign",
+            ("", "recording", "level", "how it stands"),
+            "Each recording of the campaign is listed here, with how it stands.",
+        )
+        self.sweep = SweepForm()
+        self.summary = SentenceLabel()
+        self.summary.setAccessibleName("Summary of the campaign")
+        self.progress = ProgressBar()
+        self.progress.setAccessibleName("Progress of the campaign")
+        self.progress.setRange(0, 1000)
+        self.progress.setFormat("not running")
+        self.arm_button = push_button("Arm the ca&mpaign…", "Say in words what will happen", self._arm)
+        self.arm_button.setProperty("rank", "first")
+        self.resume_button = push_button(
+            "Resume: arm what is missin&g…",
+            "Keep what is complete in its folder, make the rest",
+            self._arm_missing,
+        )
+        self.left_alone = QCheckBox("Left alone")
+        self.left_alone.setToolTip(
+            "Limits, ramps and recordings are the engine's. 'vibench watch' and 'vibench stop' reach it "
+            "from a terminal.\nWithout the tick the drive is brought down when the window does not answer."
+        )
+        self.left_alone.setChecked(True)
+        self.hold_button = push_button(
+            "Hold (drive on)", "Stay where the run is; the drive stays on", self._hold
+        )
+        self._looking = LatestRequest(
+            context.looks, preview_campaign, self._looked, self._look_failed, LOOK_MS, self
+        )
+        self._lay_out()
+        self._connect()
+        self._restore()
+
+    @property
+    def is_done(self) -> bool:
+        """Every recording of the campaign is there."""
+        status = self.context.bridge.status
+        rows = () if status is None else status.rows
+        return len(rows) > 1 and all(row.state in ("recorded", "kept") for row in rows)
+
+    def refresh(self) -> None:
+        """Show how the recordings stand."""
+        status = self.context.bridge.status
+        state = self.context.bridge.state
+        campaign = self.context.selection.campaign
+        for button in (self.arm_button, self.resume_button):
+            button.setEnabled(state is EngineState.READY and campaign is not None)
+        self.hold_button.setEnabled(state in (EngineState.RUNNING, EngineState.HELD))
+        self.hold_button.setText("Go on" if state is EngineState.HELD else "Hold (drive on)")
+        self.rows.show_rows(point_rows(self._seen, () if status is None else status.rows, state))
+        if campaign is not None and self._seen is not None:
+            self._say_summary(campaign, self._seen)  # the clock goes on
+        self._show_progress(status)
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Campaigns."""
+        return {FileKind.CAMPAIGN: self.open_file}
+
+    def undo(self) -> None:
+        """Take back an edit of the campaign."""
+        self._show_again(self._history.undo())
+
+    def redo(self) -> None:
+        """Make it again."""
+        self._show_again(self._history.redo())
+
+    def _show_again(self, campaign: Campaign | None) -> None:
+        if campaign is not None:
+            self.context.selection.choose_campaign(campaign)
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The summary and the rows, of the campaign that they name."""
+        wanted = (self.context.selection.campaign, self.context.selection.rig)
+        return tuple(Shown(each, self._of, wanted) for each in (self.summary, self.entries))
+
+    def left(self) -> None:
+        """Keep the campaign for next time, and how the page is divided."""
+        self._parts.keep()
+        campaign = self.context.selection.campaign
+        self.context.settings.keep_text(Remembered.CAMPAIGN, "" if campaign is None else toml_text(campaign))
+
+    def open_file(self, path: Path) -> None:
+        """Take over the campaign of a file."""
+        try:
+            self.context.selection.choose_campaign(load_campaign(path))
+            self.context.note_file(path)
+        except ConfigurationError as error:
+            self.context.say(notice_of(error))
+
+    def _show_progress(self, status: EngineStatus | None) -> None:
+        run = None if status is None else status.run
+        if run is None:
+            self.progress.setValue(0)
+            self.progress.setFormat("not running")
+            return
+        left_s = max(0.0, run.campaign_total_s - run.campaign_elapsed_s)
+        end = datetime.now().astimezone() + timedelta(seconds=left_s)
+        self.progress.setValue(round(1000 * run.campaign_elapsed_s / max(run.campaign_total_s, 1e-9)))
+        self.progress.setFormat(f"{run.number} of {run.count}, {clock(left_s)} left, ends about {end:%H:%M}")
+
+    def _show_campaign(self) -> None:
+        campaign, rig = self.context.selection.campaign, self.context.selection.rig
+        if campaign is None:
+            self._looking.drop()
+            self._seen = self._of = None
+            self.entries.show_rows(())
+            self.summary.setText("No campaign yet: open one, or add the test of the Test page.")
+            return
+        self._history.note(campaign)
+        self.summary.setText(f"{campaign.name}: …")
+        self._seen = self._of = None
+        self.entries.setEnabled(False)
+        self._looking.ask((campaign, rig, self.context.folder / campaign.name))
+
+    def _looked(self, seen: CampaignPreview) -> None:
+        campaign = self.context.selection.campaign
+        if campaign is None:
+            return
+        self._seen, self._of = seen, (campaign, self.context.selection.rig)
+        self.entries.setEnabled(True)
+        row = self.entries.currentRow()
+        self.entries.show_rows(seen.rows)
+        self.entries.selectRow(min(row, len(seen.rows) - 1))
+        self._say_summary(campaign, seen)
+
+    def _say_summary(self, campaign: Campaign, seen: CampaignPreview) -> None:
+        count = len(seen.levels)
+        size = "" if seen.size_bytes is None else f"   ·   {seen.size_bytes / 1e9:.2f} GB"
+        end = datetime.now().astimezone() + timedelta(seconds=seen.duration_s)
+        self.summary.setText(
+            f"{campaign.name}: {count} recording{'' if count == 1 else 's'}   ·   "
+            f"takes {clock(seen.duration_s)}   ·   "
+            f"started now, it ends about {end:%H:%M}{size}   ·   in {self.context.folder / campaign.name}"
+        )
+
+    def _look_failed(self, error: BaseException) -> None:
+        self.context.say(notice_of(error))
+
+    def _add_test(self) -> None:
+        measurement = self.context.selection.measurement
+        if measurement is None:
+            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
+        else:
+            self.context.selection.choose_campaign(
+                with_measurement(self.context.selection.campaign, measurement)
+            )
+
+    def _add_sweep(self, axis: SweepAxis, values: Range) -> None:
+        measurement = self.context.selection.measurement
+        if measurement is None:
+            self._warn("The test is not complete.", "Correct what is marked on the Test page (Ctrl+2).")
+            return
+        try:
+            chosen = self.context.selection
+            campaign = with_sweep(chosen.campaign, measurement, axis, values, chosen.rig)
+        except ConfigurationError as error:
+            self.context.say(notice_of(error))
+        else:
+            self.context.selection.choose_campaign(campaign)
+
+    @property
+    def _chosen_entry(self) -> int:
+        """Number of the chosen row; -1 for none, and while the rows are those of an earlier campaign."""
+        return self.entries.currentRow() if self.entries.isEnabled() else -1
+
+    def _remove(self) -> None:
+        campaign, number = self.context.selection.campaign, self._chosen_entry
+        if campaign is not None and number >= 0:
+            self.context.selection.choose_campaign(without(campaign, number))
+
+    def _move_up(self) -> None:
+        campaign, number = self.context.selection.campaign, self._chosen_entry
+        if campaign is not None and number > 0:
+            self.context.selection.choose_campaign(moved_up(campaign, number))
+            self.entries.setCurrentCell(number - 1, 0)
+
+    def _arm(self) -> None:
+        self._actions.arm_campaign(ExistingRecordings.REFUSE, self._attendance)
+
+    def _arm_missing(self) -> None:
+        self._actions.arm_campaign(ExistingRecordings.RESUME, self._attendance)
+
+    @property
+    def _attendance(self) -> Supervision:
+        return Supervision.UNATTENDED if self.left_alone.isChecked() else Supervision.ATTENDED
+
+    def _hold(self) -> None:
+        self._actions.hold_or_resume()
+
+    def _open(self) -> None:
+        given, _ = QFileDialog.getOpenFileName(
+            self, "Open a campaign", str(self.context.folder), "Campaigns (*.toml)"
+        )
+        if given:
+            self.open_file(Path(given))
+
+    def _save(self) -> None:
+        campaign = self.context.selection.campaign
+        if campaign is None:
+            self._warn("There is no campaign to save.", "Add a test first.")
+            return
+        wish = str(self.context.folder / f"{campaign.name}.toml")
+        given, _ = QFileDialog.getSaveFileName(self, "Save the campaign", wish, "Campaigns (*.toml)")
+        if given:
+            try:
+                save_toml(campaign, Path(given))
+            except ConfigurationError as error:
+                self.context.say(notice_of(error))
+
+    def _take(self, row: int) -> None:
+        if row > 0:
+            self.open_file(all_shipped("campaigns")[row - 1])
+
+    def _restore(self) -> None:
+        kept = self.context.settings.text(Remembered.CAMPAIGN)
+        if kept:
+            try:
+                campaign = validated(tomllib.loads(kept), Campaign, "the last campaign")
+            except (ConfigurationError, tomllib.TOMLDecodeError) as error:
+                self.context.say(notice_of(error, "It was left out; open or make another one."))
+            else:
+                self.context.selection.choose_campaign(campaign)
+        self._show_campaign()
+
+    def _warn(self, what: str, next_step: str) -> None:
+        self.context.say(Notice(NoticeKind.WARNING, what, next_step=next_step))
+
+    def _connect(self) -> None:
+        self.context.selection.campaign_changed.connect(self._show_campaign)
+        self.context.selection.rig_changed.connect(self._show_campaign)
+        self.context.folder_chosen.connect(lambda _folder: self._show_campaign())
+        self.context.recording_made.connect(lambda _path: self._show_campaign())
+        self.choice.activated.connect(self._take)
+        self.sweep.wanted.connect(self._add_sweep)
+        self.sweep.refused.connect(lambda text: self._warn(text, "Correct the sweep."))
+
+    def _lay_out(self) -> None:
+        self.choice.setAccessibleName("Known campaigns")
+        self.choice.setToolTip("Campaigns that come with vibench")
+        self.choice.addItem("take over a campaign…")
+        for path in all_shipped("campaigns"):
+            self.choice.addItem(path.stem.replace("_", " "))
+        files = QGridLayout()
+        files.addWidget(push_button("Open…", "Open a campaign from a TOML file", self._open), 0, 0)
+        files.addWidget(push_button("Save as…", "Save the campaign as a TOML file", self._save), 0, 1)
+        edits = row(
+            push_button("&Add the test", "Add the test of the Test page", self._add_test),
+            push_button("Move &up", "Move the chosen entry up", self._move_up),
+            push_button("&Remove", "Remove the chosen entry", self._remove),
+        )
+        campaign = boxed("Campaign", self.entries, edits)
+        attended = SentenceLabel("continues when the window freezes or is closed", rank="second")
+        left = column(self.choice, files, (campaign, 1), self.sweep)
+        right = column(
+            self.summary,
+            self.arm_button,
+            self.resume_button,
+            self.hold_button,
+            row(self.left_alone, (attended, 1)),
+            self.progress,
+            (boxed("Recordings", self.rows), 1),
+        )
+        self._parts = SideAndPicture(self.context, QUEUE, left, right)
+        filled(QVBoxLayout(self), self._parts)

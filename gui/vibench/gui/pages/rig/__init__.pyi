@@ -1,3 +1,0 @@
-from ._rig_page import (
-    RigPage as RigPage,
-)

@@ -1,0 +1,236 @@
+"""The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check."""
+
+from collections.abc import Callable, Mapping
+from math import isfinite
+from pathlib import Path
+
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, list_rig_instruments, shipped
+from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
+
+from ...page.app_context import AppContext
+from ...page.file_kind import FileKind
+from ...page.page import Page, SideAndPicture
+from ...page.settings import Remembered
+from ...page.user_actions import UserActions
+from ...widgets.boxes import boxed, column, filled
+from ...widgets.clock import moment_text
+from ...widgets.notice import Notice, NoticeKind, notice_of
+from ...widgets.page_names import RIG
+from ...widgets.push_button import push_button
+from ...widgets.read_table import ReadTable
+from ...widgets.units import SentenceLabel, fitted_unit
+from .knob_sheet import KnobSheetForm
+from .rig_choice import RigChoice
+
+
+def finding_name(finding: Finding) -> str:
+    """``"noise of drive voltage"``."""
+    return finding.name.replace("_", " ")
+
+
+def measured_text(finding: Finding) -> str:
+    """``"20 µV"`` for 1.997e-05 V; everything else as the check says it."""
+    number = finding.number
+    if number is None or not isfinite(number):
+        return finding.value
+    unit = fitted_unit(finding.unit, number)
+    if unit.per_si == 1.0:
+        return finding.value
+    spread = "" if finding.uncertainty is None else f" ± {finding.uncertainty * unit.per_si:.1g}"
+    return f"{number * unit.per_si:.3g}{spread} {unit.name}"
+
+
+def expected_text(finding: Finding) -> str:
+    """Say what was expected, and what to do where it was not found."""
+    advice = finding.advice
+    return f"{finding.expected}. {advice[0].upper()}{advice[1:]}" if advice else finding.expected
+
+
+FIRST_STEPS = (
+    "A first measurement takes three keys: Alt+O opens this bench, Ctrl+Return arms the test of the Test "
+    "page and says in words what will happen, F5 starts it. It ends by itself; Files and Compare show what "
+    "was recorded. F1 lists all keys."
+)
+VERDICTS = {Verdict.OK: "✔ ok", Verdict.WARN: "⚠ look", Verdict.FAIL: "✖ fail"}
+
+
+class RigPage(Page):
+    """The first step: from a file to a bench that is open and well."""
+
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
+        self._actions = UserActions(context, self)
+        self.choice = RigChoice()
+        self.knobs = KnobSheetForm()
+        self.about = SentenceLabel(rank="second")
+        self.open_button = push_button(
+            "&Open bench", "Open every instrument; the generator stays silent", self.open_bench
+        )
+        self.open_button.setProperty("rank", "first")
+        self.close_button = push_button(
+            "Close bench", "Silence everything and close the instruments", self._close
+        )
+        self.check_button = push_button(
+            "Check bench  (F6)", "A small sine for some seconds: noise, gains, clocks", self._actions.check
+        )
+        self.find_button = push_button(
+            "Find instruments", "List every instrument that can be seen", self._find
+        )
+        self.instruments = ReadTable(
+            "Instruments",
+            ("part", "what answered"),
+            "Who answers is listed here once a bench is open.",
+        )
+        self.findings = ReadTable(
+            "Findings of the check",
+            ("", "finding", "measured", "expected"),
+            "Noise, gains, clocks and the answer to a small sine, each beside what is expected of it.",
+        )
+        self.verdict = SentenceLabel()
+        self.first_steps = SentenceLabel(FIRST_STEPS, rank="second")
+        self._lay_out()
+        self._connect()
+        self._choose_first()
+
+    @property
+    def is_done(self) -> bool:
+        """The bench is open, and no check has forbidden to use it."""
+        status = self.context.bridge.status
+        if status is None or status.bench is None:
+            return False
+        return status.check is None or status.check.verdict is not Verdict.FAIL
+
+    def refresh(self) -> None:
+        """Show what is open and what the check has found."""
+        status = self.context.bridge.status
+        state = self.context.bridge.state
+        may_open = state in (EngineState.CLOSED, EngineState.FAULT)
+        knobs_missing = self._rig_needs_knobs() and self.knobs.sheet() is None
+        self.open_button.setEnabled(may_open and self.choice.rig is not None and not knobs_missing)
+        self.close_button.setEnabled(state in (EngineState.READY, EngineState.ARMED, EngineState.FAULT))
+        self.check_button.setEnabled(state is EngineState.READY)
+        self.choice.setEnabled(may_open)
+        self.knobs.setEnabled(may_open)
+        if status is not None and status.bench is not None:
+            self.instruments.show_rows([(part, reply) for part, reply in status.bench.identities.items()])
+        self._show_check(status)
+
+    def entered(self) -> None:
+        """Put the focus where the next step is."""
+        if self.open_button.isEnabled():
+            self.open_button.setFocus()
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Hardware configurations; while a bench is open, none."""
+        return {FileKind.RIG: self._choose}
+
+    def _choose(self, path: Path) -> None:
+        if self.choice.isEnabled():
+            self.choice.choose(path.resolve())
+        else:
+            self.context.say(
+                Notice(
+                    NoticeKind.WARNING, "A bench is open.", "It was kept.", "Close it, then choose another."
+                )
+            )
+
+    def open_bench(self) -> None:
+        """Open the chosen bench."""
+        rig = self.choice.rig
+        if rig is not None:
+            self.instruments.show_rows([])
+            self.context.selection.choose_rig(rig)  # not that of an engine that was taken over
+            self.context.bridge.open(rig, self.knobs.sheet())
+
+    def _show_check(self, status: EngineStatus | None) -> None:
+        report: BenchReport | None = None if status is None else status.check
+        if status is not None and status.state is EngineState.CHECKING:
+            self.verdict.setText("◍ Checking: a small sine plays for some seconds")
+        elif report is None:
+            self.verdict.setText(
+                "Not checked yet. F6 plays two per cent of the allowed level for some seconds."
+            )
+            self.findings.show_rows([])
+        else:
+            worst = VERDICTS[report.verdict]
+            assert status is not None
+            at = moment_text(status.checked_utc)
+            self.verdict.setText(f"{worst}   ·   {len(report.findings)} findings   ·   {at}")
+            order = (Verdict.FAIL, Verdict.WARN, Verdict.OK)
+            found = sorted(report.findings, key=lambda each: order.index(each.verdict))
+            self.findings.show_rows(
+                [
+                    (VERDICTS[each.verdict], finding_name(each), measured_text(each), expected_text(each))
+                    for each in found
+                ]
+            )
+
+    def _rig_needs_knobs(self) -> bool:
+        rig = self.choice.rig
+        return rig is not None and rig.virtual is None
+
+    def _chosen(self) -> None:
+        rig = self.choice.rig
+        self.knobs.show_rig(rig)
+        if rig is None:
+            self.about.setText(f"✖ {self.choice.complaint}. Choose another configuration.")
+        else:
+            chain = (rig.generator.resource, rig.amplifier.model, rig.shaker.model, rig.vibrometer.model)
+            kind = "Every instrument is simulated." if rig.virtual is not None else "Real instruments."
+            warning = f"\n⚠ {self.choice.warning}" if self.choice.warning else ""
+            self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}{warning}")
+            self.context.settings.keep_text(Remembered.BENCH, str(self.choice.path))
+        self.context.selection.choose_rig(rig)
+
+    def _choose_first(self) -> None:
+        otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
+        remembered = Path(self.context.settings.text(Remembered.BENCH, otherwise))
+        self.choice.choose(self.context.first_bench or remembered)
+
+    def _find(self) -> None:
+        rig = self.choice.rig
+        if rig is None:
+            return
+        self.find_button.setEnabled(False)
+        self.instruments.show_rows([("looking", "some seconds; a simulated rig is switched on for it")])
+        self.context.background.ask(list_rig_instruments, self._found, self._not_found, rig)
+
+    def _found(self, found: InstrumentList) -> None:
+        self.find_button.setEnabled(True)
+        rows = [("VISA", resource) for resource in found.visa_resources]
+        rows += [("DAQ", f"{each.name}: {each.product}, serial {each.serial}") for each in found.daq_devices]
+        rows += [("remark", remark) for remark in found.remarks]
+        self.instruments.show_rows(rows or [("none", "no instrument answers: look at cables and power")])
+
+    def _not_found(self, error: BaseException) -> None:
+        self.find_button.setEnabled(True)
+        self.instruments.show_rows([])
+        self.context.say(notice_of(error))
+
+    def _close(self) -> None:
+        self.context.bridge.order(EngineClient.close_bench)
+        self.instruments.show_rows([])
+
+    def _connect(self) -> None:
+        self.choice.chosen.connect(self._chosen)
+        self.choice.refused.connect(lambda error: self.context.say(notice_of(error)))
+
+    def _lay_out(self) -> None:
+        buttons = self.open_button, self.check_button, self.find_button, self.close_button
+        side = QWidget()
+        left = filled(QVBoxLayout(side), self.choice, self.about, self.knobs, *buttons)
+        left.addSpacing(self.fontMetrics().height())
+        filled(left, self.first_steps, 1)
+        right = column(
+            (boxed("Instruments", self.instruments), 1),
+            (boxed("Check", self.verdict, self.findings), 3),
+        )
+        self._parts = SideAndPicture(self.context, RIG, side, right)
+        filled(QVBoxLayout(self), self._parts)

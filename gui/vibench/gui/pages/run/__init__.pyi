@@ -1,3 +1,0 @@
-from ._run_page import (
-    RunPage as RunPage,
-)

@@ -1,0 +1,269 @@
+"""The Run page: arm, start, watch; every picture is of the newest samples."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TypeAlias
+
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
+
+from vibench.acquisition.engine import EngineClient, EngineState, TwinSwitch
+from vibench.acquisition.plan import EXCITATION_KINDS, Measurement
+from vibench.acquisition.recording import REJECTED
+from vibench.acquisition.rig import channels_of
+from vibench.analysis import MeasurementPrediction
+from vibench.analysis.live import LiveView
+
+from ...engine_link.live_run import measurement_called
+from ...page.app_context import AppContext
+from ...page.kind_views import KIND_VIEWS, OF_A_BAND, LivePicture
+from ...page.page import Page, Shown, SideAndPicture
+from ...page.user_actions import UserActions
+from ...widgets.boxes import column, filled
+from ...widgets.outcome_text import outcome_text
+from ...widgets.page_names import FILES, RUN
+from ...widgets.units import SentenceLabel
+from .arm_card import ArmCard
+from .hidden_motion_plot import HiddenMotionPlot
+from .portrait_plot import PortraitPlot
+from .spectrum_plot import SpectrumPlot
+from .sweep_plots import SweepPlot, sweep_envelope, sweep_history
+from .time_histories import TimeHistoryPlots
+from .transmissibility_plot import TransmissibilityPlot
+from .watch_card import WatchCard
+
+LAYOUT_ROUNDS = 4
+"""A scroll bar that comes makes the words narrower, and longer."""
+LivePlot: TypeAlias = TransmissibilityPlot | SpectrumPlot | SweepPlot | PortraitPlot
+
+
+class RunPage(Page):
+    """Viewer of the engine's run: it keeps nothing but what is on the screen."""
+
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
+        theme = context.theme
+        self._actions = UserActions(context, self)
+        self._view: LiveView | None = None
+        self._ended: Path | None = None
+        self._drawn: tuple[int, int, int, float] | None = None
+        self._was_driving = False
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.arm_card = ArmCard()
+        self.watch_card = WatchCard(theme)
+        self.time_histories = TimeHistoryPlots(theme)
+        self.frequency_response = TransmissibilityPlot(theme)
+        self.spectrum = SpectrumPlot(theme)
+        self.history = sweep_history(theme)
+        self.envelope = sweep_envelope(theme)
+        self.portrait = PortraitPlot(theme)
+        self.hidden_motion = HiddenMotionPlot(theme)
+        self.left_tabs, self.right_tabs = QTabWidget(), QTabWidget()
+        self.look_button = QPushButton("Look at the recording")
+        self.look_button.setToolTip("Show the last recording on the Files page")
+        self.summary = SentenceLabel()
+        self.summary.setAccessibleName("How the last run ended")
+        self._lay_out()
+        self._connect()
+        self._show_channels()
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
+
+    @property
+    def is_done(self) -> bool:
+        """Something was recorded since the window opened."""
+        return self._ended is not None
+
+    def refresh(self) -> None:
+        """Draw the newest samples, unless the picture is frozen."""
+        status = self.context.bridge.status
+        measurement = self.context.selection.measurement
+        test = (
+            ""
+            if measurement is None
+            else f"{measurement.name} ({EXCITATION_KINDS[measurement.excitation.kind].label})"
+        )
+        reason = "" if measurement is not None else "The test is not complete; see the Test page (Ctrl+2)."
+        self.arm_card.show_status(status, test, reason)
+        if self.context.bridge.is_driving and not self._was_driving:
+            # The buttons that had the focus are gone; without this the next list in the row would have it.
+            self.setFocus()
+        self._was_driving = self.context.bridge.is_driving
+        played = self._played
+        self.watch_card.show_status(status, 0 if played is None else played.excitation.stretches)
+        if not self.watch_card.freeze.isChecked() and self.hidden_motion.isVisible():
+            self.hidden_motion.show_status(status)
+        view = self.context.bridge.view
+        for part in self._of_the_run:
+            part.setEnabled(view is not None or self._view is None)
+        if view is None or self.watch_card.freeze.isChecked():
+            return
+        if view is not self._view:
+            self._begin(view)
+        tabs_shown = (self.left_tabs.currentIndex(), self.right_tabs.currentIndex())
+        wanted = (view.next_sample, *tabs_shown, self.watch_card.span_s)
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        self.watch_card.show_view(view)
+        self.time_histories.show_view(view, self.watch_card.span_s)
+        for tabs in (self.left_tabs, self.right_tabs):
+            shown = tabs.currentWidget()
+            if isinstance(shown, LivePlot):
+                shown.show_view(view)
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """Pictures and numbers, of the run that they are of; frozen ones are what somebody wants to see."""
+        if self.watch_card.freeze.isChecked() or not self.isVisible():
+            return ()
+        return tuple(Shown(each, self._view, self.context.bridge.view) for each in self._of_the_run)
+
+    @property
+    def _of_the_run(self) -> tuple[QWidget, ...]:
+        card = self.watch_card
+        return (self.time_histories, card.impacts, card.meters, *self._pictures.values())
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Space freezes, M marks, PgDn reads on; all are left to fields and buttons that use them."""
+        bar = self._parts.side.verticalScrollBar()
+        match event.key():
+            case Qt.Key.Key_PageDown | Qt.Key.Key_PageUp:
+                step = bar.pageStep() if event.key() == Qt.Key.Key_PageDown else -bar.pageStep()
+                bar.setValue(bar.value() + step)
+            case Qt.Key.Key_Space:
+                self.watch_card.freeze.toggle()
+            case Qt.Key.Key_M if event.modifiers() == Qt.KeyboardModifier.NoModifier:
+                self.watch_card.wish_mark()
+            case _:
+                super().keyPressEvent(event)
+
+    @property
+    def _pictures(self) -> Mapping[LivePicture, LivePlot]:
+        return {
+            LivePicture.FREQUENCY_RESPONSE: self.frequency_response,
+            LivePicture.SPECTRUM: self.spectrum,
+            LivePicture.HISTORY: self.history,
+            LivePicture.ENVELOPE: self.envelope,
+            LivePicture.PORTRAIT: self.portrait,
+        }
+
+    def _begin(self, view: LiveView) -> None:
+        """Another run: clear the pictures, lay its prediction beneath, show what suits its excitation."""
+        self._view = view
+        measurement = self._played
+        prediction = self.context.selection.prediction
+        if prediction is not None and (
+            measurement is None or prediction.measurement.excitation != measurement.excitation
+        ):
+            prediction = None
+        pictures = self._pictures
+        for picture in pictures.values():
+            picture.clear()
+        self._show_prediction(prediction)
+        if measurement is not None:
+            for plot in (self.history.plot, self.envelope.plot, self.frequency_response.magnitude):
+                # What the check plays before the run lies outside, and would make the band small.
+                plot.setXRange(*measurement.excitation.band_hz, padding=0.03)
+        shown = OF_A_BAND if measurement is None else KIND_VIEWS[measurement.excitation.kind]
+        self.left_tabs.setCurrentWidget(pictures[shown.left])
+        self.right_tabs.setCurrentWidget(pictures[shown.right])
+
+    def _show_prediction(self, seen: MeasurementPrediction | None) -> None:
+        self.frequency_response.show_prediction(seen)
+        self.history.show_prediction(seen)
+        self.envelope.show_prediction(seen)
+
+    def _recorded(self, path: Path) -> None:
+        self._ended = path
+        status = self.context.bridge.status
+        rows = () if status is None else status.rows
+        told = next((outcome_text(row.state, row.reason) for row in rows if row.file == str(path)), "")
+        self.summary.setText(f"Last run: {path.name}, {told}")
+        self.look_button.show()
+
+    def _show_channels(self) -> None:
+        """Have the plots before the first sample: to make them in a run would cost it a moment."""
+        rig = self.context.selection.rig
+        if rig is not None:
+            self.time_histories.show_channels(
+                tuple((each.role.value, each.unit) for each in channels_of(rig))
+            )
+
+    def _look(self) -> None:
+        if self._ended is not None:
+            self.context.recording_wanted.emit(self._ended)
+            self.context.page_wanted.emit(FILES)
+
+    def _mark(self, text: str) -> None:
+        if self.context.bridge.state in (EngineState.RUNNING, EngineState.HELD):
+            self.context.bridge.order(EngineClient.mark, text)
+
+    @property
+    def _played(self) -> Measurement | None:
+        """The measurement that runs, where its plan is known."""
+        status = self.context.bridge.status
+        run = None if status is None else status.run
+        return None if run is None else measurement_called(self.context.bridge.campaign, run.name)
+
+    def _reject(self) -> None:
+        played, view = self._played, self.context.bridge.view
+        if played is not None and view is not None:
+            view.leave_out(played.excitation.playing_s / played.excitation.stretches)
+            self._mark(REJECTED)
+
+    def _turn_twin(self, switch: TwinSwitch) -> None:
+        self.context.bridge.order(EngineClient.turn_twin, switch)
+        if switch is TwinSwitch.ON:
+            self.right_tabs.setCurrentWidget(self.hidden_motion)
+
+    def _is_armed_read(self) -> bool:
+        """Look now: what was armed a moment ago may not have been laid out yet."""
+        self.refresh()
+        for _ in range(LAYOUT_ROUNDS):
+            QCoreApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        return self.arm_card.is_read
+
+    def _connect(self) -> None:
+        self.arm_card.arm_wanted.connect(self._actions.arm_test)
+        self.arm_card.start_wanted.connect(self._actions.start)
+        self.arm_card.cancel_wanted.connect(self._actions.disarm)
+        self.arm_card.hold_wanted.connect(self._actions.hold_or_resume)
+        self.arm_card.news.connect(lambda: self._parts.side.verticalScrollBar().setValue(0))
+        self.context.is_armed_read = self._is_armed_read
+        self.watch_card.mark_wanted.connect(self._mark)
+        self.watch_card.reject_wanted.connect(self._reject)
+        # Until the next tick the picture of a run that has ended meanwhile would pass for that of this one.
+        self.watch_card.freeze.toggled.connect(lambda _: self.refresh())
+        self.watch_card.twin_wanted.connect(self._turn_twin)
+        self.look_button.clicked.connect(self._look)
+        self.context.recording_made.connect(self._recorded)
+        self.context.selection.rig_changed.connect(self._show_channels)
+
+    def _lay_out(self) -> None:
+        left = column(self.arm_card, self.watch_card, self.summary, self.look_button, 1)
+        self.look_button.hide()
+        for tabs, name, pictures in (
+            (self.left_tabs, "Pictures on the left", (self.frequency_response, self.history, self.envelope)),
+            (self.right_tabs, "Pictures on the right", (self.spectrum, self.portrait, self.hidden_motion)),
+        ):
+            tabs.setAccessibleName(name)
+            tabs.setDocumentMode(True)
+            for picture in pictures:
+                picture.setAccessibleName(picture.title)
+                tabs.setTabToolTip(tabs.addTab(picture, picture.tab), picture.title)
+        below = QSplitter(Qt.Orientation.Horizontal)
+        below.addWidget(self.left_tabs)
+        below.addWidget(self.right_tabs)
+        below.setSizes([500, 500])
+        right = QSplitter(Qt.Orientation.Vertical)
+        right.addWidget(self.time_histories)
+        right.addWidget(below)
+        right.setSizes([600, 400])
+        right.setStretchFactor(0, 3)
+        right.setStretchFactor(1, 2)
+        self._parts = SideAndPicture(self.context, RUN, left, right, self.arm_card.buttons)
+        filled(QVBoxLayout(self), self._parts)

@@ -1,3 +1,0 @@
-from ._simulate_page import (
-    SimulatePage as SimulatePage,
-)

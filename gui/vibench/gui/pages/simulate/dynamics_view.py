@@ -1,0 +1,193 @@
+"""A tab of the Simulate page: a form, an answer that grows piece by piece, and its cost and error."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+from PySide6.QtWidgets import QLayout, QVBoxLayout, QWidget
+
+from vibench.analysis import Curve
+from vibench.analysis.dynamics import SpecimenChoice
+from vibench.analysis.simulation.request import PartialResult, Trouble
+from vibench.analysis.simulation.worker import Asked
+
+from ...forms.model_form import JudgedForm
+from ...page.app_context import AppContext
+from ...page.page import Shown, SideAndPicture
+from ...page.simulator import Simulator
+from ...widgets.boxes import boxed, column, row
+from ...widgets.notice import Notice, NoticeKind
+from ...widgets.page_names import COMPARE
+from ...widgets.push_button import push_button
+from ...widgets.units import SentenceLabel
+
+Request = TypeVar("Request", bound=SpecimenChoice)
+Answer = TypeVar("Answer")
+Shown_contra = TypeVar("Shown_contra", contravariant=True)
+
+
+class AnswerPicture(Protocol[Shown_contra]):
+    """Draws an answer as far as it has come."""
+
+    @property
+    def widget(self) -> QWidget:
+        """What is put into the tab."""
+
+    def show_answer(self, answer: Shown_contra) -> None:
+        """Draw anew."""
+
+
+@dataclass(frozen=True)
+class DynamicsKind(Generic[Request, Answer]):
+    """What a tab asks, and how its answer is told."""
+
+    name: str
+    request: type[Request]
+    hidden: frozenset[str]
+    """Fields that a form cannot show."""
+    answer: Callable[[Request, tuple[PartialResult, ...], float], Answer]
+    """From the pieces so far, and the seconds they took."""
+    cost: Callable[[Answer], str]
+    curves: Callable[[Answer], tuple[Curve, ...]]
+    before: str
+    """What an answer costs and errs, said before there is one."""
+
+
+@dataclass
+class _Course:
+    """An answer under way."""
+
+    request: Asked
+    began: float
+    parts: list[PartialResult] = field(default_factory=list)
+    troubles: list[str] = field(default_factory=list)
+
+
+class DynamicsView(QWidget, Generic[Request, Answer]):
+    """The form on the left; on the right the picture, its cost and error below it."""
+
+    def __init__(
+        self, context: AppContext, kind: DynamicsKind[Request, Answer], picture: AnswerPicture[Answer]
+    ) -> None:
+        super().__init__()
+        self.context, self.kind, self.picture = context, kind, picture
+        self.setAccessibleName(kind.name.capitalize())
+        self.form: JudgedForm[Request] = JudgedForm(kind.request, kind.name, kind.hidden)
+        self.simulator = Simulator(self, self._grow, self._end, self._die)
+        self.answer: Answer | None = None
+        self._course: _Course | None = None
+        self._is_stale = False
+        self._build()
+        self.form.changed.connect(self._judge)
+        self._judge()
+
+    @property
+    def said(self) -> str:
+        """What stands below the picture."""
+        return self._state.text()
+
+    @property
+    def shown(self) -> Shown:
+        """The picture, of what was asked."""
+        asked = None if self._course is None else self._course.request
+        return Shown(self.picture.widget, asked, self.form.value)
+
+    def refresh(self) -> None:
+        """Draw what has come since the last time."""
+        if self._is_stale and self.answer is not None:
+            self._is_stale = False
+            self.picture.show_answer(self.answer)
+
+    def left(self) -> None:
+        """Keep how the tab is divided."""
+        self._parts.keep()
+
+    def begin(self) -> None:
+        """Ask what the form says."""
+        request = self.form.value
+        if request is None:
+            return
+        self._course = _Course(request, time.perf_counter())  # type: ignore[arg-type]
+        self._judge()
+        self._take(())
+        self.simulator.begin(request)  # type: ignore[arg-type]
+        self._say("Looking; the first answer waits for the program to be made ready…")
+
+    def cancel(self) -> None:
+        """Want no more; what has been found stays."""
+        self.simulator.cancel()
+        self._say("Cancelled; what had been found is shown.")
+
+    def _grow(self, parts: tuple[PartialResult, ...]) -> None:
+        self._take(parts)
+        self._say("Looking…")
+
+    def _take(self, parts: tuple[PartialResult, ...]) -> None:
+        course = self._course
+        if course is None:
+            return
+        for part in parts:
+            match part:
+                case Trouble():
+                    course.troubles.append(part.sentence)
+                case _:
+                    course.parts.append(part)
+        elapsed_s = time.perf_counter() - course.began
+        self.answer = self.kind.answer(course.request, tuple(course.parts), elapsed_s)  # type: ignore[arg-type]
+        self._is_stale = True
+
+    def _end(self) -> None:
+        self._take(())
+        self._say("Complete.")
+        if self._course is not None and self._course.troubles:
+            self.context.say(Notice(NoticeKind.WARNING, self._course.troubles[0]))
+
+    def _die(self, what: str) -> None:
+        self.context.say(
+            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Ask again.", "SIMULATOR")
+        )
+        self._say("It broke off.")
+
+    def _say(self, text: str) -> None:
+        has_nothing = self.simulator.is_busy and (self._course is None or not self._course.parts)
+        cost = "" if self.answer is None or has_nothing else self.kind.cost(self.answer)
+        self._state.setText(f"{text} {cost}")
+        self._cancel.setEnabled(self.simulator.is_busy)
+        self._compare.setEnabled(self.answer is not None and bool(self.kind.curves(self.answer)))
+
+    def _judge(self) -> None:
+        self._begin.setEnabled(self.form.value is not None)
+        asked = None if self._course is None else self._course.request
+        self.picture.widget.setEnabled(self.form.value is not None and asked in (None, self.form.value))
+
+    def _hand_to_compare(self) -> None:
+        if self.answer is not None:
+            self.context.prediction_made.emit(self.kind.curves(self.answer))
+            self.context.page_wanted.emit(COMPARE)
+
+    def _build(self) -> None:
+        self._parts = SideAndPicture(
+            self.context, self.kind.name.capitalize(), self._side(), self._right(), self._buttons()
+        )
+        QVBoxLayout(self).addWidget(self._parts)
+
+    def _side(self) -> QWidget:
+        scene, before = boxed("Scene", self.form), SentenceLabel(self.kind.before, rank="second")
+        return column(scene, before, 1)
+
+    def _buttons(self) -> QLayout:
+        self._begin = push_button("Find", "Compute what the form says, in another process", self.begin)
+        self._begin.setProperty("rank", "first")
+        self._cancel = push_button("Cancel", "Want no more; what has been found stays", self.cancel)
+        self._cancel.setEnabled(False)
+        return row((self._begin, 1), self._cancel)
+
+    def _right(self) -> QWidget:
+        self._state = SentenceLabel("Nothing has been asked yet.")
+        self._state.setAccessibleName(f"State, cost and error of the {self.kind.name}")
+        self._compare = push_button(
+            "Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
+        )
+        self._compare.setEnabled(False)
+        return column((self.picture.widget, 1), row((self._state, 1), self._compare))

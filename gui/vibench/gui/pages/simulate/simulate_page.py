@@ -1,0 +1,225 @@
+"""Simulate: a scene as a form, its cost beside it, and curves that grow while they are computed."""
+
+import json
+import os
+from collections.abc import Callable
+from contextlib import suppress
+
+from PySide6.QtWidgets import (
+    QLayout,
+    QTabWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.analysis.simulation.accuracy_cost import cost_sentences
+from vibench.analysis.simulation.progress import MOTION_COLUMNS, SimulationProgress
+from vibench.analysis.simulation.request import PartialResult, SimulationRequest
+
+from ...forms.model_form import JudgedForm
+from ...page.app_context import AppContext
+from ...page.page import Page, Shown, SideAndPicture
+from ...page.settings import Remembered
+from ...page.simulator import Simulator
+from ...widgets.boxes import boxed, column, filled, row
+from ...widgets.notice import Notice, NoticeKind
+from ...widgets.page_names import COMPARE, SIMULATE
+from ...widgets.push_button import push_button
+from ...widgets.read_table import ReadTable
+from ...widgets.timed_bar import TimedBar
+from ...widgets.units import SentenceLabel
+from .answer_plots import AnswerPlots
+from .chain_picture import ChainPicture
+from .dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
+from .dynamics_pictures import BranchPicture, SpectrumPicture
+from .dynamics_view import DynamicsView
+
+_LINES = 6
+"""Of the table of motions, headings among them."""
+
+
+class SimulatePage(Page):
+    """The form on the left; the answer on the right, as far as it has come."""
+
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
+        self.form: JudgedForm[SimulationRequest] = JudgedForm(
+            SimulationRequest, "simulation", frozenset({"described"})
+        )
+        self.plots = AnswerPlots(context.theme)
+        self.simulator = Simulator(self, self._grow, self._end, self._die)
+        self._progress: SimulationProgress | None = None
+        self._request: SimulationRequest | None = None
+        """What the curves are of."""
+        self._is_stale = False
+        self._undrawn: list[Callable[[], None]] = []
+        self.branches = DynamicsView(context, BRANCHES, BranchPicture(context.theme))
+        self.spectrum = DynamicsView(context, SPECTRUM, SpectrumPicture(context.theme))
+        self.chain = DynamicsView(context, CHAIN, ChainPicture(context.theme))
+        self._views = (self.branches, self.spectrum, self.chain)
+        self._build()
+        self.form.changed.connect(self._say_cost)
+        context.scene_wanted.connect(self.show_scene)
+        with suppress(ValueError):  # of another version, or written by somebody
+            self.form.form.show_content(dict(json.loads(context.settings.text(Remembered.SCENES))))
+        if self.form.value is None:
+            self.form.form.show_content({})
+        self._say_cost()
+        self._say_progress("Nothing has been simulated yet.")
+
+    @property
+    def progress(self) -> SimulationProgress | None:
+        """What has been found so far."""
+        return self._progress
+
+    @property
+    def is_done(self) -> bool:
+        """Ticked once there is a whole answer."""
+        return self._progress is not None and not self.simulator.is_busy and self._progress.done > 0
+
+    def refresh(self) -> None:
+        """Draw what has come since the last time, a picture a tick."""
+        if self._is_stale and not self._undrawn:
+            self._is_stale = False
+            self._undrawn = self.plots.steps(self._progress)
+            self._show_motions()
+        if self._undrawn:
+            self._undrawn.pop(0)()
+        for view in self._views:
+            view.refresh()
+
+    def left(self) -> None:
+        """Keep how the page is divided."""
+        self._parts.keep()
+        kept = self.form.form.content()
+        self.context.settings.keep_text(Remembered.SCENES, json.dumps(kept))
+        for view in self._views:
+            view.left()
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """The curves, of the scene that was asked for."""
+        return (Shown(self.plots, self._request, self.form.value), *(view.shown for view in self._views))
+
+    @property
+    def styled(self) -> tuple[QWidget, ...]:
+        """Its tabs: each has as many fields as another page."""
+        return (self._parts, *self._views)
+
+    def begin(self) -> None:
+        """Simulate what the form says."""
+        request = self.form.value
+        if request is None:
+            return
+        note = (
+            f"{request.specimen_text}, A0 = {1e6 * request.amplitude_m:g} µm, "
+            f"{request.duration_s:g} s from rest, {request.accuracy.value}"
+        )
+        self._progress = SimulationProgress(request.amplitude_m, request.points, note)
+        self._is_stale = True
+        self._request = request
+        self.plots.setEnabled(True)
+        self._bar.begin()
+        self.simulator.begin(request)
+        self._say_progress("Simulating; the first answer waits for the program to be made ready…")
+
+    def show_scene(self, frequency_hz: float, amplitude_m: float) -> None:
+        """Fill the form in for the surroundings of a drive, and for its time signal."""
+        content = {**self.form.form.content(), "amplitude_m": amplitude_m, "signal_hz": frequency_hz}
+        content |= {"start_hz": 0.9 * frequency_hz, "stop_hz": 1.1 * frequency_hz}
+        content["step_hz"] = 0.01 * frequency_hz
+        self.form.form.show_content(content)
+        self.tabs.setCurrentIndex(0)
+
+    def cancel(self) -> None:
+        """Stop at once; what has been found stays."""
+        self.simulator.cancel()
+        self._say_progress("Cancelled; what had been found is shown.")
+
+    def _grow(self, parts: tuple[PartialResult, ...]) -> None:
+        if self._progress is not None:
+            self._progress.add(parts)
+            self._is_stale = True
+            self._say_progress("Simulating…")
+
+    def _end(self) -> None:
+        self._is_stale = True
+        troubles = () if self._progress is None else self._progress.troubles
+        said = "Complete." if not troubles else f"Complete but for {len(troubles)} points."
+        forgotten = 0 if self._progress is None else self._progress.forgotten
+        self._say_progress(f"{said} At {forgotten} points the start is forgotten." if forgotten else said)
+        if troubles:
+            self.context.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
+
+    def _die(self, what: str) -> None:
+        self.context.say(
+            Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Simulate again.", "SIMULATOR")
+        )
+        self._say_progress("The simulation broke off.")
+
+    def _show_motions(self) -> None:
+        """List the motions of points that came to more than one; the table is there only then."""
+        rows = () if self._progress is None else self._progress.motion_rows
+        self.motions.show_rows(rows)
+        self.motions.setVisible(bool(rows))
+
+    def _say_cost(self) -> None:
+        request = self.form.value
+        self._begin.setEnabled(request is not None)
+        self.plots.setEnabled(request is not None and self._request in (None, request))
+        if request is None:
+            self._cost.setText(f"✖ {self.form.complaint}")
+            return
+        self._cost.setText("\n".join(cost_sentences(request, os.cpu_count() or 1)))
+
+    def _say_progress(self, text: str) -> None:
+        is_busy = self.simulator.is_busy
+        done, asked = (0, 0) if self._progress is None else (self._progress.done, self._progress.asked)
+        self._bar.show_done(done, asked)
+        self._state.setText(text)
+        self._cancel.setEnabled(is_busy)
+        self._compare.setEnabled(self._progress is not None and bool(self._progress.curves()))
+
+    def _hand_to_compare(self) -> None:
+        if self._progress is not None:
+            self.context.prediction_made.emit(self._progress.curves())
+            self.context.page_wanted.emit(COMPARE)
+
+    def _build(self) -> None:
+        self._parts = SideAndPicture(self.context, SIMULATE, self._side(), self._answer(), self._buttons())
+        self.tabs = QTabWidget()
+        self.tabs.setAccessibleName("What is simulated")
+        self._parts.setAccessibleName("Responses")
+        self.tabs.addTab(self._parts, "Responses")
+        self.tabs.addTab(self.branches, "Branches")
+        self.tabs.addTab(self.spectrum, "Exponents")
+        self.tabs.addTab(self.chain, "Chain")
+        filled(QVBoxLayout(self), self.tabs)
+
+    def _side(self) -> QWidget:
+        scene = boxed("Scene", self.form)
+        self._cost = SentenceLabel()
+        self._cost.setAccessibleName("Cost and error of this accuracy")
+        cost = boxed("Cost and error of this accuracy", self._cost)
+        return column(scene, cost, 1)
+
+    def _buttons(self) -> QLayout:
+        self._begin = push_button("&Simulate", "Compute what the form says, in another process", self.begin)
+        self._begin.setProperty("rank", "first")
+        self._cancel = push_button("&Cancel", "Stop at once; what has been found stays", self.cancel)
+        return row((self._begin, 1), self._cancel)
+
+    def _answer(self) -> QWidget:
+        self._bar = TimedBar("Points simulated", "points")
+        letters = "20000 of 20000 points, 0:00:00 left  "
+        self._bar.setMinimumWidth(self._bar.fontMetrics().horizontalAdvance(letters))
+        self._state = SentenceLabel()
+        self._compare = push_button(
+            "&Lay over recordings", "Put these curves on the Compare page", self._hand_to_compare
+        )
+        self.motions = ReadTable(
+            "Motions of points whose start is forgotten, and their shares", MOTION_COLUMNS
+        )
+        self.motions.setMaximumHeight(_LINES * self.motions.verticalHeader().defaultSectionSize())
+        self.motions.hide()
+        return column((self.plots, 1), self.motions, row((self._state, 1), self._bar, self._compare))

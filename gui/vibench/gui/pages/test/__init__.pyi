@@ -1,3 +1,0 @@
-from ._test_page import (
-    TestPage as TestPage,
-)

@@ -1,0 +1,347 @@
+"""The Test page: a form of what will be played, and beside it exactly what that is and does."""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from PySide6.QtWidgets import (
+    QFileDialog,
+    QGridLayout,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.acquisition import ConfigurationError, printable, save_toml, toml_text, validated
+from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview, excitation_text
+from vibench.acquisition.rig import BaseQuantity, Rig
+
+from ...background.background import LatestRequest
+from ...forms.editor import Choice
+from ...page.app_context import AppContext
+from ...page.file_kind import FileKind
+from ...page.history import History
+from ...page.page import Page, Shown, SideAndPicture
+from ...page.settings import Remembered
+from ...page.user_actions import UserActions
+from ...widgets.boxes import boxed, column, filled, row
+from ...widgets.clock import clock
+from ...widgets.notice import Notice, NoticeKind, notice_of
+from ...widgets.page_names import TEST
+from ...widgets.push_button import push_button
+from ...widgets.units import SentenceLabel, fitted_unit
+from .library import NamedTest, load_test, own_tests, shipped_tests
+from .limit_table import LimitTable
+from .preview_plots import PredictionPlot, PreviewPlots
+from .test_form import TestForm
+from .test_preview import TestPrediction, TestPreview, predict_test, preview_test
+
+_SHOWN = {
+    BaseQuantity.STROKE: "stroke",
+    BaseQuantity.ACCELERATION: "acceleration",
+    BaseQuantity.FORCE: "force",
+    BaseQuantity.AMPLIFIER_VOLTAGE: "amplifier's voltage",
+}
+
+
+def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
+    """Say what is played; then peak stroke, acceleration, force and volts beside their limits, time, size.
+
+    ``refusal`` is why a fast loop would not hold it.
+    """
+    parts = [excitation_text(seen.measurement.excitation)]
+    parts += [
+        _load(check, name) for load, name in _SHOWN.items() for check in seen.checks if check.load is load
+    ]
+    parts.append(f"generator {seen.peak_v:.3g} V peak, crest {seen.crest_factor:.2f}")
+    parts.append(f"takes {clock(seen.duration_s)}")
+    parts.append(f"file {seen.size_bytes / 1e6:.0f} MB")
+    if seen.least_growth_time_s is not None:
+        parts.append(f"holds motions that take {seen.least_growth_time_s:.3g} s or more to grow by e")
+    passed = [check for check in seen.checks if not check.is_kept]
+    broken = sorted(passed, key=lambda check: not check.forbids)
+    said = "   ·   ".join(parts)
+    if refusal:
+        return f"✖ {refusal}   ·   {said}"
+    if not broken:
+        return f"✔ within all limits   ·   {said}"
+    sign = "✖" if broken[0].forbids else "⚠"
+    reasons = "   ·   ".join(check.complaint() for check in broken)
+    return f"{sign} {reasons}   ·   {said}"
+
+
+def _load(check: LimitCheck, name: str) -> str:
+    unit = fitted_unit(check.unit, check.limit)
+    return f"{name} {unit.text(check.value)} of {unit.text(check.limit)}"
+
+
+Asked = tuple[Measurement | None, Rig | None] | None
+NAMELESS = {"name": "test", "notes": ""}
+"""What is predicted of a test depends on neither."""
+LOOK_MS, PREDICT_MS = 200, 900
+"""How long a test stands unchanged before it is previewed, and before it is simulated."""
+
+
+class TestPage(Page):
+    """Edits the test that Arm will arm."""
+
+    def __init__(self, context: AppContext) -> None:
+        super().__init__(context)
+        self._actions = UserActions(context, self)
+        self._preview: MeasurementPreview | None = None
+        self._refusal = ""
+        self._history: History[Measurement] = History()
+        self._of: Asked = None
+        self._asked: Asked = None
+        self._summary_of: Asked = None
+        self._predicted_of: Asked = None
+        self._tests: tuple[NamedTest, ...] = ()
+        self.choice = Choice()
+        self.form = TestForm()
+        self.summary = SentenceLabel()
+        self.summary.setAccessibleName("Summary of the test")
+        self.plots = PreviewPlots(context.theme)
+        self.limits = LimitTable()
+        self.prediction = PredictionPlot(context.theme)
+        self.prediction_note = SentenceLabel(rank="second")
+        self.expectation = SentenceLabel(rank="second")
+        self.arm_button = push_button(
+            "A&rm the test…  (Ctrl+Return)",
+            "Show in words what will happen; nothing plays before Start",
+            self._actions.arm_test,
+        )
+        self.arm_button.setProperty("rank", "first")
+        self._looking = LatestRequest(
+            context.looks, preview_test, self._looked, self._look_failed, LOOK_MS, self
+        )
+        self._predicting = LatestRequest(
+            context.background, predict_test, self._predicted, self._prediction_failed, PREDICT_MS, self
+        )
+        self._lay_out()
+        self._connect()
+        self._list_tests()
+        self._restore()
+
+    @property
+    def is_done(self) -> bool:
+        """The test is complete, keeps every limit, and no fast loop is known to lose it."""
+        return self._preview is not None and self._preview.is_allowed and not self._refusal
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a preview or a prediction is still to come."""
+        return self._looking.is_busy or self._predicting.is_busy
+
+    @property
+    def opens(self) -> Mapping[FileKind, Callable[[Path], object]]:
+        """Tests."""
+        return {FileKind.TEST: self.open_file}
+
+    def undo(self) -> None:
+        """Take back an edit of the test."""
+        self._show_again(self._history.undo())
+
+    def redo(self) -> None:
+        """Make it again."""
+        self._show_again(self._history.redo())
+
+    def _show_again(self, measurement: Measurement | None) -> None:
+        if measurement is not None:
+            self.form.show_value(measurement)
+
+    @property
+    def shown(self) -> tuple[Shown, ...]:
+        """Loads, pictures and prediction, each of the test and rig it was worked out for."""
+        wanted = self._wanted
+        return (
+            Shown(self.summary, self._summary_of, wanted),
+            *(Shown(each, self._of, wanted) for each in (self.plots, self.limits)),
+            Shown(self.prediction, self._predicted_of, wanted),
+            Shown(self.prediction_note, self._predicted_of, wanted),
+        )
+
+    @property
+    def _wanted(self) -> tuple[Measurement | None, Rig | None]:
+        """The test, without its name, and the rig."""
+        value = self.form.value
+        nameless = None if value is None else value.model_copy(update=NAMELESS)
+        return nameless, self.context.selection.rig
+
+    def left(self) -> None:
+        """Keep the test for next time, and how the page is divided."""
+        self._parts.keep()
+        measurement = self.form.value
+        if measurement is not None:
+            self.context.settings.keep_text(Remembered.TEST, toml_text(measurement))
+
+    def _changed(self) -> None:
+        measurement, asked = self.form.value, self._wanted
+        seen = self.context.selection.prediction
+        self.context.selection.choose_measurement(measurement)
+        if measurement is not None:
+            self._history.note(measurement)
+            if asked == self._asked:
+                # Another name alone: what is predicted of the test, or will be, stays.
+                if seen is not None:
+                    self.context.selection.keep_prediction(seen)
+                return
+        self._preview, self._refusal = None, ""
+        # What stands there belongs to another test until its own has come.
+        self._asked = self._summary_of = asked
+        measurement, rig = asked
+        for each in (self.limits, self.plots, self.prediction, self.prediction_note):
+            each.setEnabled(False)
+        if measurement is None or rig is None:
+            self._looking.drop()
+            self._predicting.drop()
+            what = self.form.complaint or "Choose a rig first (Ctrl+1)."
+            self.summary.setText(f"✖ {what}")
+            return
+        self.summary.setText("…")
+        self._looking.ask(TestPreview(measurement, rig))
+        self.prediction_note.setText("◌ simulating; the first time compiles the simulation, up to a minute")
+        self._predicting.ask(TestPreview(measurement, rig))
+
+    def _looked(self, seen: MeasurementPreview) -> None:
+        self._preview = seen
+        self._of = self._summary_of = self._asked
+        self.summary.setText(summary_text(seen, self._refusal))
+        for each in (self.limits, self.plots):
+            each.setEnabled(True)
+        self.plots.show_preview(seen)
+        self.limits.show_checks(seen.checks)
+
+    def _look_failed(self, error: BaseException) -> None:
+        self.summary.setText(f"✖ {error}")
+
+    def _predicted(self, prediction: TestPrediction) -> None:
+        seen = prediction.motion
+        self.context.selection.keep_prediction(seen)
+        self._predicted_of = self._asked
+        self._refusal = prediction.refusal
+        if self._preview is not None:
+            self.summary.setText(summary_text(self._preview, self._refusal))
+        self.prediction.setEnabled(True)
+        self.prediction_note.setEnabled(True)
+        self.prediction.show_prediction(seen)
+        bands = ", ".join(f"{low:.0f}–{high:.0f} Hz" for low, high in seen.collision_bands_hz)
+        collides = f"Collides at {bands}." if bands else "No collision is predicted."
+        self.prediction_note.setText(
+            f"Simulated ({seen.model}), {seen.approach.value}, base amplitude {seen.base_text} from "
+            f"{seen.basis}. {collides}"
+        )
+        told = [each.sentence for each in prediction.expected]
+        known = [each.sentence for each in prediction.expected if each.scatter is not None]
+        self.expectation.setText(f"Will be known: {known[0]} …" if known and told[1:] else "".join(told[:1]))
+        self.expectation.setToolTip("\n".join(told))
+
+    def _prediction_failed(self, error: BaseException) -> None:
+        self.prediction.show_prediction(None)
+        self.prediction_note.setEnabled(True)
+        self._predicted_of = self._asked
+        self.prediction_note.setText(f"No prediction: {error}")
+        self.expectation.setText("")
+
+    def _list_tests(self) -> None:
+        self._tests = (*own_tests(self._own_folder), *shipped_tests())
+        self.choice.blockSignals(True)
+        self.choice.clear()
+        self.choice.addItem("take over a test…")
+        for test in self._tests:
+            self.choice.addItem(printable(test.label))
+        self.choice.blockSignals(False)
+
+    @property
+    def _own_folder(self) -> Path:
+        return self.context.folder / "tests"
+
+    def _take(self, row: int) -> None:
+        if row > 0:
+            self.form.show_value(self._tests[row - 1].measurement)
+
+    def _restore(self) -> None:
+        kept = self.context.settings.text(Remembered.TEST)
+        self.form.show_value(_kept_test(kept) or self._tests[0].measurement)
+
+    def _save(self) -> None:
+        measurement = self.form.value
+        if measurement is None:
+            self.context.say(
+                Notice(NoticeKind.WARNING, "The test is not complete.", next_step=self.form.complaint)
+            )
+            return
+        wish = str(self._own_folder / f"{measurement.name}.toml")
+        given, _ = QFileDialog.getSaveFileName(self, "Save the test", wish, "Tests (*.toml)")
+        if given:
+            self.save_as(measurement, Path(given))
+
+    def save_as(self, measurement: Measurement, path: Path) -> None:
+        """Keep a test under a name; it is listed from now on if it lies in the folder of tests."""
+        try:
+            save_toml(measurement, path)
+        except ConfigurationError as error:
+            self.context.say(notice_of(error))
+        else:
+            self.context.note_file(path)
+            self.context.say(Notice(NoticeKind.INFO, f"The test was saved as {path}."))
+            self._list_tests()
+
+    def _open(self) -> None:
+        given, _ = QFileDialog.getOpenFileName(self, "Open a test", str(self._own_folder), "Tests (*.toml)")
+        if given:
+            self.open_file(Path(given))
+
+    def open_file(self, path: Path) -> None:
+        """Take over the test of a file."""
+        try:
+            self.form.show_value(load_test(path))
+            self.context.note_file(path)
+        except ConfigurationError as error:
+            self.context.say(notice_of(error))
+
+    def _connect(self) -> None:
+        self.choice.activated.connect(self._take)
+        self.form.changed.connect(self._changed)
+        self.context.selection.rig_changed.connect(self._changed)
+
+    def _lay_out(self) -> None:
+        self.choice.setAccessibleName("Known tests")
+        self.choice.setToolTip("Tests that come with vibench, and your own")
+        files = row(
+            push_button("Open…", "Open a test from a TOML file", self._open),
+            push_button("Save as…", "Save this test as a TOML file", self._save),
+        )
+        left = column(self.choice, files, self.form, 1)
+        grid = QWidget()
+        cells = QGridLayout(grid)
+        cells.addWidget(self.summary, 0, 0, 1, 2)
+        cells.addWidget(boxed("What will be played", (self.plots, 1)), 1, 0, 1, 2)
+        cells.addWidget(boxed("Against the limits", (self.limits, 1)), 2, 0)
+        cells.addWidget(
+            boxed(
+                "What the specimen is predicted to do",
+                (self.prediction, 1),
+                self.prediction_note,
+                self.expectation,
+            ),
+            2,
+            1,
+        )
+        # Below, words take their part of the height.
+        cells.setRowStretch(1, 2)
+        cells.setRowStretch(2, 3)
+        for table in (self.limits, self.prediction):
+            # Neither asks for more height than the preview: they share what is there.
+            table.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Ignored)
+        self._parts = SideAndPicture(self.context, TEST, left, grid, self.arm_button)
+        filled(QVBoxLayout(self), self._parts)
+
+
+def _kept_test(text: str) -> Measurement | None:
+    """Read what was kept; a test of an older version that is not allowed any more is left alone."""
+    if not text:
+        return None
+    try:
+        return validated(tomllib.loads(text), Measurement, "the last test")
+    except (ConfigurationError, tomllib.TOMLDecodeError):
+        return None

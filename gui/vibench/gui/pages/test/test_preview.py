@@ -1,0 +1,50 @@
+"""What is worked out about a test in another process: its outlook, and what the specimen will do."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import vibench.analysis
+from vibench.acquisition import AcquisitionError
+from vibench.acquisition.control.fast_loop import require_holdable
+from vibench.acquisition.plan import Measurement, MeasurementPreview, preview_measurement
+from vibench.acquisition.rig import Rig
+
+if TYPE_CHECKING:
+    from vibench.analysis import Expected, MeasurementPrediction
+
+
+@dataclass(frozen=True)
+class TestPreview:
+    """A test on a rig."""
+
+    measurement: Measurement
+    rig: Rig
+
+
+def preview_test(test: TestPreview) -> MeasurementPreview:
+    """Work out signal, loads, time and size."""
+    return preview_measurement(test.measurement, test.rig)
+
+
+@dataclass(frozen=True, eq=False)
+class TestPrediction:
+    """What a test will do, and how well it will tell what it is made for."""
+
+    motion: "MeasurementPrediction"
+    expected: tuple["Expected", ...]
+    refusal: str
+    """Why the rig's fast loop would not hold it; empty where nothing speaks against it."""
+
+
+def predict_test(test: TestPreview) -> TestPrediction:
+    """Simulate what the specimen will do."""
+    refusal = ""
+    try:
+        require_holdable(test.measurement, test.rig)
+    except AcquisitionError as error:
+        refusal = f"{error}"
+    return TestPrediction(
+        vibench.analysis.predict_measurement(test.measurement, test.rig),
+        vibench.analysis.expected_uncertainty(test.measurement, test.rig),
+        refusal,
+    )

@@ -1,0 +1,94 @@
+"""What can be done with a plot: by a key while it has the focus, and by its context menu; how it is saved."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
+from PySide6.QtSvg import QSvgGenerator
+from PySide6.QtWidgets import QMessageBox
+
+from ..widgets.elided_label import plain_tip
+from ..widgets.new_path import new_path
+
+if TYPE_CHECKING:
+    from .plot import Plot
+
+FILTERS = "PNG (*.png);;SVG (*.svg);;Numbers as CSV (*.csv)"
+
+
+def add_actions(plot: "Plot") -> None:
+    """Offer everything; the page keeps its own keys, which a plot hands on."""
+    clipboard = QGuiApplication.clipboard()
+    for text, key, act in (
+        ("Show everything", "A", plot.show_everything),
+        ("Linear or logarithmic", "L", plot.turn_scale),
+        ("Read values", "G", plot.reading.on_or_off),
+        ("Differences from here", "D", plot.reading.mark_or_unmark),
+        ("Copy the picture", "Ctrl+C", lambda: clipboard.setPixmap(plot.grab())),
+        ("Copy the numbers", "", lambda: clipboard.setText(numbers_of(plot, "\t"))),
+        ("Save picture or numbers…", "", lambda: save_plot(plot)),
+    ):
+        action = QAction(text, plot)
+        action.setShortcut(QKeySequence(key))
+        action.setShortcutContext(Qt.ShortcutContext.WidgetShortcut)
+        action.setShortcutVisibleInContextMenu(True)
+        action.triggered.connect(act)
+        plot.addAction(action)
+    plot.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
+
+
+def save_plot(plot: "Plot") -> None:
+    """Ask where to, and write picture or numbers there."""
+    wish = Path(f"{plot.accessibleName().lower().replace(' ', '_')}.png")
+    path = new_path(plot, "Save picture or numbers", wish, FILTERS)
+    if path is None:
+        return
+    try:
+        write_plot(plot, path)
+    except OSError as error:
+        why = plain_tip(f"{path} was not written: {error.strerror}. Choose another name.")
+        QMessageBox.warning(plot, "Not written", why)
+
+
+def write_plot(plot: "Plot", path: Path) -> None:
+    """Write picture or numbers, as the ending says; nothing is overwritten.
+
+    Raises OSError when something of that name is there, or the file cannot be written.
+    """
+    path.open("xb").close()
+    match path.suffix.lower():
+        case ".csv":
+            path.write_text(numbers_of(plot, ","), encoding="utf-8")
+        case ".svg":
+            _write_svg(plot, path)
+        case _:
+            if not plot.grab().save(str(path)):
+                path.unlink()
+                raise OSError(0, "give an ending: .png, .svg or .csv")
+
+
+def numbers_of(plot: "Plot", separator: str) -> str:
+    """Give what is drawn as rows of curve, place across and value, in the units of the axes."""
+    across, up = plot.across.axis, plot.up.axis
+    rows = [separator.join(("Curve", across.text, up.text))]
+    for number, (name, item) in enumerate(plot.named_curves):
+        if item.xData is not None and item.yData is not None:
+            called = (name or f"{plot.accessibleName()} {number + 1}").replace(separator, ";")
+            rows += [
+                f"{called}{separator}{x * across.shown.per_si:.9g}{separator}{y * up.shown.per_si:.9g}"
+                for x, y in zip(item.xData.tolist(), item.yData.tolist(), strict=True)
+            ]
+    return "\n".join(rows) + "\n"
+
+
+def _write_svg(plot: "Plot", path: Path) -> None:
+    generator = QSvgGenerator()
+    generator.setFileName(str(path))
+    generator.setSize(plot.size())
+    generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
+    # With the usual resolution axes and curves would be shifted against each other.
+    generator.setResolution(plot.logicalDpiX())
+    painter = QPainter(generator)
+    plot.render(painter)
+    painter.end()

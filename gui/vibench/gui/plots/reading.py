@@ -1,0 +1,177 @@
+"""Reading a plot: what stands under the pointer, and how far it is from a place that was marked."""
+
+from math import isfinite, log10
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QGuiApplication, QPalette
+from PySide6.QtWidgets import QLabel
+
+from vibench.acquisition import printable
+
+from ..widgets.theme import Theme
+from ..widgets.units import UNITS
+from .axis import PlotAxis, Scale
+
+if TYPE_CHECKING:
+    from .plot import Plot
+
+
+class Reading:
+    """Two crossed lines at the pointer, and a line of text with the place and the curve that is nearest.
+
+    A place that was marked stays; differences are told from there, and as a ratio in dB where the upright
+    axis is logarithmic.
+    """
+
+    def __init__(self, plot: "Plot") -> None:
+        self._plot = plot
+        self._lines: tuple[pg.InfiniteLine, ...] = ()
+        """At the pointer, then at the mark; made when they are first needed."""
+        self._label: QLabel | None = None
+        self._at = QPointF()
+        self._marked: tuple[float, float] | None = None
+        self.place: tuple[float, float] | None = None
+        """Where the lines cross, in values; None while nothing is read."""
+
+    @property
+    def text(self) -> str:
+        """What is told; empty while nothing is read."""
+        return self._label.text() if self._label is not None and self.place is not None else ""
+
+    def dress(self, theme: Theme) -> None:
+        """Draw in other colours."""
+        for line in self._lines[:2]:
+            line.setPen(pg.mkPen(theme.muted))
+        for line in self._lines[2:]:
+            line.setPen(pg.mkPen(theme.accent, style=Qt.PenStyle.DashLine))
+
+    def follow(self, place: QPointF) -> None:
+        """Read under the pointer, given in the scene; not beside the axes, nor while something is dragged."""
+        box = self._plot.getViewBox()
+        is_pressed = QGuiApplication.mouseButtons() != Qt.MouseButton.NoButton
+        if box.sceneBoundingRect().contains(place) and not is_pressed:
+            self.show_at(box.mapSceneToView(place))
+        else:
+            self.hide()
+
+    def show_at(self, point: QPointF) -> None:
+        """Read at a point of the picture, in the coordinates that are drawn."""
+        self._at = point
+        drawn, scales = (point.x(), point.y()), self._plot.scales
+        for line, at in zip(self._made()[:2], drawn, strict=True):
+            line.setValue(at)
+            line.show()
+        across, up = (_value(at, scale) for at, scale in zip(drawn, scales, strict=True))
+        self.place = across, up
+        axes = self._plot.across.axis, self._plot.up.axis
+        said = [_shown(value, axis) for value, axis in zip(self.place, axes, strict=True)]
+        nearest = self._nearest(point)
+        if nearest is not None:
+            name, height = nearest
+            said.append(f"{UNITS.told(name) or 'curve'}: {_shown(height, axes[1])}")
+            bounds = next((each.at(across) for each in self._plot.bands if name and each.of == name), None)
+            if bounds is not None:
+                said.append(f"bounds {_shown(bounds[0], axes[1])} to {_shown(bounds[1], axes[1])}")
+        if more := self._plot.read_more(*drawn):
+            said.append(more)
+        if self._marked is not None:
+            changes = [now - then for now, then in zip(self.place, self._marked, strict=True)]
+            said.append("Δ " + ", ".join(map(_shown, changes, axes)))
+            if scales[1] is Scale.LOGARITHMIC and self._marked[1] > 0.0:
+                said.append(f"{20 * log10(up / self._marked[1]):+.2f} dB")
+        self._tell("   ".join(said))
+
+    def again(self) -> None:
+        """Read anew: the curves are others."""
+        if self.place is not None:
+            self.show_at(self._at)
+
+    def on_or_off(self) -> None:
+        """Read in the middle of the picture, where no pointer is; or no more."""
+        if self.place is not None:
+            self.hide()
+        else:
+            self.show_at(self._plot.getViewBox().viewRect().center())
+
+    def mark_or_unmark(self) -> None:
+        """Tell differences from this place on; asked again at the same place, no more."""
+        if self.place is None:
+            self.on_or_off()
+        self._marked = None if self._marked == self.place else self.place
+        self._place_marks()
+
+    def rescale(self) -> None:
+        """Let the mark stay at its values when a scale turns."""
+        self.hide()
+        self._place_marks()
+
+    def hide(self) -> None:
+        """Read no more; what was marked stays."""
+        if self._label is not None:
+            self.place = None
+            self._label.hide()
+            for line in self._lines[:2]:
+                line.hide()
+
+    def forget(self) -> None:
+        """Let go of lines that the plot has thrown away."""
+        self.hide()
+        self._lines, self._marked = (), None
+
+    def _place_marks(self) -> None:
+        for line, value, scale in zip(
+            self._lines[2:], self._marked or (1.0, 1.0), self._plot.scales, strict=False
+        ):
+            is_drawn = self._marked is not None and (value > 0.0 or scale is Scale.LINEAR)
+            line.setVisible(is_drawn)
+            if is_drawn:
+                line.setValue(log10(value) if scale is Scale.LOGARITHMIC else value)
+
+    def _made(self) -> tuple[pg.InfiniteLine, ...]:
+        if not self._lines:
+            self._lines = tuple(pg.InfiniteLine(angle=angle, movable=False) for angle in (90, 0, 90, 0))
+            for line in self._lines:
+                line.hide()
+                self._plot.addItem(line, ignoreBounds=True)
+            self.dress(self._plot.theme)
+        return self._lines
+
+    def _tell(self, text: str) -> None:
+        if self._label is None:
+            self._label = QLabel(self._plot)
+            self._label.setTextFormat(Qt.TextFormat.PlainText)
+            self._label.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+            self._label.setBackgroundRole(QPalette.ColorRole.Base)
+            self._label.setAutoFillBackground(True)
+            self._label.setContentsMargins(4, 1, 4, 1)
+        self._label.setText(printable(text))
+        self._label.adjustSize()
+        size, room = self._label.size(), self._plot.size()
+        self._label.move(max(0, room.width() - size.width() - 2), room.height() - size.height() - 2)
+        self._label.show()
+
+    def _nearest(self, point: QPointF) -> tuple[str, float] | None:
+        """Find the curve that is nearest, upright, at this place across."""
+        found: list[tuple[float, str, float]] = []
+        for name, item in self._plot.named_curves:
+            drawn_x, drawn_y = item.getData()
+            if drawn_x is None or len(drawn_x) == 0 or not drawn_x[0] <= point.x() <= drawn_x[-1]:
+                continue
+            place = min(int(np.searchsorted(drawn_x, point.x())), len(drawn_x) - 1)
+            if place and point.x() - drawn_x[place - 1] < drawn_x[place] - point.x():
+                place -= 1
+            if isfinite(drawn_y[place]) and item.yData is not None:
+                found.append((abs(drawn_y[place] - point.y()), name, float(item.yData[place])))
+        return None if not found else min(found)[1:]
+
+
+def _value(drawn: float, scale: Scale) -> float:
+    return float(10.0 ** min(max(drawn, -300.0), 300.0)) if scale is Scale.LOGARITHMIC else drawn
+
+
+def _shown(value: float, axis: PlotAxis) -> str:
+    shown = axis.shown
+    return f"{value * shown.per_si:.5g} {shown.name or axis.short}".strip()

@@ -1,0 +1,110 @@
+"""A table that is read and copied, never edited."""
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableWidgetItem
+
+from .elided_label import plain_lines, plain_tip
+from .hint import paint_hint
+from .table_copy import offer_copies
+from .units import UNITS
+
+_WIDEST_LETTERS = 36
+"""Of a column that takes the room it needs; longer text is wrapped."""
+_ROW_ROOM = 8
+"""Pixels more for a row of several lines, or they would touch the next one's."""
+
+
+class ReadTable(QTableWidget):
+    """Rows of text. One column takes what is left and wraps its text, so that no row runs out of sight.
+
+    Parameters
+    ----------
+    name
+        For screen readers.
+    columns
+        Headings.
+    hint
+        What stands there while there is no row.
+    wide
+        The column that takes what is left; the last one if absent.
+
+    """
+
+    def __init__(
+        self,
+        name: str,
+        columns: Sequence[str],
+        hint: str = "",
+        wide: int = -1,
+    ) -> None:
+        super().__init__(0, len(columns))
+        self.setAccessibleName(name)
+        self.setHorizontalHeaderLabels(list(columns))
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setAlternatingRowColors(True)
+        offer_copies(self)
+        self.setShowGrid(False)
+        self.setWordWrap(True)
+        self.setTabKeyNavigation(False)
+        self.verticalHeader().hide()
+        header = self.horizontalHeader()
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(range(len(columns))[wide], QHeaderView.ResizeMode.Stretch)
+        header.setMaximumSectionSize(_WIDEST_LETTERS * self.fontMetrics().averageCharWidth())
+        self._hint = hint
+        self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
+        UNITS.on_change(self._write)
+        # A change of width comes with many steps: rows are measured once, after them.
+        self._later = QTimer(self, interval=0, singleShot=True)
+        self._later.timeout.connect(self._fit_rows)
+
+    def show_rows(self, rows: Sequence[Sequence[str]], tips: Sequence[str] = ()) -> None:
+        """Show rows, with a tip for each or none; nothing is touched while nothing changes."""
+        wanted = tuple(tuple(row) for row in rows), tuple(tips)
+        if wanted == self._shown:
+            return
+        self._shown = wanted
+        self.setRowCount(len(rows))
+        for number, row in enumerate(rows):
+            for column in range(len(row)):
+                self.setItem(number, column, QTableWidgetItem())
+        self._write()
+
+    def _write(self) -> None:
+        """Write every cell in the chosen units."""
+        rows, tips = self._shown
+        for number, row in enumerate(rows):
+            for column, text in enumerate(row):
+                item = self.item(number, column)
+                if isinstance(item, QTableWidgetItem):
+                    item.setText(UNITS.told(plain_lines(text)))
+                    item.setToolTip(plain_tip(UNITS.told(tips[number] if tips else text)))
+        self._later.start()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Wrap anew for another width."""
+        super().resizeEvent(event)
+        self._later.start()
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say the hint where there is no row."""
+        super().paintEvent(event)
+        if self._hint and self.rowCount() == 0:
+            paint_hint(
+                QPainter(self.viewport()),
+                self.viewport().rect(),
+                self._hint,
+                self.palette().placeholderText().color(),
+            )
+
+    def _fit_rows(self) -> None:
+        self.resizeRowsToContents()
+        one_line = self.verticalHeader().defaultSectionSize()
+        for row in range(self.rowCount()):
+            if self.rowHeight(row) > one_line:
+                self.setRowHeight(row, self.rowHeight(row) + _ROW_ROOM)

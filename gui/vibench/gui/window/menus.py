@@ -1,0 +1,199 @@
+"""The menus, and the keys as F1 lists them; Esc and Pause abort from dialogs and open menus too."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Protocol
+
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtWidgets import QApplication, QFileDialog, QMainWindow, QMenu, QMessageBox
+
+from vibench.acquisition import printable
+
+from ..page.app_context import AppContext
+from ..page.user_actions import UserActions
+from ..widgets.theme import DARK, LIGHT, Theme
+from .manual import show_about, show_manual
+from .settings_dialog import SettingsDialog
+
+ABORT_KEYS = frozenset({Qt.Key.Key_Escape, Qt.Key.Key_Pause})
+
+
+class AbortKey(QObject):
+    """Receives every key press of the application before any widget does.
+
+    A shortcut does not act while a modal dialog is open; a filter on the application does. The key goes
+    on to whoever has the focus, so that Esc still closes a dialog.
+    """
+
+    pressed = Signal()
+
+    def __init__(self, application: QApplication, parent: QObject) -> None:
+        super().__init__(parent)
+        self._last_seen: tuple[int, int] | None = None
+        application.installEventFilter(self)
+
+    def eventFilter(self, _watched: QObject, event: QEvent) -> bool:
+        """Watch for the keys, and let everything pass."""
+        kind = event.type()
+        if kind is QEvent.Type.KeyRelease:
+            self._last_seen = None
+        elif kind in (QEvent.Type.KeyPress, QEvent.Type.ShortcutOverride):
+            assert isinstance(event, QKeyEvent)
+            if event.key() in ABORT_KEYS and not event.isAutoRepeat() and self._is_new(event):
+                self.pressed.emit()
+        return False
+
+    def _is_new(self, event: QKeyEvent) -> bool:
+        """One press comes by several times: as an override, at the window, and at its widget."""
+        seen = (event.timestamp(), event.key())
+        is_new = seen != self._last_seen
+        self._last_seen = seen
+        return is_new
+
+
+@dataclass(frozen=True)
+class MenuAction:
+    """A row of the table of actions: where it stands, its key, and what F1 says of it."""
+
+    menu: str
+    text: str
+    act: Callable[[], object]
+    key: str = ""
+    about: str = ""
+
+
+class MenuTarget(Protocol):
+    """What the window does for its menus."""
+
+    def close(self) -> bool:
+        """End."""
+
+    def reset_layout(self) -> None:
+        """Come up as new."""
+
+    def undo(self) -> None:
+        """Take back the last edit of the plan in sight."""
+
+    def redo(self) -> None:
+        """Make it again."""
+
+    def open_path(self, path: Path) -> None:
+        """Open whatever lies there."""
+
+
+OTHER_KEYS: tuple[tuple[str, str], ...] = (
+    ("Esc, Pause", "abort: ramp down as fast as the shaker bears, from anywhere"),
+    ("Space", "freeze the picture (Run page); the recording goes on"),
+    ("PgDn, PgUp", "scroll the description of the test (Run page)"),
+    ("M", "mark an event in the recording (Run page)"),
+    ("A, L", "in a plot: show everything, logarithmic axis"),
+    ("G, D", "in a plot: read values, tell differences from there"),
+    ("Ctrl+C", "copy the picture of a plot, or the chosen cells of a table"),
+    ("Menu key", "what can be done with the plot or table that has the focus"),
+    ("F4, Alt+Down", "open the list of a choice"),
+)
+"""Keys that no menu holds. No bare letter ever starts an output."""
+EMERGENCY = "STOP is not an emergency stop: in an emergency, switch the amplifier off."
+
+
+def key_text(actions: tuple[MenuAction, ...]) -> str:
+    """Lay the keys out as rows of a table, for rich text."""
+    keys = (
+        *OTHER_KEYS,
+        *((each.key, each.about or each.text.replace("&", "")) for each in actions if each.key),
+    )
+    rows = "".join(f"<tr><td><b>{key}</b>&nbsp;&nbsp;</td><td>{what}</td></tr>" for key, what in keys)
+    return f"<table>{rows}</table>"
+
+
+def menu_actions(
+    window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
+) -> tuple[MenuAction, ...]:
+    """Give every action, menu by menu."""
+    return (
+        MenuAction("&File", "&Open…", lambda: _open(window, target, context), "Ctrl+O", "open any file"),
+        MenuAction("&File", "Recordings &folder…", lambda: choose_folder(window, context)),
+        MenuAction(
+            "&File", "&Settings…", lambda: SettingsDialog(context, window).open(), "Ctrl+,", "settings"
+        ),
+        MenuAction("&File", "&Quit", target.close, "Ctrl+Q"),
+        MenuAction("Edit", "&Undo", target.undo, "Ctrl+Z", "take back an edit of the test or campaign"),
+        MenuAction("Edit", "&Redo", target.redo, "Ctrl+Shift+Z", "make it again"),
+        MenuAction("&Test", "&Check the bench", actions.check, "F6"),
+        MenuAction("&Test", "Check as a new &reference", partial(actions.check, new_reference=True)),
+        MenuAction("&Test", "&Arm the test", actions.arm_test, "Ctrl+Return", "arm"),
+        MenuAction("&Test", "S&tart", actions.start, "F5", "start what is armed"),
+        MenuAction("&Test", "&Hold or go on", actions.hold_or_resume),
+        MenuAction("&Test", "&Stop (ramp down)", actions.stop),
+        MenuAction("&Test", "A&bort (Esc)", actions.abort),
+        *(
+            MenuAction(
+                "&View", f"&{number}  {name}", partial(context.page_wanted.emit, name), f"Ctrl+{number}"
+            )
+            for number, name in enumerate(pages, start=1)
+        ),
+        MenuAction("&View", "&Light or dark", lambda: context.choose_theme(_other(context)), "Ctrl+T"),
+        MenuAction("&View", "&Reset layout", target.reset_layout),
+        MenuAction("Hel&p", "&Manual", lambda: show_manual(window), "Shift+F1", "the manual, offline"),
+        MenuAction("Hel&p", "&About…", lambda: show_about(window, context), "", ""),
+    )
+
+
+def build_menus(
+    window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
+) -> None:
+    """Put the menus on a window."""
+    bar = window.menuBar()
+    bar.setAccessibleName("Menus")
+    table = menu_actions(window, target, context, actions, pages)
+    keys = MenuAction("Hel&p", "&Keys", lambda: show_keys(window, (*table, keys)), "F1", "this list")
+    menus = {name: bar.addMenu(name) for name in dict.fromkeys(each.menu for each in table)}
+    for row in (*table, keys):
+        action = menus[row.menu].addAction(row.text)
+        action.setShortcut(QKeySequence(row.key))
+        action.triggered.connect(lambda _checked=False, row=row: row.act())
+    recent = QMenu("Open &recent", menus["&File"])
+    menus["&File"].insertMenu(menus["&File"].actions()[1], recent)
+    recent.aboutToShow.connect(lambda: _list_recent(recent, target, context))
+
+
+def _list_recent(menu: QMenu, target: MenuTarget, context: AppContext) -> None:
+    menu.clear()
+    for path in context.recent_files:
+        name = printable(str(path)).replace("&", "&&")
+        menu.addAction(name).triggered.connect(lambda _checked=False, path=path: target.open_path(path))
+    if not context.recent_files:
+        menu.addAction("nothing yet").setEnabled(False)
+
+
+def _open(window: QMainWindow, target: MenuTarget, context: AppContext) -> None:
+    given, _ = QFileDialog.getOpenFileName(
+        window,
+        "Open",
+        str(context.folder),
+        "Recordings, tests, campaigns, configurations (*.h5 *.part *.toml)",
+    )
+    if given:
+        target.open_path(Path(given))
+
+
+def choose_folder(window: QMainWindow, context: AppContext) -> None:
+    """Ask where recordings go from now on."""
+    chosen = QFileDialog.getExistingDirectory(window, "Folder for recordings", str(context.folder))
+    if chosen:
+        context.choose_folder(Path(chosen))
+
+
+def show_keys(window: QMainWindow, actions: tuple[MenuAction, ...]) -> None:
+    """List the keys beside the window, which goes on meanwhile."""
+    text = f"{key_text(actions)}<p>{EMERGENCY}</p>"
+    box = QMessageBox(QMessageBox.Icon.NoIcon, "Keys", text, parent=window)
+    box.setModal(False)
+    box.show()
+
+
+def _other(context: AppContext) -> Theme:
+    return DARK if context.theme is LIGHT else LIGHT

@@ -1,0 +1,310 @@
+"""The frame: banner and STOP, messages, navigation, the status line."""
+
+from collections import deque
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from time import monotonic
+
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
+from PySide6.QtWidgets import (
+    QApplication,
+    QMainWindow,
+    QMessageBox,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
+
+from ..engine_link.engine_line import Urgency
+from ..page.app_context import AppContext
+from ..page.file_kind import file_kind
+from ..page.page import Page
+from ..page.settings import Remembered
+from ..page.user_actions import UserActions
+from ..widgets.boxes import filled, row
+from ..widgets.notice import Notice, NoticeKind, notice_of
+from ..widgets.page_names import RUN
+from ..widgets.theme import Theme, palette, style_sheet
+from .banner import Banner
+from .event_loop_monitor import EventLoopMonitor
+from .menus import AbortKey, build_menus
+from .message_strip import MessageStrip
+from .navigation_bar import NavigationBar
+from .page_catalogue import PageEntry
+from .state_indicator import NEXT_STEPS, indicator_of, status_fields
+from .status_line import StatusField, StatusLine
+
+SPAN_S = 1.0
+MOST_DROPPED = 20
+"""Files that are opened at once."""
+
+
+class FrameCount:
+    """Counts frames as they are drawn."""
+
+    def __init__(self) -> None:
+        self._drawn_s: deque[float] = deque()
+
+    def counted(self) -> float:
+        """Count one more, and give the frames of the last second [1/s]."""
+        now_s = monotonic()
+        self._drawn_s.append(now_s)
+        while now_s - self._drawn_s[0] > SPAN_S:
+            self._drawn_s.popleft()
+        return len(self._drawn_s) / SPAN_S
+
+
+TICK_MS = 50
+"""Twenty pictures a second: more cost a core, fewer look jerky."""
+
+
+class Window(QMainWindow):
+    """Holds the pages; what they show, and what the banner shows, comes from the engine at every tick."""
+
+    def __init__(self, context: AppContext, entries: tuple[PageEntry, ...]) -> None:
+        super().__init__()
+        self.context = context
+        self.setWindowTitle("vibench")
+        self.banner = Banner()
+        self.strip = MessageStrip()
+        self.status_line = StatusLine()
+        ordered = sorted(entries, key=lambda entry: entry.number)
+        self.pages: dict[str, Page] = {entry.name: entry.make(context) for entry in ordered}
+        self.navigation = NavigationBar(tuple(self.pages))
+        self.navigation.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self._stack = QStackedWidget()
+        self._unthemed: list[Callable[[], None]] = []
+        for name, page in self.pages.items():
+            page.setAccessibleName(f"{name} page")
+            self._stack.addWidget(page)
+        self._lay_out()
+        self.user_actions = UserActions(context, self)
+        self.setAcceptDrops(True)
+        build_menus(self, self, context, self.user_actions, tuple(self.pages))
+        self._connect()
+        self._restore()
+        self._timer = QTimer(self, interval=TICK_MS)
+        self._timer.timeout.connect(self.tick)
+        self._timer.start()
+        self._frames = FrameCount()
+        self.event_loop_monitor = EventLoopMonitor(lambda: f"{self.navigation.chosen_name} page", self)
+
+    @property
+    def page(self) -> Page:
+        """The page in sight."""
+        page = self._stack.currentWidget()
+        assert isinstance(page, Page)
+        return page
+
+    def show_page(self, name: str) -> None:
+        """Bring a page into sight."""
+        page = self.pages.get(name)
+        if page is None or page is self._stack.currentWidget():
+            return
+        self.page.left()
+        self._stack.setCurrentWidget(page)
+        self.navigation.choose(name)
+        self.context.settings.keep_text(Remembered.PAGE, name)
+        page.entered()
+        page.refresh()
+
+    def tick(self) -> None:
+        """Show what is true now, and let the engine know that somebody looks."""
+        self.context.bridge.tick()
+        status = self.context.bridge.status
+        self.banner.show_indicator(indicator_of(status, self.context.bridge.is_ordering))
+        self.strip.hint(NEXT_STEPS[self.context.bridge.state])
+        self.status_line.show_fields(
+            *status_fields(status, self._frames.counted(), self.event_loop_monitor.longest_s)
+        )
+        self.status_line.explain(StatusField.FRAMES, self.event_loop_monitor.text)
+        self.page.refresh()
+        self.navigation.show_done({name: page.is_done for name, page in self.pages.items()})
+
+    def closeEvent(self, event: QCloseEvent) -> None:
+        """Ask first while something runs; then let the engine end, and keep the shape of the window."""
+        how = self._how_to_close()
+        if how is None:
+            event.ignore()
+            return
+        self._timer.stop()
+        self.event_loop_monitor.stop()
+        self.context.bridge.close(how)
+        self.page.left()
+        self.context.settings.keep_state(Remembered.GEOMETRY, self.saveGeometry())
+        self.context.background.close()
+        super().closeEvent(event)
+
+    def look_for_left_campaign(self) -> None:
+        """Take over an engine that another window has left alone with a campaign, if there is one."""
+        self.context.background.ask(
+            left_alone, self._take_over, lambda error: self.context.say(notice_of(error))
+        )
+
+    def _take_over(self, left: Announcement | None) -> None:
+        if left is not None:
+            self.context.bridge.adopt(left)
+
+    def _show_adopted(self, request: CampaignRequest) -> None:
+        """Show a campaign that goes on, as if it had been armed here."""
+        self.context.selection.choose_rig(self.context.bridge.rig)
+        self.context.selection.choose_campaign(request.campaign)
+        self.context.say(
+            Notice(
+                NoticeKind.INFO,
+                f"The campaign {request.campaign.name} had been left alone and goes on.",
+                "It is shown here.",
+                "STOP ramps down as planned; Esc aborts.",
+            )
+        )
+        self.show_page(RUN)
+
+    def _how_to_close(self) -> Urgency | None:
+        """Ask what becomes of what runs; the drive goes on meanwhile, and Esc aborts it. None: stay."""
+        if not self.context.bridge.is_driving:
+            return Urgency.END
+        box = QMessageBox(QMessageBox.Icon.Question, "A measurement is running", "", parent=self)
+        box.setText("Ramp down, keep the recording, and close the window?")
+        stop = box.addButton("Ramp down and close", QMessageBox.ButtonRole.AcceptRole)
+        leave = None
+        if self.context.bridge.may_leave:
+            leave = box.addButton("Let it go on and close", QMessageBox.ButtonRole.DestructiveRole)
+            box.setInformativeText(
+                "It was armed to be left alone: the next window shows it, as 'vibench watch' does; "
+                "'vibench stop' ends it."
+            )
+        box.setDefaultButton(box.addButton(QMessageBox.StandardButton.Cancel))
+        box.exec()
+        if box.clickedButton() is stop:
+            return Urgency.END
+        return Urgency.LEAVE if leave is not None and box.clickedButton() is leave else None
+
+    def _lay_out(self) -> None:
+        body = row(self.navigation, (self._stack, 1))
+        body.setSpacing(0)
+        middle = QWidget()
+        layout = filled(QVBoxLayout(middle), self.banner, self.strip, (body, 1), self.status_line, margin=0)
+        layout.setSpacing(0)
+        self.setCentralWidget(middle)
+
+    def _connect(self) -> None:
+        self.navigation.chosen.connect(self.show_page)
+        self.context.page_wanted.connect(self.show_page)
+        self.context.noticed.connect(self.strip.say)
+        self.context.theme_changed.connect(self._retheme)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        self.abort_key = AbortKey(application, self)
+        self.abort_key.pressed.connect(self.user_actions.abort)
+        self.banner.stop_wanted.connect(self.user_actions.stop)
+        self.context.bridge.armed.connect(lambda _plan: self.show_page(RUN))
+        self.context.bridge.adopted.connect(self._show_adopted)
+        self.context.bridge.advanced.connect(self.strip.give_way)
+
+    def _restore(self) -> None:
+        self.resize(1280, 800)
+        geometry = self.context.settings.state(Remembered.GEOMETRY)
+        if not geometry.isEmpty():
+            self.restoreGeometry(geometry)
+        first = next(iter(self.pages))
+        wanted = self.context.settings.text(Remembered.PAGE, first)
+        name = wanted if wanted in self.pages else first
+        self._stack.setCurrentWidget(self.pages[name])
+        self.navigation.choose(name)
+        self._prepare_theme(self.context.theme)
+        while self._unthemed:
+            self._unthemed.pop(0)()
+
+    def _retheme(self, theme: Theme) -> None:
+        """Put on other colours: the frame at once, then page by page, so that nobody has to wait."""
+        self._prepare_theme(theme)
+        QTimer.singleShot(0, self, self._theme_next)
+
+    def _prepare_theme(self, theme: Theme) -> None:
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)
+        application.setPalette(palette(theme))
+        sheet = style_sheet(theme)
+        # A style sheet for the whole application would hold the window up for a third of a second.
+        for part in (self.banner, self.strip, self.navigation, self.status_line):
+            part.setStyleSheet(sheet)
+        in_sight = self._stack.currentWidget()
+        assert in_sight is not None
+        # Painted once, when it is done, and not after each step.
+        in_sight.setUpdatesEnabled(False)
+        pages = sorted(self.pages.values(), key=lambda each: each is not in_sight)
+        self._unthemed = [
+            step
+            for page in pages
+            for step in (
+                partial(page.retheme, theme),
+                *(partial(part.setStyleSheet, sheet) for part in page.styled),
+                partial(page.setUpdatesEnabled, True),
+            )
+        ]
+
+    @property
+    def is_themed(self) -> bool:
+        """Whether every page has its colours."""
+        return not self._unthemed
+
+    def _theme_next(self) -> None:
+        if self._unthemed:
+            self._unthemed.pop(0)()
+            self.context.bridge.beat()
+            QTimer.singleShot(0, self, self._theme_next)
+
+    def showEvent(self, event: QShowEvent) -> None:
+        """Begin with the focus where the next step is, and not on STOP."""
+        super().showEvent(event)
+        self.navigation.setFocus()
+        self.page.entered()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the font: parts with a style sheet take another one only with the sheet."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange and self.isVisible():
+            self._retheme(self.context.theme)
+
+    def undo(self) -> None:
+        """Take back the last edit of the plan in sight."""
+        self.page.undo()
+
+    def redo(self) -> None:
+        """Make it again."""
+        self.page.redo()
+
+    def open_path(self, path: Path) -> None:
+        """Open whatever lies there, on the page that takes it."""
+        try:
+            kind = file_kind(path)
+        except ConfigurationError as error:
+            self.context.say(notice_of(error))
+            return
+        name, act = next((name, page.opens[kind]) for name, page in self.pages.items() if kind in page.opens)
+        self.show_page(name)
+        self.context.note_file(path)
+        act(path)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:
+        """Take files."""
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:
+        """Open what was dropped."""
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        for path in paths[:MOST_DROPPED]:
+            self.open_path(path)
+        event.acceptProposedAction()
+
+    def reset_layout(self) -> None:
+        """Come up as new."""
+        self.context.settings.forget_layout()
+        self.showNormal()
+        self.resize(1280, 800)

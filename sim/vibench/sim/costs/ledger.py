@@ -1,0 +1,165 @@
+"""What runs took over what was planned, for every kind of run: its mean, and how far it scatters."""
+
+import atexit
+import contextlib
+import hashlib
+import json
+import math
+import os
+import platform
+import threading
+import time
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Self
+
+from ..engine.sources import physics_digest
+from ..operating_system.state_folder import state_folder, state_place
+
+MEMORY = 30
+"""So many runs later a run counts for a third of a new one."""
+FEWEST = 3
+"""Runs of a kind without which nothing is said of its scatter."""
+UNKNOWN_FACTOR = 10.0
+"""How far a plan may be off on a machine of which nothing is known."""
+LEAST_FACTOR = 1.5
+SURE, FEW = 2.0, 1.6
+"""Standard deviations within which 19 of 20 runs are, and what is added where they are known from few
+runs: Student's t is about SURE (1 + FEW / (runs - 1))."""
+SAVED_EVERY_S = 5.0
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """What runs of one kind have taken, in logarithms of what was planned."""
+
+    runs: int = 0
+    mean: float = 0.0
+    variance: float = 0.0
+
+    def after(self, ratio: float) -> Self:
+        """Learn from one more run; the mean and variance fade (West, Comm. ACM 22 (1979) 532)."""
+        runs = min(self.runs + 1, MEMORY)
+        off, share = math.log(ratio) - self.mean, 1.0 / runs
+        spread = (1.0 - share) * (self.variance + share * off * off)
+        return type(self)(runs, self.mean + share * off, spread)
+
+
+@dataclass(frozen=True)
+class Expected:
+    """How long work will take."""
+
+    time_s: float
+    """On one core of this machine."""
+    factor: float
+    """19 of 20 runs of this kind took between this part and this multiple of it."""
+    runs: int
+    """From which it is known; 0 where nothing was measured yet."""
+
+    def __str__(self) -> str:
+        """Say it to a reader."""
+        learnt = (
+            f"as {self.runs} such runs took on this machine"
+            if self.runs >= FEWEST
+            else "on a machine on which too few such runs were made to know better"
+        )
+        return (
+            f"Estimated time on one core: {self.time_s:.1g} s within a factor of {self.factor:.2g}, {learnt}."
+        )
+
+
+class CostLedger:
+    """What runs have cost, by kind; one for all threads of a process."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lock = threading.Lock()
+        self._kinds = _read(path)
+        self._saved_s = time.monotonic()
+        self._is_new = False
+
+    def expected(self, kind: str, planned_s: float) -> Expected:
+        """Say how long planned work of a kind will take here; a new kind as what its name begins with."""
+        with self._lock:
+            known = next((self._kinds[name] for name in _names(kind) if self._is_known(name)), _Kind())
+        factor = UNKNOWN_FACTOR
+        if known.runs >= FEWEST:
+            # The mean itself is as uncertain as the scatter over the root of the runs.
+            spread = math.sqrt(known.variance * (1.0 + 1.0 / known.runs) * known.runs / (known.runs - 1.0))
+            factor = max(LEAST_FACTOR, math.exp(SURE * (1.0 + FEW / (known.runs - 1.0)) * spread))
+        return Expected(planned_s * math.exp(known.mean), factor, known.runs)
+
+    def runs_of(self, kind: str) -> int:
+        """How many runs of just this kind were learnt from."""
+        with self._lock:
+            return self._kinds.get(kind, _Kind()).runs
+
+    def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
+        """Note what a run took whose kernels were compiled and loaded before."""
+        if not (planned_s > 0.0 and taken_s > 0.0):
+            return
+        with self._lock:
+            for name in _names(kind):
+                self._kinds[name] = self._kinds.get(name, _Kind()).after(taken_s / planned_s)
+            self._is_new = True
+        if time.monotonic() - self._saved_s > SAVED_EVERY_S:
+            self.save()
+
+    def _is_known(self, name: str) -> bool:
+        return name in self._kinds and self._kinds[name].runs >= FEWEST
+
+    def save(self) -> None:
+        """Keep what is new; where the folder cannot be written to, the next process begins anew."""
+        with self._lock:
+            self._saved_s = time.monotonic()
+            if not self._is_new:
+                return
+            self._is_new = False
+            text = json.dumps({kind: asdict(known) for kind, known in sorted(self._kinds.items())}, indent=1)
+        beside = self._path.with_suffix(f".{os.getpid()}")
+        with contextlib.suppress(OSError):
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            beside.write_text(text, encoding="utf-8")
+            beside.replace(self._path)
+
+
+def _names(kind: str) -> list[str]:
+    """Give a kind, ``a/b/c``, and all that it begins with."""
+    parts = kind.split("/")
+    return ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
+
+
+def _read(path: Path) -> dict[str, _Kind]:
+    """Read what was kept; nothing where there is no such file, or its content is not what is kept."""
+    try:
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        known = {
+            kind: _Kind(int(each["runs"]), each["mean"], each["variance"]) for kind, each in kept.items()
+        }
+        is_sound = all(
+            each.runs > 0 and math.isfinite(each.mean) and 0.0 <= each.variance < math.inf
+            for each in known.values()
+        )
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return {}
+    return known if is_sound else {}
+
+
+@cache
+def cost_ledger() -> CostLedger:
+    """Give the ledger of this machine, these versions and sources; it is saved when the process ends."""
+    about = (
+        platform.node(),
+        platform.machine(),
+        platform.python_version(),
+        version("numba"),
+        physics_digest(),
+    )
+    name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]
+    with contextlib.suppress(OSError):  # nothing is learnt then
+        state_folder()
+    ledger = CostLedger(state_place() / "costs" / f"{name}.json")
+    atexit.register(ledger.save)
+    return ledger

@@ -1,0 +1,260 @@
+"""A library of the native engine: found, loaded, and called by `ctypes`, which releases Python's lock."""
+
+import ctypes
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .processor import usable_families
+from .structures import Structure, StructureType, parse_structures
+
+FOLDER = Path(__file__).parent / "libraries"
+"""Where the build puts libraries: ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
+CHECKOUT = Path(__file__).resolve().parents[4]
+BUILD = CHECKOUT / "native" / "build.py"
+"""Builds them; there in a checkout, not in an installed wheel."""
+_ENDING = {"win32": "dll", "darwin": "dylib"}.get(sys.platform, "so")
+"""Of libraries of this system; wheels of others may have been built in the same checkout."""
+REBUILD = "python native/build.py"
+FUNCTIONS = (
+    *("interpolate", "decimate", "filter_signal", "show"),
+    *("move_shaker", "play_loop", "hear_loop", "close_loop"),
+    *("filter_motion", "smooth_motion", "follow_contacts", "start_chain", "follow_chain"),
+    *("describe_collisions", "follow_batch"),
+)
+"""Of the library, each with one structure."""
+Tables = NDArray[np.float64]
+"""What a run of one scene needs ready, as the engine lays it out."""
+_Pointer = ctypes.c_void_p
+
+
+class EngineError(RuntimeError):
+    """The native engine cannot be used here; the text says what to do."""
+
+
+class _Lending(np.ndarray[tuple[int, ...], np.dtype[np.void]]):
+    """A structure that keeps what it points to."""
+
+    lent: dict[str, object]
+
+
+class Engine:
+    """A library of the native engine, loaded."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._library = ctypes.CDLL(str(path))
+        self._declare("vibench_structure", ctypes.c_char_p, ctypes.c_int64)
+        self._declare("vibench_size_of", ctypes.c_int64, ctypes.c_int64)
+        self._declare("vibench_size_of_tables", ctypes.c_int64, ctypes.c_int64)
+        self._declare("vibench_prepare", ctypes.c_int64, _Pointer, _Pointer)
+        self._declare("vibench_start", ctypes.c_int64, _Pointer, _Pointer, ctypes.c_double)
+        number, count = ctypes.c_double, ctypes.c_int64
+        self._declare("vibench_size_of_cubic_tables", count, count)
+        self._declare("vibench_prepare_cubics", count, _Pointer, _Pointer)
+        self._declare("vibench_run_cubics", count, _Pointer, _Pointer, _Pointer, number, _Pointer)
+        run = (_Pointer, _Pointer, number, number, _Pointer)
+        self._declare("vibench_run", count, *run)
+        self._declare("vibench_run_with_tangent", count, *run, _Pointer)
+        filled = (_Pointer, _Pointer, _Pointer)
+        self._declare("vibench_take_readings", count, _Pointer, _Pointer, number, *filled, count)
+        self._declare("vibench_reach", number, _Pointer, _Pointer)
+        self._declare("vibench_chain_memory", count, count, count)
+        for name in FUNCTIONS:
+            self._declare(f"vibench_{name}", count, _Pointer)
+        self._functions = {name: getattr(self._library, f"vibench_{name}") for name in FUNCTIONS}
+        self._types = self._read_structures()
+
+    def _declare(self, name: str, result: type, *arguments: type) -> None:
+        function = getattr(self._library, name)
+        function.restype, function.argtypes = result, arguments
+
+    def _read_structures(self) -> dict[str, StructureType]:
+        texts: list[str] = []
+        while (text := self._library.vibench_structure(len(texts))) is not None:
+            texts.append(text.decode())
+        types = parse_structures(texts)
+        for index, (name, of) in enumerate(types.items()):
+            size = self._library.vibench_size_of(index)
+            if size != of.itemsize:
+                msg = f"{self.path} uses {size} bytes for a {name}, Python {of.itemsize}: run {REBUILD}."
+                raise EngineError(msg)
+        return types
+
+    @property
+    def family(self) -> str:
+        """Family of processors that the library was compiled for."""
+        return self.path.name.split("-")[1]
+
+    def new(self, name: str, **fields: object) -> Structure:
+        """Make a structure of the interface, zero where nothing is given; names as in native/structures.hpp.
+
+        An array that is a field is lent, not copied; it lives as long as the structure.
+        """
+        structure = np.zeros((), self._types[name]).view(_Lending)
+        structure.lent = {}
+        self.fill(structure, **fields)
+        return structure
+
+    def rows(self, name: str, count: int) -> Structure:
+        """Make a row of structures, zero everywhere."""
+        return np.zeros(count, self._types[name])
+
+    def fill(self, structure: Structure, **fields: object) -> None:
+        """Change fields of a structure that `new` made."""
+        assert isinstance(structure, _Lending)
+        structure.lent |= fields
+        for field, value in fields.items():
+            structure[field] = _lent(value) if isinstance(value, np.ndarray) else value
+
+    def call(self, function: str, structure: Structure) -> int:
+        """Call a function of native/api.cpp that takes one structure; returns what is described there.
+
+        Raises ValueError when the engine refuses the structure.
+        """
+        code = int(self._functions[function](structure.ctypes.data))
+        if code < 0:
+            msg = f"The native engine refuses to {function}: array sizes must agree and numbers be finite."
+            raise ValueError(msg)
+        return code
+
+    def chain_memory(self, cells: int, kinds: int) -> int:
+        """Return how many numbers of memory a chain lends; ``kinds`` counts cells that differ."""
+        return int(self._library.vibench_chain_memory(cells, kinds))
+
+    def prepare(self, scene: Structure) -> Tables:
+        """Make the tables of a scene; its shapes of collisions and steps must outlive them.
+
+        Raises ValueError when the engine refuses a number of the scene.
+        """
+        size = int(self._library.vibench_size_of_tables(int(scene["specimen"]["law"])))
+        tables = np.zeros(size // 8, np.float64)
+        if self._library.vibench_prepare(scene.ctypes.data, tables.ctypes.data) != 0:
+            msg = "This scene is not allowed: numbers must be finite, masses and springs positive."
+            raise ValueError(msg)
+        return tables
+
+    def prepare_cubics(self, scene: Structure) -> Tables:
+        """Make the tables of a scene whose base is cubics on intervals, as `prepare` does."""
+        size = int(self._library.vibench_size_of_cubic_tables(int(scene["specimen"]["law"])))
+        tables = np.zeros(size // 8, np.float64)
+        if self._library.vibench_prepare_cubics(scene.ctypes.data, tables.ctypes.data) != 0:
+            msg = "This scene is not allowed: numbers must be finite, masses and springs positive."
+            raise ValueError(msg)
+        return tables
+
+    def start(self, tables: Tables, state: Structure, tolerance: float) -> int:
+        """Decide whether the motion of ``state`` starts on a stop; returns 0, or -1 when refused."""
+        return int(self._library.vibench_start(tables.ctypes.data, state.ctypes.data, tolerance))
+
+    def run(
+        self,
+        tables: Tables,
+        state: Structure,
+        until_s: float,
+        tolerance: float,
+        record: Structure,
+        tangent: Structure | None = None,
+    ) -> int:
+        """Advance ``state``, carry ``tangent`` along, and fill ``record``.
+
+        Returns the number of an `Outcome`, or -1 when refused.
+        """
+        run = (tables.ctypes.data, state.ctypes.data, until_s, tolerance, record.ctypes.data)
+        if tangent is None:
+            return int(self._library.vibench_run(*run))
+        return int(self._library.vibench_run_with_tangent(*run, tangent.ctypes.data))
+
+    def run_cubics(
+        self, tables: Tables, state: Structure, drive: Structure, tolerance: float, record: Structure
+    ) -> int:
+        """Advance ``state`` over the intervals of ``drive`` and fill ``record``; returns as `run` does."""
+        run = (tables.ctypes.data, state.ctypes.data, drive.ctypes.data, tolerance, record.ctypes.data)
+        return int(self._library.vibench_run_cubics(*run))
+
+    def take_readings(
+        self,
+        tables: Tables,
+        state: Structure,
+        tolerance: float,
+        record: Structure,
+        tangent: Structure,
+        readings: Structure,
+        last: int,
+    ) -> int:
+        """Advance up to reading ``last``, and fill ``readings``; returns as `run` does."""
+        filled = (each.ctypes.data for each in (record, tangent, readings))
+        return int(
+            self._library.vibench_take_readings(
+                tables.ctypes.data, state.ctypes.data, tolerance, *filled, last
+            )
+        )
+
+    def reach(self, tables: Tables, state: Structure) -> float:
+        """Return the largest abs(p) while no stop is touched [m]; infinite on a stop."""
+        return float(self._library.vibench_reach(tables.ctypes.data, state.ctypes.data))
+
+
+def _lent(numbers: NDArray[Any]) -> Structure | tuple[int, int]:
+    """Return what the engine knows an array of numbers by; a structure as it is."""
+    if numbers.dtype.names:
+        return numbers
+    if numbers.dtype != np.float64 or not numbers.flags.c_contiguous:
+        msg = f"An array of {numbers.dtype} was given: the native engine takes contiguous float64 arrays."
+        raise TypeError(msg)
+    return numbers.__array_interface__["data"][0], numbers.size
+
+
+def library_path() -> Path:
+    """Find the library of the fastest family that runs here; in a checkout, build it where it is missing.
+
+    Raises EngineError when there is none, or when it was built from other sources and cannot be rebuilt.
+    """
+    families = usable_families()
+    current = sources_digest()
+    found = _newest_of(families, current)
+    if found is None and current is not None and importlib.util.find_spec("ziglang") is not None:
+        command = [sys.executable, str(BUILD), *families[:1]]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)  # noqa: S603 - a script of this checkout
+        found = _newest_of(families, current)
+    if found is not None:
+        return found
+    if current is None:
+        msg = f"{FOLDER} holds no native engine for {families or 'this processor'}: install vibench again."
+    else:
+        msg = f"The native engine is older than its sources: run pip install ziglang && {REBUILD}."
+    raise EngineError(msg)
+
+
+def native_digest() -> str:
+    """Return the digest of the native sources, in a checkout and in an installed wheel; empty if unknown."""
+    digest = sources_digest()
+    if digest is not None:
+        return digest
+    found = sorted(FOLDER.glob("engine-*"))
+    return found[0].stem.split("-")[2] if found else ""
+
+
+def sources_digest() -> str | None:
+    """Return the digest of the native sources; None where there are none, as in an installed wheel."""
+    if not BUILD.is_file():
+        return None
+    spec = importlib.util.spec_from_file_location("vibench_native_build", BUILD)
+    assert spec is not None
+    assert spec.loader is not None
+    build = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(build)
+    return str(build.sources_digest())
+
+
+def _newest_of(families: tuple[str, ...], digest: str | None) -> Path | None:
+    for family in families:
+        found = sorted(FOLDER.glob(f"engine-{family}-{digest or '*'}.{_ENDING}"))
+        if found:
+            return found[0]
+    return None

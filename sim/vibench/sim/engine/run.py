@@ -1,0 +1,321 @@
+"""A motion of a specimen under a harmonic drive, advanced by the native engine. SI units."""
+
+import math
+from copy import copy
+from enum import IntEnum
+from functools import lru_cache
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..model.accuracy import Accuracy
+from ..model.drive import Harmonic
+from ..model.outcome import Outcome
+from ..model.rigid_stops import RigidStops
+from ..model.specimen import Specimen, gong2025
+from ..model.state import Y, Z
+from .library import Engine, EngineError, library_path
+from .scene import scene_of
+
+Floats = NDArray[np.float64]
+MOST_STEPS = 2_000_000_000
+"""Steps of flight in a run: seconds of work, and two days of the paper's specimen. One whose fastest mode is
+a million times faster than its drive would be followed for weeks."""
+MOST_IMPACTS = 1 << 26
+"""In one run: the memory of their times is half a gigabyte (none until they happen)."""
+SPARE_IMPACTS = 100
+"""Allowed on top of the rate, for short runs."""
+DIRECTIONS = 6
+"""Of a state: the most small changes that can be carried along."""
+INSIDE = 1e-9
+"""A start this part of the displacements beyond a rigid stop is taken to be on it: their rounding."""
+KNOWN_DURATION_S = 0.03
+KNOWN_MOTION = (
+    -2.11343791e-05,
+    -6.81040288e-05,
+    -3.33122184e-05,
+    5.06300264e-03,
+    2.63303389e-02,
+    -1.20895040e-02,
+)
+"""Where the paper's specimen is then, with a loss of 0.5 s/m, under 20 um at 130 Hz from rest."""
+KNOWN_TO = 1e-6
+"""Of 100 um and 0.1 m/s."""
+
+
+class Watch(IntEnum):
+    """What is observed on the way."""
+
+    NOTHING = 0
+    PEAKS = 1
+    """Extremes of x and p."""
+    PEAKS_AND_LINES = 2
+    """Their components at the drive frequency as well."""
+
+
+class RunRecord:
+    """What a run fills on its way. None of it changes a step."""
+
+    def __init__(
+        self,
+        most_impacts: int,
+        *,
+        start_s: float = 0.0,
+        sample_rate_hz: float = 1.0,
+        samples: int = 0,
+        steps: int | None = None,
+        engine: Engine | None = None,
+    ) -> None:
+        """Make room for impacts, and for samples at ``start_s`` + k / ``sample_rate_hz``."""
+        # Only what has been filled is ever read: to clear it first takes as long as a short run.
+        self._samples = np.empty((samples, DIRECTIONS))
+        self._times = np.empty(most_impacts)
+        self.structure = record = (native_engine() if engine is None else engine).new("Record")
+        """As the engine takes it."""
+        record["start"], record["sample_rate"] = start_s, sample_rate_hz
+        record["samples"], record["sample_room"] = self._samples.ctypes.data, samples
+        record["impact_times"], record["impact_room"] = self._times.ctypes.data, most_impacts
+        record["steps_left"] = MOST_STEPS if steps is None else steps
+
+    def watch(self, what: Watch) -> None:
+        """Observe this from now on."""
+        self.structure["watch"] = what
+
+    @property
+    def impacts(self) -> int:
+        """Contacts that began, so far."""
+        return int(self.structure["impacts"])
+
+    @property
+    def impact_times_s(self) -> Floats:
+        """When they began."""
+        return self._times[: self.impacts]
+
+    @property
+    def samples(self) -> Floats:
+        """x, y, z, vx, vy, vz at the samples so far, shape (n, 6)."""
+        return self._samples[: int(self.structure["samples_kept"])]
+
+    def all_samples(self, last: ArrayLike) -> Floats:
+        """Return every sample there is room for: those that rounding puts beyond the end are ``last``."""
+        self._samples[int(self.structure["samples_kept"]) :] = last
+        return self._samples
+
+    @property
+    def steps_left(self) -> int:
+        """Steps that may still be made."""
+        return int(self.structure["steps_left"])
+
+    @property
+    def peak_x_m(self) -> float:
+        """Largest abs(x) observed."""
+        return float(self.structure["peak_x"])
+
+    @property
+    def peak_p_m(self) -> float:
+        """Largest abs(p) observed."""
+        return float(self.structure["peak_p"])
+
+    @property
+    def area_x(self) -> complex:
+        """Integral of x exp(-i (omega t + phase)), where lines were observed [m s]."""
+        return complex(self.structure["line_x"])
+
+    @property
+    def area_p(self) -> complex:
+        """The same of p."""
+        return complex(self.structure["line_p"])
+
+
+class NativeRun:
+    """One motion: where it is, and the small changes that are carried along with it."""
+
+    def __init__(
+        self,
+        specimen: Specimen,
+        drive: Harmonic,
+        initial_state: ArrayLike,
+        tolerance: float,
+        *,
+        start_time_s: float = 0.0,
+        engine: Engine | None = None,
+    ) -> None:
+        """Start from x, y, z, vx, vy, vz, absolute [m, m/s], shape (6,).
+
+        Raises ValueError when the engine refuses the specimen, the drive or the start.
+        """
+        self.engine = engine = native_engine() if engine is None else engine
+        self.specimen = specimen
+        self._tables = engine.prepare(scene_of(engine, specimen, drive))
+        self._tangent = engine.new("Tangent")
+        self._state = engine.new("State")
+        self._state["clock_high"] = start_time_s
+        self.tolerance = tolerance
+        """Relative error allowed in a step of a contact."""
+        self.place(initial_state)
+
+    def place(self, motion: ArrayLike) -> None:
+        """Put the motion to x, y, z, vx, vy, vz, shape (6,), now; a stop that is reached is found.
+
+        Raises ValueError when the motion is inside a rigid stop.
+        """
+        self._state["motion"] = motion
+        refuse_inside_a_stop(self._state["motion"], self.specimen)
+        if self.engine.start(self._tables, self._state, self.tolerance) != 0:
+            msg = f"A tolerance of {self.tolerance} is not allowed: it must lie between 0 and 1."
+            raise ValueError(msg)
+
+    def apart(self, tolerance: float | None = None) -> Self:
+        """Return a copy of the motion; one with another tolerance carries no small changes."""
+        twin = copy(self)
+        twin.__dict__.update(_state=self._state.copy(), _tangent=self._tangent.copy())
+        if tolerance is not None:
+            twin.tolerance = tolerance
+            twin.carry(np.empty((0, DIRECTIONS)))
+        return twin
+
+    def carry(self, changes: Floats) -> None:
+        """Carry small changes of the state along from now on, shape (n, 6); none when n = 0."""
+        self._tangent["changes"] = len(changes)
+        self._tangent["rows"][: len(changes)] = changes
+        self._tangent["growth"] = 0.0
+
+    @property
+    def changes(self) -> Floats:
+        """What became of the changes, shape (n, 6), over exp(`growth`)."""
+        return np.array(self._tangent["rows"][: int(self._tangent["changes"])])
+
+    @property
+    def growth(self) -> Floats:
+        """Logarithm of a factor of each change, shape (n,)."""
+        return np.array(self._tangent["growth"][: int(self._tangent["changes"])])
+
+    def advance(self, until_s: float, record: RunRecord) -> Outcome:
+        """Advance to an instant [s]; one that has passed already changes nothing.
+
+        Raises ValueError when the engine refuses the instant.
+        """
+        tangent = self._tangent if self._tangent["changes"] > 0 else None
+        code = self.engine.run(self._tables, self._state, until_s, self.tolerance, record.structure, tangent)
+        if code < 0:
+            msg = f"The native engine refuses to advance to {until_s} s: the instant must be finite."
+            raise ValueError(msg)
+        return Outcome(code)
+
+    def read(self, readings: "GrowthReadings", last: int, record: RunRecord) -> Outcome:
+        """Advance up to reading ``last`` of how the changes grow."""
+        return Outcome(
+            self.engine.take_readings(
+                *(self._tables, self._state, self.tolerance, record.structure),
+                *(self._tangent, readings.structure, last),
+            )
+        )
+
+    @property
+    def motion(self) -> Floats:
+        """x, y, z, vx, vy, vz now, shape (6,)."""
+        return np.array(self._state["motion"])
+
+    @property
+    def addresses(self) -> tuple[int, int]:
+        """Where its tables and its state lie, for a batch; they live as long as the run."""
+        return self._tables.ctypes.data, self._state.ctypes.data
+
+    @property
+    def time_s(self) -> float:
+        """How far the motion has come."""
+        return float(self._state["clock_high"])
+
+    def pass_over(self, length_s: float) -> None:
+        """Let time pass, in which the motion comes back to its state."""
+        clock = float(self._state["clock_high"]), float(self._state["clock_low"]), length_s
+        self._state["clock_high"] = high = math.fsum(clock)
+        self._state["clock_low"] = math.fsum((*clock, -high))
+
+    @property
+    def is_in_flight(self) -> bool:
+        """No stop is touched now."""
+        return bool(self._state["side"] == 0.0)
+
+    @property
+    def reach_m(self) -> float:
+        """Largest abs(p) from now on, as long as no stop is touched; infinite on a stop."""
+        return self.engine.reach(self._tables, self._state)
+
+
+class GrowthReadings:
+    """How changes grow from instant to instant, made orthonormal in a metric."""
+
+    def __init__(self, changes: int, room: int, interval_s: float, parts: int, metric: Floats) -> None:
+        """Make room for readings at whole numbers of ``interval_s``, each cut in equal ``parts``."""
+        self._growth = np.zeros((room, changes))
+        self._impacts = np.zeros(room, np.int64)
+        self._motions = np.zeros((room, DIRECTIONS))
+        self.structure = readings = native_engine().new("Readings")
+        """As the engine takes it."""
+        readings["interval"], readings["parts"], readings["metric"] = interval_s, parts, metric
+        readings["growth"], readings["impacts"] = self._growth.ctypes.data, self._impacts.ctypes.data
+        readings["motions"], readings["room"] = self._motions.ctypes.data, room
+
+    @property
+    def made(self) -> int:
+        """Readings so far."""
+        return int(self.structure["made"])
+
+    @property
+    def growth(self) -> Floats:
+        """Logarithm of the factor by which each change grew in each interval, shape (n, m)."""
+        return self._growth[: self.made]
+
+    @property
+    def impacts(self) -> NDArray[np.int64]:
+        """In each interval, shape (n,)."""
+        return self._impacts[: self.made]
+
+    @property
+    def motions(self) -> Floats:
+        """x, y, z, vx, vy, vz at each interval's end, shape (n, 6)."""
+        return self._motions[: self.made]
+
+
+def refuse_inside_a_stop(motion: Floats, specimen: Specimen) -> None:
+    """Raise ValueError when a motion begins beyond a rigid stop."""
+    if not isinstance(specimen.contact, RigidStops):
+        return
+    lower, upper = specimen.gaps_m
+    p = float(motion[Y] - motion[Z])
+    beyond = max(p - upper, -p - lower)
+    if beyond > INSIDE * (min(lower, upper) + float(np.abs(motion[:3]).sum())):
+        msg = (
+            f"A start at y - z = {p} m is not allowed: rigid stops stand at {-lower} and {upper} m; "
+            "start between them."
+        )
+        raise ValueError(msg)
+
+
+def most_impacts(rate_hz: float, duration_s: float) -> int:
+    """Return how many impacts a run may have that strikes at most so often on average."""
+    return min(math.ceil(rate_hz * duration_s) + SPARE_IMPACTS, MOST_IMPACTS)
+
+
+@lru_cache(maxsize=1)
+def native_engine() -> Engine:
+    """Load the engine of this processor; it has then answered a known scene.
+
+    Raises EngineError when there is none, or when its answer is wrong.
+    """
+    engine = Engine(library_path())
+    check_known_answer(engine)
+    return engine
+
+
+def check_known_answer(engine: Engine) -> None:
+    """Refuse an engine that was compiled wrongly, which can be silent and fast."""
+    specimen, drive = gong2025(contact="hunt_crossley:0.5"), Harmonic(130.0, 20e-6)
+    run = NativeRun(specimen, drive, np.zeros(6), Accuracy.STANDARD.tolerance, engine=engine)
+    outcome = run.advance(KNOWN_DURATION_S, RunRecord(100, engine=engine))
+    off = np.abs(run.motion - KNOWN_MOTION) / np.repeat([1e-4, 0.1], 3)
+    if outcome is not Outcome.REACHED_END or not math.isfinite(off.max()) or off.max() > KNOWN_TO:
+        msg = f"{engine.path} fails its self-test by {off.max():.1e}: rebuild it, or report this."
+        raise EngineError(msg)

@@ -1,0 +1,206 @@
+"""A specimen and a harmonic drive as the native engine takes them: the modal forms are Python's part."""
+
+import cmath
+import math
+from dataclasses import replace
+from functools import cache
+from threading import Lock
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model.bound_modes import PULL, RATE, ROW, SHAPE, bound_motion
+from ..model.drive import Harmonic
+from ..model.hertz import Hertz
+from ..model.linear_gap import LinearGap
+from ..model.modes import harmonic_motion, modal_form
+from ..model.no_contact import NoContact
+from ..model.power_law import PowerLaw
+from ..model.rigid_stops import RigidStops
+from ..model.specimen import Specimen
+from ..model.state import Y, Z
+from .collision_shapes import ABOUT_MIDDLE, HEIGHTS, POINTS, SHARES, collision_shapes
+from .library import Engine
+from .power_shapes import (
+    AT_END,
+    AT_START,
+    COURSE,
+    GAUSS_POINTS,
+    GAUSS_WEIGHTS,
+    INSTANT_SLOPES,
+    INSTANT_WEIGHTS,
+    INSTANTS,
+    POINT_WEIGHTS,
+    POINTS_AT,
+    POWER_SHARES,
+)
+from .structures import Structure
+
+NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)
+"""`Law` in native/structures.hpp."""
+Phasors = NDArray[np.complex128]
+
+
+def scene_of(engine: Engine, specimen: Specimen, drive: Harmonic) -> Structure:
+    """Fill a `Scene` of native/structures.hpp.
+
+    Raises ValueError when two modes coincide.
+    """
+    scene = engine.new("Scene")
+    omega = 2.0 * math.pi * drive.frequency_hz
+    fill_specimen(scene["specimen"], specimen)
+    fill_drive(scene["drive"], drive, specimen)
+    _fill_free(scene["flight"], specimen, omega, drive.amplitude_m)
+    match specimen.contact:
+        case RigidStops():
+            _fill_rigid(scene["held"], specimen, omega, drive.amplitude_m)
+        case LinearGap(stiffness=stop):
+            _fill_springs(scene, specimen, stop, omega, drive.amplitude_m)
+        case PowerLaw() as law:
+            fill_power(engine, scene, law)
+        case Hertz():
+            scene["collisions"] = collision_structure(engine).ctypes.data
+    return scene
+
+
+def fill_power(engine: Engine, scene: Structure, law: PowerLaw) -> None:
+    """Fill what a `Scene` or a `CubicScene` knows of a power law."""
+    _fill_power(scene["power"], law)
+    scene["power_shapes"] = power_structure(engine).ctypes.data
+
+
+def fill_cell(target: Structure, cell: Specimen, next_stiffness: float, next_damping: float) -> None:
+    """Fill a `CellKind`: a cell of a chain and the link behind it [N/m], [N s/m]."""
+    fill_specimen(target["specimen"], cell)
+    match cell.contact:
+        case LinearGap():
+            # In a chain contacts with springs are resolved in steps.
+            target["specimen"]["law"] = YIELDING
+        case PowerLaw() as law:
+            _fill_power(target["power"], law)
+    target["next_stiffness"], target["next_damping"] = next_stiffness, next_damping
+
+
+def fill_drive(target: Structure, drive: Harmonic, first: Specimen) -> None:
+    """Fill a `Drive`: what it does to the m0 that hangs on the base."""
+    _, force = harmonic_motion(first, 2.0 * math.pi * drive.frequency_hz, drive.amplitude_m)
+    target["frequency"] = drive.frequency_hz
+    target["start"] = cmath.exp(1j * drive.phase_rad)
+    target["force"] = force
+
+
+def power_structure(engine: Engine) -> Structure:
+    """Return the `PowerShapes` of native/structures.hpp."""
+    with _ONE_THREAD:
+        return _power_structure(engine)
+
+
+def collision_structure(engine: Engine) -> Structure:
+    """Return the `CollisionShapes` of native/structures.hpp."""
+    with _ONE_THREAD:
+        return _collision_structure(engine)
+
+
+# The tables of a run point into these, so that they live as long as the process. Without the lock two threads
+# would make one each at the first call, and the cache would drop one of them.
+_ONE_THREAD = Lock()
+
+
+@cache
+def _power_structure(engine: Engine) -> Structure:
+    shapes = engine.new("PowerShapes")
+    shapes["points"], shapes["weights"] = POINTS_AT, GAUSS_WEIGHTS
+    shapes["shares"] = POWER_SHARES[:, :, :GAUSS_POINTS]
+    shapes["ends"] = POWER_SHARES[:, :, GAUSS_POINTS]
+    shapes["at_start"], shapes["at_end"], shapes["course"] = AT_START, AT_END, COURSE
+    shapes["point_weights"], shapes["instants"] = POINT_WEIGHTS, INSTANTS
+    shapes["instant_weights"], shapes["instant_slopes"] = INSTANT_WEIGHTS, INSTANT_SLOPES
+    return shapes
+
+
+@cache
+def _collision_structure(engine: Engine) -> Structure:
+    solved = engine.new("CollisionShapes")
+    solved["shares"] = SHARES[:, :, :POINTS]
+    solved["ends"] = SHARES[:, :, POINTS].T
+    solved["weights"] = SHARES[0, :, POINTS]
+    solved["heights"] = HEIGHTS
+    solved["about_middle"] = ABOUT_MIDDLE
+    solved["shapes"], solved["durations"] = collision_shapes()
+    return solved
+
+
+def fill_specimen(target: Structure, specimen: Specimen) -> None:
+    """Fill a `Specimen` of native/structures.hpp."""
+    for name, values in (("m", specimen.masses), ("k", specimen.stiffnesses), ("c", specimen.dampings)):
+        for index, value in enumerate(values):
+            target[f"{name}{index}"] = value
+    target["lower_gap"], target["upper_gap"] = specimen.gaps_m
+    stops = specimen.contact.stops
+    target["linear_stiffness"] = stops.linear_stiffness
+    target["contact_stiffness"] = stops.contact_stiffness
+    target["loss"] = stops.loss
+    match specimen.contact:
+        case NoContact():
+            target["law"] = NO_STOPS
+            target["lower_gap"] = target["upper_gap"] = math.inf
+        case Hertz():
+            target["law"] = HERTZ
+        case LinearGap():
+            target["law"] = SPRINGS
+        case RigidStops(restitution=restitution):
+            target["law"], target["restitution"] = RIGID, restitution
+        case PowerLaw():
+            target["law"] = POWERS
+        case _:
+            target["law"] = YIELDING
+
+
+def _fill_power(target: Structure, law: PowerLaw) -> None:
+    count = len(law.terms)
+    target["reference"], target["terms"] = law.reference, count
+    target["exponents"][:count] = [exponent for exponent, _ in law.terms]
+    target["forces"][:count] = [force for _, force in law.terms]
+
+
+def _fill_free(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
+    modes = modal_form(specimen)
+    steady, _ = harmonic_motion(specimen, omega, amplitude_m)
+    _fill_motion(target, modes.rates, modes.shapes, modes.rows, steady)
+
+
+def _fill_rigid(target: Structure, specimen: Specimen, omega: float, amplitude_m: float) -> None:
+    """m1 on a stop that holds it: two bodies, and one condition, that the stop can only push."""
+    bound = bound_motion(specimen, omega, amplitude_m)
+    _fill_motion(target["motion"], bound[:-1, RATE], bound[:-1, SHAPE], bound[:-1, ROW], bound[-1, SHAPE])
+    m1, m2 = specimen.masses[1:]
+    target["pulls"][: len(bound)] = bound[:, PULL] / m2
+    target["let_go"], target["rests"] = specimen.stiffnesses[1] * (1.0 / m1 + 1.0 / m2), 1.0
+
+
+def _fill_springs(
+    scene: Structure, specimen: Specimen, stop: float, omega: float, amplitude_m: float
+) -> None:
+    """m1 on a stop that is a spring: the specimen with that spring beside k1, about another place of rest."""
+    k0, k1, k2 = specimen.stiffnesses
+    pressed = replace(specimen, stiffnesses=(k0, k1 + stop, k2), contact=NoContact())
+    held = scene["held"]
+    try:
+        _fill_free(held["motion"], pressed, omega, amplitude_m)
+    except ValueError:
+        # Two of its modes coincide: contacts are resolved in steps.
+        scene["specimen"]["law"] = YIELDING
+        return
+    steady = held["motion"]["steady"]
+    count = int(held["motion"]["modes"])
+    held["pulls"][:count] = (held["motion"]["shapes"][:, Y] - held["motion"]["shapes"][:, Z])[:count]
+    held["pulls"][count] = steady[Y] - steady[Z]
+    held["let_go"], held["rests"] = k1 / (k1 + stop), stop / (k1 + stop)
+
+
+def _fill_motion(target: Structure, rates: Phasors, shapes: Phasors, rows: Phasors, steady: Phasors) -> None:
+    target["modes"] = len(rates)
+    target["rates"][: len(rates)] = rates
+    target["shapes"][: len(rates)] = shapes
+    target["rows"][: len(rates)] = rows
+    target["steady"] = steady

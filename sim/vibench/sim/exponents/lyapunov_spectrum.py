@@ -1,0 +1,226 @@
+"""All six Lyapunov exponents of a specimen under a harmonic drive, and the dimension they give. SI units.
+
+Six small changes span every direction of the state; carried along together and made orthogonal as they go,
+they give the exponents in descending order (Benettin et al., Meccanica 15 (1980) 9). Their sum is the mean
+rate at which volumes shrink: -tr(M^-1 C) for every elastic law and any motion, which tests the whole
+calculation.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+
+from ..engine.run import DIRECTIONS
+from ..kernels.arrays import Floats
+from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.drive import Harmonic
+from ..model.modes import state_matrix
+from ..model.outcome import Outcome
+from ..model.specimen import Specimen
+from ..model.word import chosen
+from ..motion.integrate import MAX_IMPACT_RATE_HZ
+from ..motion.poincare import state_scales
+from .blocking import BlockedMean, blocked_mean
+from .lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
+from .settling import FinalMotion, settling
+from .tangent_run import TangentRun, interval_for, run_with_tangent
+
+
+@dataclass(frozen=True, eq=False)
+class LyapunovSpectrum:
+    """The exponents of the motion in which a run ended. NaN where the run did not reach its end."""
+
+    drive: Harmonic
+    accuracy: Accuracy
+    exponents_per_s: Floats
+    """Descending, shape (6,); minus infinity for a direction that a stop which holds m1 has taken away."""
+    standard_errors_per_s: Floats
+    """Shape (6,); zero where the exponents are those of the modes."""
+    blocks: NDArray[np.int64]
+    """Independent stretches of the run behind each standard error, shape (6,)."""
+    verdict: ExponentVerdict
+    """Of the largest."""
+    source: Source
+    motion: FinalMotion
+    since_s: float
+    impacts: int
+    """Since time zero."""
+    impact_rate_hz: float
+    """In the final motion."""
+    dimension_standard_error: float
+    """Of `dimension`, with the exponents' errors as they go together; 0 where it is a whole number."""
+    final_state: Floats
+    end_time_s: float
+    outcome: Outcome
+
+    @property
+    def sum_per_s(self) -> float:
+        """Mean rate at which the logarithm of a volume changes."""
+        return float(np.sum(self.exponents_per_s))
+
+    @property
+    def dimension(self) -> float:
+        """Kaplan and Yorke's dimension of the attractor's stroboscopic section; one more in time."""
+        return kaplan_yorke(self.exponents_per_s)
+
+    def intervals_per_s(self, confidence: float = 0.95) -> Floats:
+        """Bounds of each exponent, shape (6, 2): Student's, with a degree of freedom less than blocks."""
+        reach = self._reach(confidence) * self.standard_errors_per_s
+        return np.column_stack([self.exponents_per_s - reach, self.exponents_per_s + reach])
+
+    def dimension_interval(self, confidence: float = 0.95) -> tuple[float, float]:
+        """Bounds of the dimension, by the fewest blocks of all exponents; never outside 0 to 6."""
+        reach = float(self._reach(confidence).max()) * self.dimension_standard_error
+        return max(0.0, self.dimension - reach), min(float(DIRECTIONS), self.dimension + reach)
+
+    def _reach(self, confidence: float) -> Floats:
+        if not 0.0 < confidence < 1.0:
+            msg = f"A confidence of {confidence} is not allowed: it must lie between 0 and 1."
+            raise ValueError(msg)
+        return np.asarray(scipy.special.stdtrit(np.maximum(self.blocks - 1, 1), 0.5 + 0.5 * confidence))
+
+
+def lyapunov_spectrum(
+    specimen: Specimen,
+    drive: Harmonic,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
+    duration_s: float = 25.0,
+    settle_s: float = 5.0,
+    initial_state: ArrayLike | None = None,
+    *,
+    interval_s: float | None = None,
+    max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
+) -> LyapunovSpectrum:
+    """Tell how fast neighbouring motions part or come together, in every direction.
+
+    Arguments as in `vibench.sim.lyapunov_exponent`, ``initial_state`` of shape (6,) [m, m/s]; the
+    errors need blocks as long as the motion's memory too.
+    """
+    accuracy = chosen(Accuracy, accuracy)
+    interval = interval_for(specimen, drive, interval_s)
+    skipped = intervals_to_skip(interval, duration_s, settle_s)
+    run = run_with_tangent(
+        specimen,
+        drive,
+        DIRECTIONS,
+        settle_s + duration_s,
+        interval,
+        accuracy,
+        initial_state,
+        max_impact_rate_hz,
+    )
+    length = interval.length_s
+    if run.outcome is not Outcome.REACHED_END:
+        nothing = np.full(DIRECTIONS, math.nan)
+        parts = _Taken(
+            nothing,
+            nothing,
+            ONE_BLOCK,
+            math.nan,
+            ExponentVerdict.UNKNOWN,
+            Source.AVERAGE,
+            FinalMotion.THROUGHOUT,
+            0,
+        )
+    else:
+        parts = _taken(specimen, drive, run, skipped)
+    since = parts.since
+    lasting = (len(run.growth) - since) * length
+    return LyapunovSpectrum(
+        drive=drive,
+        accuracy=accuracy,
+        exponents_per_s=parts.exponents,
+        standard_errors_per_s=parts.errors,
+        blocks=parts.blocks,
+        verdict=parts.verdict,
+        source=parts.source,
+        motion=parts.motion,
+        since_s=since * length,
+        impacts=len(run.impact_times_s),
+        impact_rate_hz=float(run.impacts[since:].sum()) / lasting if lasting > 0.0 else 0.0,
+        dimension_standard_error=parts.dimension_error,
+        final_state=run.final_state,
+        end_time_s=run.end_time_s,
+        outcome=run.outcome,
+    )
+
+
+ONE_BLOCK = np.ones(DIRECTIONS, dtype=np.int64)
+
+
+class _Taken(NamedTuple):
+    """What is read off a run."""
+
+    exponents: Floats
+    errors: Floats
+    blocks: NDArray[np.int64]
+    dimension_error: float
+    verdict: ExponentVerdict
+    source: Source
+    motion: FinalMotion
+    since: int
+
+
+def _taken(specimen: Specimen, drive: Harmonic, run: TangentRun, skipped: int) -> _Taken:
+    end = settling(run, state_scales(specimen, drive))
+    if end.motion is FinalMotion.QUIET:
+        system, _ = state_matrix(specimen)
+        decays = np.sort(np.linalg.eigvals(system).real)[::-1]
+        verdict = verdict_of(float(decays[0]), 0.0)
+        return _Taken(
+            decays, np.zeros(DIRECTIONS), ONE_BLOCK, 0.0, verdict, Source.MODES, end.motion, end.since
+        )
+    # A motion that settles late may leave little to average: never less than half of what was asked for.
+    since = min(max(skipped, end.since), (len(run.growth) + skipped) // 2)
+    rates = run.rates[since:]
+    means = [_mean(each) for each in rates.T]
+    order = np.argsort([-each.mean for each in means], kind="stable")
+    exponents = np.array([means[k].mean for k in order])
+    errors = np.array([means[k].standard_error for k in order])
+    return _Taken(
+        exponents,
+        errors,
+        np.array([means[k].blocks for k in order], dtype=np.int64),
+        _dimension_error(rates[:, order], exponents),
+        verdict_of(float(exponents[0]), float(errors[0])),
+        Source.AVERAGE,
+        end.motion,
+        since,
+    )
+
+
+def _mean(rates: Floats) -> BlockedMean:
+    """Mean of local exponents with its error; minus infinity where the direction was lost."""
+    if not bool(np.all(np.isfinite(rates))):
+        return BlockedMean(-math.inf, 0.0, 1, len(rates), 1.0, is_long_enough=True)
+    return blocked_mean(rates)
+
+
+def _dimension_error(rates: Floats, exponents: Floats) -> float:
+    """Give the standard error of the dimension: its linear part in the local exponents, averaged like one.
+
+    D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0: dD = -dS / l + S dl / l^2.
+    """
+    kept = math.floor(kaplan_yorke(exponents))
+    if kept in (0, len(exponents)) or not math.isfinite(exponents[kept]):
+        return 0.0
+    total, next_one = float(np.sum(exponents[:kept])), float(exponents[kept])
+    moved = -rates[:, :kept].sum(axis=1) / next_one + total * rates[:, kept] / next_one**2
+    return blocked_mean(moved).standard_error
+
+
+def kaplan_yorke(exponents: Floats) -> float:
+    """Dimension that exponents in descending order give an attractor; all of them where none shrinks.
+
+    j + (l_1 + ... + l_j) / |l_(j+1)| with the largest j whose sum is not negative (Kaplan and Yorke, Lecture
+    Notes in Mathematics 730 (1979) 204).
+    """
+    sums = np.cumsum(exponents)
+    kept = int(np.count_nonzero(np.cumprod(sums >= 0.0)))
+    if kept in (0, len(exponents)):
+        return float(kept)
+    return kept + float(sums[kept - 1] / abs(exponents[kept]))

@@ -1,0 +1,153 @@
+"""The linear law of a controller: a Kalman filter of the sampled plant, and the feedback of its estimate.
+
+For a controller that takes no such law there is one of two gains.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
+from scipy.optimize import fmin
+
+from ..kernels.arrays import Table, Vector
+from .plant import SampledPlant
+
+
+@dataclass(frozen=True)
+class LawWeights:
+    """What a law shall weigh; sizes of motion that go with a volt."""
+
+    relative_m: float = 3e-5
+    """Motion of p that is worth a tenth of a volt of control."""
+    push_n: float = 3e-3
+    """Force between m1 and m2 that the filter expects without knowing it, rms over a step [N]."""
+    volt: float = 1e-2
+    """Unknown voltage, likewise [V]."""
+    acceleration: float = 0.2
+    """Noise of a sample of the base's acceleration [m/s2]."""
+    velocity: float = 1e-4
+    """Noise of a sample of m0's velocity [m/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearLaw:
+    """Volts u of samples s: u = output @ memory + direct @ s, then memory = step @ memory + inlet @ s."""
+
+    step: Table
+    """Shape (n, n)."""
+    inlet: Table
+    """Shape (n, 2), per m/s2 of the base and per m/s of m0."""
+    output: Table
+    """Shape (1, n) [V]."""
+    direct: Table
+    """Shape (1, 2)."""
+
+
+def designed_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> LinearLaw:
+    """Design the law that takes motion out of the spring between m1 and m2.
+
+    Linear-quadratic Gaussian (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch. 9), the
+    estimate being that of the moment of the sample.
+
+    Parameters
+    ----------
+    plant
+        As far as it is known; the law is made for its latency.
+    weights
+        What is weighed.
+
+    """
+    step, volt, shown, cost, unknown, noise = _weighed(plant, weights)
+    gain = _gain(step, volt[:, None], cost, np.eye(1))
+    covariance = solve_discrete_are(step.T, shown.T, unknown + 1e-12 * np.eye(plant.size), noise)
+    filtered = np.linalg.solve(shown @ covariance @ shown.T + noise, shown @ covariance).T
+    kept = np.eye(plant.size) - filtered @ shown
+    closed = step - volt[:, None] @ gain
+    return LinearLaw(closed @ kept, closed @ filtered, -gain @ kept, -gain @ filtered)
+
+
+def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights()) -> LinearLaw:
+    """Design a law of two gains, by the measure of `designed_law`: for a controller that takes no other.
+
+    ``u = -(kp s + kd d)`` of one sample s, its rate of change behind a low-pass ``d += a ((s - before) / step
+    - d)``, ``a = step / (tau + step)``. Both gains and tau are those of the least expected cost (W. S. Levine
+    and M. Athans, IEEE Trans. Autom. Control 15 (1970) 44).
+
+    Parameters
+    ----------
+    plant
+        As far as it is known; the law is made for its latency.
+    sample
+        Which is answered: 0 the base's acceleration, 1 m0's velocity.
+    weights
+        What is weighed.
+
+    """
+    problem, step_s = _weighed(plant, weights), plant.timing.step_s
+    omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
+    size = 0.1 / weights.relative_m / omega ** (2 - sample)
+
+    def law(unknowns: Vector) -> LinearLaw:
+        share = step_s / (abs(unknowns[2]) / omega + step_s)
+        kp, kd = size * unknowns[0], size * unknowns[1] / omega
+        inlet, direct = np.zeros((2, 2)), np.zeros((1, 2))
+        inlet[:, sample], direct[0, sample] = (share / step_s, 1.0), -kp - kd * share / step_s
+        rate = np.array([[1.0 - share, -share / step_s]])
+        return LinearLaw(np.vstack([rate, np.zeros((1, 2))]), inlet, -kd * rate, direct)
+
+    start = np.array([[0.0, 0.0, 1.0], [-0.1, 0.0, 1.0], [0.0, -0.1, 1.0], [0.0, 0.0, 2.0]])
+
+    def cost(unknowns: Vector) -> float:
+        return _expected_cost(problem, law(unknowns))
+
+    return law(np.asarray(fmin(cost, start[0], xtol=1e-3, ftol=1e-12, initial_simplex=start, disp=False)))
+
+
+class _Weighed(NamedTuple):
+    """A plant in the sizes of its motions, and what is weighed in it."""
+
+    step: Table
+    volt: Vector
+    shown: Table
+    cost: Table
+    unknown: Table
+    noise: Table
+
+
+def _weighed(plant: SampledPlant, weights: LawWeights) -> _Weighed:
+    scale = plant.scales
+    step, volt = plant.step
+    step = step * scale / scale[:, None]
+    volt = volt / scale
+    into, relative = (each * factor for each, factor in zip(plant.spring, (1 / scale, scale), strict=True))
+    fast = np.zeros(plant.size)
+    omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
+    fast[7], fast[8] = scale[7] / omega, -scale[8] / omega
+    cost = (np.outer(relative, relative) + np.outer(fast, fast)) * (0.1 / weights.relative_m) ** 2
+    pushed = step @ into * plant.timing.step_s
+    unknown = np.outer(pushed, pushed) * weights.push_n**2 + np.outer(volt, volt) * weights.volt**2
+    noise = np.diag([weights.acceleration**2, weights.velocity**2])
+    return _Weighed(step, volt, plant.shown * scale, cost, unknown, noise)
+
+
+def _expected_cost(problem: _Weighed, law: LinearLaw) -> float:
+    """Give what motion and volts cost a sample in the mean, under noise; infinite where they grow."""
+    answer = np.hstack([law.direct @ problem.shown, law.output])[0]
+    own = len(problem.step)
+    closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.shown, law.step])])
+    closed[:own, :own] = problem.step
+    closed[:own] += np.outer(problem.volt, answer)
+    if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
+        return float("inf")
+    heard = np.vstack([np.outer(problem.volt, law.direct), law.inlet])
+    noise = heard @ problem.noise @ heard.T
+    noise[:own, :own] += problem.unknown
+    covariance = solve_discrete_lyapunov(closed, noise)
+    direct = (law.direct @ problem.noise @ law.direct.T).item()
+    return float(np.trace(covariance[:own, :own] @ problem.cost) + answer @ covariance @ answer + direct)
+
+
+def _gain(step: Table, volt: Table, cost: Table, price: Table) -> Table:
+    value = solve_discrete_are(step, volt, cost, price)
+    return np.asarray(np.linalg.solve(price + volt.T @ value @ volt, volt.T @ value @ step))

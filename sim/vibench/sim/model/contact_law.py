@@ -1,0 +1,56 @@
+"""The laws of contact between m1 and its stops: each a file of its own, its place in the union, and its row.
+
+A law that yields, F = (k1 d + k d^(3/2)) (1 + loss dd/dt) at the indentation d, needs nothing else: the
+kernels, the independent solution and harmonic balance take its `stops`. A force of another shape needs a
+room of its own beside `vibench.sim.contact`.
+"""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from .hertz import HERTZ, Hertz
+from .hunt_crossley import HUNT_CROSSLEY, HuntCrossley
+from .linear_gap import LINEAR_GAP, LinearGap
+from .no_contact import LINEAR, NoContact
+from .power_law import POWER, PowerLaw
+from .rigid_stops import RIGID, RigidStops
+from .stops import LawWord, Reference, UnreadableLawError
+
+ContactLaw = Hertz | NoContact | LinearGap | HuntCrossley | RigidStops | PowerLaw
+
+CONTACT_LAWS: Mapping[str, LawWord[ContactLaw]] = MappingProxyType(
+    {
+        "hertz": HERTZ,
+        "linear": LINEAR,
+        "linear_gap": LINEAR_GAP,
+        "hunt_crossley": HUNT_CROSSLEY,
+        "rigid": RIGID,
+        "power": POWER,
+    }
+)
+"""By the kind of each law, which is the word of a command line or a file too."""
+
+
+def model_named(text: str, contact_stiffness: float, gap_m: float) -> ContactLaw:
+    """Turn a model's name, ``hertz`` or ``rigid:0.8`` for example, into its law.
+
+    Raises ValueError when the name is not one of the forms, or its numbers are not allowed.
+
+    Parameters
+    ----------
+    text
+        A word of `CONTACT_LAWS`, and what its form asks for behind a colon.
+    contact_stiffness, gap_m
+        What a fitted law is fitted to: k_contact [N/m^1.5] of the paper's stops, and the clearance [m].
+
+    """
+    reference = Reference(contact_stiffness, gap_m)
+    name, _, detail = text.strip().partition(":")
+    if name in CONTACT_LAWS:
+        try:
+            return CONTACT_LAWS[name].made(detail, reference)
+        except UnreadableLawError:
+            pass
+    *forms, last = (law.form for law in CONTACT_LAWS.values())
+    msg = f"Contact {text!r} is not known: give one of {', '.join(forms)}, {last}."
+    raise ValueError(msg)

@@ -1,0 +1,49 @@
+"""A Hertz contact that loses energy. SI units."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
+
+from .stops import STRICT, LawWord, Reference, Stops, number_in, require_positive
+
+
+@dataclass(frozen=True)
+class HuntCrossley:
+    """Hertz contact that loses energy: F = stiffness * penetration^(3/2) * (1 + loss * penetration rate).
+
+    Hunt and Crossley, J. Appl. Mech. 42 (1975) 440, eq. 8, with lambda = loss * stiffness. Without other
+    forces m1 leaves more slowly than 1/loss whatever it came with, so that the stop never pulls; springs that
+    tear it off faster than that do make it pull, as the law says.
+    """
+
+    OWN_UNITS: ClassVar = {"stiffness": "N m-1.5", "loss": "s m-1"}
+
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
+    stiffness: float
+    """[N/m^1.5]."""
+    loss: float
+    """chi [s/m]; about 3/2 of (1 - restitution) per approach speed while that is small. Zero is Hertz."""
+    kind: Literal["hunt_crossley"] = "hunt_crossley"
+
+    def __post_init__(self) -> None:
+        require_positive("Contact stiffness", self.stiffness, "N/m^1.5")
+        if not 0.0 <= self.loss < math.inf:
+            msg = f"Contact loss {self.loss} s/m is not allowed: it must be zero or positive, and finite."
+            raise ValueError(msg)
+
+    @property
+    def stops(self) -> Stops:
+        """Numbers of the kernels."""
+        return Stops(contact_stiffness=float(self.stiffness), loss=float(self.loss))
+
+
+def _made(detail: str, reference: Reference) -> HuntCrossley:
+    return HuntCrossley(reference.stiffness, number_in(detail))
+
+
+HUNT_CROSSLEY = LawWord(
+    "hunt_crossley:s/m", "hertz with a loss that grows with the speed", "hunt_crossley:2", _made
+)

@@ -1,0 +1,43 @@
+"""Stops that are springs. SI units."""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
+
+from .stops import PAPER_INDENTATION_M, STRICT, LawWord, Reference, Stops, number_in, require_positive
+
+
+@dataclass(frozen=True)
+class LinearGap:
+    """Stops that are springs: F = stiffness * penetration, no loss of its own."""
+
+    OWN_UNITS: ClassVar = {"stiffness": "N m-1"}
+
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
+    stiffness: float
+    """[N/m]."""
+    kind: Literal["linear_gap"] = "linear_gap"
+
+    def __post_init__(self) -> None:
+        require_positive("Stop stiffness", self.stiffness, "N/m")
+
+    @property
+    def stops(self) -> Stops:
+        """Numbers of the kernels."""
+        return Stops(linear_stiffness=float(self.stiffness))
+
+
+def fitted_linear_gap(contact_stiffness: float, indentation_m: float = PAPER_INDENTATION_M) -> LinearGap:
+    """Fit springy stops to a Hertz contact of k [N/m^1.5]: equal force at the given indentation."""
+    require_positive("Indentation of the fit", indentation_m, "m")
+    return LinearGap(contact_stiffness * math.sqrt(indentation_m))
+
+
+def _made(detail: str, reference: Reference) -> LinearGap:
+    return LinearGap(number_in(detail)) if detail else fitted_linear_gap(reference.stiffness)
+
+
+LINEAR_GAP = LawWord("linear_gap[:N/m]", "stops that are springs", "linear_gap", _made)

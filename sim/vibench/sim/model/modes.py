@@ -1,0 +1,203 @@
+"""The specimen without contact, solved exactly: state matrix, modes, transmissibility. SI units."""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..kernels.arrays import Complex, Table, Vector
+from .specimen import Specimen
+from .state import VX
+
+
+def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
+    """Flight as d/dt s = A s + b f, with s = (x, y, z, vx, vy, vz) and f = k0 U + c0 dU/dt.
+
+    Returns A, shape (6, 6), and b, shape (6,).
+    """
+    system = _first_order(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
+    entry = np.zeros(6)
+    entry[VX] = 1.0 / specimen.masses[0]
+    return system, entry
+
+
+def _first_order(mass: Table, stiffness: Table, damping: Table) -> Table:
+    """Displacements above velocities: the matrix of their rates, shape (2n, 2n)."""
+    inverse, size = np.linalg.inv(mass), len(mass)
+    system = np.zeros((2 * size, 2 * size))
+    system[:size, size:] = np.eye(size)
+    system[size:, :size] = -inverse @ stiffness
+    system[size:, size:] = -inverse @ damping
+    return system
+
+
+def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Complex:
+    """Displacement of every mass, and of p, over the base displacement, without contact.
+
+    (K - w^2 M + i w C)^-1 (k0 + i w c0, 0, 0); exact, for any damping.
+
+    Parameters
+    ----------
+    specimen
+        Its contact law and gap play no part.
+    frequency_hz
+        Shape (n,) [Hz]; zero and above.
+
+    Returns
+    -------
+    Complex, shape (n, 4): x, y, z and p = y - z over U; time goes as exp(+i w t).
+
+    Raises
+    ------
+    ValueError
+        When a frequency is negative or not finite.
+
+    """
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
+        msg = "Frequencies must be one row of finite numbers, zero or positive, in Hz."
+        raise ValueError(msg)
+    omega = 2.0 * np.pi * frequency[:, None, None]
+    dynamic = (
+        specimen.stiffness_matrix - omega**2 * specimen.mass_matrix + 1j * omega * specimen.damping_matrix
+    )
+    forcing = np.zeros((len(frequency), 3, 1), dtype=np.complex128)
+    forcing[:, 0, 0] = specimen.stiffnesses[0] + 1j * omega[:, 0, 0] * specimen.dampings[0]
+    # In mass-normalised coordinates: a light mass beside a heavy one keeps all its digits.
+    root = np.sqrt(np.asarray(specimen.masses))
+    scaled = np.linalg.solve(dynamic / np.outer(root, root), forcing / root[:, None])
+    moved = (scaled[:, :, 0] / root).astype(np.complex128)
+    return np.column_stack([moved, moved[:, 1] - moved[:, 2]])
+
+
+class ModalForm(NamedTuple):
+    """Free motion of d displacements as s(t) = Re sum_j (rows_j . s0) shapes_j exp(rates_j t)."""
+
+    rates: Complex
+    """Shape (n,) [1/s]: one of each conjugate pair, and every real one; d <= n <= 2d."""
+    shapes: Complex
+    """Shape (n, 2d)."""
+    rows: Complex
+    """Shape (n, 2d): left eigenvectors, doubled for a pair."""
+
+
+COINCIDENT = 1e7
+"""Condition of the eigenvectors beyond which two modes count as one (critical damping to 14 digits)."""
+PROPORTIONAL = 1e-12
+"""Modal damping off the diagonal below this part of the largest is rounding: the undamped modes are modes."""
+CRITICAL = 1e-12
+"""abs(1 - damping ratio^2) below which a mode has no pair of distinct rates."""
+WIDEST = 1e10
+"""Ratio of natural frequencies beyond which double precision does not resolve the slowest mode."""
+REFUSAL = "Two modes coincide (critical damping): change a damping by 0.1 per cent."
+
+
+@lru_cache(maxsize=64)
+def modal_form(specimen: Specimen) -> ModalForm:
+    """Diagonalise the specimen without contact, for any damping; its arrays are not to be written to.
+
+    Raises ValueError as `diagonal_form`.
+    """
+    return diagonal_form(specimen.mass_matrix, specimen.stiffness_matrix, specimen.damping_matrix)
+
+
+def diagonal_form(mass: Table, stiffness: Table, damping: Table) -> ModalForm:
+    """Diagonalise M s'' + C s' + K s = 0 with a diagonal M.
+
+    The undamped modes come from a symmetric problem, whose vectors are orthogonal however near two
+    frequencies are. They stay modes where damping is proportional to the springs, or none.
+
+    Raises ValueError when two modes coincide (critical damping), for then no full set of modes exists, and
+    when natural frequencies lie too far apart.
+    """
+    root = np.sqrt(np.diag(mass))
+    try:
+        factor = np.linalg.cholesky(stiffness / np.outer(root, root))
+    except np.linalg.LinAlgError:
+        factor = np.zeros_like(stiffness)
+    # Singular values of the factor are frequencies: their squares would lose twice the digits of a slow mode.
+    modes, omega, _ = np.linalg.svd(factor)
+    modes, omega = modes[:, ::-1], omega[::-1]
+    if not WIDEST * omega[0] > omega[-1]:
+        msg = (
+            f"Natural frequencies from {omega[0]:.3g} to {omega[-1]:.3g} rad/s span more than double "
+            "precision resolves: give masses and stiffnesses closer to each other."
+        )
+        raise ValueError(msg)
+    losses = modes.T @ (damping / np.outer(root, root)) @ modes
+    shapes, rows = modes / root[:, None], (modes * root[:, None]).T
+    diagonal = np.diag(losses)
+    if np.max(np.abs(losses - np.diag(diagonal))) <= PROPORTIONAL * np.max(diagonal):
+        return _undamped_shapes(omega, diagonal, shapes, rows)
+    return _coupled_shapes(omega, losses, shapes, rows)
+
+
+def _undamped_shapes(omega: Vector, damping: Vector, shapes: Table, rows: Table) -> ModalForm:
+    """Rates, shapes and rows of q'' + damping q' + omega^2 q = 0 in every mode."""
+    parts = [part for mode in zip(omega, 0.5 * damping, shapes.T, rows, strict=True) for part in _mode(*mode)]
+    rates, moved, read = zip(*parts, strict=True)
+    return ModalForm(np.asarray(rates, np.complex128), np.array(moved), np.array(read))
+
+
+def _mode(omega: float, decay: float, shape: Vector, row: Vector) -> list[tuple[complex, Complex, Complex]]:
+    """Split one mode q = row.displacement into its terms: one of a pair, or two that do not oscillate."""
+    turn = (omega - decay) * (omega + decay)
+    if abs(turn) <= CRITICAL * omega**2:
+        raise ValueError(REFUSAL)
+    if turn > 0.0:
+        damped = math.sqrt(turn)
+        rate = complex(-decay, damped)
+        # q = Re(e exp(rate t)) with e = q0 - i (q0' + decay q0) / damped.
+        read = _state((1.0 - 1j * decay / damped) * row, -1j / damped * row)
+        return [(rate, _state(shape, rate * shape), read)]
+    fast = -decay - math.sqrt(-turn)
+    slow = omega**2 / fast
+    return [
+        (rate, _state(shape, rate * shape), _state(-other * row, row) / (rate - other))
+        for rate, other in ((slow, fast), (fast, slow))
+    ]
+
+
+def _state(displacement: NDArray[np.generic], velocity: NDArray[np.generic]) -> Complex:
+    return np.concatenate([displacement, velocity]).astype(np.complex128)
+
+
+def _coupled_shapes(omega: Vector, losses: Table, shapes: Table, rows: Table) -> ModalForm:
+    """Do as `_undamped_shapes` where damping couples the undamped modes."""
+    # In the coordinates q and q' / omega, fast modes beside slow ones do not make the condition large.
+    values, vectors = np.linalg.eig(
+        np.block(
+            [
+                [np.zeros_like(losses), np.diag(omega)],
+                [-np.diag(omega), -losses * omega[None, :] / omega[:, None]],
+            ]
+        )
+    )
+    if np.linalg.cond(vectors) > COINCIDENT:
+        raise ValueError(REFUSAL)
+    left = np.linalg.inv(vectors)
+    kept = values.imag >= 0.0
+    weights = np.where(values.imag[kept] > 0.0, 2.0, 1.0)[:, None]
+    size = len(omega)
+    moved = np.hstack([vectors.T[:, :size] @ shapes.T, vectors.T[:, size:] @ (shapes * omega).T])
+    read = np.hstack([left[:, :size] @ rows, left[:, size:] @ (rows / omega[:, None])])
+    # A passive structure does not grow: a positive real part is rounding.
+    rates = np.minimum(values.real[kept], 0.0) + 1j * values.imag[kept]
+    return ModalForm(
+        rates=rates.astype(np.complex128),
+        shapes=np.ascontiguousarray(moved[kept], dtype=np.complex128),
+        rows=np.ascontiguousarray(read[kept] * weights, dtype=np.complex128),
+    )
+
+
+def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tuple[Complex, complex]:
+    """Phasors of the steady motion without contact under U = amplitude sin(omega t).
+
+    Returns the motion S, shape (6,), s(t) = Re(S exp(i omega t)), and the base force, likewise [N].
+    """
+    base = -1j * amplitude_m
+    displacement = base_transmissibility(specimen, omega / (2.0 * np.pi))[0, :3] * base
+    force = (specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0]) * base
+    return np.concatenate([displacement, 1j * omega * displacement]), force

@@ -1,0 +1,118 @@
+"""Powers of p at every p: the continuous substitute of stops. SI units."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
+
+from .stops import (
+    HERTZ_EXPONENT,
+    PAPER_INDENTATION_M,
+    STRICT,
+    LawWord,
+    Reference,
+    Stops,
+    UnreadableLawError,
+    number_in,
+    require_positive,
+)
+
+MOST_TERMS = 6
+HIGHEST_EXPONENT = 1001
+"""Beyond it the law is a wall for every purpose: a part in a thousand of p changes the force by e."""
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """The continuous substitute of stops: F = sum force_i (p / reference)^exponent_i, at every p.
+
+    Held relative to a reference displacement, because a coefficient of p^47 in SI is 1e204 and overflows.
+    The gap plays no part in it (Gong et al. 2025, eq. 3).
+    """
+
+    OWN_UNITS: ClassVar = {"reference": "m"}
+
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
+    reference: float
+    """Displacement p at which the terms have the forces given [m]."""
+    terms: tuple[tuple[int, float], ...]
+    """(exponent, force [N]); exponents odd and ascending, forces positive."""
+    kind: Literal["power"] = "power"
+
+    def __post_init__(self) -> None:
+        require_positive("Reference displacement", self.reference, "m")
+        if not self.terms:
+            msg = "A power law without terms is not allowed: give one exponent or more."
+            raise ValueError(msg)
+        if len(self.terms) > MOST_TERMS:
+            msg = f"A power law of {len(self.terms)} terms is not allowed: at most {MOST_TERMS}."
+            raise ValueError(msg)
+        previous = 0
+        for exponent, force in self.terms:
+            if exponent % 2 == 0 or not max(previous, 1) < exponent <= HIGHEST_EXPONENT:
+                msg = (
+                    f"Exponents {[n for n, _ in self.terms]} are not allowed: "
+                    f"odd, ascending, from 3 to {HIGHEST_EXPONENT}."
+                )
+                raise ValueError(msg)
+            require_positive(f"Force of p^{exponent} at the reference", force, "N")
+            previous = exponent
+
+    @property
+    def stops(self) -> Stops:
+        """None: the force acts at every p, not at a stop."""
+        return Stops()
+
+
+def fitted_power_law(
+    exponents: Sequence[int],
+    contact_stiffness: float,
+    gap_m: float,
+    indentation_m: float = PAPER_INDENTATION_M,
+    shares: Sequence[float] | None = None,
+) -> PowerLaw:
+    """Fit a sum of powers to a Hertz contact as the paper does: equal force at p = gap + indentation.
+
+    Raises ValueError when an argument is not allowed.
+
+    Parameters
+    ----------
+    exponents
+        Odd, in any order: (5,) or (3, 5, 7).
+    contact_stiffness, gap_m, indentation_m
+        k_contact [N/m^1.5] of what is fitted, and where.
+    shares
+        Part of that force which each power takes; they must add up to 1. The paper leaves it open; the
+        default is equal parts.
+
+    """
+    parts = [1.0 / len(exponents)] * len(exponents) if shares is None else list(shares)
+    if len(parts) != len(exponents) or not math.isclose(sum(parts), 1.0, rel_tol=1e-9):
+        msg = f"Shares {parts} of exponents {list(exponents)} are not allowed: one each, adding up to 1."
+        raise ValueError(msg)
+    require_positive("Indentation of the fit", indentation_m, "m")
+    force = contact_stiffness * indentation_m**HERTZ_EXPONENT
+    terms = sorted((n, part * force) for n, part in zip(exponents, parts, strict=True))
+    return PowerLaw(gap_m + indentation_m, tuple(terms))
+
+
+def _made(detail: str, reference: Reference) -> PowerLaw:
+    """Fit powers, ``3+5+7`` in equal parts or ``3@0.2+7@0.8``; behind a colon the indentation."""
+    powers, _, indentation = detail.partition(":")
+    terms = [term.partition("@") for term in powers.split("+")]
+    try:
+        exponents = [int(exponent) for exponent, _, _ in terms]
+    except ValueError:
+        raise UnreadableLawError(detail) from None
+    is_equal = all(share == "" for _, _, share in terms)
+    shares = None if is_equal else [number_in(share) for _, _, share in terms]
+    at_m = number_in(indentation) if indentation else PAPER_INDENTATION_M
+    return fitted_power_law(exponents, reference.stiffness, reference.gap_m, at_m, shares)
+
+
+POWER = LawWord(
+    "power:3+5+7 or power:3@0.2+7@0.8[:M]", "odd powers of p instead of stops, with shares", "power:5", _made
+)

@@ -1,0 +1,36 @@
+"""Stops that do not yield. SI units."""
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
+
+from .stops import STRICT, LawWord, Reference, Stops, number_in
+
+
+@dataclass(frozen=True)
+class RigidStops:
+    """Stops that do not yield: m1 and m2 part with ``restitution`` times the speed of approach (Newton)."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = STRICT
+
+    restitution: float
+    """0 (they stay together) to 1 (nothing is lost)."""
+    kind: Literal["rigid"] = "rigid"
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.restitution <= 1.0:
+            msg = f"Restitution {self.restitution} is not allowed: it must lie in [0, 1]."
+            raise ValueError(msg)
+
+    @property
+    def stops(self) -> Stops:
+        """Numbers of the kernels."""
+        return Stops(restitution=float(self.restitution))
+
+
+def _made(detail: str, _reference: Reference) -> RigidStops:
+    return RigidStops(number_in(detail))
+
+
+RIGID = LawWord("rigid:0..1", "stops that do not yield, with a restitution", "rigid:0.8", _made)

@@ -1,0 +1,222 @@
+"""The 3-DOF vibro-impact specimen: masses, springs, dampers, gap and contact. SI units.
+
+The base displacement U moves m0 through (k0, c0); m2 hangs on m0 through (k2, c2); m1 hangs on m2
+through (k1, c1) and strikes stops on m2 where ``|p| = |y - z|`` reaches the gap. Coordinates are in
+the order (x, y, z), the absolute displacements of m0, m1, m2 (Gong et al. 2025, eq. 1).
+"""
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict
+
+from .contact_law import ContactLaw, model_named
+from .elasticity import Elasticity, hertz_stiffness
+
+Triple = tuple[float, float, float]
+Gaps = tuple[float, float]
+"""Clearances at negative and at positive p [m]; one of them may be infinite."""
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """What is shaken. Index i of a triple belongs to m_i, k_i, c_i of the paper."""
+
+    OWN_UNITS: ClassVar = {
+        "masses": "kg",
+        "stiffnesses": "N m-1",
+        "dampings": "N s m-1",
+        "mass_matrix": "kg",
+        "stiffness_matrix": "N m-1",
+        "damping_matrix": "N s m-1",
+    }
+    """Of values whose name says none."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
+
+    masses: Triple
+    """m0, m1, m2 [kg]."""
+    stiffnesses: Triple
+    """k0, k1, k2 [N/m]."""
+    dampings: Triple
+    """c0, c1, c2 [N s/m]; zero is allowed."""
+    gap_m: float
+    """Clearance between m1 and each stop at rest [m]; infinite for no stop at positive p."""
+    contact: ContactLaw
+    lower_gap_m: float | None = None
+    """Clearance of the stop at negative p where it differs; infinite for none there."""
+
+    def __post_init__(self) -> None:
+        _refuse_unless_positive("mass m", "kg", self.masses)
+        _refuse_unless_positive("stiffness k", "N/m", self.stiffnesses)
+        for index, damping in enumerate(self.dampings):
+            if not 0.0 <= damping < math.inf:
+                msg = f"Damping c{index} = {damping} N s/m is not allowed: it must be zero or positive."
+                raise ValueError(msg)
+        lower, upper = self.gaps_m
+        if not (lower > 0.0 and upper > 0.0 and min(lower, upper) < math.inf):
+            msg = (
+                f"Gap {self.gap_m if self.lower_gap_m is None else self.gaps_m} m is not allowed: "
+                "it must be positive, and one side finite; "
+                'for no stops at all give the contact "linear".'
+            )
+            raise ValueError(msg)
+
+    @property
+    def gaps_m(self) -> Gaps:
+        """Clearances of the stops at negative and at positive p, both positive [m]."""
+        return (self.gap_m if self.lower_gap_m is None else self.lower_gap_m), self.gap_m
+
+    @property
+    def mass_matrix(self) -> Matrix:
+        """M, shape (3, 3) [kg]."""
+        return np.diag(np.asarray(self.masses, dtype=np.float64))
+
+    @property
+    def stiffness_matrix(self) -> Matrix:
+        """K without contact, shape (3, 3) [N/m]."""
+        return _chain_matrix(self.stiffnesses)
+
+    @property
+    def damping_matrix(self) -> Matrix:
+        """C, shape (3, 3) [N s/m]."""
+        return _chain_matrix(self.dampings)
+
+    @property
+    def natural_frequencies_hz(self) -> NDArray[np.float64]:
+        """Undamped natural frequencies without contact, ascending, shape (3,) [Hz]."""
+        return _natural_frequencies(self.mass_matrix, self.stiffness_matrix)
+
+    @property
+    def bound_frequencies_hz(self) -> NDArray[np.float64]:
+        """Undamped natural frequencies with m1 stuck to m2, ascending, shape (2,) [Hz]."""
+        mass, _, stiffness = bound_matrices(self)
+        return _natural_frequencies(mass, stiffness)
+
+    @property
+    def damping_ratios(self) -> NDArray[np.float64]:
+        """Damping ratio of each mode without contact, in the order of its frequency, shape (3,).
+
+        ``-Re(s) / abs(s)`` of its pair of poles. Above 1 the mode does not oscillate.
+        """
+        root = np.sqrt(np.asarray(self.masses))
+        values, vectors = np.linalg.eigh(self.stiffness_matrix / np.outer(root, root))
+        damping = vectors.T @ (self.damping_matrix / np.outer(root, root)) @ vectors
+        own = np.diag(damping)
+        if np.all(np.abs(damping - np.diag(own)) <= _ROUNDING * np.max(own)):
+            return np.asarray(own / (2.0 * np.sqrt(values)), dtype=np.float64)
+        return _ratios_of_coupled_modes(np.diag(np.sqrt(values)), damping)
+
+
+_ROUNDING = 1e-12
+
+
+def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64]:
+    """Give the ratios of modes that the dampers couple: own frequencies [rad/s], modal damping [1/s]."""
+    poles = np.linalg.eigvals(np.block([[np.zeros_like(own), own], [-own, -damping]]))
+    still = np.sort(np.abs(poles[poles.imag == 0.0]))
+    # Of modes that do not oscillate the slowest pole belongs to the fastest: their product is the square of
+    # the mode's frequency, and their sum the damping.
+    pairs = list(zip(still[: still.size // 2], still[: still.size // 2 - 1 : -1], strict=True))
+    found = [(math.sqrt(slow * fast), 0.5 * (slow + fast) / math.sqrt(slow * fast)) for slow, fast in pairs]
+    found += [(abs(pole), -pole.real / abs(pole)) for pole in poles if pole.imag > 0.0]
+    return np.array([ratio for _, ratio in sorted(found)])
+
+
+JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
+"""(x, y, z) of a unit of x and of z while m1 sticks to m2."""
+
+
+def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
+    """Give M, C and K of the two bodies, x and z, that are left while m1 sticks to m2.
+
+    Returns
+    -------
+    tuple of ndarray
+        M [kg], C [N s/m] and K [N/m], each of shape (2, 2).
+
+    """
+    whole = specimen.mass_matrix, specimen.damping_matrix, specimen.stiffness_matrix
+    mass, damping, stiffness = (JOIN.T @ matrix @ JOIN for matrix in whole)
+    return mass, damping, stiffness
+
+
+PAPER_MASSES: Triple = (5.8e-3, 2.1e-3, 2.0e-3)
+"""Gong et al. 2025, section 2 [kg]."""
+PAPER_FREQUENCIES_HZ: Triple = (322.0, 100.0, 390.6)
+"""f0, f1, f2 of the single oscillators, k_i = m_i (2 pi f_i)^2; same place."""
+STEEL = Elasticity(206e9, 0.27)
+"""The sphere m1; same place."""
+ALUMINIUM = Elasticity(67e9, 0.3)
+"""The stops; same place."""
+PAPER_RADIUS_M = 4.4e-3
+"""As the paper says (2.1 g of steel would be 4.0 mm)."""
+
+
+def gong2025(
+    damping_time_s: float = 2e-5,
+    gap_m: float | Gaps = 45e-6,
+    contact: str = "hertz",
+) -> Specimen:
+    """Build the specimen of Gong et al. 2025, section 2.
+
+    Parameters
+    ----------
+    damping_time_s
+        c_i = damping_time_s * k_i [s]. The paper leaves it open; the default is the one reading
+        found under which both of its statements on chaos hold.
+    gap_m
+        Clearance at each stop [m], or (lower, upper); a power law is fitted at the nearer.
+    contact
+        ``"hertz"``: the paper's stops; ``"linear"``: none; ``"power:5"`` and others as
+        `vibench.sim.model` says.
+
+    Raises
+    ------
+    ValueError
+        When damping time, gap or contact law is not allowed.
+
+    """
+    if not 0.0 <= damping_time_s < math.inf:
+        msg = f"Damping time {damping_time_s} s is not allowed: it must be zero or positive."
+        raise ValueError(msg)
+    stiffness = hertz_stiffness(STEEL, ALUMINIUM, PAPER_RADIUS_M)
+    if isinstance(gap_m, tuple) and len(gap_m) != len(("lower", "upper")):
+        msg = f"Gap {gap_m} m is not allowed: give one clearance, or (lower, upper)."
+        raise ValueError(msg)
+    lower, upper = gap_m if isinstance(gap_m, tuple) else (None, gap_m)
+    law = model_named(contact, stiffness, upper if lower is None else min(lower, upper))
+    m0, m1, m2 = PAPER_MASSES
+    f0, f1, f2 = PAPER_FREQUENCIES_HZ
+    k0, k1, k2 = (m * (2.0 * math.pi * f) ** 2 for m, f in ((m0, f0), (m1, f1), (m2, f2)))
+    return Specimen(
+        masses=PAPER_MASSES,
+        stiffnesses=(k0, k1, k2),
+        dampings=(damping_time_s * k0, damping_time_s * k1, damping_time_s * k2),
+        gap_m=upper,
+        contact=law,
+        lower_gap_m=lower,
+    )
+
+
+def _refuse_unless_positive(name: str, unit: str, values: Triple) -> None:
+    for index, value in enumerate(values):
+        if not 0.0 < value < math.inf:
+            msg = f"The {name}{index} = {value} {unit} is not allowed: it must be positive and finite."
+            raise ValueError(msg)
+
+
+def _chain_matrix(links: Triple) -> Matrix:
+    """Symmetric matrix of the links base-m0 (0), m2-m1 (1), m0-m2 (2) in (x, y, z)."""
+    c0, c1, c2 = links
+    return np.array([[c0 + c2, 0.0, -c2], [0.0, c1, -c1], [-c2, -c1, c1 + c2]])
+
+
+def _natural_frequencies(mass: Matrix, stiffness: Matrix) -> NDArray[np.float64]:
+    root = np.sqrt(np.diag(mass))
+    values = np.linalg.eigvalsh(stiffness / np.outer(root, root))
+    return np.asarray(np.sqrt(values) / (2.0 * np.pi), dtype=np.float64)

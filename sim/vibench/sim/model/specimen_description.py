@@ -1,0 +1,415 @@
+"""A specimen as data: its numbers, in a file or in a table of another file, and where they come from.
+
+A description says everything of a specimen; nothing in it is assumed. It may start from another one
+(``model``, by name or by path) and say what differs, as the tables of rigs, studies and imports do.
+"""
+
+import math
+import reprlib
+import tomllib
+import warnings
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    ValidationError,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_serializer,
+    field_validator,
+    model_validator,
+)
+
+from .contact_law import model_named
+from .elasticity import Elasticity, hertz_stiffness
+from .frozen_model import FrozenModel
+from .specimen import Gaps, Specimen, Triple
+from .toml_table import fault_in_words, toml_table
+
+BASE = "model"
+"""Key of the described specimen that a table starts from."""
+FOLDER = "folder"
+"""Key of a validation's context: the folder that a path in ``model`` is relative to, given by whoever reads a
+file. Without it only shipped specimens can be named, so that what stands in a recording opens no file."""
+SOURCES = "sources"
+SUFFIX = ".toml"
+FORMAT, VERSION = "format_version", 1
+"""Key by which a file may say which version it was written for, and the one that is read."""
+DEEPEST = 5
+"""Files that a file may start from, one after the other."""
+USUAL_SPECIMEN = "gong2025"
+"""The specimen of a rig, a study or a command that names none."""
+ALTERNATIVES = (("single_frequencies_hz", "stiffnesses_n_per_m"), ("damping_time_s", "dampings_ns_per_m"))
+"""Pairs of keys that say the same: a specimen has one of each."""
+_ANY_GAP_M = 1e-5
+"""For asking whether a contact law is known, which depends on no gap."""
+PositiveTriple = tuple[PositiveFloat, PositiveFloat, PositiveFloat]
+NonNegativeTriple = tuple[NonNegativeFloat, NonNegativeFloat, NonNegativeFloat]
+
+
+class UnknownSpecimenError(ValueError):
+    """A specimen that is not shipped, or a file that describes none."""
+
+
+class SpecimenWarning(UserWarning):
+    """Springs or dampings that change because other numbers of a specimen were replaced."""
+
+
+class _Described(FrozenModel):
+    model_config = ConfigDict(ser_json_inf_nan="strings")
+
+
+class Material(_Described):
+    """How stiff a body is."""
+
+    youngs_modulus_pa: PositiveFloat
+    """E."""
+    poissons_ratio: Annotated[float, Field(gt=-1.0, le=0.5)]
+    """Lateral over axial strain."""
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """The same for a contact."""
+        return Elasticity(self.youngs_modulus_pa, self.poissons_ratio)
+
+
+class SphereOnPlane(_Described):
+    """Two bodies that touch: k = 4/3 E* sqrt(R), Johnson, Contact Mechanics (1985), eq. 4.23."""
+
+    radius_m: PositiveFloat
+    """Of the sphere at the point that touches."""
+    sphere: Material
+    plane: Material
+
+    @property
+    def stiffness(self) -> float:
+        """K of F = k d^(3/2) [N/m^1.5]."""
+        return hertz_stiffness(self.sphere.elasticity, self.plane.elasticity, self.radius_m)
+
+
+def _known_law(word: str) -> str:
+    model_named(word, 1.0, _ANY_GAP_M)
+    return word
+
+
+ContactWord = Annotated[str, AfterValidator(_known_law)]
+"""A contact law as `CONTACT_LAWS` spells it: ``hertz``, ``rigid:0.8``, ``power:3+5+7``."""
+
+
+def _infinity(said: object) -> object:
+    """Read the word that stands for an infinite gap in JSON, which has no such number."""
+    return math.inf if said in ("inf", "Infinity") else said
+
+
+Gap = Annotated[float, Field(gt=0.0, allow_inf_nan=True), BeforeValidator(_infinity)]
+DampingTime = Annotated[float, Field(ge=0.0, le=1.0)]
+"""Damping over stiffness [s]; the longest is 300 times critical in the paper's first mode. Far beyond, runs
+take minutes, or their numbers leave those of a computer."""
+
+
+class SpecimenDescription(_Described):
+    """Three masses in a chain, base - m0 - m2 - m1, with stops for m1 on m2 (Gong et al. 2025, eq. 1).
+
+    Fewer or more masses, other places for the stops, springs that harden by themselves, friction and
+    several pairs of stops are not described.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    """How the specimen is called in results."""
+    about: str = ""
+    """What it is, in a line."""
+    masses_kg: PositiveTriple
+    """m0, m1, m2."""
+    single_frequencies_hz: PositiveTriple | None = None
+    """f0, f1, f2 of each mass on its own spring: k_i = m_i (2 pi f_i)^2; instead of the stiffnesses."""
+    stiffnesses_n_per_m: PositiveTriple | None = None
+    """k0 (base to m0), k1 (m2 to m1), k2 (m0 to m2)."""
+    damping_time_s: DampingTime | None = None
+    """c_i = damping time * k_i; instead of the dampings."""
+    dampings_ns_per_m: NonNegativeTriple | None = None
+    """c0, c1, c2, beside k0, k1, k2."""
+    gap_m: Gap | tuple[Gap, Gap]
+    """Clearance between m1 and each stop at rest, or (lower, upper) at negative and at positive p = y - z;
+    infinite for a side without a stop."""
+    contact: ContactWord
+    """Law of the stops: hertz, linear (no stops), linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, ..."""
+    hertz_stiffness: PositiveFloat | SphereOnPlane
+    """k of F = k d^(3/2) at a stop [N/m^1.5], or the bodies that touch; what other laws are fitted to."""
+    sources: dict[str, str] = Field(default={})
+    """Where a number comes from, by its key."""
+    _meant: ClassVar[Mapping[str, str]] = {}
+    """What a table says that does not say it."""
+
+    def __hash__(self) -> int:
+        # A table of sources has no hash of its own; all that is said is in the text.
+        return hash(self.model_dump_json())
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_its_base(cls, said: object, info: ValidationInfo) -> object:
+        """Fill in what a table leaves to the specimen that it names; a name alone is that specimen."""
+        folder: Path | None = (info.context or {}).get(FOLDER)
+        match said:
+            case str():
+                return _complete({BASE: said}, folder)
+            case Mapping():
+                return _complete({**cls._meant, **said}, folder)
+            case _:
+                return said
+
+    @field_validator("gap_m", mode="wrap")
+    @classmethod
+    def _one_clearance_or_two(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
+        try:
+            return handler(said)
+        except ValidationError as error:
+            raise ValueError("it must be a number above 0 [m], or [lower, upper]") from error
+
+    @field_validator("hertz_stiffness", mode="wrap")
+    @classmethod
+    def _number_or_bodies(cls, said: object, handler: ValidatorFunctionWrapHandler) -> object:
+        """Say what is wrong in the bodies, where bodies are given: pydantic complains of a number first."""
+        try:
+            return handler(said)
+        except ValidationError as error:
+            fault = max(error.errors(), key=lambda each: len(each["loc"]))
+            within = ".".join(str(part) for part in fault["loc"][1:])
+            said = f"{within} is missing" if fault["type"] == "missing" else fault_in_words(fault)
+            raise ValueError(f"{within}: {said}" if within and within not in said else said) from error
+
+    @field_serializer("gap_m", when_used="json")
+    def _without_infinity(self, gap_m: float | Gaps) -> float | list[float | str]:
+        """Write an infinite clearance as a word: JSON has no number for it, whatever holds the specimen."""
+        if isinstance(gap_m, float):
+            return gap_m
+        return [gap if math.isfinite(gap) else str(gap) for gap in gap_m]
+
+    @model_validator(mode="after")
+    def _says_each_thing_once(self) -> Self:
+        for pair in ALTERNATIVES:
+            said = [key for key in pair if getattr(self, key) is not None]
+            if len(said) != 1:
+                have = "both are" if said else "neither is"
+                raise ValueError(f"{' and '.join(pair)} say the same, and {have} given; give one of them")
+        unknown = sorted(self.sources.keys() - type(self).model_fields.keys())
+        if unknown:
+            raise ValueError(f"sources names {unknown[0]!r}, which is no key of a specimen")
+        try:
+            with np.errstate(all="ignore"):
+                moves = self.specimen().natural_frequencies_hz
+        except ArithmeticError:
+            moves = np.array([math.nan])
+        if not bool(np.all(np.isfinite(moves))):
+            raise ValueError("its masses and springs are too small, or too large, to be computed with")
+        return self
+
+    def specimen(
+        self,
+        contact: str | None = None,
+        damping_time_s: float | None = None,
+        gap_m: float | Gaps | None = None,
+    ) -> Specimen:
+        """Build the specimen, with another contact law, damping or gap where one is given.
+
+        Parameters
+        ----------
+        contact
+            A word of `CONTACT_LAWS`, with its numbers.
+        damping_time_s
+            c_i = damping_time_s * k_i [s].
+        gap_m
+            Clearance at both stops [m], or (lower, upper). A power law is fitted at the nearer one.
+
+        Raises
+        ------
+        ValueError
+            In one sentence, when a number or the law is not allowed.
+
+        """
+        gap = self.gap_m if gap_m is None else gap_m
+        lower, upper = gap if isinstance(gap, tuple) else (None, gap)
+        nearest = upper if lower is None else min(lower, upper)
+        return Specimen(
+            masses=self.masses_kg,
+            stiffnesses=self.stiffnesses,
+            dampings=self._dampings(damping_time_s),
+            gap_m=upper,
+            contact=model_named(self.contact if contact is None else contact, self.hertz_k, nearest),
+            lower_gap_m=lower,
+        )
+
+    @property
+    def stiffnesses(self) -> Triple:
+        """k0, k1, k2 [N/m]."""
+        if self.stiffnesses_n_per_m is not None:
+            return self.stiffnesses_n_per_m
+        assert self.single_frequencies_hz is not None, "one of the two is given"
+        k0, k1, k2 = (
+            m * (2.0 * math.pi * f) ** 2
+            for m, f in zip(self.masses_kg, self.single_frequencies_hz, strict=True)
+        )
+        return k0, k1, k2
+
+    @property
+    def hertz_k(self) -> float:
+        """K of F = k d^(3/2) at a stop [N/m^1.5]."""
+        return (
+            self.hertz_stiffness
+            if isinstance(self.hertz_stiffness, float)
+            else self.hertz_stiffness.stiffness
+        )
+
+    def _dampings(self, damping_time_s: float | None) -> Triple:
+        time_s = self.damping_time_s if damping_time_s is None else damping_time_s
+        if time_s is None:
+            assert self.dampings_ns_per_m is not None, "one of the two is given"
+            return self.dampings_ns_per_m
+        if not 0.0 <= time_s < math.inf:
+            msg = f"Damping time {time_s} s is not allowed: it must be zero or positive."
+            raise ValueError(msg)
+        k0, k1, k2 = self.stiffnesses
+        return time_s * k0, time_s * k1, time_s * k2
+
+
+class SpecimenTable(SpecimenDescription):
+    """A specimen in a rig, a study or an import: what differs from the one that it names, or the paper's."""
+
+    _meant = MappingProxyType({BASE: USUAL_SPECIMEN})
+
+
+def usual_specimen() -> SpecimenTable:
+    """Give the specimen that is meant where none is named: the paper's."""
+    return SpecimenTable.model_validate(USUAL_SPECIMEN)
+
+
+def load_specimen(specimen: str | Path) -> SpecimenDescription:
+    """Read a described specimen: the name of a shipped one, or the path of a TOML file.
+
+    Raises
+    ------
+    UnknownSpecimenError
+        In one sentence, when there is none, or when the file does not describe one.
+
+    """
+    try:
+        return SpecimenDescription.model_validate(str(specimen), context={FOLDER: Path()})
+    except ValidationError as error:
+        raise UnknownSpecimenError(_complaint(str(specimen), error)) from error
+
+
+def shipped_specimens() -> Mapping[str, SpecimenDescription]:
+    """Give the specimens that come with vibench, by the names that may stand for a file."""
+    return {name: SpecimenDescription.model_validate(name) for name in _shipped()}
+
+
+def _complete(table: dict[str, Any], folder: Path | None, depth: int = 0) -> dict[str, Any]:
+    """Lay a table over the specimen that it starts from, and that over its own."""
+    if BASE not in table:
+        return table
+    if depth > DEEPEST:
+        raise ValueError(f"a specimen starts from {table[BASE]!r}, which comes back to it; name another one")
+    specimen = str(table.pop(BASE))
+    known = _shipped()
+    if specimen in known:
+        return _laid_over(_complete(tomllib.loads(known[specimen]), None, depth + 1), table)
+    names, called = ", ".join(known), reprlib.repr(specimen)
+    if folder is None:
+        raise ValueError(f"no specimen that comes with vibench is called {called}; there are {names}")
+    path = folder / specimen
+    try:
+        is_there = path.exists()
+    except OSError:  # no file can have such a name
+        is_there = False
+    if not is_there:
+        raise ValueError(
+            f"no specimen is called {called}, and there is no such file; give the path of a TOML file, "
+            f"or one of {names}"
+        )
+    return _laid_over(_complete(_of_this_version(path), path.parent, depth + 1), table)
+
+
+def _of_this_version(path: Path) -> dict[str, Any]:
+    """Read a file, which may say the version that it was written for."""
+    said = toml_table(path)
+    written = said.pop(FORMAT, VERSION)
+    if isinstance(written, bool) or written != VERSION:
+        raise ValueError(
+            f"{path}: {FORMAT} = {reprlib.repr(written)} is not a version that this vibench reads, "
+            f"{VERSION}; a later vibench wrote it: install that one"
+        )
+    return said
+
+
+@cache
+def _shipped() -> Mapping[str, str]:
+    """Text of each specimen that comes with vibench, by its name."""
+    found = [each for each in (files("vibench.sim") / "specimens").iterdir() if each.name.endswith(SUFFIX)]
+    return {
+        each.name.removesuffix(SUFFIX): each.read_text("utf-8")
+        for each in sorted(found, key=lambda each: each.name)
+    }
+
+
+def _laid_over(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace what is said anew; the other of two keys that say the same goes, and so do its sources."""
+    replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
+    kept = {key: value for key, value in base.items() if key not in replaced}
+    _warn_of_changes(base, {**kept, **said}, said)
+    old, new = base.get(SOURCES, {}), said.get(SOURCES, {})
+    if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
+        return {**kept, **said}
+    return {**kept, **said, SOURCES: {**{key: old[key] for key in old if key not in replaced}, **new}}
+
+
+def _warn_of_changes(base: Mapping[str, Any], made: Mapping[str, Any], said: Mapping[str, Any]) -> None:
+    """Warn of springs and dampings that are not given, and follow from what is."""
+    changed = {key: value for key, value in made.items() if key in _KEYS and key != SOURCES}
+    try:
+        before, now = (SpecimenDescription.model_validate(each).specimen() for each in (base, changed))
+    except ValidationError:  # the specimen is refused elsewhere
+        return
+    for name, (kept, direct) in zip(("stiffnesses", "dampings"), ALTERNATIVES, strict=True):
+        old, new = getattr(before, name), getattr(now, name)
+        if not (said.keys() & {kept, direct} or np.allclose(old, new, rtol=1e-4, atol=0.0)):
+            warnings.warn(
+                f"{made['name']}: {name} changed from {_listed(old)} to {_listed(new)}, because {kept} was "
+                f"kept; give {direct} = {_listed(old)} to keep them, or {kept} = {made[kept]} to confirm "
+                "the change",
+                SpecimenWarning,
+                stacklevel=2,
+            )
+
+
+def _listed(numbers: Triple) -> str:
+    return f"[{', '.join(f'{each:.6g}' for each in numbers)}]"
+
+
+def _complaint(specimen: str, error: ValidationError) -> str:
+    """Say the first fault: the key, what was given, and what is allowed."""
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"] if isinstance(part, int) or part in _KEYS)
+    said = fault_in_words(first)
+    match first["type"]:
+        case "missing":
+            fault = f"{key} is missing"
+        case "extra_forbidden":
+            fault = f"{first['loc'][-1]} is no key of a specimen; there are {', '.join(sorted(_KEYS))}"
+        case _ if key:
+            fault = f"{key} = {reprlib.repr(first['input'])}: {said}"
+        case _:
+            return said if specimen in said else f"{specimen}: {said}"
+    return f"{specimen} describes no specimen: {fault}"
+
+
+_KEYS = frozenset(SpecimenDescription.model_fields)

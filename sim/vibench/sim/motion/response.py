@@ -1,0 +1,143 @@
+"""Responses I and II of a specimen under one harmonic drive, observed while it runs. SI units."""
+
+import math
+from dataclasses import dataclass
+
+from numpy.typing import ArrayLike
+
+from ..engine.run import NativeRun, RunRecord, Watch, most_impacts
+from ..kernels.arrays import Floats
+from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.drive import Harmonic
+from ..model.outcome import Outcome
+from ..model.specimen import Specimen
+from ..model.word import chosen
+from .integrate import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
+
+WHOLE = 1e-9
+"""A window this close to a whole number of periods is taken for it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """What one point of a response curve says. NaN where the run did not reach its end."""
+
+    drive: Harmonic
+    accuracy: Accuracy
+    duration_s: float
+    window_s: float
+    """The largest values are taken over this long before the end."""
+    line_periods: int
+    """The lines, over this many whole drive periods before the end: the most that the window holds."""
+    largest_x_m: float
+    """Response I of m0, not normalised."""
+    largest_p_m: float
+    """Response I of p = y - z, not normalised."""
+    line_x_m: complex
+    """x = Re(line_x_m * exp(i (omega t + phase))) at the drive frequency; the drive itself is -i A0."""
+    line_p_m: complex
+    """The same of p."""
+    impacts: int
+    """Contacts that began within the window."""
+    impacts_before: int
+    """Contacts that began before the window."""
+    line_start_state: Floats
+    """x, y, z, vx, vy, vz where the lines begin, shape (6,)."""
+    final_state: Floats
+    """x, y, z, vx, vy, vz at the end, shape (6,): where the next point of a sweep may start."""
+    outcome: Outcome
+
+    @property
+    def response_i(self) -> float:
+        """Largest abs(x) over the window, over the drive amplitude."""
+        return self.largest_x_m / self.drive.amplitude_m
+
+    @property
+    def response_ii(self) -> float:
+        """Amplitude of x at the drive frequency, over the drive amplitude."""
+        return abs(self.line_x_m) / self.drive.amplitude_m
+
+    @property
+    def relative_i(self) -> float:
+        """Largest abs(p) over the window, over the drive amplitude."""
+        return self.largest_p_m / self.drive.amplitude_m
+
+    @property
+    def relative_ii(self) -> float:
+        """Amplitude of p at the drive frequency, over the drive amplitude."""
+        return abs(self.line_p_m) / self.drive.amplitude_m
+
+
+def steady_response(
+    specimen: Specimen,
+    drive: Harmonic,
+    accuracy: Accuracy | AccuracyWord = Accuracy.STANDARD,
+    duration_s: float = 30.0,
+    window_s: float = 5.0,
+    initial_state: ArrayLike | None = None,
+    *,
+    max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
+) -> Response:
+    """Drive a specimen for a while and say how large its motion is at the end.
+
+    The defaults are those of Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed. In
+    chaos Response I is one draw from a scatter of a few per cent, whatever the accuracy; the state
+    that is reached may depend on the ``initial_state``, shape (6,) [m, m/s], which therefore belongs to
+    the record.
+
+    Raises ValueError when the drive has no amplitude, or the window is longer than the run or shorter
+    than one drive period.
+    """
+    accuracy = chosen(Accuracy, accuracy)
+    periods = whole_periods(drive, duration_s, window_s)
+    check_impact_rate(max_impact_rate_hz)
+    run = NativeRun(specimen, drive, start_motion(initial_state), accuracy.tolerance)
+    record = RunRecord(most_impacts(max_impact_rate_hz, duration_s))
+    line_s = periods / drive.frequency_hz
+    outcome = run.advance(float(duration_s - window_s), record)
+    before, line_start = record.impacts, run.motion
+    for watch, until in ((Watch.PEAKS, duration_s - line_s), (Watch.PEAKS_AND_LINES, float(duration_s))):
+        if outcome is Outcome.REACHED_END:
+            line_start = run.motion
+            record.watch(watch)
+            outcome = run.advance(until, record)
+    # A line is the mean of twice the motion against the drive.
+    scale = 2.0 / line_s if outcome is Outcome.REACHED_END else math.nan
+    peaks = (record.peak_x_m, record.peak_p_m) if outcome is Outcome.REACHED_END else (math.nan, math.nan)
+    return Response(
+        drive=drive,
+        accuracy=accuracy,
+        duration_s=duration_s,
+        window_s=window_s,
+        line_periods=periods,
+        largest_x_m=peaks[0],
+        largest_p_m=peaks[1],
+        line_x_m=scale * record.area_x,
+        line_p_m=scale * record.area_p,
+        impacts=record.impacts - before,
+        impacts_before=before,
+        line_start_state=line_start,
+        final_state=run.motion,
+        outcome=outcome,
+    )
+
+
+def whole_periods(drive: Harmonic, duration_s: float, window_s: float) -> int:
+    """Refuse what cannot be observed; count the whole periods in the window."""
+    if drive.amplitude_m == 0.0:
+        msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
+        raise ValueError(msg)
+    if not 0.0 < duration_s < math.inf:
+        msg = f"Duration {duration_s} s is not allowed: it must be positive and finite."
+        raise ValueError(msg)
+    if not 0.0 < window_s <= duration_s:
+        msg = f"Window {window_s} s is not allowed: it must be positive and within the run of {duration_s} s."
+        raise ValueError(msg)
+    periods = math.floor(window_s * drive.frequency_hz * (1.0 + WHOLE))
+    if periods < 1:
+        msg = (
+            f"Window {window_s} s is not allowed at {drive.frequency_hz} Hz: "
+            f"it must hold one drive period, {1.0 / drive.frequency_hz} s."
+        )
+        raise ValueError(msg)
+    return periods

@@ -1,0 +1,264 @@
+"""Follow any family of periodic motions along a parameter, and gather what is on the way into a branch."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..kernels.arrays import Vector
+from ..model.drive import Harmonic
+from .branch import POINTWISE, BifurcationKind, Branch, BranchEvent, Parameter
+from .continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace
+from .drive_path import DrivePath
+from .orbit_events import OrbitSigns, bifurcations_between, is_joined, sign_of
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitReport:
+    """What a branch keeps of one point."""
+
+    frequency_hz: float
+    amplitude_m: float
+    response_i: Vector
+    """Shape (n + 1,)."""
+    response_ii: Vector
+    """Shape (n + 1,)."""
+    state: Vector
+    """Displacements and velocities at the drive's time zero, shape (2 n,)."""
+    signs: OrbitSigns
+    left_out: float
+
+
+class Family(Curve, Protocol):
+    """A curve whose points are periodic motions."""
+
+    @property
+    def path(self) -> DrivePath:
+        """Along which the drive changes."""
+        ...
+
+    @property
+    def tolerance(self) -> float:
+        """Largest error estimate that a point may have."""
+        ...
+
+    def report(self, point: Vector) -> OrbitReport:
+        """Describe the motion at a point."""
+        ...
+
+    def refined(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
+        """Give the family at a higher resolution, with a point and a tangent carried over to it.
+
+        None when this is the highest.
+        """
+        ...
+
+
+@dataclass
+class _Gathered:
+    reports: list[OrbitReport]
+    events: list[BranchEvent]
+
+    def add_event(self, kind: BifurcationKind, report: OrbitReport) -> None:
+        last = len(self.reports) - 1
+        self.events.append(BranchEvent(kind, report.frequency_hz, report.amplitude_m, report.state, last))
+
+
+RANGE_LENGTH = 10.0
+"""The parameter's range counts as this many units of length, the gap or the spring's length scale as one."""
+
+
+def branch_range(
+    parameter: Parameter, frequency_hz: float, amplitude_m: float, stop: float
+) -> tuple[float, float]:
+    """Give the value at which a branch to ``stop`` starts, and how much of it is a unit of length [Hz, m]."""
+    value = {Parameter.FREQUENCY: frequency_hz, Parameter.AMPLITUDE: amplitude_m}[parameter]
+    if not 0.0 < stop < math.inf or stop == value:
+        msg = f"A branch from {value} to {stop} is not allowed: positive, and two different ends."
+        raise ValueError(msg)
+    return value, abs(stop - value) / RANGE_LENGTH
+
+
+def parameter_value(path: DrivePath, drive: Harmonic) -> float:
+    """Read where on a path a drive lies [Hz, or m]."""
+    return drive.frequency_hz if path.parameter is Parameter.FREQUENCY else drive.amplitude_m
+
+
+def range_scale(low: float, high: float, value: float) -> float:
+    """Give how much of a range [Hz, or m] is a unit of length."""
+    if not 0.0 < low < high < math.inf or not low <= value <= high:
+        msg = f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
+        raise ValueError(msg)
+    return (high - low) / RANGE_LENGTH
+
+
+def follow(
+    family: Family, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
+) -> Branch:
+    """Follow a family from a point on it; the resolution rises where the error estimate asks for it.
+
+    Parameters
+    ----------
+    family
+        At the resolution to begin with.
+    start
+        On the family.
+    toward, bounds
+        Sign of the first step, and range, of the family's scaled parameter.
+    steps
+        Lengths and tolerances.
+
+    """
+    gathered = _Gathered([], [])
+    parameter = family.path.parameter
+    while True:
+        end, last = _follow_at(family, start, toward, bounds, steps, gathered)
+        if end is not None:
+            return _branch(gathered, parameter, end)
+        refined = family.refined(last.point, last.tangent)
+        if refined is None:
+            return _lost(gathered, parameter)
+        finer, guess, normal = refined
+        point, iterations = correct(finer, guess, normal / np.linalg.norm(normal), steps.tolerance)
+        if iterations == 0:
+            return _lost(gathered, parameter)
+        family, start, toward = finer, point, float(last.tangent[-1])
+
+
+NEARLY_GRAZING = 0.01
+"""A branch lost with a contact this close to beginning or ending, over the gap, is lost by grazing."""
+
+
+def _lost(gathered: _Gathered, parameter: Parameter) -> Branch:
+    """End a branch that no step goes on from; at a rigid stop grazing does that, and is named."""
+    if gathered.reports[-1].signs.grazing_distance < NEARLY_GRAZING:
+        gathered.add_event(BifurcationKind.GRAZING, gathered.reports[-1])
+    return _branch(gathered, parameter, ArcEnd.STEP_TOO_SHORT)
+
+
+def follow_both_ways(family: Family, start: Vector, bounds: tuple[float, float], steps: ArcSteps) -> Branch:
+    """Follow a family from a point on it to both ends; a branch that closes on itself, once round."""
+    onward = follow(family, start, 1.0, bounds, steps) if start[-1] < bounds[1] else None
+    if onward is not None and onward.end is ArcEnd.CLOSED:
+        return replace(onward, begin=ArcEnd.CLOSED)
+    back = follow(family, start, -1.0, bounds, steps) if start[-1] > bounds[0] else None
+    if back is None or onward is None:
+        whole = onward or back
+        assert whole is not None
+        return replace(whole, begin=ArcEnd.REACHED_BOUND)
+    return _joined(back, onward)
+
+
+def _joined(back: Branch, onward: Branch) -> Branch:
+    """Turn one branch round and put it before another that begins at the same point."""
+    before = len(back.frequencies_hz) - 1
+    arrays: dict[str, Any] = {
+        name: np.concatenate([getattr(back, name)[:0:-1], getattr(onward, name)]) for name in POINTWISE
+    }
+    events = (
+        *(replace(each, index=max(before - 1 - each.index, 0)) for each in reversed(back.events)),
+        *(replace(each, index=before + each.index) for each in onward.events),
+    )
+    return replace(onward, **arrays, events=events, begin=back.end)
+
+
+def _follow_at(
+    family: Family,
+    start: Vector,
+    toward: float,
+    bounds: tuple[float, float],
+    steps: ArcSteps,
+    gathered: _Gathered,
+) -> tuple[ArcEnd | None, ArcPoint]:
+    """Follow at one resolution; gives why the branch ended (None: a finer one should go on), and where."""
+    points = trace(family, start, toward, bounds, steps)
+    before = next(points)
+    first = family.report(before.point)
+    signs = first.signs
+    if not gathered.reports:
+        # Elsewhere the point at which a finer resolution took over is known already.
+        gathered.reports.append(first)
+    for here in points:
+        if here.end is ArcEnd.STEP_TOO_SHORT:
+            return None, here
+        report = family.report(here.point)
+        if is_joined(signs, report.signs) and not here.is_fold:
+            _add_joined(family, before, here, signs, steps, gathered)
+            return ArcEnd.JOINED, here
+        if here.is_fold:
+            gathered.add_event(BifurcationKind.FOLD, report)
+            continue
+        if report.left_out > family.tolerance and family.refined(before.point, before.tangent) is not None:
+            return None, before
+        if here.end is ArcEnd.TOO_MANY_POINTS:
+            return here.end, here
+        for kind in bifurcations_between(signs, report.signs):
+            _add_located(family, before, here, kind, signs, steps, gathered)
+        gathered.reports.append(report)
+        if here.end is not None:
+            return here.end, here
+        before, signs = here, report.signs
+    return ArcEnd.TOO_MANY_POINTS, before
+
+
+def _add_joined(
+    family: Family,
+    before: ArcPoint,
+    after: ArcPoint,
+    signs: OrbitSigns,
+    steps: ArcSteps,
+    gathered: _Gathered,
+) -> None:
+    """End a branch on the simpler motion through which it would turn into its own twin."""
+
+    def measure(point: ArcPoint) -> float:
+        return float(family.report(point.point).signs.apart @ signs.apart)
+
+    found = locate(family, before, after, measure, steps.tolerance) or before
+    report = family.report(found.point)
+    last = len(gathered.reports) - 1
+    gathered.events[:] = [
+        each for each in gathered.events if not (each.kind is BifurcationKind.FOLD and each.index == last)
+    ]
+    assert signs.joins is not None
+    gathered.add_event(signs.joins, report)
+    gathered.reports.append(report)
+
+
+def _add_located(
+    family: Family,
+    before: ArcPoint,
+    after: ArcPoint,
+    kind: BifurcationKind,
+    signs: OrbitSigns,
+    steps: ArcSteps,
+    gathered: _Gathered,
+) -> None:
+    def measure(point: ArcPoint) -> float:
+        return sign_of(kind, family.report(point.point).signs, signs)
+
+    found = locate(family, before, after, measure, steps.tolerance)
+    if found is None:
+        return
+    report = family.report(found.point)
+    if kind is BifurcationKind.NEIMARK_SACKER and not report.signs.has_pair_on_circle:
+        return
+    gathered.add_event(kind, report)
+
+
+def _branch(gathered: _Gathered, parameter: Parameter, end: ArcEnd) -> Branch:
+    reports = gathered.reports
+    return Branch(
+        parameter=parameter,
+        frequencies_hz=np.array([r.frequency_hz for r in reports]),
+        amplitudes_m=np.array([r.amplitude_m for r in reports]),
+        response_i=np.array([r.response_i for r in reports]),
+        response_ii=np.array([r.response_ii for r in reports]),
+        states=np.array([r.state for r in reports]),
+        multipliers=np.array([r.signs.over_period for r in reports]),
+        left_out=np.array([r.left_out for r in reports]),
+        contacts=np.array([r.signs.contacts for r in reports], dtype=np.int64),
+        events=tuple(gathered.events),
+        end=end,
+    )

@@ -1,0 +1,340 @@
+"""Follow a curve of solutions through its folds: pseudo-arclength continuation.
+
+n equations in n unknowns and one parameter, r(u, lambda) = 0, define a curve in n + 1 dimensions. Step
+along its tangent, then correct across it (Keller 1977; Allgower and Georg, Introduction to Numerical
+Continuation Methods, SIAM 2003, chapters 2, 6 and 9): a fold is a point like any other, found where the
+tangent's last component changes sign. Unknowns and parameter should be scaled to the order of one.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+
+from ..kernels.arrays import Table, Vector
+
+
+class Curve(Protocol):
+    """Equations whose solutions are followed."""
+
+    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+        """Give r, shape (n,), and dr/dpoint, shape (n, n + 1), at (u, lambda), shape (n + 1,).
+
+        Not finite where the equations cannot be evaluated.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ArcSteps:
+    """How finely a curve is followed."""
+
+    first: float = 0.01
+    """First step, along the curve."""
+    longest: float = 0.05
+    shortest: float = 1e-7
+    """A curve that needs a shorter step is given up."""
+    most_turn_rad: float = 0.3
+    """A step across which the tangent turns more is tried again, shorter."""
+    tolerance: float = 1e-10
+    """Largest residual of a point on the curve."""
+    most_points: int = 2000
+
+
+class ArcEnd(StrEnum):
+    """Why a curve was left."""
+
+    REACHED_BOUND = "the parameter reached an end of its range"
+    CLOSED = "the branch closed on itself: an isolated one"
+    JOINED = "the motion became one of a shorter period or a higher symmetry, whose branch goes on"
+    TOO_MANY_POINTS = "more points than allowed: raise most_points, or lengthen the longest step"
+    STEP_TOO_SHORT = (
+        "no solution within the shortest step: a kink or an end of the branch, or too few harmonics"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ArcPoint:
+    """One point of a curve."""
+
+    point: Vector
+    """(u, lambda), shape (n + 1,)."""
+    tangent: Vector
+    """Unit tangent in the direction of travel."""
+    arc: float = 0.0
+    """Length of the curve from its start."""
+    is_fold: bool = False
+    """The parameter turns here; added between two steps."""
+    end: ArcEnd | None = field(default=None)
+    """Why this point is the last; None on all others."""
+
+
+NEWTON_ITERATIONS = 12
+TARGET_ITERATIONS = 4
+"""A step corrected in fewer iterations is followed by a longer one."""
+FARTHEST_ASIDE = 0.5
+"""A step corrected by more than this part of its length found another branch: the most that the tangent may
+turn moves the curve aside by a third of that."""
+LEAP_GROWTH = 10.0
+"""Factor between the lengths tried at a kink."""
+LONGEST_LEAP = 5.0
+"""A leap that lands further away than this many times its length found another branch."""
+LOCATING_ITERATIONS = 40
+LOCATED = 1e-9
+"""What is sought (a tangent's component, a multiplier's distance) counts as zero below this."""
+CRAWLING, MOST_CRAWLED = 10.0, 50
+"""A curve that is followed in steps below so many of the shortest, so many in a row, is at a kink."""
+NEAR_START = 0.2
+"""A step that passes its start at less than this part of its length is looked at for closing."""
+SAME_POINT = 1e-6
+"""Along the curve: closer than that the start has been met again."""
+SHORTEST_BRACKET = 1e-12
+"""Along the curve: closer than that nothing is told apart."""
+
+
+def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tuple[Vector, int]:
+    """Newton iteration in the hyperplane through ``guess`` across ``normal``.
+
+    Returns the point and the iterations it took; 0 iterations mean that it did not converge.
+    """
+    point = guess.copy()
+    for iteration in range(1, NEWTON_ITERATIONS + 1):
+        residual, jacobian = curve.linearised(point)
+        if not bool(np.all(np.isfinite(residual)) and np.all(np.isfinite(jacobian))):
+            return point, 0
+        if float(np.max(np.abs(residual))) < tolerance:
+            return point, iteration
+        system = np.vstack([jacobian, normal])
+        aside = float(normal @ (point - guess))
+        try:
+            point = point - np.linalg.solve(system, np.append(residual, aside))
+        except np.linalg.LinAlgError:
+            return point, 0
+    return point, 0
+
+
+def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
+    """Give the unit tangent of the curve, in the half-space of ``along``."""
+    _, jacobian = curve.linearised(point)
+    system = np.vstack([jacobian, along])
+    aim = np.zeros(len(point))
+    aim[-1] = 1.0
+    try:
+        direction = np.linalg.solve(system, aim)
+    except np.linalg.LinAlgError:
+        direction = np.linalg.svd(jacobian)[2][-1]
+    direction = direction / np.linalg.norm(direction)
+    return np.asarray(direction * math.copysign(1.0, float(direction @ along)))
+
+
+def trace(
+    curve: Curve, start: Vector, toward: float, bounds: tuple[float, float], steps: ArcSteps
+) -> Iterator[ArcPoint]:
+    """Follow the curve from a point on it until the parameter leaves its bounds.
+
+    Parameters
+    ----------
+    curve
+        As scaled by the caller.
+    start
+        On the curve within the tolerance, shape (n + 1,).
+    toward
+        The sign gives the parameter's direction at the start.
+    bounds
+        Range of the parameter, ends included.
+    steps
+        Lengths and tolerances.
+
+    Yields
+    ------
+    The start, then every point, folds between them; the last says why it is the last.
+
+    """
+    along = np.zeros(len(start))
+    along[-1] = math.copysign(1.0, toward)
+    here = first = ArcPoint(start, tangent_at(curve, start, along))
+    yield here
+    step, slow, leapt_at = steps.first, 0, -math.inf
+    for _ in range(steps.most_points):
+        ahead, step = _advance(curve, here, step, steps)
+        slow = slow + 1 if step < CRAWLING * steps.shortest else 0
+        if ahead is None or slow > MOST_CRAWLED:
+            # Nothing smooth lies between two kinks that are so near: what is to come is not followed.
+            is_stuck = here.arc - leapt_at < 2 * MOST_CRAWLED * CRAWLING * steps.shortest
+            slow, leapt_at = 0, here.arc
+            ahead = None if is_stuck else _leap(curve, here, steps)
+            if ahead is None:
+                yield _ended(here, ArcEnd.STEP_TOO_SHORT)
+                return
+            if ahead.tangent[-1] * here.tangent[-1] < 0.0:
+                yield ArcPoint(here.point, here.tangent, here.arc, is_fold=True)
+            step = steps.first
+            yield ahead
+            here = ahead
+            continue
+        fold = _fold_between(curve, here, ahead, steps)
+        inside = bounds[0] < ahead.point[-1] < bounds[1]
+        if fold is not None and bounds[0] <= fold.point[-1] <= bounds[1]:
+            yield fold
+        if not inside:
+            yield _at_bound(curve, here if fold is None else fold, ahead, bounds, steps)
+            return
+        if _passes(curve, first, here, ahead, steps):
+            arc = here.arc + float(np.linalg.norm(first.point - here.point))
+            yield ArcPoint(first.point, first.tangent, arc, end=ArcEnd.CLOSED)
+            return
+        yield ahead
+        here = ahead
+    yield _ended(here, ArcEnd.TOO_MANY_POINTS)
+
+
+def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tuple[ArcPoint | None, float]:
+    """Take one step, shortened until it holds; gives the point and the next step's length."""
+    while step >= steps.shortest:
+        guess = here.point + step * here.tangent
+        point, iterations = correct(curve, guess, here.tangent, steps.tolerance)
+        aside = float(np.linalg.norm(point - guess))
+        if iterations > 0 and aside < FARTHEST_ASIDE * step + SAME_POINT:
+            tangent = tangent_at(curve, point, here.tangent)
+            turn = math.acos(min(1.0, float(tangent @ here.tangent)))
+            if turn <= steps.most_turn_rad:
+                made = float(np.linalg.norm(point - here.point))
+                ahead = ArcPoint(point, tangent, here.arc + made)
+                return ahead, min(steps.longest, step * _stretch(iterations, turn, steps))
+        step *= 0.5
+    return None, step
+
+
+def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, steps: ArcSteps) -> bool:
+    """Say whether the step from one point to the next went through the start of the curve."""
+    step = ahead.point - here.point
+    length = float(np.linalg.norm(step))
+    part = float((start.point - here.point) @ step) / length**2
+    nearest = here.point + part * step
+    aside = float(np.linalg.norm(start.point - nearest))
+    if here is start or not 0.0 < part <= 1.0 or aside > NEAR_START * length:
+        return False
+    if float(start.tangent @ ahead.tangent) < 0.0:
+        return False
+    # The curve's own point across the start: another sheet of it may lie as near.
+    guess = nearest + start.tangent * float((start.point - nearest) @ start.tangent)
+    point, iterations = correct(curve, guess, start.tangent, steps.tolerance)
+    return iterations > 0 and float(np.linalg.norm(point - start.point)) < SAME_POINT
+
+
+def _leap(curve: Curve, here: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
+    """Cross a kink, where a contact begins: the branch goes on, or turns back, within a rounding error.
+
+    There the unknowns go on growing but the parameter may reverse: step along the tangent so mirrored, or
+    along the tangent itself, by lengths that rise from the shortest, with no limit on the turn.
+    """
+    mirrored = here.tangent.copy()
+    mirrored[-1] = -mirrored[-1]
+    length = LEAP_GROWTH * steps.shortest
+    while length <= steps.longest:
+        for along in (here.tangent, mirrored):
+            point, iterations = correct(curve, here.point + length * along, along, steps.tolerance)
+            if iterations > 0:
+                made = float(np.linalg.norm(point - here.point))
+                tangent = tangent_at(curve, point, point - here.point)
+                if made < LONGEST_LEAP * length and float(tangent @ along) > 0.0:
+                    return ArcPoint(point, tangent, here.arc + made)
+        length *= LEAP_GROWTH
+    return None
+
+
+def _stretch(iterations: int, turn: float, steps: ArcSteps) -> float:
+    """Factor from this step to the next, by how hard it was and how much the curve bends."""
+    effort: float = 2.0 ** ((TARGET_ITERATIONS - iterations) / 2.0)
+    bend = 0.6 * steps.most_turn_rad / max(turn, 1e-12)
+    return min(2.0, max(0.5, min(effort, bend)))
+
+
+def _fold_between(curve: Curve, before: ArcPoint, after: ArcPoint, steps: ArcSteps) -> ArcPoint | None:
+    """Locate a change of sign of the tangent's parameter component, by as `locate` does."""
+    if before.tangent[-1] * after.tangent[-1] >= 0.0:
+        return None
+
+    def parameter_slope(point: ArcPoint) -> float:
+        return float(point.tangent[-1])
+
+    found = locate(curve, before, after, parameter_slope, steps.tolerance)
+    return None if found is None else ArcPoint(found.point, found.tangent, found.arc, is_fold=True)
+
+
+class Measure(Protocol):
+    """A number that changes sign where something happens."""
+
+    def __call__(self, point: ArcPoint, /) -> float:
+        """Evaluate at a point on the curve."""
+        ...
+
+
+def locate(
+    curve: Curve, before: ArcPoint, after: ArcPoint, measure: Measure, tolerance: float
+) -> ArcPoint | None:
+    """Find where ``measure`` vanishes between two neighbouring points; Illinois regula falsi on the arc.
+
+    None when a point between them cannot be found on the curve.
+    """
+    low, high = before, after
+    value_low, value_high = measure(before), measure(after)
+    found, moved = after, 0
+    for _ in range(LOCATING_ITERATIONS):
+        between = _between(curve, low, high, value_low / (value_low - value_high), tolerance)
+        if between is None:
+            return None if found is after else found
+        found = between
+        value = measure(found)
+        if abs(value) < LOCATED or float(np.linalg.norm(high.point - low.point)) < SHORTEST_BRACKET:
+            break
+        # Illinois: an end that stays twice counts half, so that both ends close in.
+        if value * value_low < 0.0:
+            high, value_high = found, value
+            value_low *= 0.5 if moved > 0 else 1.0
+            moved = 1
+        else:
+            low, value_low = found, value
+            value_high *= 0.5 if moved < 0 else 1.0
+            moved = -1
+    return found
+
+
+def _between(curve: Curve, low: ArcPoint, high: ArcPoint, part: float, tolerance: float) -> ArcPoint | None:
+    """Find the point on the curve at a part of the chord between two; elsewhere where a kink hinders."""
+    chord = high.point - low.point
+    length = float(np.linalg.norm(chord))
+    if length == 0.0:
+        return None
+    chord = chord / length
+    for share in (part, 0.5 * (1.0 + part), 0.5 * part, 0.9, 0.1, 0.99, 0.01):
+        point, iterations = correct(curve, low.point + share * length * chord, chord, tolerance)
+        if iterations > 0 and float(np.linalg.norm(point - low.point)) <= 2.0 * length:
+            arc = low.arc + float(np.linalg.norm(point - low.point))
+            return ArcPoint(point, tangent_at(curve, point, chord), arc)
+    return None
+
+
+def _at_bound(
+    curve: Curve, before: ArcPoint, after: ArcPoint, bounds: tuple[float, float], steps: ArcSteps
+) -> ArcPoint:
+    """End exactly on the bound that was passed."""
+    bound = bounds[0] if after.point[-1] <= bounds[0] else bounds[1]
+    span = after.point[-1] - before.point[-1]
+    part = (bound - before.point[-1]) / span if span != 0.0 else 1.0
+    guess = before.point + part * (after.point - before.point)
+    guess[-1] = bound
+    across = np.zeros(len(guess))
+    across[-1] = 1.0
+    point, iterations = correct(curve, guess, across, steps.tolerance)
+    if iterations == 0:
+        return _ended(before, ArcEnd.STEP_TOO_SHORT)
+    arc = before.arc + float(np.linalg.norm(point - before.point))
+    return ArcPoint(point, tangent_at(curve, point, before.tangent), arc, end=ArcEnd.REACHED_BOUND)
+
+
+def _ended(here: ArcPoint, why: ArcEnd) -> ArcPoint:
+    return ArcPoint(here.point, here.tangent, here.arc, here.is_fold, why)

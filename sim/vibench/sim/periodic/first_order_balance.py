@@ -1,0 +1,194 @@
+"""The paper's analytical solution: first-order harmonic balance of power laws, all branches. SI units.
+
+With p = Re(P exp(i w t)), the balance of the fundamental (Gong et al. 2025, eqs. 4 and 5) is
+P (1 + G N(|P|)) = P_lin: G is the compliance that the spring sees and N its describing function. Squared,
+it is one equation for |P| with a few powers (`vibench.sim.periodic`), so no branch can be missed.
+
+All positive zeros of a sum of a few powers, whatever the exponents.
+
+A polynomial of degree 201 with four terms has at most three positive zeros (Descartes), but companion
+matrices and powers of u lose them. Rolle's theorem finds them all: divided by its lowest power and
+differentiated, a sum of m powers becomes one of m - 1, between whose zeros the sum is monotone. In
+t = ln u, and with every term over the largest, nothing overflows.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from ..kernels.arrays import Complex, Floats
+from .condensation import LinearStructure, condense
+from .restoring_force import PowerSpring
+
+TOUCHING = 1e-14
+"""A turning point whose value is this part of its largest term is a double zero."""
+ROOT_TOLERANCE = 1e-15
+"""On ln u, absolute; brentq adds four units in the last place of it."""
+
+
+def positive_zeros(coefficients: Floats, exponents: Floats) -> Floats:
+    """Find every u > 0 with sum c_i u^e_i = 0, ascending.
+
+    Parameters
+    ----------
+    coefficients, exponents
+        Shape (m,), finite; exponents may repeat and need not be whole.
+
+    Returns
+    -------
+    Shape (n,), n < m; a double zero is given once.
+
+    """
+    kept, powers = _gathered(
+        np.asarray(coefficients, dtype=np.float64), np.asarray(exponents, dtype=np.float64)
+    )
+    return np.exp(np.array(_zeros(kept, powers), dtype=np.float64))
+
+
+def _gathered(coefficients: Floats, exponents: Floats) -> tuple[Floats, Floats]:
+    """Sum equal exponents, drop zeros, sort."""
+    powers, place = np.unique(exponents, return_inverse=True)
+    sums = np.zeros(len(powers))
+    np.add.at(sums, place, coefficients)
+    return sums[sums != 0.0], powers[sums != 0.0]
+
+
+def _value(t: float, coefficients: Floats, exponents: Floats) -> float:
+    """Sum over its largest term: the sign is what counts."""
+    sizes = np.log(np.abs(coefficients)) + exponents * t
+    return float(np.sum(np.sign(coefficients) * np.exp(sizes - sizes.max())))
+
+
+def _bounds(coefficients: Floats, exponents: Floats) -> tuple[float, float]:
+    """Beyond these t the lowest, the highest, power outweighs all others together."""
+    sizes = np.log(np.abs(coefficients)) + np.log(len(coefficients))
+    own = np.log(np.abs(coefficients))
+    low = np.min((own[0] - sizes[1:]) / (exponents[1:] - exponents[0]))
+    high = np.max((sizes[:-1] - own[-1]) / (exponents[-1] - exponents[:-1]))
+    return float(low), float(high)
+
+
+def _zeros(coefficients: Floats, exponents: Floats) -> list[float]:
+    if len(coefficients) < 2 or np.all(coefficients > 0.0) or np.all(coefficients < 0.0):
+        return []
+    lowered = exponents - exponents[0]
+    turning = _zeros(coefficients[1:] * lowered[1:], lowered[1:])
+    low, high = _bounds(coefficients, exponents)
+    ends = [min([low, *turning]), *turning, max([high, *turning])]
+    values = [_value(t, coefficients, exponents) for t in ends]
+    found = [
+        t for t, value in zip(ends[1:-1], values[1:-1], strict=True) if abs(value) < TOUCHING * len(values)
+    ]
+    for k in range(len(ends) - 1):
+        touching = any(t in found for t in ends[k : k + 2])
+        if values[k] * values[k + 1] < 0.0 and not touching:
+            low, high = ends[k], ends[k + 1]
+            root = scipy.optimize.brentq(
+                _value, low, high, args=(coefficients, exponents), xtol=ROOT_TOLERANCE
+            )
+            found.append(float(root))
+    return sorted(found)
+
+
+FUNDAMENTAL = np.array([1])
+
+
+def fundamental_share(exponent: int) -> float:
+    """Amplitude of the fundamental of cos^n: binomial(n, (n-1)/2) / 2^(n-1); 3/4 for n = 3, 5/8 for n = 5.
+
+    Whole numbers of any size divided once: correctly rounded for every odd n.
+    """
+    if exponent < 1 or exponent % 2 == 0:
+        msg = f"Exponent {exponent} is not allowed: the first-order balance takes odd powers 1, 3, 5, ..."
+        raise ValueError(msg)
+    return math.comb(exponent, (exponent - 1) // 2) / (1 << (exponent - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class FirstOrderState:
+    """One solution of the first-order balance at one frequency."""
+
+    relative: complex
+    """Phasor P of p, time as exp(+i w t) under U = A0 sin(w t) [m]."""
+    displacements: Complex
+    """Phasors of every displacement of the structure, shape (n,) [m]."""
+    is_stable_to_amplitude: bool
+    """False on the middle one of three branches, which no experiment sees.
+
+    It says nothing of other instabilities: `vibench.sim.periodic` does.
+    """
+
+
+def first_order_states(
+    structure: LinearStructure, spring: PowerSpring, frequency_hz: float, amplitude_m: float
+) -> list[FirstOrderState]:
+    """Find every first-order solution at one frequency and drive amplitude, by ascending abs(P).
+
+    Parameters
+    ----------
+    structure, spring
+        What is shaken: `vibench.sim.periodic.structure_of` a specimen, and its power law.
+    frequency_hz, amplitude_m
+        Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
+
+    Raises
+    ------
+    ValueError
+        When frequency or amplitude is not allowed.
+
+    """
+    if not (0.0 < frequency_hz < math.inf and 0.0 <= amplitude_m < math.inf):
+        msg = (
+            f"A drive of {frequency_hz} Hz and {amplitude_m} m is not allowed: "
+            "its frequency must be positive, its amplitude zero or positive, both finite."
+        )
+        raise ValueError(msg)
+    seen = condense(structure, 2.0 * math.pi * frequency_hz, FUNDAMENTAL)
+    drive = -1j * amplitude_m
+    alone = seen.linear * drive
+    compliance = complex(seen.compliance[0])
+    coefficients, exponents = _squared_balance(compliance, spring)
+    target = abs(alone / spring.length) ** 2
+    sizes = positive_zeros(np.append(coefficients, -target), np.append(exponents, 0.0))
+    slopes = [_slope_sign(size, coefficients, exponents) for size in sizes]
+    states = []
+    for size, slope in zip(sizes, slopes, strict=True):
+        describing = _describing(float(size), spring)
+        relative = alone / (1.0 + compliance * describing)
+        states.append(
+            FirstOrderState(
+                relative=relative,
+                displacements=seen.carried * drive - seen.reach[0] * describing * relative,
+                is_stable_to_amplitude=slope > 0.0,
+            )
+        )
+    return states
+
+
+def _describing(size: float, spring: PowerSpring) -> float:
+    """N = F_1 / P [N/m] at abs(P) = size * length; infinite where it overflows."""
+    with np.errstate(over="ignore"):
+        return float(
+            sum(
+                fundamental_share(n) * f / spring.length * np.float64(size) ** (n - 1)
+                for n, f in spring.terms
+            )
+        )
+
+
+def _squared_balance(compliance: complex, spring: PowerSpring) -> tuple[Floats, Floats]:
+    """|P/length|^2 |1 + G N|^2 as coefficients and exponents of |P|/length."""
+    weights = np.array([fundamental_share(n) * f / spring.length for n, f in spring.terms])
+    powers = np.array([float(n) for n, _ in spring.terms])
+    coefficients = np.concatenate(
+        [[1.0], 2.0 * compliance.real * weights, (abs(compliance) ** 2 * np.outer(weights, weights)).ravel()]
+    )
+    exponents = np.concatenate([[2.0], powers + 1.0, (powers[:, None] + powers[None, :]).ravel()])
+    return coefficients, exponents
+
+
+def _slope_sign(size: float, coefficients: Floats, exponents: Floats) -> float:
+    sizes = exponents * math.log(size)
+    return float(np.sum(coefficients * exponents * np.exp(sizes - sizes.max())))

@@ -1,0 +1,185 @@
+"""Is a periodic motion stable? Floquet multipliers from the variational equation along it. SI units.
+
+Small departures d of a motion obey M d'' + (C + e(t) b b') d' + (K + s(t) b b') d = 0 with s = dF/dp and
+e = dF/d(dp/dt) along the motion; what one period makes of them is the monodromy matrix, whose eigenvalues
+decide (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 3.2). Free stretches are one
+matrix exponential each; contacts begin and end exactly where p reaches a stop, and are crossed by
+fourth-order Magnus steps (Blanes et al., Phys. Rep. 470 (2009) 151, eq. 253) that crowd at both ends, where
+the stiffness of a Hertz contact starts like a square root.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from ..kernels.arrays import Complex, Floats
+from .condensation import Harmonics, LinearStructure
+from .frequency_time import grid_size, motion_on_grid, waveform
+from .restoring_force import RestoringForce
+
+CONTACT_STEPS = 96
+"""Magnus steps across one contact."""
+STEPS_PER_TURN = 8.0
+"""Magnus steps in a radian of the fastest motion that the structure or the pressed spring can make."""
+STEPS_PER_HARMONIC = 16
+"""Magnus steps of a period, over its highest harmonic, where the spring is smooth everywhere."""
+SMOOTH_STEPS = 128
+"""Fewest steps of a period where the spring is smooth everywhere."""
+GAUSS = math.sqrt(3.0) / 6.0
+"""Distance of the two Gauss points from the middle of a step of length one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A periodic motion of p in harmonics."""
+
+    frequency_hz: float
+    harmonics: Harmonics
+    relative: Complex
+    """P_k, shape (m,) [m]."""
+
+    def p(self, turn: Floats) -> Floats:
+        """Displacement p at phases ``turn`` [rad] [m]."""
+        return np.real(np.exp(1j * np.multiply.outer(turn, self.harmonics)) @ self.relative)
+
+    def rate(self, turn: Floats) -> Floats:
+        """dp/dt at phases ``turn`` [m/s]."""
+        omega = 2.0 * math.pi * self.frequency_hz
+        factors = 1j * omega * self.harmonics * self.relative
+        return np.real(np.exp(1j * np.multiply.outer(turn, self.harmonics)) @ factors)
+
+
+def multipliers(monodromy: NDArray[np.float64]) -> Complex:
+    """Eigenvalues, largest magnitude first."""
+    values = np.linalg.eigvals(monodromy).astype(np.complex128)
+    return values[np.argsort(-np.abs(values), kind="stable")]
+
+
+def transition(
+    structure: LinearStructure, spring: RestoringForce, motion: Motion, span_rad: float = 2.0 * math.pi
+) -> NDArray[np.float64]:
+    """Find what the first ``span_rad`` of a period make of small departures (d, d'), shape (2 n, 2 n)."""
+    system, spring_in = _state_form(structure)
+    edges = [0.0, *crossings(spring, motion, span_rad), span_rad]
+    period = 1.0 / motion.frequency_hz
+    fastest = _fastest(structure, spring, motion, system)
+    result = np.eye(2 * structure.size)
+    for start, stop in pairwise(edges):
+        length = (stop - start) / (2.0 * math.pi) * period
+        middle = np.array([0.5 * (start + stop)])
+        if spring.kinks and not _acts(spring, motion, middle):
+            result = scipy.linalg.expm(system * length) @ result
+            continue
+        marks = _marks(start, stop, fastest * length, spring, int(motion.harmonics[-1]))
+        result = _crossed(system, spring_in, structure, spring, motion, marks) @ result
+    return np.asarray(result)
+
+
+def _state_form(structure: LinearStructure) -> tuple[Floats, Floats]:
+    """Rates of (q, q') without the spring, shape (2n, 2n), and what a force in the spring adds, (2n,)."""
+    n = structure.size
+    system = np.zeros((2 * n, 2 * n))
+    system[:n, n:] = np.eye(n)
+    system[n:, :n] = -np.linalg.solve(structure.mass, structure.stiffness)
+    system[n:, n:] = -np.linalg.solve(structure.mass, structure.damping)
+    return system, np.concatenate([np.zeros(n), -np.linalg.solve(structure.mass, structure.direction)])
+
+
+def _fastest(structure: LinearStructure, spring: RestoringForce, motion: Motion, system: Floats) -> float:
+    """Fastest rate of the structure plus that of the spring at its stiffest [rad/s]."""
+    omega = 2.0 * math.pi * motion.frequency_hz
+    samples = grid_size(int(motion.harmonics[-1]))
+    p, rate = motion_on_grid(motion.relative, motion.harmonics, omega, samples)
+    stiffest = float(np.max(np.abs(spring.stiffness(p, rate))))
+    lightness = float(structure.direction @ np.linalg.solve(structure.mass, structure.direction))
+    return float(np.max(np.abs(np.linalg.eigvals(system)))) + math.sqrt(stiffest * lightness)
+
+
+def _acts(spring: RestoringForce, motion: Motion, turn: Floats) -> bool:
+    p, rate = motion.p(turn), motion.rate(turn)
+    return bool(spring.stiffness(p, rate)[0] != 0.0)
+
+
+def crossings(spring: RestoringForce, motion: Motion, span_rad: float) -> list[float]:
+    """Phases in the span at which p crosses a stop, ascending [rad]."""
+    samples = grid_size(int(motion.harmonics[-1]))
+    grid = 2.0 * math.pi * np.arange(samples + 1) / samples
+    wave = waveform(motion.relative, motion.harmonics, samples)
+    wave = np.append(wave, wave[0])
+    found = []
+    for stop in spring.kinks:
+        above = wave - stop
+        for k in np.flatnonzero((above[:-1] < 0.0) != (above[1:] < 0.0)):
+
+            def distance(turn: float, stop: float = stop) -> float:
+                return float(motion.p(np.array([turn]))[0]) - stop
+
+            low, high = distance(float(grid[k])), distance(float(grid[k + 1]))
+            if low * high < 0.0:
+                found.append(float(scipy.optimize.brentq(distance, grid[k], grid[k + 1], xtol=1e-14)))
+    return sorted(turn for turn in found if turn <= span_rad)
+
+
+def _marks(start: float, stop: float, turn: float, spring: RestoringForce, highest: int) -> Floats:
+    """Phases between which Magnus steps are taken [rad]."""
+    needed = math.ceil(STEPS_PER_TURN * turn)
+    if spring.kinks:
+        even = np.linspace(0.0, math.pi, max(CONTACT_STEPS, needed) + 1)
+        return start + 0.5 * (stop - start) * (1.0 - np.cos(even))
+    steps = max(SMOOTH_STEPS, needed, STEPS_PER_HARMONIC * highest)
+    return np.linspace(start, stop, steps + 1)
+
+
+def _crossed(
+    system: Floats,
+    spring_in: Floats,
+    structure: LinearStructure,
+    spring: RestoringForce,
+    motion: Motion,
+    marks: Floats,
+) -> Floats:
+    """Transition over all steps between ``marks``: Magnus exponents of order four, all at once."""
+    widths = np.diff(marks)
+    middles = 0.5 * (marks[1:] + marks[:-1])
+    early = _rates(middles - GAUSS * widths, system, spring_in, structure, spring, motion)
+    late = _rates(middles + GAUSS * widths, system, spring_in, structure, spring, motion)
+    lengths = (widths / (2.0 * math.pi * motion.frequency_hz))[:, None, None]
+    bracket = late @ early - early @ late
+    exponents = 0.5 * lengths * (early + late) + math.sqrt(3.0) / 12.0 * lengths**2 * bracket
+    steps = _exponentials(exponents)
+    while len(steps) > 1:
+        # Pairwise: as many products, but whole arrays at a time.
+        pairs = steps[1::2] @ steps[: len(steps) // 2 * 2 : 2]
+        steps = np.concatenate([pairs, steps[-1:]]) if len(steps) % 2 else pairs
+    return np.asarray(steps[0])
+
+
+def _exponentials(small: Floats) -> Floats:
+    """Exponentials of many matrices whose eigenvalues are below one, by the Pade approximant [3/3]."""
+    squared = small @ small
+    even = np.eye(small.shape[-1]) + squared / 10.0
+    odd = small / 2.0 + squared @ small / 120.0
+    return np.linalg.solve(even - odd, even + odd).astype(np.float64)
+
+
+def _rates(
+    turn: Floats,
+    system: Floats,
+    spring_in: Floats,
+    structure: LinearStructure,
+    spring: RestoringForce,
+    motion: Motion,
+) -> Floats:
+    p, rate = motion.p(turn), motion.rate(turn)
+    rows = np.concatenate(
+        [
+            np.multiply.outer(spring.stiffness(p, rate), structure.direction),
+            np.multiply.outer(spring.damping(p, rate), structure.direction),
+        ],
+        axis=1,
+    )
+    return np.asarray(system + spring_in[None, :, None] * rows[:, None, :])

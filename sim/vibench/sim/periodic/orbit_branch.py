@@ -1,0 +1,164 @@
+"""Branches of exact periodic motions with impacts, along frequency or amplitude, through folds. SI units."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels.arrays import Table, Vector
+from ..model.drive import Harmonic
+from ..model.word import chosen
+from ..motion.poincare import state_scales
+from .branch import Branch, Parameter, ParameterWord
+from .branch_following import (
+    Family,
+    OrbitReport,
+    branch_range,
+    follow,
+    follow_both_ways,
+    parameter_value,
+    range_scale,
+)
+from .continuation import ArcSteps
+from .drive_path import DrivePath, path_from
+from .period_map import PeriodMap
+from .shooting import PeriodicOrbit, ShootingEnd, described_orbit
+
+ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=500)
+"""A residual below 1e-9 of the gap: what the flow at reference accuracy allows."""
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitFamily:
+    """Fixed points of the period map; the last component is the parameter over its scale."""
+
+    mapping: PeriodMap
+    path: DrivePath
+    reference: Harmonic
+    """The drive by which states are measured."""
+    scale: float
+    """Hz, or m, per unit of length."""
+
+    @property
+    def tolerance(self) -> float:
+        """None: the flow is exact, nothing can be left out."""
+        return math.inf
+
+    @property
+    def scales(self) -> Vector:
+        """Measure of a state, shape (6,)."""
+        return state_scales(self.mapping.specimen, self.reference)
+
+    def drive_at(self, point: Vector) -> Harmonic:
+        """Give the drive at a point."""
+        return Harmonic(*self.path.drive(float(point[-1]) * self.scale))
+
+    def state_at(self, point: Vector) -> Vector:
+        """Give the state at the drive's time zero."""
+        return point[:-1] * self.scales
+
+    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+        """How far the motion goes in a period, and the derivatives by state and parameter."""
+        if point[-1] <= 0.0:
+            return np.full(6, math.nan), np.full((6, 7), math.nan)
+        drive, state, own = self.drive_at(point), self.state_at(point), self.scales
+        # The map measures velocities by the drive at the point, this family by one drive throughout.
+        ratio = state_scales(self.mapping.specimen, drive) / own
+        gone = (self.mapping.image(state, drive) - state) / own
+        derivative = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :]
+        along = ratio * self._slope(state, drive, float(point[-1]) * self.scale) * self.scale
+        return gone, np.column_stack([derivative - np.eye(6), along])
+
+    def _slope(self, state: Vector, drive: Harmonic, value: float) -> Vector:
+        """D image / d parameter, over the scales of the drive [1/Hz or 1/m]."""
+        by_frequency, by_amplitude = self.path.slopes(value)
+        slope = np.zeros(6)
+        if by_frequency != 0.0:
+            slope += by_frequency / drive.frequency_hz * self.mapping.frequency_slope(state, drive)
+        if by_amplitude != 0.0:
+            slope += by_amplitude / drive.amplitude_m * self.mapping.amplitude_slope(state, drive)
+        return slope
+
+    def report(self, point: Vector) -> OrbitReport:
+        """Responses, multipliers and contacts."""
+        state, drive = self.state_at(point), self.drive_at(point)
+        gone = (self.mapping.image(state, drive) - state) / state_scales(self.mapping.specimen, drive)
+        orbit = described_orbit(self.mapping, drive, state, gone)
+        return OrbitReport(
+            frequency_hz=orbit.drive.frequency_hz,
+            amplitude_m=orbit.drive.amplitude_m,
+            response_i=orbit.response_i,
+            response_ii=orbit.response_ii,
+            state=orbit.state,
+            signs=orbit.signs,
+            left_out=orbit.error,
+        )
+
+    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
+        """None: there is no finer resolution."""
+        return None
+
+
+def periodic_branch(
+    orbit: PeriodicOrbit, parameter: Parameter | ParameterWord, stop: float, steps: ArcSteps = ORBIT_STEPS
+) -> Branch:
+    """Follow a periodic motion along frequency [Hz] or drive amplitude [m], from where it is to ``stop``.
+
+    The branch ends at ``stop``, or back at its start's value where it turned round. Pseudo-arclength
+    continuation (Keller 1977): steps along the curve, so that folds are passed.
+
+    Raises
+    ------
+    ValueError
+        When the orbit did not converge, or ``stop`` is not allowed.
+
+    """
+    parameter = chosen(Parameter, parameter)
+    path = path_from(parameter, orbit.drive.frequency_hz, orbit.drive.amplitude_m)
+    value, scale = branch_range(parameter, orbit.drive.frequency_hz, orbit.drive.amplitude_m, stop)
+    family, start = _family_at(orbit, path, value, scale)
+    here, there = value / scale, stop / scale
+    bounds = (min(here, there), max(here, there))
+    return follow(family, start, there - here, bounds, steps)
+
+
+def periodic_branch_within(
+    orbit: PeriodicOrbit, path: DrivePath, low: float, high: float, steps: ArcSteps = ORBIT_STEPS
+) -> Branch:
+    """Follow a periodic motion both ways along a drive path, through folds, to the ends of a range.
+
+    Parameters
+    ----------
+    orbit
+        Its drive lies on the path, within the range.
+    path
+        `FrequencyPath` or `AmplitudePath`.
+    low, high
+        Ends of the range, ascending [Hz, or m].
+    steps
+        Lengths and tolerances; the range is ten units long.
+
+    Returns
+    -------
+    The whole branch, in ascending order where it has no fold; `Branch.begin` and `Branch.end` say why it was
+    left at both ends. A branch that closed on itself has been gone round once.
+
+    Raises
+    ------
+    ValueError
+        When the orbit did not converge, or lies outside.
+
+    """
+    value = parameter_value(path, orbit.drive)
+    family, start = _family_at(orbit, path, value, range_scale(low, high, value))
+    return follow_both_ways(family, start, (low / family.scale, high / family.scale), steps)
+
+
+def _family_at(
+    orbit: PeriodicOrbit, path: DrivePath, value: float, scale: float
+) -> tuple[OrbitFamily, Vector]:
+    if orbit.outcome is not ShootingEnd.CONVERGED:
+        msg = f"A branch cannot start at {orbit.drive}: {orbit.outcome}."
+        raise ValueError(msg)
+    family = OrbitFamily(orbit.period_map, path, orbit.drive, scale)
+    return family, np.append(orbit.state / family.scales, value / scale)

@@ -1,0 +1,210 @@
+"""A mode's phase resonance along the level of the drive, stable or not: its backbone. SI units.
+
+At a phase resonance the fundamental of m0 lags the base by a given angle, a quarter of a period as a rule
+(Peter and Leine, Mech. Syst. Signal Process. 98 (2018) 572). A base that shakes by u pushes the motion
+against it by m w^2 u, in phase with u, so that this motion is a quarter of a period behind. Shooting with the
+phase as a seventh equation and the frequency as a seventh unknown finds it on any motion; pseudo-arclength
+continuation follows it over the level.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from ..kernels.arrays import Table, Vector
+from ..model.drive import Harmonic
+from ..model.modes import base_transmissibility
+from ..model.specimen import Specimen
+from ..model.word import chosen
+from ..motion.poincare import state_scales
+from .branch import Branch
+from .branch_following import Family, OrbitReport, follow
+from .continuation import ArcSteps, correct
+from .drive_path import AmplitudePath, DrivePath
+from .frequency_time import phasors_of
+from .orbit_branch import OrbitFamily
+from .period_map import OrbitShape, PeriodMap
+from .phase_reference import PhaseReference, PhaseReferenceWord
+
+QUARTER_BEHIND = -0.5 * math.pi
+STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)
+"""A tenth of a decade of level, or a tenth of the gap, a step."""
+LENGTH_PER_DECADE = 2.0
+FREQUENCY_SHARE = 0.1
+"""A change of the frequency by this share counts as one unit of length."""
+FARTHEST = 20.0
+"""Units of length from the start, in frequency or level, beyond which an iteration has gone astray."""
+STRAYED = 1e3
+"""A state so many gaps away is none: an iteration that tries it has gone astray. On a hard spring it would
+swing many millions of times a period, and its run take minutes."""
+SAMPLES = 256
+DIFFERENCE = 1e-6
+"""Step of the differences by which the phase's slopes are taken, over each unknown's scale."""
+SCAN_POINTS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseResonanceFamily:
+    """Motions that keep a phase; the last two components are the logarithms of frequency and amplitude."""
+
+    mapping: PeriodMap
+    reference: Harmonic
+    """The drive by which states, frequencies and amplitudes are measured."""
+    phase_rad: float
+    of: PhaseReference
+
+    @property
+    def path(self) -> DrivePath:
+        """Along amplitude; the frequency follows."""
+        return AmplitudePath(self.reference.frequency_hz)
+
+    @property
+    def tolerance(self) -> float:
+        """None: the flow is exact."""
+        return math.inf
+
+    @property
+    def scales(self) -> Vector:
+        """Measure of a state, shape (6,)."""
+        return state_scales(self.mapping.specimen, self.reference)
+
+    def amplitude_m(self, point: Vector) -> float:
+        """Drive amplitude at a point [m]."""
+        return self.reference.amplitude_m * float(10.0 ** (point[7] / LENGTH_PER_DECADE))
+
+    def drive_at(self, point: Vector) -> Harmonic:
+        """Give the drive at a point."""
+        frequency_hz = self.reference.frequency_hz * math.exp(FREQUENCY_SHARE * float(point[6]))
+        return Harmonic(frequency_hz, self.amplitude_m(point))
+
+    def linearised(self, point: Vector) -> tuple[Vector, Table]:
+        """How far the motion goes in a period and the phase is off, with the derivatives, shape (7, 8)."""
+        if not bool(np.all(np.abs(point[6:]) < FARTHEST) and np.all(np.abs(point[:6]) < STRAYED)):
+            return np.full(7, math.nan), np.full((7, 8), math.nan)
+        drive, state, own = self.drive_at(point), point[:6] * self.scales, self.scales
+        ratio = state_scales(self.mapping.specimen, drive) / own
+        gone = (self.mapping.image(state, drive) - state) / own
+        if not bool(np.all(np.isfinite(gone))):
+            return np.full(7, math.nan), np.full((7, 8), math.nan)
+        by_state = ratio[:, None] * self.mapping.derivative(state, drive) / ratio[None, :] - np.eye(6)
+        by_frequency = FREQUENCY_SHARE * ratio * self.mapping.frequency_slope(state, drive)
+        by_level = math.log(10.0) / LENGTH_PER_DECADE * ratio * self.mapping.amplitude_slope(state, drive)
+        off, slopes = self._off(point), np.empty(8)
+        for k, nudge in enumerate(DIFFERENCE * np.eye(8)):
+            slopes[k] = (self._off(point + nudge) - self._off(point - nudge)) / (2.0 * DIFFERENCE)
+        return np.append(gone, off), np.vstack([np.column_stack([by_state, by_frequency, by_level]), slopes])
+
+    def _off(self, point: Vector) -> float:
+        """Sine of the angle by which the phase of x over the base is off."""
+        run = self.mapping.orbit(point[:6] * self.scales, self.drive_at(point), SAMPLES)
+        count = self.mapping.periods * SAMPLES
+        # The base A0 sin(w t) has the phasor -i A0.
+        phasor = 1j * complex(phasors_of(run.states[:count, 0])[self.mapping.periods])
+        turned = self.of.motion(phasor / self.amplitude_m(point)) * np.exp(-1j * self.phase_rad)
+        return float(turned.imag / abs(turned))
+
+    def report(self, point: Vector) -> OrbitReport:
+        """Responses, multipliers and contacts."""
+        drive = self.drive_at(point)
+        family = OrbitFamily(self.mapping, AmplitudePath(drive.frequency_hz), drive, drive.amplitude_m)
+        return family.report(np.append(point[:6] * self.scales / family.scales, 1.0))
+
+    def refined(self, point: Vector, tangent: Vector) -> tuple[Family, Vector, Vector] | None:  # noqa: ARG002 - exact
+        """None: there is no finer resolution."""
+        return None
+
+
+def phase_resonance_branch(
+    specimen: Specimen,
+    band_hz: tuple[float, float],
+    levels_m: tuple[float, float],
+    of: PhaseReference | PhaseReferenceWord = PhaseReference.RELATIVE,
+    phase_rad: float = QUARTER_BEHIND,
+    steps: ArcSteps = STEPS,
+) -> Branch:
+    """Follow a mode's phase resonance from the motion without contacts over the level of the base.
+
+    Parameters
+    ----------
+    specimen
+        Any contact law; two equal stops, or none.
+    band_hz
+        Where the phase of the motion without contacts is met once: around one mode [Hz].
+    levels_m
+        Drive amplitudes, ascending; the lower one so low that m1 keeps between its stops [m].
+    of, phase_rad
+        The motion of m0, and its phase over the base, both as displacements.
+    steps
+        Along the branch: half a unit is a quarter of a decade of level, or of frequency 5 %.
+
+    Returns
+    -------
+    The branch over amplitude, with the frequency and the multipliers of each motion; it may turn back.
+
+    Raises
+    ------
+    ValueError
+        When there is no damping, no mode in the band has this phase, or several do, no motion is found at the
+        lower level, it already reaches the stops, or `of` is no word of `PhaseReference`.
+
+    """
+    (low_m, high_m), of = levels_m, chosen(PhaseReference, of)
+    if not any(specimen.dampings):
+        msg = (
+            "A specimen without damping has no phase resonance: at a resonance its motion without contacts "
+            "grows without end. Give a damping time above 0."
+        )
+        raise ValueError(msg)
+    frequency_hz = linear_phase_resonance_hz(specimen, band_hz, of, phase_rad)
+    drive = Harmonic(frequency_hz, low_m)
+    answer = base_transmissibility(specimen, frequency_hz)[0]
+    if not 0.0 < low_m < high_m or low_m * abs(answer[3]) >= min(specimen.gaps_m):
+        msg = (
+            f"Levels {low_m:g} to {high_m:g} m are not allowed: ascending, and the lower one below "
+            f"{min(specimen.gaps_m) / abs(answer[3]):.3g} m, where m1 reaches its stops."
+        )
+        raise ValueError(msg)
+    phasors = -1j * low_m * answer[:3]
+    state = np.concatenate([phasors.real, (2j * math.pi * frequency_hz * phasors).real])
+    family = PhaseResonanceFamily(PeriodMap(specimen, OrbitShape.MIRRORED), drive, phase_rad, of)
+    guess = np.concatenate([state / family.scales, [0.0, 0.0]])
+    start, iterations = correct(family, guess, np.eye(8)[7], steps.tolerance)
+    if iterations == 0 or not band_hz[0] <= family.drive_at(start).frequency_hz <= band_hz[1]:
+        # Contacts that act at every p move it away from the linear motion.
+        msg = (
+            f"No motion with this phase is found from {band_hz[0]:g} to {band_hz[1]:g} Hz at {low_m:g} m, "
+            "beginning with the linear one: give a lower level to begin with, or a wider band."
+        )
+        raise ValueError(msg)
+    far = LENGTH_PER_DECADE * math.log10(high_m / low_m)
+    return follow(family, start, 1.0, (-1e-9, far), steps)
+
+
+def linear_phase_resonance_hz(
+    specimen: Specimen, band_hz: tuple[float, float], of: PhaseReference, phase_rad: float
+) -> float:
+    """Find the frequency in a band at which m0, free of contacts, has a phase over the base [Hz]."""
+
+    def off(frequency_hz: float) -> float:
+        seen = complex(base_transmissibility(specimen, frequency_hz)[0, 0])
+        turned = of.motion(seen) * np.exp(-1j * phase_rad)
+        return float(turned.imag / abs(turned))
+
+    grid = np.linspace(*band_hz, SCAN_POINTS)
+    values = [off(float(each)) for each in grid]
+    # Falling: motion lags more as the frequency rises through a mode.
+    found_hz = [
+        float(scipy.optimize.brentq(off, grid[k], grid[k + 1], xtol=1e-12))
+        for k in range(len(grid) - 1)
+        if values[k] > 0.0 >= values[k + 1]
+    ]
+    if len(found_hz) == 1:
+        return found_hz[0]
+    where = f"at {', '.join(f'{each:.4g}' for each in found_hz)} Hz" if found_hz else "nowhere"
+    msg = (
+        f"Between {band_hz[0]:g} and {band_hz[1]:g} Hz the phase of m0 over the base is {where} "
+        f"{math.degrees(phase_rad):.3g} degrees: give a band around one mode."
+    )
+    raise ValueError(msg)

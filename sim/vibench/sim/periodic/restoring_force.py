@@ -1,0 +1,210 @@
+"""The nonlinear spring between m1 and m2 as a smooth function: its force, and the slopes of it. SI units.
+
+What harmonic balance and stability need of a contact law, whole arrays at a time.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..kernels.arrays import Floats
+from ..model.no_contact import NoContact
+from ..model.power_law import PowerLaw
+from ..model.rigid_stops import RigidStops
+from ..model.specimen import Specimen
+
+
+class RestoringForce(Protocol):
+    """F(p, dp/dt), added to the linear spring between the masses."""
+
+    @property
+    def length(self) -> float:
+        """Displacement at which the force matters [m]: a gap, or where a power law is fitted."""
+        ...
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """Values of p where a derivative of the force jumps, ascending [m]."""
+        ...
+
+    @property
+    def is_odd(self) -> bool:
+        """F(-p, -v) = -F(p, v)."""
+        ...
+
+    def force(self, p: Floats, rate: Floats) -> Floats:
+        """F [N]."""
+        ...
+
+    def stiffness(self, p: Floats, rate: Floats) -> Floats:
+        """dF/dp [N/m]."""
+        ...
+
+    def damping(self, p: Floats, rate: Floats) -> Floats:
+        """dF/d(dp/dt) [N s/m]."""
+        ...
+
+
+@dataclass(frozen=True)
+class PowerSpring:
+    """A sum of odd powers, F = sum F_i (p / length)^n_i: no coefficient that overflows."""
+
+    length: float
+    """Where the terms have the forces given [m]."""
+    terms: tuple[tuple[int, float], ...]
+    """(n_i, F_i [N]) with n_i odd."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.length < math.inf:
+            msg = f"Reference displacement {self.length} m is not allowed: it must be positive and finite."
+            raise ValueError(msg)
+        for exponent, force in self.terms:
+            if exponent < 1 or exponent % 2 == 0 or not math.isfinite(force):
+                msg = f"The term ({exponent}, {force} N) is not allowed: odd exponent, finite force."
+                raise ValueError(msg)
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """None: a power law is smooth."""
+        return ()
+
+    @property
+    def is_odd(self) -> bool:
+        """Odd powers only."""
+        return True
+
+    def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
+        """F [N]; infinite where it overflows."""
+        with np.errstate(over="ignore", under="ignore"):
+            return np.asarray(sum(f * (p / self.length) ** n for n, f in self.terms) + 0.0 * p)
+
+    def stiffness(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - the rate plays no part
+        """dF/dp [N/m]."""
+        with np.errstate(over="ignore", under="ignore"):
+            slope = sum(n * f / self.length * (p / self.length) ** (n - 1) for n, f in self.terms)
+            return np.asarray(slope + 0.0 * p)
+
+    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - no loss of its own
+        """Zero."""
+        return np.zeros_like(p)
+
+
+@dataclass(frozen=True)
+class GapSpring:
+    """Stops on one or both sides: (k d^exponent + beside d) (1 + loss dd/dt) at the penetration d."""
+
+    stiffness_coefficient: float
+    """k [N/m^exponent]."""
+    exponent: float
+    """1 for a linear stop, 3/2 for Hertz."""
+    upper: float
+    """The stop at positive p [m]."""
+    lower: float
+    """The stop at negative p, as a positive distance [m]; infinite for none."""
+    loss: float = 0.0
+    """Hunt and Crossley's lambda over k [s/m]."""
+    beside: float = 0.0
+    """Stiffness of a linear spring that is pressed together with the stop [N/m]."""
+
+    def __post_init__(self) -> None:
+        if not (self.stiffness_coefficient > 0.0 and self.exponent >= 1.0 and self.loss >= 0.0):
+            msg = (
+                f"A stop of stiffness {self.stiffness_coefficient}, exponent {self.exponent} and loss "
+                f"{self.loss} s/m is not allowed: positive, at least 1, zero or more."
+            )
+            raise ValueError(msg)
+        if not (self.upper > 0.0 and self.lower > 0.0 and math.isfinite(min(self.upper, self.lower))):
+            msg = f"Stops at {self.upper} and -{self.lower} m are not allowed: positive, one of them finite."
+            raise ValueError(msg)
+
+    @property
+    def length(self) -> float:
+        """The nearer stop."""
+        return min(self.upper, self.lower)
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """The stops that exist."""
+        return tuple(stop for stop in (-self.lower, self.upper) if math.isfinite(stop))
+
+    @property
+    def is_odd(self) -> bool:
+        """Equal gaps."""
+        return self.upper == self.lower
+
+    def force(self, p: Floats, rate: Floats) -> Floats:
+        """F [N]."""
+        side, depth = self._pressed(p)
+        return side * self._push(depth) * (1.0 + self.loss * side * rate)
+
+    def stiffness(self, p: Floats, rate: Floats) -> Floats:
+        """dF/dp [N/m]."""
+        side, depth = self._pressed(p)
+        slope = self.exponent * self.stiffness_coefficient * depth ** (self.exponent - 1.0) + self.beside
+        return np.where(depth > 0.0, slope * (1.0 + self.loss * side * rate), 0.0)
+
+    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - linear in the rate
+        """dF/d(dp/dt) [N s/m]."""
+        _, depth = self._pressed(p)
+        return self.loss * self._push(depth)
+
+    def _push(self, depth: Floats) -> Floats:
+        return self.stiffness_coefficient * depth**self.exponent + self.beside * depth
+
+    def _pressed(self, p: Floats) -> tuple[Floats, Floats]:
+        depth = np.where(p > 0.0, p - self.upper, -p - self.lower)
+        return np.sign(p), np.maximum(depth, 0.0)
+
+
+@dataclass(frozen=True)
+class NoForce:
+    """No spring at all: the linear structure."""
+
+    length: float = 1.0
+    """Any: nothing happens anywhere."""
+
+    @property
+    def kinks(self) -> tuple[float, ...]:
+        """None."""
+        return ()
+
+    @property
+    def is_odd(self) -> bool:
+        """Zero is odd."""
+        return True
+
+    def force(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere
+        """Zero."""
+        return np.zeros_like(p)
+
+    def stiffness(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere
+        """Zero."""
+        return np.zeros_like(p)
+
+    def damping(self, p: Floats, rate: Floats) -> Floats:  # noqa: ARG002 - zero everywhere
+        """Zero."""
+        return np.zeros_like(p)
+
+
+def spring_of(specimen: Specimen) -> RestoringForce:
+    """Turn a specimen's stops into the function that harmonic balance needs.
+
+    Raises
+    ------
+    ValueError
+        When the stops are rigid, whose force is not finite.
+
+    """
+    lower, upper = specimen.gaps_m
+    match specimen.contact:
+        case PowerLaw(reference=reference, terms=terms):
+            return PowerSpring(reference, terms)
+        case NoContact():
+            return NoForce()
+        case RigidStops():
+            msg = "Rigid stops push with no finite force: follow the motion in time instead, or use Hertz."
+            raise ValueError(msg)
+        case law:
+            return GapSpring(*law.stops.term, upper, lower, law.stops.loss, law.stops.spring_beside)

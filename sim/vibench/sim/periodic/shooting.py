@@ -1,0 +1,241 @@
+"""Periodic motions with impacts by shooting: a state that the exact flow brings back to itself. SI units.
+
+Newton's iteration on the period map finds stable and unstable motions alike, of any number of drive
+periods (Nayfeh and Balachandran, Applied Nonlinear Dynamics, Wiley 1995, section 6.4).
+"""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..kernels.arrays import Complex, Floats, Table, Vector
+from ..model.drive import Harmonic
+from ..model.no_contact import NoContact
+from ..model.power_law import PowerLaw
+from ..model.specimen import Specimen
+from ..model.state import Y, Z
+from ..model.word import chosen
+from ..motion.integrate import Trajectory, integrate, start_motion
+from ..motion.poincare import state_scales
+from .branch import NEUTRAL, BifurcationKind
+from .floquet import multipliers
+from .frequency_time import phasors_of
+from .orbit_events import OrbitSigns, Symmetry
+from .period_map import OrbitShape, OrbitShapeWord, PeriodMap
+
+NEWTON_ITERATIONS = 30
+MOST_HALVINGS = 8
+RETURNED = 1e-9
+"""A motion is periodic when it comes back this close, over the state's scale."""
+FLOW_ERROR = 1e-10
+"""Of a period at reference accuracy, over the state's scale: measured at a tenth of it (docs/accuracy.md)."""
+SAMPLES = 4096
+"""Samples of a drive period from which responses are taken."""
+SETTLING_PERIODS = 400
+"""Drive periods followed before shooting begins, where no state is given."""
+
+
+class ShootingEnd(StrEnum):
+    """Whether a periodic motion was found, and what to change."""
+
+    CONVERGED = "converged"
+    NO_ORBIT = "no periodic motion near the start: start elsewhere, or ask for another shape or period"
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicOrbit:
+    """A periodic motion, its stability and its responses."""
+
+    drive: Harmonic
+    period_map: PeriodMap
+    state: Vector
+    """x, y, z, vx, vy, vz at the drive's time zero, shape (6,)."""
+    signs: OrbitSigns
+    defect: float
+    """How far from itself the motion comes back, over the state's scale."""
+    error: float
+    """How far the true motion may be, as part of the fundamental of p: the defect and the error of the flow,
+    multiplied as the map multiplies them. It grows beyond all bounds at a fold."""
+    response_i: Vector
+    """Largest magnitude of x, y, z and p over the drive amplitude, shape (4,)."""
+    response_ii: Vector
+    """Amplitude at the drive frequency, likewise."""
+    outcome: ShootingEnd
+
+    @property
+    def floquet_multipliers(self) -> Complex:
+        """Over the whole period of the motion, largest first, shape (6,)."""
+        return self.signs.over_period
+
+    @property
+    def is_stable(self) -> bool:
+        """No multiplier outside the unit circle."""
+        return bool(abs(self.floquet_multipliers[0]) < 1.0 + NEUTRAL)
+
+    @property
+    def impacts(self) -> int:
+        """Contacts that begin in a period of the motion."""
+        return self.signs.contacts
+
+
+def periodic_orbit(
+    specimen: Specimen,
+    drive: Harmonic,
+    shape: OrbitShape | OrbitShapeWord = OrbitShape.REPEATED,
+    periods: int = 1,
+    start: ArrayLike | None = None,
+) -> PeriodicOrbit:
+    """Find a periodic motion near a state.
+
+    Parameters
+    ----------
+    specimen, drive
+        The drive's amplitude must be positive, its phase zero.
+    shape, periods
+        How it repeats: see `OrbitShape`; ``periods`` is for a repeated one.
+    start
+        x, y, z, vx, vy, vz at time zero, shape (6,); None takes where a run from rest is after 400 periods.
+
+    Returns
+    -------
+    The motion; look at ``outcome`` first.
+
+    Raises
+    ------
+    ValueError
+        When the drive has a phase, or no amplitude.
+
+    """
+    if drive.amplitude_m == 0.0 or drive.phase_rad != 0.0:
+        msg = f"Drive {drive} is not allowed for shooting: give a positive amplitude and phase zero."
+        raise ValueError(msg)
+    mapping = PeriodMap(specimen, chosen(OrbitShape, shape), periods)
+    settling = SETTLING_PERIODS / drive.frequency_hz
+    first = integrate(specimen, drive, settling).final_state if start is None else start_motion(start)
+    scales = state_scales(specimen, drive)
+    state = first.copy()
+    gone = (mapping.image(state, drive) - state) / scales
+    for _ in range(NEWTON_ITERATIONS):
+        if not _size(gone) > RETURNED:
+            break
+        slope = mapping.derivative(state, drive) - np.eye(6)
+        if not bool(np.all(np.isfinite(slope))):
+            break
+        step = np.linalg.lstsq(slope, gone)[0] * scales
+        state, gone, is_better = _damped(mapping, drive, state, step, gone)
+        if not is_better:
+            break
+    return described_orbit(mapping, drive, state, gone)
+
+
+def _damped(
+    mapping: PeriodMap, drive: Harmonic, state: Vector, step: Vector, gone: Vector
+) -> tuple[Vector, Vector, bool]:
+    """Halve the step until the motion comes back closer; gives the state, how far it goes, and success."""
+    scales = state_scales(mapping.specimen, drive)
+    for halving in range(MOST_HALVINGS):
+        trial = state - 0.5**halving * step
+        trial_gone = (mapping.image(trial, drive) - trial) / scales
+        if _size(trial_gone) < _size(gone):
+            return trial, trial_gone, True
+    return state, gone, False
+
+
+def _size(values: Vector) -> float:
+    size = float(np.max(np.abs(values)))
+    return size if math.isfinite(size) else math.inf
+
+
+def described_orbit(mapping: PeriodMap, drive: Harmonic, state: Vector, gone: Vector) -> PeriodicOrbit:
+    """Stability and responses of a motion that starts at ``state`` and misses it by ``gone``, over scales."""
+    run = mapping.orbit(state, drive, SAMPLES)
+    moved = run.states[: mapping.periods * SAMPLES]
+    waves, rates = (np.column_stack([part, part[:, Y] - part[:, Z]]) for part in (moved[:, :3], moved[:, 3:]))
+    derivative = mapping.derivative(state, drive)
+    lines = np.array([abs(phasors_of(wave)[mapping.periods]) for wave in waves.T])
+    defect = _size(gone)
+    found = bool(defect <= RETURNED and np.all(np.isfinite(derivative)))
+    return PeriodicOrbit(
+        drive=drive,
+        period_map=mapping,
+        state=state,
+        signs=_signs(mapping, drive, state, np.nan_to_num(derivative), run),
+        defect=defect,
+        error=_missing(derivative, gone) * float(state_scales(mapping.specimen, drive)[0] / lines[3]),
+        response_i=_largest(waves, rates, 1.0 / (SAMPLES * drive.frequency_hz)) / drive.amplitude_m,
+        response_ii=lines / drive.amplitude_m,
+        outcome=ShootingEnd.CONVERGED if found else ShootingEnd.NO_ORBIT,
+    )
+
+
+def _largest(waves: Floats, rates: Floats, step_s: float) -> Floats:
+    """Largest magnitudes, shape (n,), of periodic waves, shape (m, n): by the cubics between samples.
+
+    Two samples of a wave and of its rate define a cubic (Hermite); it turns where its slope is zero.
+    """
+    found = np.abs(waves).max(axis=0)
+    ahead, rates_ahead = np.roll(waves, -1, axis=0), np.roll(rates, -1, axis=0)
+    for column in range(waves.shape[1]):
+        turns = np.flatnonzero(rates[:, column] * rates_ahead[:, column] < 0.0)
+        start, end = waves[turns, column], ahead[turns, column]
+        first, last = step_s * rates[turns, column], step_s * rates_ahead[turns, column]
+        cubic, square = 2.0 * (start - end) + first + last, 3.0 * (end - start) - 2.0 * first - last
+        with np.errstate(divide="ignore", invalid="ignore"):
+            root = np.sqrt(np.maximum(square**2 - 3.0 * cubic * first, 0.0))
+            # The form without cancellation; of the two turns the one within the step.
+            places = np.stack([-first / (square + root), -first / (square - root)])
+        inside = np.where((places >= 0.0) & (places <= 1.0), places, 0.0)
+        tops = start + inside * (first + inside * (square + inside * cubic))
+        found[column] = max(found[column], float(np.abs(tops).max(initial=0.0)))
+    return np.asarray(found, dtype=np.float64)
+
+
+def _missing(derivative: Table, gone: Vector) -> float:
+    """Bound how far the true motion is: the errors of flow and return, through the inverse of the map."""
+    slope = derivative - np.eye(6)
+    if not bool(np.all(np.isfinite(slope)) and np.all(np.isfinite(gone))):
+        return math.inf
+    return float(np.abs(np.linalg.pinv(slope)).sum(axis=1).max() * (_size(gone) + FLOW_ERROR))
+
+
+def _signs(
+    mapping: PeriodMap, drive: Harmonic, state: Vector, derivative: Table, run: Trajectory
+) -> OrbitSigns:
+    simpler = mapping.simpler
+    scales = state_scales(mapping.specimen, drive)
+    apart = np.zeros(0) if simpler is None else (simpler.image(state, drive) - state) / scales
+    joins = None
+    if simpler is not None:
+        is_mirror = simpler.shape is OrbitShape.MIRRORED
+        joins = BifurcationKind.SYMMETRY_BREAKING if is_mirror else BifurcationKind.PERIOD_DOUBLING
+    return OrbitSigns(
+        multipliers(derivative),
+        run.impacts.count,
+        Symmetry.MIRRORED if mapping.shape is OrbitShape.MIRRORED else Symmetry.NONE,
+        apart,
+        joins,
+        _grazing_distance(mapping.specimen, drive, run),
+    )
+
+
+def _grazing_distance(specimen: Specimen, drive: Harmonic, run: Trajectory) -> float:
+    """How far the nearest contact is from beginning or ending, over the gap or the gap times 2 pi f."""
+    match specimen.contact:
+        case NoContact() | PowerLaw():
+            return math.inf
+        case _:
+            pass
+    lower, upper = specimen.gaps_m
+    p = run.states[:, Y] - run.states[:, Z]
+    gap = min(lower, upper)
+    short = np.minimum(upper - p, lower + p)
+    dips = (short[1:-1] <= short[:-2]) & (short[1:-1] <= short[2:]) & (short[1:-1] > 0.0)
+    nearest = float(short[1:-1][dips].min(initial=math.inf)) / gap
+    rate = np.abs(run.states[:, Y + 3] - run.states[:, Z + 3])
+    # The speed at the sample before each touch.
+    places = np.searchsorted(run.time_s, run.impacts.times_s) - 1
+    slowest = float(rate[np.clip(places, 0, None)].min(initial=math.inf))
+    return min(nearest, slowest / (gap * 2.0 * math.pi * drive.frequency_hz))

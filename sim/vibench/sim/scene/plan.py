@@ -1,0 +1,219 @@
+"""How a scene will be answered, decided before it is run: only what it requires is modelled. SI units."""
+
+import math
+from dataclasses import dataclass
+
+from ..costs.ledger import Expected, cost_ledger
+from ..model.power_law import PowerLaw
+from ..model.specimen import Specimen
+from .linear_motion import LinearMotion, linear_motion, never_touches
+from .observed_window import whole_periods
+from .pace import MOST_STATES
+from .prediction import Method
+from .scene import AutomaticDuration, FixedDuration, Observable, Scene
+from .several_starts import CLEAR, FEWEST, MOST
+
+DECAYED_SHARE = 1e-9
+"""Share of the response that the start may still have where the steady motion stands for it."""
+
+CLOSED_FORM_S = 5e-4
+"""Time for a closed form [s]; this and the next three as a plan counts it. What a machine makes of it, and of
+all that a plan cannot know, is learnt from what runs took (`vibench.sim.costs`)."""
+FLIGHT_S, PERIOD_S, IMPACT_S, STEPS_S = 5e-5, 1e-7, 1e-6, 3e-4
+"""Time for a second of flight, for a drive period of it, for an impact, and for a second under a force at
+every p [s]."""
+TANGENT = 1.5
+"""Time with a tangent vector over the time without."""
+SETTLING_S = 10.0
+"""Duration that an automatic one is planned as [s]."""
+IMPACTS_PER_PERIOD = 2.0
+"""Where p would pass both stops once a period; more where it would pass them by far."""
+MICROMETRES = 1e6
+
+
+@dataclass(frozen=True)
+class ScenePlan:
+    """How a scene will be answered, and what it will cost."""
+
+    method: Method
+    sentences: tuple[str, ...]
+    """What is modelled, what is carried along, what is not, and why."""
+    planned_s: float
+    """The work in it, in seconds of a machine that nobody has."""
+    longest_planned_s: float
+    """The same if the motion never repeats and is followed to the end of an automatic duration."""
+    kind: str
+    """What runs have taken is learnt for each kind, and for what it begins with."""
+    largest_p_m: float
+    """As long as no stop is touched, abs(p) stays below this."""
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """Two scenes with the same are answered in the same way, whatever their numbers."""
+        return (self.method.value, *self.sentences[1:])
+
+    @property
+    def cost(self) -> Expected:
+        """How long it will take on one core of this machine, by what such runs took lately."""
+        return cost_ledger().expected(self.kind, self.planned_s)
+
+    @property
+    def cost_s(self) -> float:
+        """The same without how far it may be off [s]."""
+        return self.cost.time_s
+
+    def explain(self) -> str:
+        """Say the plan to a reader."""
+        return "\n".join((*self.sentences, str(self.cost)))
+
+
+def plan_scene(scene: Scene) -> ScenePlan:
+    """Decide how a scene is to be answered, without running it.
+
+    Raises ValueError when the specimen cannot be followed in time.
+    """
+    return plan_of(scene, linear_motion(scene.specimen, scene.drive, scene.start.state))
+
+
+def plan_of(scene: Scene, motion: LinearMotion) -> ScenePlan:
+    """Plan a scene whose motion, as long as nothing is touched, is ``motion``."""
+    method = _method(scene.specimen, motion, scene.duration)
+    if method is Method.CLOSED_FORM:
+        why = _why_closed(scene.specimen, motion)
+        return ScenePlan(method, (why,), CLOSED_FORM_S, CLOSED_FORM_S, method.value, motion.largest_p_m)
+    if whole_periods(scene.duration.window_s, scene.drive.frequency_hz) > MOST_STATES:
+        frequency_hz = scene.drive.frequency_hz
+        msg = (
+            f"Window {scene.duration.window_s:g} s is not allowed at {frequency_hz:g} Hz: "
+            f"a state is stored in each drive period; give {MOST_STATES / frequency_hz:.3g} s or less."
+        )
+        raise ValueError(msg)
+    sentences = (
+        _why_followed(scene.specimen, motion, method),
+        *_carried(scene.observe),
+        _length(scene.duration),
+        *(() if never_touches(scene.specimen, motion) else (_other_starts(scene.budget_s),)),
+    )
+    longest_s = scene.duration.longest_s
+    length_s = longest_s if isinstance(scene.duration, FixedDuration) else min(SETTLING_S, longest_s)
+    per_s = _planned_per_s(scene, motion, method)
+    return ScenePlan(
+        method,
+        sentences,
+        CLOSED_FORM_S + per_s * length_s,
+        CLOSED_FORM_S + per_s * longest_s,
+        _kind(scene, method),
+        motion.largest_p_m,
+    )
+
+
+def transient_decay_s(motion: LinearMotion) -> float:
+    """When the start has no share in a motion without contact any more; infinite if never."""
+    return motion.died_away_s(DECAYED_SHARE)
+
+
+def _method(specimen: Specimen, motion: LinearMotion, duration: FixedDuration | AutomaticDuration) -> Method:
+    match specimen.contact, duration:
+        case PowerLaw(), _:
+            return Method.POLYNOMIAL
+        case _, FixedDuration():
+            by_s = duration.duration_s - duration.window_s
+        case _, AutomaticDuration():
+            by_s = duration.longest_s - 1.0 / motion.drive.frequency_hz
+    is_proved = never_touches(specimen, motion) and transient_decay_s(motion) <= by_s
+    return Method.CLOSED_FORM if is_proved else Method.EVENT_DRIVEN
+
+
+def _why_closed(specimen: Specimen, motion: LinearMotion) -> str:
+    steady = "The steady motion is known in closed form; nothing is followed in time."
+    if specimen.contact.kind == "linear":
+        return f"There are no stops. {steady}"
+    return (
+        f"No stop is ever touched: abs(p) stays below {motion.largest_p_m * MICROMETRES:.3g} um, "
+        f"transient and all, and the gap is {min(specimen.gaps_m) * MICROMETRES:.3g} um. {steady}"
+    )
+
+
+def _why_followed(specimen: Specimen, motion: LinearMotion, method: Method) -> str:
+    if method is Method.POLYNOMIAL:
+        return "The force acts at every p: one adaptive method of order 8 follows the motion throughout."
+    largest, gap = motion.largest_p_m * MICROMETRES, min(specimen.gaps_m) * MICROMETRES
+    if never_touches(specimen, motion):
+        return (
+            "No stop is ever touched, but the start is not forgotten before the window: "
+            "the motion is followed by exact flight."
+        )
+    return (
+        f"A stop may be touched: without stops abs(p) might reach {largest:.3g} um, "
+        f"and the gap is {gap:.3g} um. "
+        "Flight between contacts is exact; contacts are resolved to the tolerance of the accuracy."
+    )
+
+
+def _carried(observe: tuple[Observable, ...]) -> list[str]:
+    sentences = [
+        "A tangent vector is carried for the exponent."
+        if Observable.LYAPUNOV in observe
+        else "A tangent vector is carried only if the motion does not repeat, to tell what it is."
+    ]
+    if Observable.SPECTRUM in observe:
+        sentences.append("Samples are kept over the window for the spectrum.")
+    else:
+        sentences.append("No samples are kept but the states once a drive period.")
+    if Observable.SCATTER in observe:
+        sentences.append(
+            f"The scene is run from {FEWEST - 1} more starts a millionth of the gap apart, for their scatter."
+        )
+    return sentences
+
+
+def _other_starts(budget_s: float) -> str:
+    if budget_s == 0.0:
+        return "Whether the start decides which motion is reached is not looked for: there is no budget."
+    return (
+        "Another start, a millionth of the gap away, is followed beside it. If they part, or the motion is "
+        f"chaotic, the start is forgotten, and which motion is reached is chance: then {CLEAR} to {MOST} "
+        f"starts are followed, and chaos is followed on, for {budget_s:g} s of processor time at most."
+    )
+
+
+def _length(duration: FixedDuration | AutomaticDuration) -> str:
+    window = f"{duration.window_s:g} s"
+    match duration:
+        case FixedDuration(duration_s=duration_s):
+            return f"The motion is followed for {duration_s:g} s, the last {window} observed."
+        case AutomaticDuration(longest_s=longest_s):
+            return (
+                "The motion is followed until it repeats, and observed over one of its periods; "
+                f"if it never does, over {window}; "
+                f"for {longest_s:g} s or {MOST_STATES} drive periods at most."
+            )
+
+
+def _kind(scene: Scene, method: Method) -> str:
+    """Name the runs that take about as long as their plans say, or are all off alike."""
+    match scene.duration:
+        case FixedDuration():
+            duration = "fixed"
+        case AutomaticDuration():
+            duration = "automatic"
+    observed = "+".join(sorted(each.value for each in scene.observe))
+    return "/".join(
+        (
+            *(method.value, scene.specimen.contact.kind, scene.accuracy.value, duration, observed),
+            # Where the start is forgotten other starts take as long as they may.
+            f"{scene.budget_s:.0e} s",
+        )
+    )
+
+
+def _planned_per_s(scene: Scene, motion: LinearMotion, method: Method) -> float:
+    """Plan the work in a second of motion [s]."""
+    share = abs(motion.steady_p) / min(scene.specimen.gaps_m)
+    rate_hz = IMPACTS_PER_PERIOD * scene.drive.frequency_hz * math.sqrt(share) * min(1.0, share) ** 2
+    flight_s = FLIGHT_S + PERIOD_S * scene.drive.frequency_hz
+    per_s = STEPS_S if method is Method.POLYNOMIAL else flight_s + IMPACT_S * rate_hz
+    runs = 1.0 + (TANGENT if Observable.LYAPUNOV in scene.observe else 0.0)
+    runs += FEWEST - 1 if Observable.SCATTER in scene.observe else 0.0
+    runs += 1.0 if scene.budget_s > 0.0 else 0.0
+    return per_s * runs

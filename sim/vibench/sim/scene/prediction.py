@@ -1,0 +1,195 @@
+"""What a scene's answer says: one flat, frozen value that goes into tables, files and JSON. SI units."""
+
+from dataclasses import dataclass, fields
+from enum import StrEnum
+
+import numpy as np
+
+from ..kernels.arrays import Floats
+from ..model.outcome import Outcome
+from .shares import EscapeRate, Share
+
+State = tuple[float, float, float, float, float, float]
+"""x, y, z, vx, vy, vz, absolute [m, m/s]."""
+
+
+class MotionKind(StrEnum):
+    """What a motion has come to, as its states once a drive period tell."""
+
+    PERIODIC = "periodic"
+    """It repeats after `Prediction.period` drive periods."""
+    QUASI_PERIODIC = "quasi-periodic"
+    """It neither repeats nor forgets where it began."""
+    CHAOTIC = "chaotic"
+    """It does not repeat, and forgets where it began."""
+    UNDECIDED = "undecided"
+    """It was not followed for long enough to tell."""
+    CHAOTIC_SO_FAR = "chaotic so far"
+    """Chaotic for as long as it was followed, which does not tell whether it stays so: the chaos of other
+    starts died out, or all were followed for too short a time. `Ensemble.escape` says how long it lasts."""
+
+
+class StartMemory(StrEnum):
+    """Whether the start decides which motion is reached."""
+
+    KEPT = "kept"
+    """A start a millionth of a gap away came the same way."""
+    LOST = "lost"
+    """On the way a small change grew until nothing of the start was left: another run of the same scene, on
+    another machine or at another accuracy, may reach another motion."""
+    UNKNOWN = "unknown"
+    """It was not looked for: there was no budget."""
+
+
+@dataclass(frozen=True)
+class FoundMotion:
+    """One of the motions that were reached from starts too near to each other to be told apart.
+
+    Motions are the same when kind and period are and all responses agree to a thousandth, or within the
+    scatter of chaos. Symmetric partners, whose responses are equal, are one motion.
+    """
+
+    motion: MotionKind
+    period: int | None
+    """Of a periodic motion, in drive periods."""
+    response_i: float | None
+    """Largest abs(x) over the drive amplitude; of the first start that repeats, or the mean over its starts
+    if none does; as the next three."""
+    response_ii: float | None
+    relative_i: float | None
+    relative_ii: float | None
+    error_estimate: float | None
+    """Relative; of Response I of one more run that reaches this motion."""
+    starts: int
+    """How many reached it."""
+    share: Share
+    """Of all starts. The intervals of all motions hold together in 19 cases of 20, and also in the end:
+    starts that were chaotic so far, undecided, or on one of several chaotic motions may come to any other."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """What became of a scene whose start was forgotten, from several starts a millionth of a gap apart."""
+
+    starts: int
+    """The one that was asked for among them."""
+    motions: tuple[FoundMotion, ...]
+    """Found, the one with the largest share first."""
+    asked: int
+    """Which of them the start that was asked for came to."""
+    unseen_share: float
+    """A motion that was not found has less than this share, in 39 cases of 40: also in the end, as starts
+    that were chaotic so far, or undecided, may come to it."""
+    escape: EscapeRate | None
+    """How often chaos died out; None where there was none to speak of."""
+    scatter: float | None
+    """Standard deviation of Response I over all starts, over its mean."""
+    followed_s: float
+    """Time that all starts together were followed."""
+
+
+class Method(StrEnum):
+    """How a scene is answered."""
+
+    CLOSED_FORM = "closed form"
+    """No stop is ever touched, by a bound: the linear specimen's exact answer."""
+    EVENT_DRIVEN = "event driven"
+    """Exact flight from contact to contact; contacts resolved to the tolerance."""
+    POLYNOMIAL = "polynomial"
+    """A force at every p: one adaptive method of order 8 from end to end."""
+
+
+@dataclass(frozen=True, eq=False)
+class ScenePrediction:
+    """Responses of one scene and all that is needed to judge them. None where it was not asked, or not found.
+
+    Responses are over the drive amplitude, those called relative are of p = y - z.
+    """
+
+    frequency_hz: float
+    amplitude_m: float
+    response_i: float | None
+    """Largest abs(x) over the window."""
+    response_ii: float | None
+    """Amplitude of x at the drive frequency."""
+    relative_i: float | None
+    """Largest abs(p) over the window."""
+    relative_ii: float | None
+    """Amplitude of p at the drive frequency."""
+    impacts: int
+    """Contacts that began within the window."""
+    impact_rate_hz: float
+    """The same, per second."""
+    motion: MotionKind
+    period: int | None
+    """Of a periodic motion, in drive periods."""
+    duration_s: float
+    """How long the specimen was followed."""
+    window_s: float
+    """The last part of it, over which the largest values were taken."""
+    settled_s: float | None
+    """When the motion was found to be settled; None where the duration was given."""
+    ended: str
+    """Why it was followed no longer."""
+    integration_error: float | None
+    """The part of it that a stricter accuracy would lessen."""
+    scatter: float | None
+    """Relative standard deviation of Response I between windows, where the motion never repeats."""
+    lyapunov_per_s: float | None
+    """Largest Lyapunov exponent [1/s]."""
+    lyapunov_error_per_s: float | None
+    """Its standard error [1/s]."""
+    start: str
+    """The state it began from: "rest", or as the scene calls it."""
+    final_state: State
+    outcome: Outcome
+    method: Method
+    accuracy: str
+    response_i_error: float | None = None
+    """Relative, as the next three; see `vibench.sim.scene.solve_scene`."""
+    response_ii_error: float | None = None
+    relative_i_error: float | None = None
+    relative_ii_error: float | None = None
+    error_estimate: float | None = None
+    """The largest of the four."""
+    section: Floats | None = None
+    """States once a drive period within the window, where a Poincare section was asked for, shape (n, 6)."""
+    spectrum_hz: Floats | None = None
+    """Frequencies of the lines, where a spectrum was asked for, shape (lines,)."""
+    spectrum: Floats | None = None
+    """Amplitude of x at each of them over the drive amplitude, shape (lines,)."""
+    memory: StartMemory = StartMemory.UNKNOWN
+    """Whether the start decided which motion was reached."""
+    ensemble: Ensemble | None = None
+    """What other starts came to where it did not; None where it did, or where there was no budget."""
+
+    @property
+    def is_one_of_several(self) -> bool:
+        """The numbers are those of one motion, and other starts reached others."""
+        return self.ensemble is not None and len(self.ensemble.motions) > 1
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values for JSON: None where there is no number."""
+        return _fields_of(self)
+
+
+def _fields_of(value: ScenePrediction | Ensemble | FoundMotion | Share | EscapeRate) -> dict[str, object]:
+    return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+
+
+def _plain(value: object) -> object:  # noqa: PLR0911 - a row for each kind of value
+    match value:
+        case Outcome():
+            return value.text
+        case StrEnum():
+            return str(value)
+        case np.ndarray():
+            return value.tolist()
+        case float() if not np.isfinite(value):
+            return None
+        case tuple():
+            return [_plain(each) for each in value]
+        case Ensemble() | FoundMotion() | Share() | EscapeRate():
+            return _fields_of(value)
+        case _:
+            return value

@@ -1,0 +1,190 @@
+"""What a motion has come to: told from its states once a drive period and the growth of a small change.
+
+Whether it repeats is read from the states alone. A motion that does not repeat is chaotic when a small change
+grows without end, quasi-periodic when it does neither grow nor die (Lichtenberg and Lieberman, Regular and
+Chaotic Dynamics (1992), section 5.3; growth is counted in natural logarithms).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kernels.arrays import Floats
+from .prediction import MotionKind
+
+MOST_PERIODS = 32
+"""Longest period that is looked for, in drive periods."""
+FEWEST_BETWEEN = 8
+"""States that are compared lie at least this many drive periods apart."""
+SLOWEST_RATIO = 0.99
+"""A change that shrinks less than this between two comparisons is taken to shrink by this."""
+NEARLY = 0.01
+"""Change over the size of a motion, from one of its periods to the next, up to which it may be settling."""
+TINY = 1e-300
+"""Size of a motion that has none."""
+DISTINCT = 20.0
+"""A motion of several periods differs from one of fewer by so many tolerances; one that differs by less may
+be settling down to it still."""
+CERTAIN_GROWTH = 12.0
+"""A small change has grown by e^12 = 160 000: more than shear makes of it."""
+NEUTRAL = 0.1
+"""Growth per forgetting time that counts as none: the specimen's own damping has -1."""
+DRIFT_PARTS = 6
+"""A motion drifts whose changes grow or shrink over so many parts in turn: by chance in 2 cases of 720."""
+FEWEST_NEUTRAL = 8.0
+"""Forgetting times that a motion must neither grow nor die to be called quasi-periodic."""
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """After how many drive periods a motion repeats, and how nearly."""
+
+    period: int
+    distance: float
+    """How far it still has to go, over its size."""
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """How a small change has grown over stretches of a motion, one after the other."""
+
+    logarithms: Floats
+    """Natural logarithm of the growth over each stretch, shape (stretches,)."""
+    duration_s: float
+    """Of all stretches together."""
+
+    @property
+    def total(self) -> float:
+        """Over all stretches."""
+        return float(self.logarithms.sum())
+
+    @property
+    def is_certain(self) -> bool:
+        """A small change has surely grown."""
+        return self.total > CERTAIN_GROWTH
+
+    @property
+    def halves(self) -> tuple[float, float]:
+        """Over the earlier and the later stretches."""
+        middle = len(self.logarithms) // 2
+        return float(self.logarithms[:middle].sum()), float(self.logarithms[middle:].sum())
+
+
+@dataclass(frozen=True)
+class Sharpness:
+    """What counts as the same, over the size of a motion."""
+
+    tolerance: float
+    """Distance still to go that counts as there."""
+    noise: float
+    """Changes from one period to the next that come from the steps of the integration alone."""
+
+
+def repetition(
+    section: Floats, omega: float, forgetting_periods: float, sharpness: Sharpness
+) -> Repetition | None:
+    """Find the fewest drive periods after which the end of a section repeats; None if it does not.
+
+    States a forgetting time apart are compared, twice over: a small change from one period to the next may
+    be a slow drift that goes far. What is still to go follows from how the change shrinks.
+
+    Parameters
+    ----------
+    section
+        States once a drive period, shape (n, 6); longer ones find longer periods.
+    omega
+        Of the drive [rad/s]: measures velocities against displacements.
+    forgetting_periods
+        Drive periods in which the slowest mode without contact fades by e.
+    sharpness
+        What counts as the same.
+
+    """
+    points = section / np.repeat([1.0, omega], 3)
+    points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
+    if len(points) > MOST_PERIODS and _returns_nowhere(points, sharpness.tolerance):
+        return None
+    apart = np.inf
+    for period in range(1, MOST_PERIODS + 1):
+        lag = period * int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN) / period))
+        if len(points) < 2 * lag + period:
+            return None
+        step = _change(points[-lag:], points[-lag - period : -period])
+        if step < sharpness.tolerance:
+            distance = _still_to_go(points, period, lag, sharpness.noise)
+            is_there = distance < sharpness.tolerance and apart > DISTINCT * sharpness.tolerance
+            return Repetition(period, distance) if is_there else None
+        apart = min(apart, step)
+    return None
+
+
+def _returns_nowhere(points: Floats, tolerance: float) -> bool:
+    """Whether the last state alone tells that nothing repeats: what chaos costs to look at."""
+    changes = np.abs(points[-1 - MOST_PERIODS : -1] - points[-1]).max(axis=1)
+    return bool(np.all(changes >= tolerance))
+
+
+def wandered_until(section: Floats, omega: float, period: int) -> int:
+    """Find since when the end of a section has come back, nearly, after a period: that many states before."""
+    points = section / np.repeat([1.0, omega], 3)
+    points = points / max(float(np.abs(points).max(initial=0.0)), TINY)
+    changes = np.abs(points[period:] - points[:-period]).max(axis=1)
+    wandering = np.flatnonzero(changes > NEARLY)
+    return int(wandering[-1]) + period + 1 if len(wandering) else 0
+
+
+def is_drifting(section: Floats, omega: float) -> bool:
+    """Return whether the changes of a motion from period to period shrink or grow steadily.
+
+    Near a bifurcation a motion settles so slowly that a small change neither grows nor fades in the time
+    that was watched, as on a torus. On a torus the changes keep their size.
+
+    Parameters
+    ----------
+    section
+        States once a drive period, shape (n, 6).
+    omega
+        Angular frequency of the drive [rad/s].
+
+    """
+    points = section / np.repeat([1.0, omega], 3)
+    periods = range(1, min(MOST_PERIODS, len(points) // (2 * DRIFT_PARTS)) + 1)
+    changes = [np.square(points[period:] - points[:-period]).sum(axis=1) for period in periods]
+    if not changes:
+        return False
+    smallest = min(changes, key=lambda squares: float(squares.mean()))
+    trend = np.diff([float(part.mean()) for part in np.array_split(smallest, DRIFT_PARTS)])
+    return bool(np.all(trend < 0.0) or np.all(trend > 0.0))
+
+
+def _still_to_go(points: Floats, period: int, lag: int, noise: float) -> float:
+    """How far a motion is from where its changes lead, if they go on shrinking as they do."""
+    late = _change(points[-period:], points[-period - lag : -lag])
+    if late < noise:
+        return late
+    early = _change(points[-period - lag : -lag], points[-period - 2 * lag : -2 * lag])
+    ratio = min(late / early, SLOWEST_RATIO) if early > 0.0 else SLOWEST_RATIO
+    return late * max(1.0, ratio / (1.0 - ratio))
+
+
+def section_needed(forgetting_periods: float) -> int:
+    """States that let every period up to the longest be found."""
+    return 2 * (int(np.ceil(max(forgetting_periods, FEWEST_BETWEEN))) + MOST_PERIODS) + MOST_PERIODS
+
+
+def kind_of(repeats: Repetition | None, growth: Growth, fading_s: float) -> MotionKind:
+    """Judge a motion; one that may still be settling, within eight times ``fading_s``, is undecided."""
+    if repeats is not None:
+        return MotionKind.PERIODIC
+    times = growth.duration_s / fading_s
+    per_time = growth.total / times if times > 0.0 else 0.0
+    earlier, later = growth.halves
+    if growth.is_certain and per_time > NEUTRAL and min(earlier, later) > 0.25 * growth.total:
+        return MotionKind.CHAOTIC
+    if times >= FEWEST_NEUTRAL and abs(per_time) < NEUTRAL:
+        return MotionKind.QUASI_PERIODIC
+    return MotionKind.UNDECIDED
+
+
+def _change(after: Floats, before: Floats) -> float:
+    return float(np.abs(after - before).max(initial=0.0))

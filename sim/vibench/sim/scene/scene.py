@@ -1,0 +1,166 @@
+"""A scene: what is shaken, how, and what is to be seen of it. SI units."""
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import ClassVar, Literal
+
+from pydantic import ConfigDict
+
+from ..model.accuracy import Accuracy
+from ..model.drive import Harmonic
+from ..model.specimen import Specimen
+from ..model.word import chosen
+from ..motion.response import WHOLE
+from .prediction import State
+
+_STRICT = ConfigDict(extra="forbid")
+PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
+"""Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed."""
+BUDGET_S = 1.0
+"""What a scene may cost on top of its own run."""
+
+
+class Observable(StrEnum):
+    """What is looked at."""
+
+    RESPONSE = "response"
+    """Responses I and II of m0 and of p."""
+    LYAPUNOV = "lyapunov"
+    """The largest exponent; a tangent vector is carried."""
+    SPECTRUM = "spectrum"
+    """Amplitudes of m0 over frequency; samples are stored."""
+    POINCARE = "poincare"
+    """States once a drive period."""
+    SCATTER = "scatter"
+    """How much Response I differs between starts that hardly do; the scene is run several times more."""
+
+
+MOST_PERIODS = 1e12
+"""After so many drive periods a double tells times apart to a ten-thousandth of one."""
+
+
+@dataclass(frozen=True)
+class FixedDuration:
+    """Follow the motion for this long, and observe the end of it."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    duration_s: float = PAPER_DURATION_S
+    window_s: float = PAPER_WINDOW_S
+    kind: Literal["fixed"] = "fixed"
+
+    @property
+    def longest_s(self) -> float:
+        """As long as the motion is followed."""
+        return self.duration_s
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.duration_s < math.inf:
+            msg = f"Duration {self.duration_s} s is not allowed: it must be positive and finite."
+            raise ValueError(msg)
+        if not 0.0 < self.window_s <= self.duration_s:
+            msg = (
+                f"Window {self.window_s} s is not allowed: "
+                f"it must be positive and within the run of {self.duration_s} s."
+            )
+            raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class AutomaticDuration:
+    """Follow the motion until it has settled, then observe a period of it, or a window if it has none."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    window_s: float = PAPER_WINDOW_S
+    longest_s: float = 300.0
+    """The motion is observed after this long at the latest."""
+    kind: Literal["automatic"] = "automatic"
+
+    def __post_init__(self) -> None:
+        for name, value in (("Window", self.window_s), ("Longest duration", self.longest_s)):
+            if not 0.0 < value < math.inf:
+                msg = f"{name} {value} s is not allowed: it must be positive and finite."
+                raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class Rest:
+    """Begin with nothing moving."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    kind: Literal["rest"] = "rest"
+
+    @property
+    def state(self) -> State:
+        """Zeros."""
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def name(self) -> str:
+        """How results call it."""
+        return "rest"
+
+
+@dataclass(frozen=True)
+class Given:
+    """Begin in a state of one's own."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    state: State
+    """x, y, z, vx, vy, vz, absolute [m, m/s]."""
+    name: str = "given"
+    """How results call it."""
+    kind: Literal["given"] = "given"
+
+    def __post_init__(self) -> None:
+        if len(self.state) != 6 or not all(math.isfinite(value) for value in self.state):
+            msg = f"Start {self.state} is not allowed: give six finite numbers x, y, z, vx, vy, vz."
+            raise ValueError(msg)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What one simulation is asked."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = _STRICT
+
+    specimen: Specimen
+    drive: Harmonic
+    observe: tuple[Observable, ...] = (Observable.RESPONSE,)
+    accuracy: Accuracy = Accuracy.STANDARD
+    duration: FixedDuration | AutomaticDuration = FixedDuration()
+    start: Rest | Given = Rest()
+    budget_s: float = BUDGET_S
+    """Processor time for what one run cannot tell: whether chaos lasts, and what other starts come to where
+    the start is forgotten. Counted as on the machine of docs/accuracy.md, so that the answer is the same on
+    every other. Zero looks for neither."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.budget_s < math.inf:
+            msg = f"Budget {self.budget_s} s is not allowed: it must be zero or positive, and finite."
+            raise ValueError(msg)
+        object.__setattr__(self, "accuracy", chosen(Accuracy, self.accuracy))
+        object.__setattr__(self, "observe", tuple(chosen(Observable, each) for each in self.observe))
+        if not self.observe:
+            msg = f"A scene in which nothing is observed is not allowed: give one of {', '.join(Observable)}."
+            raise ValueError(msg)
+        if self.drive.amplitude_m == 0.0:
+            msg = "A drive of amplitude 0 m has no response over the drive: give a positive amplitude."
+            raise ValueError(msg)
+        for length_s in (self.duration.longest_s, self.duration.window_s):
+            if length_s * self.drive.frequency_hz > MOST_PERIODS:
+                msg = (
+                    f"Duration {length_s:g} s is not allowed at {self.drive.frequency_hz} Hz: it must be "
+                    f"{MOST_PERIODS:g} drive periods at most, {MOST_PERIODS / self.drive.frequency_hz:g} s."
+                )
+                raise ValueError(msg)
+        if self.duration.window_s * self.drive.frequency_hz < 1.0 - WHOLE:
+            msg = (
+                f"Window {self.duration.window_s} s is not allowed at {self.drive.frequency_hz} Hz: "
+                f"it must hold one drive period, {1.0 / self.drive.frequency_hz} s."
+            )
+            raise ValueError(msg)

@@ -1,0 +1,358 @@
+"""What becomes of a scene from starts too near to each other to be told apart. SI units.
+
+After transient chaos it is chance which motion is reached, and when: starts a millionth of a gap apart are
+draws of it. They are followed round by round until all have settled, until it is known that chaos lasts, or
+until the budget is used up.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..engine.run import Watch
+from ..kernels.arrays import Floats
+from ..model.outcome import Outcome
+from ..model.specimen import Specimen
+from ..model.state import Y, Z
+from .followed_run import FollowedRun, Stretch
+from .observed_window import ObservedWindow, follow_strobed, observe_window, window_of
+from .pace import Pace
+from .prediction import MotionKind
+from .repetition import NEUTRAL, Growth, kind_of
+from .scatter import WindowScatter, window_scatter
+from .shares import EscapeRate, escape_rate
+from .states_alone import Asking, Following, StatesAlone
+
+PUSH = 1e-6
+"""Largest difference between starts: displacements over the gap, velocities over gap times 2 pi f."""
+SEED = 2025
+PARTED = 0.01
+"""Starts whose displacements have come so far apart, over the size of the motion, have forgotten where they
+began: that is ten thousand times as far as they were."""
+TOUCHING = 0.999
+"""Of a gap: m1 that is so far out may be in contact."""
+LEAST_SIZE = 1e-3
+"""Of a gap: what a motion counts for at least, when starts are said to have parted."""
+CLEAR, FEWEST, MOST = 8, 16, 64
+"""Starts that are followed, that which was asked for among them: the first where all of them settled on one
+motion, or chaos surely lasts; the last where they came to more than one motion, and the budget allows."""
+LEAST_S = 1e-3
+"""Following and observing a start costs this at least."""
+TOO_FEW = 4
+"""Fewer starts say nothing."""
+LASTING_S = 300.0
+"""Chaos counts as lasting when its mean lifetime is surely longer: ten times the paper's run."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReachedMotion:
+    """What one start came to."""
+
+    run: FollowedRun
+    """At its end."""
+    motion: MotionKind
+    period: int | None
+    responses_m: Floats
+    """Largest x, line of x, largest p, line of p, shape (4,)."""
+    scatter: WindowScatter | None
+    """Of the largest x, where nothing repeats."""
+    wandered_until_s: float
+    """When it was last seen to change from period to period."""
+    growth: Growth
+    """Of a small change, as long as one was carried along: over no time, where it repeats."""
+
+
+def pushes(specimen: Specimen, frequency_hz: float, count: int, seed: int) -> Floats:
+    """Draw small changes of a start, shape (count, 6)."""
+    scale = PUSH * min(specimen.gaps_m) * np.repeat([1.0, 2.0 * math.pi * frequency_hz], 3)
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 6)) * scale
+
+
+def forgets_its_start(begin: FollowedRun, path: Sequence[Stretch]) -> bool:
+    """Whether another start, pushed away, came far from the path of a motion on its way.
+
+    Parameters
+    ----------
+    begin
+        The motion where it began.
+    path
+        What was seen of it, from there until it had settled.
+
+    """
+    gap_m = min(begin.specimen.gaps_m)
+    farthest_m = max((np.abs(each.states[:, :3]).max(initial=0.0) for each in path), default=0.0)
+    size_m = max(float(farthest_m), LEAST_SIZE * gap_m)
+    twin = begin.pushed(pushes(begin.specimen, begin.drive.frequency_hz, 1, SEED)[0])
+    for stretch in path:
+        beside = twin.follow(stretch.end_s, samples=stretch.samples)
+        pressed = _pressed(begin.specimen, beside.states) & _pressed(begin.specimen, stretch.states)
+        apart_m = np.abs(beside.states[~pressed, :3] - stretch.states[~pressed, :3]).max(initial=0.0)
+        if not apart_m < PARTED * size_m:
+            return True
+    return False
+
+
+def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
+    """Say of each state, shape (n, 6), whether m1 is at a stop: there lanes give the flight after it."""
+    lower_m, upper_m = (TOUCHING * gap_m for gap_m in specimen.gaps_m)
+    p = states[:, Y] - states[:, Z]
+    return np.asarray((p >= upper_m) | (p <= -lower_m))
+
+
+@dataclass(frozen=True)
+class Horizon:
+    """How far other starts are followed."""
+
+    first_s: float
+    """In the first round; in each one after it, twice as far."""
+    last_s: float
+    """At most."""
+    judging_s: float
+    """What does not repeat then is followed so much longer with a small change, to tell what it is."""
+    window_s: float
+    """And observed for so long."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """How many starts are followed, and at what cost."""
+
+    clear: int = CLEAR
+    """That which was asked for among them; enough where they leave no doubt."""
+    fewest: int = FEWEST
+    """Elsewhere."""
+    most: int = MOST
+    """Where those came to more than one motion."""
+    seed: int = SEED
+    budget_s: float = math.inf
+    """Nominal cost of all of them."""
+
+
+NOT_CARRIED = Growth(np.empty(0), 0.0)
+MORE_S = 1.0
+"""Starts that are followed on are followed for longer than they need, by this together."""
+
+
+class SeveralStarts:
+    """Starts beside the one that was asked for, and what they came to."""
+
+    def __init__(
+        self, begin: FollowedRun, asked: ReachedMotion, pace: Pace, horizon: Horizon, draw: Draw
+    ) -> None:
+        self._pace = pace
+        self._horizon = horizon
+        self._draw = draw
+        changes = pushes(begin.specimen, begin.drive.frequency_hz, draw.most - 1, draw.seed)
+        self._waiting = [begin.pushed(change) for change in changes]
+        self._under_way: list[StatesAlone] = []
+        self._reached = [asked]
+
+    @property
+    def reached(self) -> tuple[ReachedMotion, ...]:
+        """What the starts came to, the one that was asked for first."""
+        return tuple(self._reached)
+
+    @property
+    def followed_s(self) -> float:
+        """Time that all starts together were followed."""
+        return sum(each.run.time_s for each in self.reached)
+
+    @property
+    def escape(self) -> EscapeRate | None:
+        """How often chaos died out; None where no motion wandered long enough to tell.
+
+        A motion that wanders when it should have been on its attractor is taken to be chaotic from there on:
+        until it is known to have settled, or as long as a small change surely grows. Any other may have left
+        chaos already, as long ago as it takes to be seen to repeat.
+        """
+        known = [
+            (each.wandered_until_s, each.period is not None, each.motion is MotionKind.CHAOTIC)
+            for each in self._reached
+        ]
+        known += [(each.wandered_until_s, each.repeats is not None, False) for each in self._under_way]
+        unsure_s, attractor_s = self._pace.settling_s, self._pace.attractor_s
+        chaos = [
+            (until_s - attractor_s - (0.0 if is_over or has_grown else unsure_s), is_over)
+            for until_s, is_over, has_grown in known
+        ]
+        chaotic_s = sum(max(0.0, life_s) for life_s, _ in chaos)
+        if chaotic_s <= 0.0:
+            return None
+        return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
+
+    def follow(self) -> Asking[None]:
+        """Follow as many starts as the budget allows, as far as it takes, and observe them."""
+        asked, budget_s = self._reached[0].run, self._draw.budget_s
+        each_s = asked.cost_s * min(1.0, self._horizon.first_s / asked.time_s)
+        if budget_s < (TOO_FEW - 1) * each_s:
+            return
+        spent_s = yield from self._follow_some(self._draw.clear - 1, budget_s, each_s)
+        if not self._is_clear:
+            more = self._draw.fewest - self._draw.clear
+            spent_s += yield from self._follow_some(more, budget_s - spent_s, each_s)
+        if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
+            # What a start took tells how many more the budget allows.
+            each_s = spent_s / (len(self.reached) - 1)
+            more = self._draw.most - self._draw.fewest
+            yield from self._follow_some(more, budget_s - spent_s, each_s)
+
+    @property
+    def _is_clear(self) -> bool:
+        """All starts came to one motion, for good."""
+        settled = all(each.period is not None for each in self._reached)
+        return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
+
+    def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> Asking[float]:
+        """Follow more starts, as many as a budget allows, and observe them; gives what it cost."""
+        count = _as_many(wanted, budget_s, each_s)
+        self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
+        self._waiting = self._waiting[count:]
+        yield from self._follow_rounds(budget_s)
+        found = [self._observed(each) for each in self._under_way]
+        self._under_way = []
+        self._reached += [each for each in found if each.run.outcome is Outcome.REACHED_END]
+        return sum(each.run.cost_s for each in found)
+
+    @property
+    def _cost_s(self) -> float:
+        return sum(each.run.cost_s for each in self._under_way)
+
+    @property
+    def _is_lasting(self) -> bool:
+        """No start has settled, in so long a time that chaos surely lasts."""
+        escape = self.escape
+        return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
+
+    @property
+    def _has_settled(self) -> bool:
+        """Some start has come to a motion that repeats."""
+        reached = any(each.period is not None for each in self._reached)
+        return reached or any(each.repeats is not None for each in self._under_way)
+
+    def _follow_rounds(self, budget_s: float) -> Asking[None]:
+        reach_s = min(self._horizon.first_s, self._horizon.last_s)
+        while True:
+            left = [each for each in self._under_way if not each.is_over]
+            allowed_s = max(0.0, budget_s - self._cost_s) / max(1, len(left))
+            yield [Following(each, reach_s, each.run.cost_s + allowed_s) for each in left]
+            left = [each for each in left if not each.is_over]
+            if not left or self._cost_s >= budget_s or self._is_lasting:
+                return
+            if any(each.run.time_s < reach_s for each in left):
+                continue  # On what the others have not used of their parts.
+            if reach_s >= self._horizon.last_s:
+                return
+            lasting_s = reach_s + self._lasting_after_s / len(left)
+            reach_s = min(2.0 * reach_s, lasting_s, self._horizon.last_s)
+
+    @property
+    def _lasting_after_s(self) -> float:
+        """How much longer all starts together are followed until chaos surely lasts, if none settles."""
+        escape = self.escape
+        if escape is None or self._has_settled:
+            return math.inf
+        return max(0.0, escape.chaotic_s * (LASTING_S / escape.lifetime_above_s - 1.0)) + MORE_S
+
+    def _observed(self, other: StatesAlone) -> ReachedMotion:
+        run = other.run
+        if other.repeats is not None:
+            period, kind = other.repeats.period, MotionKind.PERIODIC
+            begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
+            one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
+            window = window_of(begins, [one])
+            return reached_motion(run, kind, period, window, None, other.wandered_until_s, NOT_CARRIED)
+        until_s = other.wandered_until_s
+        growth = other.growth_over(self._horizon.judging_s)
+        window = observe_window(run, self._horizon.window_s)
+        scatter = window_scatter([block.peak_x_m for block in window.blocks], len(window.blocks))
+        kind = kind_of(None, growth, self._pace.fading_s)
+        return reached_motion(run, kind, None, window, scatter, until_s, growth)
+
+
+def reached_motion(
+    run: FollowedRun,
+    motion: MotionKind,
+    period: int | None,
+    window: ObservedWindow,
+    scatter: WindowScatter | None,
+    wandered_until_s: float,
+    growth: Growth,
+) -> ReachedMotion:
+    """Describe what a run came to by the window at its end."""
+    return ReachedMotion(run, motion, period, window.responses_m, scatter, wandered_until_s, growth)
+
+
+def _as_many(wanted: int, budget_s: float, each_s: float) -> int:
+    """How many starts a budget allows."""
+    return math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
+
+
+SAME = 1e-3
+"""Relative difference of responses up to which two motions are the same."""
+APART = 2.0
+"""Two windows of chaos differ by more than so many times what 19 in 20 do only if they are of two motions."""
+
+
+CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
+"""A motion is shown by the start that shows it best, in this order."""
+
+
+def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
+    """Sort what starts came to into motions, each with the start first that shows it best."""
+    groups: list[list[ReachedMotion]] = []
+    for each in sorted(reached, key=_clearness):
+        same = next((group for group in groups if is_same(group[0], each)), None)
+        if same is None:
+            groups.append([each])
+        else:
+            same.append(each)
+    return groups
+
+
+def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKind:
+    """Name the kind of a motion that several starts came to.
+
+    Chaos that is weak, or comes in bursts, leaves most starts calm for as long as they are watched: where a
+    small change has surely grown from one of them, the growth from all together tells.
+    """
+    kinds = [each.motion for each in group if each.motion in CLEAREST]
+    if group[0].period is None and any(each.growth.is_certain for each in group):
+        grown = sum(each.growth.total for each in group)
+        times = sum(each.growth.duration_s for each in group) / forgetting_s
+        is_chaos = MotionKind.CHAOTIC in kinds and grown > NEUTRAL * times
+        return MotionKind.CHAOTIC if is_chaos else MotionKind.UNDECIDED
+    if group[0].period is not None or not kinds:
+        return group[0].motion
+    return max(CLEAREST, key=kinds.count)
+
+
+def _clearness(one: ReachedMotion) -> int:
+    return CLEAREST.index(one.motion) if one.motion in CLEAREST else len(CLEAREST)
+
+
+def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
+    """Whether two starts came to the same motion, or to its symmetric partner.
+
+    Motions are known by their period and all four responses, and by these alone where one start has come to
+    it too late to be seen to repeat, or to be told from chaos. Of motions that do not repeat only the largest
+    value is compared, within what windows scatter by: two chaotic motions that differ by less count as one.
+    Weak chaos is called undecided or quasi-periodic by some starts; what tells that it is one motion is that
+    all of them scatter alike, so that of two kinds the smaller scatter counts.
+    """
+    if one.period is not None and other.period is not None and one.period != other.period:
+        return False
+    difference = np.abs(one.responses_m - other.responses_m)
+    if np.all(difference <= SAME * np.maximum(one.responses_m, other.responses_m)):
+        return True
+    if one.period is not None or other.period is not None:
+        return False
+    is_one_kind = one.motion is other.motion
+    if one.scatter is None or other.scatter is None:
+        return is_one_kind
+    counts = max if is_one_kind else min
+    largest = max(one.responses_m[0], other.responses_m[0])
+    allowed = SAME + APART * counts(one.scatter.between_runs, other.scatter.between_runs)
+    return bool(difference[0] <= allowed * largest)

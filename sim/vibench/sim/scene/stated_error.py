@@ -1,0 +1,273 @@
+"""How far each response of an answer may be off: measured, by the kind of question that was asked. SI units.
+
+A motion that has settled forgets the errors of its steps as they come: it is taken on from its end with a
+far smaller tolerance until that has been forgotten too, and what was answered is compared with that. A
+motion that has not settled carries its errors along: it is followed once more from its start with that
+tolerance, and observed in the same window. Where the two part on the way, growth has forgotten
+the start, and another run is another draw: what two draws differ by is found from the parts of the window if
+the motion has become stationary by then, else from a few starts that nobody can tell apart.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..engine.run import Watch
+from ..kernels.arrays import Floats
+from ..model.accuracy import Accuracy
+from ..model.outcome import Outcome
+from .fixed_run import SceneRun, leads
+from .followed_run import FollowedRun
+from .observed_window import ObservedWindow, observe_window
+from .pace import Pace
+from .prediction import MotionKind, ScenePrediction
+from .scatter import draws_apart, draws_of_starts
+from .scene import AutomaticDuration, Scene
+from .several_starts import SEED, pushes
+from .states_alone import Asking
+
+STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
+"""Tolerance of the comparison. A hundredth of quick's would not do: a collision in one is better."""
+FORGETTING = 4.0
+"""Forgetting times that a motion which repeats is followed before it is compared."""
+SHORTER = 4
+"""Shorter windows that are compared with one. Other lines leak into theirs this many times as much."""
+LOOKS = 8
+"""Periods of it, or drive periods of a motion that does not repeat, that are compared."""
+SAFETY = 2.0
+"""Error that is stated over the error that was measured."""
+ROUNDING = 1e-11
+"""Relative error of an exact answer."""
+ROUNDED = 1e-13
+"""How far away a compared run starts, over the drive's amplitude: some times what roundings come to over a
+run, since the difference that it makes is one draw of many."""
+_SIDES = np.array([1.0, -1.0, -1.0, -1.0, 1.0, 1.0])
+"""y and z alike: stops may leave p no room."""
+SLOWEST_RATIO = 0.9
+"""A difference that shrinks less than this from one look to the next is taken to shrink by this."""
+FIRST_LOOK = 16
+"""Drive periods after which two runs from one start are compared; then whenever the time has doubled."""
+PARTED = 0.05
+"""Two runs have parted when they differ by this part of the gap, or their responses by this part."""
+MEMORIES = 8.0
+"""Forgetting times of the slowest mode after which a motion that forgets its start is stationary."""
+MEMBERS = 5
+"""Starts beside the one asked for, where a window does not tell how draws differ."""
+
+
+@dataclass(frozen=True, eq=False)
+class StatedErrors:
+    """Relative errors, of Response I and II of x, then of p; NaN where they are not known."""
+
+    stated: Floats
+    """What each response may be off by, shape (4,)."""
+    integration: float
+    """The largest that a stricter accuracy would lessen, as it was measured."""
+
+
+UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
+"""Of a run that was lost."""
+
+
+def stated_errors(
+    scene: Scene, begin: FollowedRun, run: FollowedRun, seen: SceneRun, pace: Pace, slowest_rate: float
+) -> Asking[StatedErrors]:
+    """Find the errors of an answer.
+
+    Parameters
+    ----------
+    scene
+        What was asked.
+    begin, run
+        The motion at time zero, and at its end.
+    seen, pace
+        What was seen of it, and what decided how long is long.
+    slowest_rate
+        Of the slowest mode without contact [1/s], zero or negative.
+
+    """
+    answer = seen.window.responses_m
+    # Who looks more closely may find that it does not repeat yet, and take the lines over another length.
+    sure = _rounding(answer) + seen.leaked
+    if isinstance(scene.duration, AutomaticDuration) and seen.repeats is None:
+        sure += _by_window(seen)
+    if seen.repeats is not None and seen.was_settled:
+        off = off_settled(run, answer, scene.accuracy, seen.repeats.period, pace.forgetting_s)
+        return StatedErrors(SAFETY * off + seen.repeats.distance + _rounding(answer), float(np.max(off)))
+    strict = _strict_run(scene, begin, seen, run)
+    if strict.responses_m is not None and strict.is_together:
+        off = np.abs(answer - strict.responses_m) / np.abs(answer)
+        if float(np.max(off)) < PARTED:
+            return StatedErrors(SAFETY * off + sure, float(np.max(off)))
+    added = error_per_period(run, scene.accuracy)
+    drawn = yield from _drawn(begin, seen, strict, pace, slowest_rate)
+    return StatedErrors(drawn + SAFETY * added + seen.leaked, added)
+
+
+def _by_window(seen: SceneRun) -> Floats:
+    """Estimate the relative errors made by where a window begins and ends, shape (4,).
+
+    They are the largest differences from shorter windows that begin elsewhere. A motion that settled slowly
+    is compared with what it was long before, because it may go on to settle.
+    """
+    answer = seen.window.responses_m
+    lines = np.array([[block.line_x_m, block.line_p_m] for block in seen.blocks])
+    peaks = np.array([[block.peak_x_m, block.peak_p_m] for block in seen.blocks])
+    length = max(1, len(seen.window.blocks) // SHORTER)
+    short = [slice(first, first + length) for first in range(len(seen.blocks) - length + 1)]
+    off_peaks = np.max([np.abs(peaks[each].max(axis=0) - answer[::2]) for each in short], axis=0)
+    whole = np.array([seen.window.line_x_m, seen.window.line_p_m])
+    off_lines = np.max([np.abs(lines[each].mean(axis=0) - whole) for each in short], axis=0) / SHORTER
+    return np.asarray(SAFETY * np.array([off_peaks, off_lines]).T.ravel() / answer)
+
+
+def _rounding(answer: Floats) -> Floats:
+    """Relative errors of exact responses: a line is what is left of a motion as large as its peaks."""
+    return ROUNDING * np.repeat(answer[::2], 2) / answer
+
+
+@dataclass(frozen=True, eq=False)
+class _StrictRun:
+    """A motion followed from its start at a stricter accuracy."""
+
+    run: FollowedRun
+    """Where it parted from the answer's, on the way to the window, or at the window's end."""
+    responses_m: Floats | None
+    """In the window, shape (4,), if it came there."""
+    is_together: bool
+    """It never parted."""
+
+
+def _drawn(
+    begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace, slowest_rate: float
+) -> Asking[Floats]:
+    """Find what two draws differ by, relatively, shape (4,)."""
+    memories = -slowest_rate * seen.window.begins.time_s
+    if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
+        drawn = draws_apart(seen.blocks, len(seen.window.blocks))
+        if drawn is not None:
+            return drawn
+    others = yield from _more_starts(begin, seen, strict, pace)
+    return draws_of_starts(seen.window.responses_m, others)
+
+
+def _more_starts(begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace) -> Asking[list[Floats]]:
+    """Follow a few more starts, and observe the same window of them; NaN where one is lost.
+
+    The stricter run is one of them: what the steps have changed before starts come apart is common to all
+    others.
+    """
+    pushed = pushes(begin.specimen, begin.drive.frequency_hz, MEMBERS, SEED)
+    runs = [begin.pushed(push) for push in pushed[1:]]
+    found = [strict.responses_m] if strict.responses_m is not None else []
+    if not found:
+        runs.append(strict.run.apart(begin.tolerance))
+    window = seen.window
+    yield from leads(runs, window.begins.time_s - pace.section_s, pace)
+    for run in runs:
+        run.follow(window.begins.time_s)
+        found.append(_responses_in(observe_window(run, window.length_s), run))
+    return found
+
+
+def off_settled(
+    run: FollowedRun, answer: Floats, accuracy: Accuracy, period: int, forgetting_s: float
+) -> Floats:
+    """How far the responses of a motion that repeats are off, relatively; NaN if the comparison was lost.
+
+    What was answered, and what the next periods would answer, whose steps fall elsewhere, against a stricter
+    run, which is followed for as long again: a motion that forgets more slowly than its modes still moves.
+    """
+    cycle_s = period / run.drive.frequency_hz
+    wait_s = cycle_s * np.ceil(FORGETTING * forgetting_s / cycle_s)
+    strict = run.apart(STRICTER[accuracy])
+    looks = []
+    for _ in range(2):
+        strict.follow(strict.time_s + wait_s)
+        looks.append(_responses(strict, LOOKS * cycle_s))
+    on = run.apart(accuracy.tolerance)
+    seen = [answer, *(_responses(on, cycle_s) for _ in range(LOOKS))]
+    off = np.max(np.abs(np.array(seen) - looks[1]), axis=0)
+    moved = np.abs(looks[1] - looks[0])
+    ratio = np.minimum(
+        moved / np.maximum(np.abs(answer - looks[0]), np.finfo(np.float64).tiny), SLOWEST_RATIO
+    )
+    return np.asarray((off + moved * ratio / (1.0 - ratio)) / np.abs(looks[1]))
+
+
+def error_per_period(run: FollowedRun, accuracy: Accuracy) -> float:
+    """Relative error that a drive period adds to a motion's responses, the largest seen; NaN if lost."""
+    cycle_s = 1.0 / run.drive.frequency_hz
+    on = run.apart(accuracy.tolerance)
+    seen, missed = [], []
+    for _ in range(LOOKS):
+        twin = on.apart(STRICTER[accuracy])
+        seen.append(_responses(on, cycle_s))
+        missed.append(np.abs(seen[-1] - _responses(twin, cycle_s)))
+    return float(np.max(np.max(missed, axis=0) / np.max(np.abs(seen), axis=0)))
+
+
+def _strict_run(scene: Scene, begin: FollowedRun, seen: SceneRun, run: FollowedRun) -> _StrictRun:
+    """Follow a motion from its start at a stricter accuracy until it parts, and else through the window.
+
+    Its start is a rounding away, or laws that are flown exactly would be compared with themselves, and a
+    motion in which roundings grow would pass for exact.
+    """
+    loose, strict = begin.apart(scene.accuracy.tolerance), begin.apart(STRICTER[scene.accuracy])
+    strict = strict.pushed(ROUNDED * scene.drive.amplitude_m * _SIDES * _places_and_speeds(scene))
+    begin_s, frequency = seen.window.begins.time_s, begin.drive.frequency_hz
+    while strict.time_s < begin_s:
+        until_s = min(begin_s, max(2.0 * strict.time_s, FIRST_LOOK / frequency))
+        for each in (loose, strict):
+            each.follow(until_s)
+        if not _are_together(scene, loose, strict):
+            return _StrictRun(strict, None, is_together=False)
+    # Lines over as many periods.
+    window = observe_window(strict, seen.window.length_s, max(seen.window.line_periods, 1))
+    return _StrictRun(strict, _responses_in(window, strict), _are_together(scene, run, strict))
+
+
+def _responses_in(window: ObservedWindow, run: FollowedRun) -> Floats:
+    """Responses of a window at whose end a run is, shape (4,); NaN if the run was lost."""
+    return window.responses_m if run.outcome is Outcome.REACHED_END else np.full(4, np.nan)
+
+
+def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
+    """Whether two runs are at the same place, as far as the stops can tell."""
+    if not one.outcome is other.outcome is Outcome.REACHED_END:
+        return False
+    apart = np.abs(one.state - other.state) / _places_and_speeds(scene)
+    return bool(np.max(apart) < PARTED * min(scene.specimen.gaps_m))
+
+
+def _places_and_speeds(scene: Scene) -> Floats:
+    """Give one, and the angular frequency of the drive: what differences of a state are measured by."""
+    return np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
+
+
+def _responses(run: FollowedRun, length_s: float) -> Floats:
+    """Responses over a stretch of whole drive periods, shape (4,); NaN if the run was lost."""
+    seen = run.follow(run.time_s + length_s, Watch.PEAKS_AND_LINES)
+    if run.outcome is not Outcome.REACHED_END:
+        return np.full(4, np.nan)
+    scale = 2.0 / length_s
+    return np.array([seen.peak_x_m, scale * abs(seen.area_x), seen.peak_p_m, scale * abs(seen.area_p)])
+
+
+def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
+    """Add the errors of the responses, and the largest of them."""
+    response_i, response_ii, relative_i, relative_ii = (known(float(error)) for error in stated)
+    return replace(
+        found,
+        response_i_error=response_i,
+        response_ii_error=response_ii,
+        relative_i_error=relative_i,
+        relative_ii_error=relative_ii,
+        error_estimate=known(float(np.max(stated))),
+    )
+
+
+def known(value: float) -> float | None:
+    """Give a number, or None where there is none."""
+    return value if math.isfinite(value) else None

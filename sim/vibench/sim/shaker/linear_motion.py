@@ -1,0 +1,143 @@
+"""Amplifier, coil, table and specimen under sines: exact while no stop is touched, else to first order.
+
+While collisions hold abs(p) at the gap, the fundamental of the stops' force is that of a spring between m1
+and m2 which leaves p as large as the gap (first-order harmonic balance, as in Gong et al. 2025, eq. 5, with
+stops that neither yield nor lose energy). The force acts along one coordinate, so the motion follows in
+closed form from the free one and from that of a unit force.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..model.specimen import Specimen
+from .parts import Amplifier, FloatArray, Shaker
+
+ComplexArray = NDArray[np.complex128]
+SINE_COLUMNS = ("voltage", "current", "base", "m0", "p")
+"""Phasors at the coil [V, A] and of displacements [m], absolute but for p; time goes as exp(+i w t)."""
+_VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
+
+
+@dataclass(frozen=True, eq=False)
+class LinearMotion:
+    """What a voltage, and what the stops, move at each of n frequencies; columns SINE_COLUMNS."""
+
+    per_volt: ComplexArray
+    """Per volt at the amplifier's input while no stop is touched, shape (n, 5)."""
+    per_newton: ComplexArray
+    """Per newton by which the stops push m1 up and m2 down, shape (n, 5)."""
+
+    @property
+    def lever(self) -> ComplexArray:
+        """Per metre of a p that the stops bring about, shape (n, 5)."""
+        return self.per_newton / self.per_newton[:, [_P]]
+
+    @property
+    def stuck(self) -> ComplexArray:
+        """Per volt while the stops hold m1 to m2, shape (n, 5)."""
+        return self.per_volt - self.lever * self.per_volt[:, [_P]]
+
+    def under(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
+        """Give the motion under sines of these amplitudes, shape (n, 5).
+
+        Parameters
+        ----------
+        volts
+            At the amplifier's input, peak, shape (n,) or one for all [V].
+        gap_m
+            Clearance that p is held in; infinite without stops.
+
+        """
+        free = (
+            self.per_volt * np.broadcast_to(np.asarray(volts, dtype=np.float64), len(self.per_volt))[:, None]
+        )
+        push = _push(free[:, _P], self.per_newton[:, _P], gap_m)
+        return np.asarray(free + self.per_newton * push[:, None])
+
+    def volts_for(self, base_m: ArrayLike, gap_m: float) -> FloatArray:
+        """Give the amplitudes at the amplifier's input that hold the base's at ``base_m``, shape (n,) [V]."""
+        free, by_push = self.per_volt, self.per_newton
+        per_base = free[:, _P] / free[:, _BASE]
+        # What the stops do to p while the voltage keeps the base where it is.
+        on_held_base = by_push[:, _P] - per_base * by_push[:, _BASE]
+        held_m = np.asarray(base_m, dtype=np.float64)
+        push = _push(per_base * held_m, on_held_base, gap_m)
+        return np.asarray(np.abs((held_m - by_push[:, _BASE] * push) / free[:, _BASE]))
+
+
+def linear_motion(
+    amplifier: Amplifier, shaker: Shaker, specimen: Specimen | None, frequency_hz: ArrayLike
+) -> LinearMotion:
+    """Solve the equations that `LoadedShaker` follows in time for sines, without impacts and limits.
+
+    With Z the coil's impedance and G the force constant, coil and table are (m s^2 + d s + k + s G^2/Z) x =
+    (G/Z) u + k0 (x0 - x) + c0 s (x0 - x) (Beranek, Acoustics, ch. 3; Gong et al. 2025, eq. 1).
+
+    Parameters
+    ----------
+    amplifier, shaker
+        Their band edges, gain and linear parts; not what clips or ends the stroke.
+    specimen
+        On the table; None for a bare one, whose m0 and p are zero.
+    frequency_hz
+        Zero and above, shape (n,) [Hz].
+
+    """
+    s = np.asarray(2j * np.pi * np.atleast_1d(frequency_hz), dtype=np.complex128)
+    impedance: ComplexArray = shaker.coil_resistance_ohm + s * shaker.coil_inductance_h
+    per_volt_n = shaker.force_constant_n_per_a / impedance
+    table: ComplexArray = (
+        shaker.moving_mass_kg * s**2
+        + (shaker.suspension_damping_ns_per_m + shaker.force_constant_n_per_a * per_volt_n) * s
+        + shaker.suspension_stiffness_n_per_m
+    )
+    voltage = _amplified(amplifier, s)
+    forces: ComplexArray = np.zeros((s.size, 4, 2), dtype=np.complex128)
+    forces[:, 0, 0], forces[:, 2, 1], forces[:, 3, 1] = per_volt_n * voltage, 1.0, -1.0
+    if specimen is None:
+        moved = np.zeros_like(forces)
+        moved[:, 0, 0] = forces[:, 0, 0] / table
+    else:
+        solved = np.linalg.solve(_dynamic_stiffness(table, specimen, s), forces)
+        moved = np.asarray(solved, dtype=np.complex128)
+
+    def columns(displacement: ComplexArray, volts: ComplexArray) -> ComplexArray:
+        base, m0, m1, m2 = displacement.T
+        current = (volts - s * shaker.force_constant_n_per_a * base) / impedance
+        return np.stack([volts, current, base, m0, m1 - m2], axis=1)
+
+    return LinearMotion(columns(moved[:, :, 0], voltage), columns(moved[:, :, 1], np.zeros_like(voltage)))
+
+
+def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray) -> ComplexArray:
+    """Table, m0, m1 and m2 in one matrix, shape (n, 4, 4) [N/m]."""
+    s_of = s[:, None, None]
+    stiffness = np.zeros((s.size, 4, 4), dtype=np.complex128)
+    stiffness[:, 1:, 1:] = (
+        specimen.stiffness_matrix + s_of * specimen.damping_matrix + s_of**2 * specimen.mass_matrix
+    )
+    coupling = specimen.stiffnesses[0] + s * specimen.dampings[0]
+    stiffness[:, 0, 0] = table + coupling
+    stiffness[:, 0, 1] = stiffness[:, 1, 0] = -coupling
+    return stiffness
+
+
+def _amplified(amplifier: Amplifier, s: ComplexArray) -> ComplexArray:
+    """Output volts per input volt, shape of ``s``."""
+    low_cut = 2 * np.pi * amplifier.low_cut_hz
+    below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
+    return np.asarray(amplifier.gain * below / (1.0 + s / (2 * np.pi * amplifier.high_cut_hz)))
+
+
+def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:
+    """Give the stops' force that leaves a free p as large as the gap, as a spring would, shape (n,) [N].
+
+    With K the spring, p / (1 + K H) has the gap's size: one positive root of a quadratic.
+    """
+    excess = np.maximum((np.abs(p) / gap_m) ** 2 - 1.0, 0.0)
+    size = np.maximum(np.abs(receptance) ** 2, np.finfo(np.float64).tiny)
+    root = (np.sqrt(receptance.real**2 + size * excess) - receptance.real) / size
+    spring = np.where(excess > 0.0, root, 0.0)
+    return np.asarray(-spring * p / (1.0 + spring * receptance))

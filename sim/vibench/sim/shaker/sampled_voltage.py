@@ -1,0 +1,199 @@
+"""Rig and specimen moved together by a voltage that was sampled: base and m0 on the same grid of samples.
+
+The voltage is brought to the steps of a `LoadedShaker` and its motion back to the samples as band-limited
+signals (Shannon), piece by piece, so that a recording of any length fits in memory. SI units.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike, NDArray
+from scipy import fft
+
+from ..model.specimen import Specimen
+from .loaded_shaker import LoadedShaker
+from .parts import Amplifier, FloatArray, Shaker
+
+ComplexArray = NDArray[np.complex128]
+Gain = Callable[[FloatArray], ComplexArray]
+"""Complex gain of a sensor over frequency [Hz], shape kept."""
+
+FINEST_STEP_HZ = 1e5
+"""The steps are at least so many a second: 600 Hz then errs by 1e-3 of the specimen's push on the table."""
+_PASS_PART = 0.45
+"""Of the sample rate: passed whole; from there a cosine edge to half the rate, as behind a converter."""
+_MARGIN = 2048
+"""Samples on either side of a piece: the filters' memory beyond is below 1e-8."""
+_PIECE = 1 << 17
+"""Samples that are filtered together."""
+_BLOCK_S = 0.02
+"""Impacts are counted in blocks of this length."""
+
+
+def unchanged(frequency_hz: FloatArray) -> ComplexArray:
+    """Show a motion as it is."""
+    return np.ones(frequency_hz.shape, dtype=np.complex128)
+
+
+@dataclass(frozen=True)
+class DrivenTable:
+    """What a voltage is played into: everything that moves, and how its motion is seen."""
+
+    amplifier: Amplifier
+    """Of no numbers where the voltage is that of the coil."""
+    shaker: Shaker
+    specimen: Specimen
+    base_sensor: Gain = unchanged
+    """Of the channel that shows the base's acceleration."""
+    m0_sensor: Gain = unchanged
+    """Of the channel that shows m0's velocity; a delay is a phase that falls."""
+    base_low_cut_hz: float = 0.0
+    """-3 dB of the coupling of the base's channel, first order; 0 where direct voltage passes."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampledMotion:
+    """What the sensors show, shape (samples,)."""
+
+    base_acceleration: FloatArray
+    """[m/s2]"""
+    m0_velocity: FloatArray
+    """[m/s]"""
+    impact_times_s: FloatArray
+    """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
+    impacts: NDArray[np.int64]
+    """Contacts begun up to them, shape (blocks + 1,)."""
+    limited_steps: int
+    """Steps in which the amplifier clipped or limited its current."""
+
+
+def follow_voltage(
+    table: DrivenTable,
+    volts: FloatArray,
+    sample_rate_hz: float,
+    *,
+    start: ArrayLike = (0.0,) * 6,
+) -> SampledMotion:
+    """Move table and specimen, from rest, by a sampled voltage.
+
+    Parameters
+    ----------
+    table
+        What is moved.
+    volts
+        Voltage at the amplifier's input, or at the coil where the amplifier has no numbers [V], shape
+        (samples,), finite. Best with silence at both ends.
+    start
+        The specimen's x, y, z, vx, vy, vz [m, m/s], absolute.
+
+    Raises
+    ------
+    MotionFailed
+        When the motion is no longer finite.
+
+    """
+    ratio = ceil(FINEST_STEP_HZ / sample_rate_hz)
+    step_s = 1 / (sample_rate_hz * ratio)
+    shaken = LoadedShaker(table.amplifier, table.shaker, table.specimen, step_s, start)
+    gains = (table.base_sensor, table.m0_sensor)
+    kept = [np.empty(volts.size), np.empty(volts.size)]
+    impacts = [0]
+    block = max(1, round(_BLOCK_S * sample_rate_hz)) * ratio
+    tail = np.zeros((2, 0))
+    done = 0
+    resampling = _Resampling(sample_rate_hz, ratio)
+    for stop, fine in resampling.stretches(volts):
+        means = np.empty((2, fine.size))
+        for begin in range(0, fine.size, block):
+            end = min(begin + block, fine.size)
+            motion = shaken.move(fine[begin:end])
+            means[0, begin:end] = motion.base_acceleration
+            means[1, begin:end] = motion.m0_velocity
+            impacts.append(shaken.impacts)
+        tail = np.concatenate([tail, means], axis=1)
+        # The last samples wait for the motion behind them, but at the end.
+        upto = stop if stop == volts.size else max(stop - _MARGIN, 0)
+        held = stop - tail.shape[1] // ratio
+        for row, gain, result in zip(tail, gains, kept, strict=True):
+            result[done:upto] = resampling.samples(row, gain)[done - held : upto - held]
+        done = upto
+        tail = tail[:, max(0, (done - _MARGIN - held)) * ratio :]
+    blocks_s = np.minimum(np.arange(len(impacts)) * (block * step_s), volts.size / sample_rate_hz)
+    return SampledMotion(
+        base_acceleration=_coupled(kept[0], table.base_low_cut_hz / sample_rate_hz),
+        m0_velocity=kept[1],
+        impact_times_s=blocks_s,
+        impacts=np.array(impacts, dtype=np.int64),
+        limited_steps=shaken.limited_steps,
+    )
+
+
+class _Resampling:
+    """Brings samples to steps, and means over steps to samples behind a sensor and a converter.
+
+    Means lie half a step behind the voltage that was brought to the steps, and are read there: both
+    shifts cancel.
+    """
+
+    def __init__(self, sample_rate_hz: float, ratio: int) -> None:
+        self._sample_rate_hz = sample_rate_hz
+        self._ratio = ratio
+        # The pieces of a record are of one length, but the last.
+        self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
+
+    def stretches(self, volts: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+        """Yield the end of each stretch of samples, and the voltage's means over their steps."""
+        ratio = self._ratio
+        block = max(1, round(_BLOCK_S * self._sample_rate_hz))
+        length = ceil(_PIECE / block) * block
+        for first in range(0, volts.size, length):
+            stop = min(first + length, volts.size)
+            padded = np.zeros(_padded(stop - first))
+            low, high = max(first - _MARGIN, 0), min(stop + _MARGIN, volts.size)
+            padded[low - first + _MARGIN : high - first + _MARGIN] = volts[low:high]
+            spectrum = fft.rfft(padded) * self._weights_of(padded.size, None)
+            fine = fft.irfft(spectrum, padded.size * ratio, overwrite_x=True)
+            yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
+
+    def samples(self, means: FloatArray, gain: Gain) -> FloatArray:
+        """Give the samples behind a sensor of this gain."""
+        count = means.size // self._ratio
+        size = _padded(count)
+        padded = np.zeros(size * self._ratio)
+        padded[_MARGIN * self._ratio : (_MARGIN + count) * self._ratio] = means
+        spectrum = fft.rfft(padded)[: size // 2 + 1] * self._weights_of(size, gain)
+        return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[_MARGIN : _MARGIN + count])
+
+    def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
+        """Give what the lines of so many samples are multiplied by, to steps or from them behind a sensor."""
+        known = self._weights.get((size, gain))
+        if known is None:
+            frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
+            mean_of_step = np.sinc(frequency_hz / (self._sample_rate_hz * self._ratio)) * self._ratio
+            band = _pass_band(frequency_hz / self._sample_rate_hz)
+            known = band * mean_of_step if gain is None else band * gain(frequency_hz) / mean_of_step
+            self._weights[size, gain] = known
+        return known
+
+
+def _padded(samples: int) -> int:
+    """Give a length that a transform likes, with room for the margins."""
+    return int(fft.next_fast_len(samples + 2 * _MARGIN, real=True))
+
+
+def _coupled(values: FloatArray, cut: float) -> FloatArray:
+    """Pass values through a first-order high-pass, its -3 dB in cycles per sample."""
+    if cut == 0.0:
+        return values
+    half_turn = np.tan(np.pi * cut)
+    weights = np.array([1.0, -1.0]) / (1 + half_turn)
+    return np.asarray(scipy.signal.lfilter(weights, [1.0, -(1 - half_turn) / (1 + half_turn)], values))
+
+
+def _pass_band(cycles: FloatArray) -> FloatArray:
+    """One up to 0.45 cycles per sample, a cosine edge to nothing at half a cycle."""
+    edge = (cycles - _PASS_PART) / (0.5 - _PASS_PART)
+    return np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))

@@ -1,0 +1,358 @@
+"""What a program can ask and set: the properties of system, devices, tasks and channels, in one table.
+
+Names are those of NI's protocol file (`nidaqmx.proto`); the NI-DAQmx help has a page on each property.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from nidaqmx._stubs import nidaqmx_pb2
+from nidaqmx.constants import (
+    AOIdleOutputBehavior,
+    ChannelType,
+    Coupling as WireCoupling,
+    ExcitationSource,
+    ExcitationVoltageOrCurrent,
+    RegenerationMode,
+    SampleTimingType,
+    UsageTypeAI,
+)
+from nidaqmx.error_codes import DAQmxErrors
+
+from ..analogue import Coupling
+from .acquisition import Acquisition
+from .channels import OutputChannel
+from .devices import AnalogInputs, AnalogOutputs, Device, Idle, Overloads
+from .errors import DaqmxRefusal, member, unsupported_value
+from .reading import asked_available, default_samples, newest
+from .system import DaqmxSystem
+from .tasks import Task, TaskState
+from .timing import check_memory
+
+DRIVER_VERSION = (24, 8, 0)
+"""Major, minor, update. From 24.5 on the client asks the driver how many samples "all" are."""
+_IDLE = {Idle.ZERO: AOIdleOutputBehavior.ZERO_VOLTS, Idle.HOLD: AOIdleOutputBehavior.MAINTAIN_EXISTING_VALUE}
+
+
+@dataclass(frozen=True)
+class Attribute:
+    """One row: how a property is read and, if it can be written, how it is written."""
+
+    get: Callable[[Any], object]
+    set: Callable[[Any, Any], None] | None = None
+
+
+Attributes = Mapping[str, Attribute]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The properties of one kind of thing."""
+
+    name: str
+    """As the names of its properties begin in the protocol."""
+    subjects: Callable[[DaqmxSystem, Any], Sequence[Any]]
+    """Finds the things that a request speaks of: the first is asked, all of them are set."""
+    attributes: Callable[[Any], Attributes]
+    """The rows that a thing has."""
+
+
+# How the rows read and write
+
+
+def _field(name: str, convert: Callable[[Any], object] = lambda value: value) -> Callable[[Any, Any], None]:
+    """Return what writes a field of a channel."""
+
+    def write(thing: object, value: object) -> None:
+        setattr(thing, name, convert(value))
+
+    return write
+
+
+def _coupling(code: int) -> Coupling:
+    return Coupling(member(WireCoupling, code, "AI_Coupling").name)
+
+
+def _require(property_name: str, allowed: Callable[[Any], Enum]) -> Callable[[Any, int], None]:
+    """Return what takes the one value that a thing can have, and refuses any other."""
+
+    def write(thing: object, code: int) -> None:
+        if code != allowed(thing).value:
+            raise unsupported_value(property_name, code, allowed(thing).name)
+
+    return write
+
+
+def not_supported(name: str, where: str) -> DaqmxRefusal:
+    """Refuse an attribute that this device, channel or task does not have (-200197)."""
+    return DaqmxRefusal(DAQmxErrors.ATTR_NOT_SUPPORTED, f"Property: {name}\n{where}")
+
+
+def _inputs(device: Device) -> AnalogInputs:
+    if device.inputs is None:
+        raise not_supported("analogue input", f"Device: {device.name} ({device.product_type})")
+    return device.inputs
+
+
+def _outputs(device: Device) -> AnalogOutputs:
+    if device.outputs is None:
+        raise not_supported("analogue output", f"Device: {device.name} ({device.product_type})")
+    return device.outputs
+
+
+def _both_signs(ranges_v: tuple[float, ...]) -> list[float]:
+    return [limit for full_scale in ranges_v for limit in (-full_scale, full_scale)]
+
+
+def _start_terminal(task: Task) -> str:
+    terminal = task.start_terminal
+    if task.is_on_chassis and task.state < TaskState.RESERVED:
+        code = DAQmxErrors.CANNOT_GET_PROPERTY_WHEN_TASK_NOT_RESERVED_COMMITTED_OR_RUNNING
+        raise DaqmxRefusal(code, f"Task Name: {task.name}\nReserve the task first.")
+    return terminal
+
+
+def _set_rate(task: Task, rate_hz: float) -> None:
+    task.timing.requested_hz = rate_hz
+    task.timing.kind = SampleTimingType.SAMPLE_CLOCK
+
+
+def _watched(task: Task) -> Acquisition:
+    """Return the running acquisition of a device that detects overloads."""
+    match task.side:
+        case AnalogInputs(overloads=Overloads.DETECTED):
+            pass
+        case _:
+            device = task.devices[0]
+            raise not_supported(
+                "Read.OVERLOADED_CHANS_EXIST", f"Device: {device.name} ({device.product_type})"
+            )
+    if task.acquisition is None:
+        raise DaqmxRefusal(DAQmxErrors.CANT_GET_PROPERTY_TASK_NOT_RUNNING, f"Task Name: {task.name}")
+    return task.acquisition
+
+
+def _overloads_exist(task: Task) -> bool:
+    acquisition = _watched(task)
+    acquisition.look_for_overloads()
+    return bool(acquisition.overloaded.any())
+
+
+def _overloaded_names(task: Task) -> str:
+    flags = _watched(task).overloaded
+    return ", ".join(channel.name for channel, is_over in zip(task.inputs, flags, strict=True) if is_over)
+
+
+def _total_generated(task: Task) -> int:
+    if task.generation is None:
+        return 0
+    task.rig.pace.answer_progress(task.rig)
+    return task.generation.generated
+
+
+def _space(task: Task) -> int:
+    if task.generation is not None:
+        return task.generation.space
+    return task.output_buffer.size - task.output_buffer.filled
+
+
+def _set_regeneration(task: Task, mode: int) -> None:
+    task.require_stopped()
+    task.writing.regeneration = member(RegenerationMode, mode, "Write_RegenMode")
+
+
+def _set_input_buffer(task: Task, size: int) -> None:
+    task.reading.buffer_size = size
+
+
+def _set_output_buffer(task: Task, size: int) -> None:
+    check_memory(size, len(task.outputs))
+    task.writing.buffer_size = size
+    task.buffer = None
+
+
+def _channel_names(task: Task) -> str:
+    return ", ".join(channel.name for channel in task.channels)
+
+
+# fmt: off
+SYSTEM: Attributes = {
+    "DEV_NAMES": Attribute(lambda system: ", ".join(each.name for each in system.catalogue.devices)),
+    "NIDAQ_MAJOR_VERSION": Attribute(lambda _: DRIVER_VERSION[0]),
+    "NIDAQ_MINOR_VERSION": Attribute(lambda _: DRIVER_VERSION[1]),
+    "NIDAQ_UPDATE_VERSION": Attribute(lambda _: DRIVER_VERSION[2]),
+}
+DEVICE: Attributes = {
+    "PRODUCT_TYPE": Attribute(lambda device: device.product_type),
+    "PRODUCT_CATEGORY": Attribute(lambda device: device.category),
+    "SERIAL_NUM": Attribute(lambda device: device.serial),
+    "IS_SIMULATED": Attribute(lambda _: True),
+    "CHASSIS_MODULE_DEV_NAMES": Attribute(lambda device: ", ".join(device.modules)),
+    "AI_PHYSICAL_CHANS": Attribute(lambda device: ", ".join(device.input_names)),
+    "AI_VOLTAGE_RNGS": Attribute(lambda device: _both_signs(_inputs(device).ranges_v)),
+    "AI_MAX_SINGLE_CHAN_RATE": Attribute(lambda device: _inputs(device).rates.maximum_hz),
+    "AO_PHYSICAL_CHANS": Attribute(lambda device: ", ".join(device.output_names)),
+    "AO_VOLTAGE_RNGS": Attribute(lambda device: _both_signs((_outputs(device).range_v,))),
+    "AO_MAX_RATE": Attribute(lambda device: _outputs(device).rates.maximum_hz),
+}
+TASK: Attributes = {
+    "NAME": Attribute(lambda task: task.name),
+    "CHANNELS": Attribute(_channel_names),
+    "DEVICES": Attribute(lambda task: ", ".join(device.name for device in task.devices)),
+}
+TIMING: Attributes = {
+    "SAMP_CLK_RATE": Attribute(lambda task: task.rate_hz, _set_rate),
+    "SAMP_TIMING_TYPE": Attribute(lambda task: task.kind),
+}
+TRIGGER: Attributes = {
+    "START_TRIG_TERM": Attribute(_start_terminal),
+    "START_TRIG_RETRIGGERABLE": Attribute(lambda _: False),
+}
+READ: Attributes = {
+    "CHANNELS_TO_READ": Attribute(_channel_names),
+    "NUM_CHANS": Attribute(lambda task: len(task.channels)),
+    "CURR_READ_POS": Attribute(lambda task: task.acquisition.position if task.acquisition else 0),
+    "TOTAL_SAMP_PER_CHAN_ACQUIRED": Attribute(newest),
+    "AVAIL_SAMP_PER_CHAN": Attribute(asked_available),
+    "0x31E8": Attribute(default_samples),  # not named in the protocol: how many a read of "all" brings
+    "OVERLOADED_CHANS_EXIST": Attribute(_overloads_exist),
+    "OVERLOADED_CHANS": Attribute(_overloaded_names),
+}
+WRITE: Attributes = {
+    "NUM_CHANS": Attribute(lambda task: len(task.outputs)),
+    "REGEN_MODE": Attribute(lambda task: task.writing.regeneration, _set_regeneration),
+    "SPACE_AVAIL": Attribute(_space),
+    "TOTAL_SAMP_PER_CHAN_GENERATED": Attribute(_total_generated),
+}
+BUFFER: Attributes = {
+    "INPUT_BUF_SIZE": Attribute(lambda task: task.buffer_size, _set_input_buffer),
+    "OUTPUT_BUF_SIZE": Attribute(lambda task: task.output_buffer.size, _set_output_buffer),
+}
+INPUT: Attributes = {
+    "PHYSICAL_CHAN_NAME": Attribute(lambda channel: channel.physical),
+    "CHAN_TYPE": Attribute(lambda _: ChannelType.ANALOG_INPUT),
+    "AI_MEAS_TYPE": Attribute(lambda _: UsageTypeAI.VOLTAGE),
+    "AI_MAX": Attribute(lambda channel: channel.maximum, _field("maximum")),
+    "AI_MIN": Attribute(lambda channel: channel.minimum, _field("minimum")),
+    "AI_RNG_HIGH": Attribute(lambda channel: channel.range_v),
+    "AI_RNG_LOW": Attribute(lambda channel: -channel.range_v),
+    "AI_COUPLING": Attribute(
+        lambda channel: WireCoupling[channel.actual_coupling.name], _field("coupling", _coupling)),
+    "AI_EXCIT_SRC": Attribute(lambda channel: channel.excitation,
+        _field("excitation", lambda code: member(ExcitationSource, code, "AI_Excit_Src"))),
+    "AI_EXCIT_VAL": Attribute(lambda channel: channel.excitation_a, _field("excitation_a")),
+    "AI_EXCIT_VOLTAGE_OR_CURRENT": Attribute(lambda _: ExcitationVoltageOrCurrent.USE_CURRENT,
+        _require("AI_Excit_VoltageOrCurrent", lambda _: ExcitationVoltageOrCurrent.USE_CURRENT)),
+    "AI_RAW_SAMP_SIZE": Attribute(lambda channel: channel.raw_bits),
+    "AI_DEV_SCALING_COEFF": Attribute(lambda channel: [0.0, channel.volts_per_count, 0.0, 0.0]),
+}
+OUTPUT: Attributes = {
+    "PHYSICAL_CHAN_NAME": Attribute(lambda channel: channel.physical),
+    "CHAN_TYPE": Attribute(lambda _: ChannelType.ANALOG_OUTPUT),
+    "AO_MAX": Attribute(lambda channel: channel.maximum, _field("maximum")),
+    "AO_MIN": Attribute(lambda channel: channel.minimum, _field("minimum")),
+    "AO_IDLE_OUTPUT_BEHAVIOR": Attribute(lambda channel: _IDLE[channel.outputs.idle],
+        _require("AO_IdleOutputBehavior", lambda channel: _IDLE[channel.outputs.idle])),
+}
+# fmt: on
+
+
+def _task(system: DaqmxSystem, request: Any) -> list[Task]:
+    return [system.task(request.task.name)]
+
+
+def _channels(system: DaqmxSystem, request: Any) -> list[Any]:
+    task = system.task(request.task.name)
+    task.require_channels()
+    return task.find(request.channel)
+
+
+GROUPS = {
+    "SystemInfo": Group("System", lambda system, _: [system], lambda _: SYSTEM),
+    "Device": Group("Device", lambda system, request: [system.device(request.device_name)], lambda _: DEVICE),
+    "Task": Group("Task", _task, lambda _: TASK),
+    "Timing": Group("Timing", _task, lambda _: TIMING),
+    "Trig": Group("Trigger", _task, lambda _: TRIGGER),
+    "Read": Group("Read", _task, lambda _: READ),
+    "Write": Group("Write", _task, lambda _: WRITE),
+    "Buffer": Group("Buffer", _task, lambda _: BUFFER),
+    "Chan": Group(
+        "Channel", _channels, lambda channel: OUTPUT if isinstance(channel, OutputChannel) else INPUT
+    ),
+}
+"""The groups by the names of their calls."""
+SET_AT_REST = ("Timing", "Trig", "Buffer", "Chan")
+"""Groups that cannot be set while the task runs."""
+
+
+# From a call to a row, and from a value to a message
+
+SERVICE = nidaqmx_pb2.DESCRIPTOR.services_by_name["NiDAQmx"]
+_CALL = re.compile(r"^(?P<verb>Get|Set)(?P<scope>[A-Za-z]+?)Attribute[A-Z]\w*$")
+
+
+def attribute_calls(system: DaqmxSystem) -> dict[str, Callable[[Any], Mapping[str, object]]]:
+    """Return the calls that get and set properties of these groups, by their names in the protocol."""
+    made = {}
+    for method in SERVICE.methods:
+        found = _CALL.match(method.name)
+        if found and found["scope"] in GROUPS:
+            make = _getter if found["verb"] == "Get" else _setter
+            made[method.name] = make(system, found["scope"], method.output_type)
+    return made
+
+
+def _getter(system: DaqmxSystem, scope: str, response: Any) -> Callable[[Any], Mapping[str, object]]:
+    group, row = GROUPS[scope], _finder(GROUPS[scope])
+
+    def get(request: Any) -> Mapping[str, object]:
+        subject = group.subjects(system, request)[0]
+        return _fields(response, row(subject, request)[1].get(subject))
+
+    return get
+
+
+def _setter(system: DaqmxSystem, scope: str, _: Any) -> Callable[[Any], Mapping[str, object]]:
+    group, row = GROUPS[scope], _finder(GROUPS[scope])
+
+    def write(request: Any) -> Mapping[str, object]:
+        if scope in SET_AT_REST:
+            system.task(request.task.name).require_stopped()
+        for subject in group.subjects(system, request):
+            name, attribute = row(subject, request)
+            if attribute.set is None:
+                raise not_supported(name, "It can only be read.")
+            has_raw = "value_raw" in request.DESCRIPTOR.fields_by_name
+            attribute.set(subject, (has_raw and request.value_raw) or request.value)
+        return {}
+
+    return write
+
+
+def _finder(group: Group) -> Callable[[Any, Any], tuple[str, Attribute]]:
+    """Return what finds the row that a request names by number (-200197 for one that is not there)."""
+    names = {
+        value.number: value.name.rpartition("_ATTRIBUTE_")[2]
+        for name, descriptor in nidaqmx_pb2.DESCRIPTOR.enum_types_by_name.items()
+        if name.startswith(group.name) and name.endswith("Attribute") and not name.endswith("ResetAttribute")
+        for value in descriptor.values
+    }
+
+    def find(subject: Any, request: Any) -> tuple[str, Attribute]:
+        number = int(request.attribute_raw or request.attribute)
+        name = names.get(number, f"0x{number:X}")
+        attributes = group.attributes(subject)
+        if name not in attributes:
+            raise not_supported(f"{group.name}.{name}", "The simulated driver does not have it.")
+        return f"{group.name}.{name}", attributes[name]
+
+    return find
+
+
+def _fields(response: Any, value: object) -> Mapping[str, object]:
+    """Put a value into the field of a response."""
+    name = "value_raw" if "value_raw" in response.fields_by_name else "value"
+    return {name: value.value if isinstance(value, Enum) else value}

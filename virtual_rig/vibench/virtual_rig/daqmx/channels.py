@@ -1,0 +1,120 @@
+"""The channels of a simulated DAQmx task: what is converted, how, and within which limits."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from nidaqmx.constants import ExcitationSource, TerminalConfiguration
+from nidaqmx.error_codes import DAQmxErrors
+from numpy.typing import NDArray
+
+from ..analogue import Coupling, Input
+from .devices import AnalogInputs, AnalogOutputs, Device
+from .errors import DaqmxRefusal, unsupported_value
+
+_SHORT_BITS, _LONG_BITS = 16, 32
+_SLACK = 1 + 1e-9
+"""Limits that were computed may miss the range by a rounding error."""
+
+
+@dataclass
+class InputChannel:
+    """One voltage input of a task, as configured so far."""
+
+    name: str
+    physical: str
+    device: Device
+    inputs: AnalogInputs
+    minimum: float
+    maximum: float
+    """Expected extremes [V]."""
+    terminal: TerminalConfiguration = TerminalConfiguration.DEFAULT
+    coupling: Coupling | None = None
+    """None: the device's default (AC under excitation, DC otherwise)."""
+    excitation: ExcitationSource = ExcitationSource.NONE
+    excitation_a: float = 0.0
+
+    @property
+    def iepe_current_a(self) -> float:
+        """Current the device feeds into the sensor [A]."""
+        return self.excitation_a if self.excitation is ExcitationSource.INTERNAL else 0.0
+
+    @property
+    def actual_coupling(self) -> Coupling:
+        """The coupling in force."""
+        if self.coupling is not None:
+            return self.coupling
+        wants = Coupling.AC if self.iepe_current_a else Coupling.DC
+        return wants if wants in self.inputs.couplings else self.inputs.couplings[0]
+
+    @property
+    def range_v(self) -> float:
+        """Smallest full scale of the device that holds the expected extremes [V]; NaN if none does."""
+        wanted_v = max(abs(self.minimum), abs(self.maximum))
+        return next((each for each in self.inputs.ranges_v if wanted_v <= each * _SLACK), float("nan"))
+
+    @property
+    def volts_per_count(self) -> float:
+        """One step of the converter [V]."""
+        return float(self.range_v / 2 ** (self.inputs.bits - 1))
+
+    @property
+    def raw_bits(self) -> int:
+        """Bits of an unscaled sample on its way."""
+        return _SHORT_BITS if self.inputs.bits <= _SHORT_BITS else _LONG_BITS
+
+    def verify(self) -> None:
+        """Refuse what the device cannot do: range, terminal, coupling, excitation."""
+        inputs, where = self.inputs, f"on {self.physical}"
+        if self.minimum >= self.maximum:
+            raise unsupported_value("AI_Min", self.minimum, f"below AI_Max = {self.maximum:g}")
+        if not np.isfinite(self.range_v):
+            raise unsupported_value("AI_Max", self.maximum, f"up to {inputs.ranges_v[-1]:g} {where}")
+        if self.terminal not in (TerminalConfiguration.DEFAULT, *inputs.terminals):
+            allowed = ", ".join(terminal.name for terminal in inputs.terminals)
+            raise unsupported_value("AI_TermCfg", self.terminal.name, f"{allowed} {where}")
+        if self.actual_coupling not in inputs.couplings:
+            raise unsupported_value("AI_Coupling", self.actual_coupling, ", ".join(inputs.couplings))
+        if self.iepe_current_a not in (0.0, *inputs.iepe_currents_a):
+            allowed = ", ".join(f"{current:g}" for current in (0.0, *inputs.iepe_currents_a))
+            raise unsupported_value("AI_Excit_Val", self.iepe_current_a, f"{allowed} A {where}")
+        if self.iepe_current_a and self.actual_coupling is not Coupling.AC:
+            raise unsupported_value("AI_Coupling", self.actual_coupling, "AC while IEPE excitation is on")
+
+    def wiring(self) -> Input:
+        """Describe the channel to the analogue world."""
+        return Input(self.physical, self.range_v, self.actual_coupling, self.iepe_current_a)
+
+
+@dataclass
+class OutputChannel:
+    """One voltage output of a task."""
+
+    name: str
+    physical: str
+    device: Device
+    outputs: AnalogOutputs
+    minimum: float
+    maximum: float
+    """Expected extremes [V]."""
+
+    def verify(self) -> None:
+        """Refuse extremes that the device cannot deliver."""
+        if self.minimum >= self.maximum:
+            raise unsupported_value("AO_Min", self.minimum, f"below AO_Max = {self.maximum:g}")
+        range_v = self.outputs.range_v
+        for name, value in (("AO_Min", self.minimum), ("AO_Max", self.maximum)):
+            if abs(value) > range_v * _SLACK:
+                raise unsupported_value(name, value, f"-{range_v:g} to {range_v:g} V on {self.physical}")
+
+    def check(self, volts: NDArray[np.float64]) -> None:
+        """Refuse samples beyond the channel's extremes: DAQmx does not clip."""
+        slack_v = (_SLACK - 1) * self.maximum
+        too_low, too_high = volts < self.minimum - slack_v, volts > self.maximum + slack_v
+        if np.any(too_low | too_high):
+            extreme = volts.min() if np.any(too_low) else volts.max()
+            allowed = f"Allowed: {self.minimum:g} to {self.maximum:g}"
+            detail = f"Channel: {self.name}\nRequested Value: {extreme:g}\n{allowed}"
+            raise DaqmxRefusal(DAQmxErrors.INVALID_AO_DATA_WRITE, detail, samples_written=0)
+
+
+Channel = InputChannel | OutputChannel

@@ -1,0 +1,278 @@
+"""Calls that move samples between a program and a task: read, written, and packed as protobuf packs them."""
+
+import math
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from ni.protobuf.types.waveform_pb2 import DoubleAnalogWaveform
+from nidaqmx.constants import FillMode, SampleTimingType, WaveformAttributeMode
+from nidaqmx.error_codes import DAQmxErrors
+from numpy.typing import NDArray
+
+from .calls import Call, Fields, pick, task_of
+from .errors import DaqmxRefusal, unsupported_value
+from .generation import Generation
+from .reading import READ_ALL, Reading, default_samples, read, require_inputs
+from .system import DaqmxSystem
+from .tasks import Task
+from .timing import StartsItself, check_memory
+
+_STATUS_TAG = b"\x08"
+"""Field 1, varint."""
+_ARRAY_TAG = b"\x12"
+"""Field 2, length-delimited."""
+_COUNT_TAG = b"\x18"
+"""Field 3, varint."""
+_MORE = 0x80
+_SEVEN_BITS = 0x7F
+_INT64_WRAP = 1 << 64
+
+
+def varint(number: int) -> bytes:
+    """Write a number in base-128 digits, least first; a negative one wraps as 64 bits do."""
+    if number < 0:
+        number += _INT64_WRAP
+    digits = bytearray()
+    while number > _SEVEN_BITS:
+        digits.append(number & _SEVEN_BITS | _MORE)
+        number >>= 7
+    digits.append(number)
+    return bytes(digits)
+
+
+def packed_response(status: int, values: NDArray[np.float64], samples: int) -> bytes:
+    """Write a ReadAnalogF64Response, ready to send: status, array, samples per channel."""
+    raw = np.ascontiguousarray(values, dtype="<f8").tobytes()
+    array = _ARRAY_TAG + varint(len(raw)) + raw
+    return b"".join((_STATUS_TAG, varint(status), array, _COUNT_TAG, varint(samples)))
+
+
+def write(task: Task, volts: NDArray[np.float64], start: StartsItself, timeout_s: float) -> int:
+    """Write samples, shape (channels, samples) [V]; return samples per channel written.
+
+    Raises
+    ------
+    DaqmxRefusal
+        -200561 for values beyond a channel's limits (nothing is clipped), -200292 for a full buffer,
+        -200290 after an underflow.
+
+    """
+    require_outputs(task)
+    for row, channel in enumerate(task.outputs):
+        channel.check(volts[row])
+    if task.kind is SampleTimingType.ON_DEMAND:
+        return _write_on_demand(task, volts, start)
+    if task.is_running:
+        written = _write_running(task, volts, timeout_s)
+    else:
+        written = _write_stopped(task, volts)
+        if start is StartsItself.YES:
+            task.start()
+    return written
+
+
+def require_outputs(task: Task) -> None:
+    """Refuse to write to a task without outputs."""
+    if not task.outputs:
+        task.require_channels()
+        raise DaqmxRefusal(DAQmxErrors.WRITE_NO_OUTPUT_CHANS_IN_TASK, f"Task Name: {task.name}")
+
+
+def _write_on_demand(task: Task, volts: NDArray[np.float64], start: StartsItself) -> int:
+    if not task.is_running:
+        if start is StartsItself.NO:
+            code = DAQmxErrors.CANNOT_WRITE_WHEN_AUTO_START_FALSE_AND_TASK_NOT_RUNNING
+            raise DaqmxRefusal(code, f"Task Name: {task.name}", samples_written=0)
+        task.start()
+    for channel, row in zip(task.outputs, volts, strict=True):
+        task.rig.world.silence(channel.physical)
+        task.rig.world.play(channel.physical, row, channel.outputs.rates.maximum_hz)
+    return int(volts.shape[1])
+
+
+def _write_stopped(task: Task, volts: NDArray[np.float64]) -> int:
+    buffer, count = task.output_buffer, volts.shape[1]
+    missing = buffer.written + count - buffer.size
+    if missing > 0 and not buffer.is_sized:
+        check_memory(buffer.size + missing, len(task.outputs))
+        buffer.grow(missing)
+    elif missing > 0:
+        detail = (
+            f"Buffer: {buffer.size} samples per channel; already written {buffer.written}, now {count} more"
+        )
+        raise DaqmxRefusal(DAQmxErrors.NO_MORE_SPACE, detail, samples_written=0)
+    buffer.write(volts)
+    return int(count)
+
+
+def _write_running(task: Task, volts: NDArray[np.float64], timeout_s: float) -> int:
+    deadline_s = math.inf if timeout_s < 0 else time.monotonic() + timeout_s
+    count, written = volts.shape[1], 0
+    while written < count:
+        piece = min(count - written, task.output_buffer.size)
+        if task.generation is not None and not _await_space(task, task.generation, piece, deadline_s):
+            raise DaqmxRefusal(
+                DAQmxErrors.SAMPLES_CAN_NOT_YET_BE_WRITTEN, f"Task Name: {task.name}", samples_written=written
+            )
+        task.output_buffer.write(volts[:, written : written + piece])
+        written += piece
+    return written
+
+
+def _await_space(task: Task, generation: Generation, samples: int, deadline_s: float) -> bool:
+    def is_there() -> bool:
+        has_ended = generation.failure is not None or task.generation is not generation
+        return generation.space >= samples or has_ended
+
+    left_s = -1.0 if math.isinf(deadline_s) else max(0.0, deadline_s - time.monotonic())
+    has_come = task.rig.pace.ask(task.rig, generation.time_of_room(samples), is_there, left_s)
+    if generation.failure is not None:
+        raise generation.failure
+    if task.generation is not generation:
+        raise DaqmxRefusal(DAQmxErrors.RUNTIME_ABORTED_ROUTING, f"Task Name: {task.name}", samples_written=0)
+    return has_come
+
+
+_SECONDS_1904_TO_1970 = 2_082_844_800
+"""NI's time stamps count from 1904."""
+_READ_BITS = {"I16": 16, "I32": 32}
+
+
+def _read_scaled(system: DaqmxSystem, request: Any) -> bytes:
+    reading = _read_what_fits(task_of(system, request), request)
+    return packed_response(reading.status, _laid_out(reading.volts, request), reading.samples)
+
+
+def _read_waveforms(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    reading = read(task, request.num_samps_per_chan, request.timeout)
+    mode = WaveformAttributeMode(pick(request, "waveform_attribute_mode"))
+    waveforms = [_waveform(task, row, reading, mode) for row in range(len(task.inputs))]
+    return {"status": reading.status, "waveforms": waveforms, "samps_per_chan_read": reading.samples}
+
+
+def _waveform(task: Task, row: int, reading: Reading, mode: WaveformAttributeMode) -> DoubleAnalogWaveform:
+    waveform = DoubleAnalogWaveform(y_data=reading.volts[row])
+    if WaveformAttributeMode.TIMING in mode:
+        part_s, whole_s = math.modf(task.rig.wall_s(reading.began_s))
+        waveform.t0.seconds = int(whole_s) + _SECONDS_1904_TO_1970
+        waveform.t0.fractional_seconds = int(part_s * 2**64)
+        waveform.dt = 1 / task.rate_hz
+    if WaveformAttributeMode.EXTENDED_PROPERTIES in mode:
+        waveform.attributes["NI_ChannelName"].string_value = task.inputs[row].name
+        waveform.attributes["NI_UnitDescription"].string_value = "Volts"
+    return waveform
+
+
+def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    reading = _whole(read(task, request.num_samps_per_chan, request.timeout))
+    size = task.inputs[0].raw_bits // 8
+    raw = np.ascontiguousarray(_counts(task, reading).T).astype(f"<i{size}").tobytes()
+    return {"read_array": raw, "samps_read": reading.samples, "num_bytes_per_samp": size * len(task.inputs)}
+
+
+def _binary_reader(bits: int) -> Call:
+    """Return the call that reads unscaled samples of so many bits."""
+
+    def read_binary(system: DaqmxSystem, request: Any) -> Fields:
+        task = task_of(system, request)
+        require_inputs(task)
+        if task.inputs[0].inputs.bits > bits:
+            detail = f"{task.inputs[0].inputs.bits}-bit samples need the 32-bit call\nTask Name: {task.name}"
+            raise DaqmxRefusal(DAQmxErrors.CHANNEL_SIZE_TOO_BIG_FOR_PORT_READ_TYPE, detail)
+        reading = _read_what_fits(task, request)
+        counts = _laid_out(_counts(task, reading), request)
+        return {
+            "status": reading.status,
+            "read_array": counts.astype(np.int64).ravel().tolist(),
+            "samps_per_chan_read": reading.samples,
+        }
+
+    return read_binary
+
+
+def _write(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    require_outputs(task)
+    values = np.array(request.write_array, dtype=np.float64)
+    samples = request.num_samps_per_chan
+    _check_size(task, values.size, samples)
+    is_by_scan = pick(request, "data_layout") == FillMode.GROUP_BY_SCAN_NUMBER.value
+    rows = values.reshape(samples, -1).T if is_by_scan else values.reshape(-1, samples)
+    return {"samps_per_chan_written": write(task, rows, _start(request), request.timeout)}
+
+
+def _write_waveforms(system: DaqmxSystem, request: Any) -> Fields:
+    task = task_of(system, request)
+    require_outputs(task)
+    rows = [np.array(waveform.y_data) for waveform in request.waveforms]
+    if len({row.size for row in rows}) != 1:
+        raise unsupported_value("number of waveforms", len(rows), "one a channel, all of one length")
+    _check_size(task, sum(row.size for row in rows), rows[0].size)
+    return {"samps_per_chan_written": write(task, np.stack(rows), _start(request), request.timeout)}
+
+
+def _read_what_fits(task: Task, request: Any) -> Reading:
+    """Read what was asked for; "all" means as much as the caller has room for."""
+    channels = max(1, len(task.channels))
+    room = request.array_size_in_samps // channels
+    wanted = request.num_samps_per_chan
+    if wanted == READ_ALL:
+        wanted = room if not task.is_running else min(room, default_samples(task))
+    if wanted > room:
+        detail = f"Room for {room} samples per channel, {wanted} requested"
+        raise DaqmxRefusal(DAQmxErrors.READ_BUFFER_TOO_SMALL, detail, samples_read=0)
+    return read(task, wanted, request.timeout)
+
+
+def _laid_out(values: NDArray[np.float64], request: Any) -> NDArray[np.float64]:
+    """One row after the other, or one scan after the other; rows keep the distance the caller's array has."""
+    if pick(request, "fill_mode") == FillMode.GROUP_BY_SCAN_NUMBER.value:
+        return values.T
+    channels, samples = values.shape
+    width = request.array_size_in_samps // channels
+    if samples == width or channels == 1:
+        return values
+    rows = np.zeros((channels, width))
+    rows[:, :samples] = values
+    return rows
+
+
+def _whole(reading: Reading) -> Reading:
+    """Check a reading for a caller that cannot take a part of it."""
+    if reading.status:
+        raise DaqmxRefusal(reading.status, samples_read=reading.samples)
+    return reading
+
+
+def _counts(task: Task, reading: Reading) -> NDArray[np.float64]:
+    steps = np.array([[channel.volts_per_count] for channel in task.inputs])
+    largest = 2 ** (task.inputs[0].inputs.bits - 1)
+    counts: NDArray[np.float64] = np.clip(np.rint(reading.volts / steps), -largest, largest - 1)
+    return counts
+
+
+def _start(request: Any) -> StartsItself:
+    return StartsItself.YES if request.auto_start else StartsItself.NO
+
+
+def _check_size(task: Task, size: int, samples: int) -> None:
+    if size != samples * len(task.outputs):
+        detail = (
+            f"{size} values for {len(task.outputs)} channels of {samples} samples\nTask Name: {task.name}"
+        )
+        raise DaqmxRefusal(DAQmxErrors.WRITE_NUM_CHANS_MISMATCH, detail, samples_written=0)
+
+
+DATA_CALLS: Mapping[str, Call] = {
+    "ReadAnalogF64": _read_scaled,
+    "ReadAnalogWaveforms": _read_waveforms,
+    "ReadRaw": _read_raw,
+    **{f"ReadBinary{kind}": _binary_reader(bits) for kind, bits in _READ_BITS.items()},
+    "WriteAnalogF64": _write,
+    "WriteAnalogWaveforms": _write_waveforms,
+}
+"""The calls by their names in the protocol."""

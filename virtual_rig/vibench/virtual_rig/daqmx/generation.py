@@ -1,0 +1,180 @@
+"""A running generation: the output buffer, and handing its samples to the world in time."""
+
+import math
+
+import numpy as np
+from nidaqmx.constants import RegenerationMode
+from nidaqmx.error_codes import DAQmxErrors
+from numpy.typing import NDArray
+
+from ..analogue import AnalogueWorld
+from .devices import AnalogOutputs, Idle
+from .errors import DaqmxRefusal
+
+LEAD_S = 0.005
+"""How far samples are handed to the world ahead of their time [s]: no gap, yet new data soon plays."""
+
+_ROUNDING_SAMPLES = 1e-5
+
+
+class OutputBuffer:
+    """What a program has written and the device has not yet used up, shape (channels, size) [V]."""
+
+    def __init__(self, channels: int, size: int = 0) -> None:
+        """``size`` 0: as large as what is written before the start."""
+        self.is_sized = size > 0
+        self.written = 0
+        self._ring = np.zeros((channels, size))
+
+    @property
+    def size(self) -> int:
+        """Samples per channel."""
+        return int(self._ring.shape[1])
+
+    @property
+    def filled(self) -> int:
+        """Samples that a regeneration repeats."""
+        return min(self.written, self.size)
+
+    def grow(self, count: int) -> None:
+        """Make room for ``count`` more, before the start of a task that was given no buffer size."""
+        self._ring = np.concatenate([self._ring, np.zeros((self._ring.shape[0], count))], axis=1)
+
+    def write(self, volts: NDArray[np.float64]) -> None:
+        """Append samples, over the oldest ones if need be; the caller has made sure there is room."""
+        at = (self.written + np.arange(volts.shape[1])) % self.size
+        self._ring[:, at] = volts
+        self.written += volts.shape[1]
+
+    def cyclic(self, first: int, count: int) -> NDArray[np.float64]:
+        """``count`` samples from number ``first`` on, the filled part repeated for ever."""
+        return self._ring[:, (first + np.arange(count)) % self.filled]
+
+
+class Generation:
+    """The played samples, counted from the start of the task."""
+
+    def __init__(
+        self,
+        world: AnalogueWorld,
+        outputs: tuple[str, ...],
+        rate_hz: float,
+        began_s: float,
+        total: float,
+        buffer: OutputBuffer,
+        regeneration: RegenerationMode,
+        device: AnalogOutputs,
+    ) -> None:
+        """Begin at rig time ``began_s``; ``total`` samples, or infinity."""
+        self.rate_hz = rate_hz
+        self.began_s = began_s
+        self.total = total
+        self.buffer = buffer
+        self.handed_over = 0
+        self.generated = 0
+        self.failure: DaqmxRefusal | None = None
+        self._world = world
+        self._outputs = outputs
+        self._repeats = regeneration is RegenerationMode.ALLOW_REGENERATION
+        self._idle = device.idle
+        self._memory = np.empty((len(outputs), 0))
+        """What has left the buffer and waits on the device; a repeated buffer is not fetched ahead."""
+        self._most_in_memory = 0 if self._repeats else device.memory
+        self._fetched = 0
+        self._recent = np.empty((len(outputs), 0))
+        self._is_open = True
+
+    @property
+    def is_done(self) -> bool:
+        """Whether nothing more will be generated."""
+        return self.generated >= self.total or self.failure is not None
+
+    @property
+    def space(self) -> int:
+        """Samples per channel that can be written now; a repeated buffer can always be rewritten."""
+        if self._repeats:
+            return self.buffer.size
+        self._fetch(self.handed_over + self._most_in_memory)
+        return self.buffer.size - (self.buffer.written - self._fetched)
+
+    def time_of_room(self, samples: int) -> float:
+        """Rig time at which there is room for so many samples [s]."""
+        left = self.buffer.written + samples - self.buffer.size - self._most_in_memory
+        return self.time_of(max(0, left)) - LEAD_S
+
+    @property
+    def uses_up_its_buffer(self) -> bool:
+        """Whether every sample is played once only."""
+        return not self._repeats
+
+    def time_of(self, count: float) -> float:
+        """Rig time at which ``count`` samples have been generated [s]; infinite if they never will."""
+        return self.began_s + count / self.rate_hz if count <= self.total else math.inf
+
+    @property
+    def passed(self) -> int:
+        """Samples per channel that have left the buffer."""
+        return self.generated
+
+    @property
+    def used(self) -> float:
+        """A listener need not wait for anybody."""
+        return math.inf
+
+    def listened_until_s(self, count: int) -> float:  # noqa: ARG002 - see below
+        """Let others make time pass: listening to a buffer repeated for ever would never pause."""
+        return math.inf
+
+    def prepare(self, until_s: float) -> None:
+        """Hand over what is played up to rig time ``until_s``, and a little more."""
+        if not self._is_open:
+            return
+        wanted = math.ceil((until_s + LEAD_S - self.began_s) * self.rate_hz)
+        count = int(min(wanted, self.total, self._end)) - self.handed_over
+        if count <= 0:
+            return
+        self._fetch(self.handed_over + count)
+        block, self._memory = self._memory[:, :count], self._memory[:, count:]
+        for output, volts in zip(self._outputs, block, strict=True):
+            self._world.play(output, volts, self.rate_hz)
+        self.handed_over += count
+        kept = math.ceil(LEAD_S * self.rate_hz) + 1
+        self._recent = np.concatenate([self._recent, block], axis=1)[:, -kept:]
+
+    def _fetch(self, until: int) -> None:
+        """Move samples from the buffer to the device, as far as there are any."""
+        count = int(min(until, self.total, self._end)) - self._fetched
+        if count > 0:
+            self._memory = np.concatenate([self._memory, self.buffer.cyclic(self._fetched, count)], axis=1)
+            self._fetched += count
+
+    @property
+    def _end(self) -> float:
+        return math.inf if self._repeats and self.buffer.filled else self.buffer.written
+
+    def advance_to(self, now_s: float) -> None:
+        """Count what has been played at rig time ``now_s``; notice an underflow."""
+        if not self._is_open:
+            return
+        due = math.floor((now_s - self.began_s) * self.rate_hz + _ROUNDING_SAMPLES)
+        self.generated = int(min(due, self.total, self.handed_over))
+        if due > self.handed_over and self.handed_over < self.total:
+            self.failure = DaqmxRefusal(
+                DAQmxErrors.GEN_STOPPED_TO_PREVENT_REGEN_OF_OLD_SAMPLES, samples_written=0
+            )
+        if self.is_done:
+            self._rest()
+
+    def close(self) -> None:
+        """End the generation now: what is queued is dropped."""
+        if self._is_open:
+            self._rest()
+
+    def _rest(self) -> None:
+        self._is_open = False
+        for output in self._outputs:
+            self._world.silence(output)
+        if self._idle is Idle.HOLD and self.generated:
+            last = max(0, self._recent.shape[1] - 1 - (self.handed_over - self.generated))
+            for output, volts in zip(self._outputs, self._recent[:, last : last + 1], strict=True):
+                self._world.play(output, volts, self.rate_hz)

@@ -1,0 +1,270 @@
+"""The simulated DAQmx system on a port: any nidaqmx program can connect to it."""
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from types import TracebackType
+from typing import Any, Self
+
+import grpc
+from nidaqmx._stubs import nidaqmx_pb2
+from nidaqmx.error_codes import DAQmxErrors
+
+from vibench.acquisition import ConfigurationError
+
+from ..analogue import AnalogueWorld
+from .attributes import SERVICE, attribute_calls
+from .calls import CALLS, Fields
+from .data_calls import DATA_CALLS
+from .devices import Catalogue
+from .errors import DaqmxRefusal
+from .events import EVENTS, Listener
+from .faults import Faults, Unavailable
+from .rig import OnDemandPace, Pace, Rig
+from .system import DaqmxSystem
+from .token import TokenRequired
+
+LOOPBACK = "127.0.0.1:0"
+"""This computer only, on a free port: the server knows no passwords."""
+
+LAST_PORT = 65_535
+_WORKERS = 64
+"""Every blocking read and every event listener holds one thread."""
+
+LONGEST_REQUEST_BYTES = 64_000_000
+"""Eight million samples of an output in one call, which is 40 s of the fastest."""
+_NO_LIMIT = -1
+_OPTIONS = (
+    ("grpc.max_receive_message_length", LONGEST_REQUEST_BYTES),
+    ("grpc.max_send_message_length", _NO_LIMIT),
+    ("grpc.so_reuseport", 0),  # a second server on the same port is an error, not a lottery
+)
+
+Handler = Callable[[Any, grpc.ServicerContext], Any]
+Metadata = tuple[tuple[str, str], ...]
+
+
+class DaqServer:
+    """The simulated DAQmx system, served; leaving it clears every task and ends every thread.
+
+    Parameters
+    ----------
+    world
+        What the converters are wired to.
+    pace
+        How rig time passes; default: on demand.
+    address
+        ``"host:port"``; port 0 takes a free one, see `DaqServer.address`.
+    catalogue
+        The devices; default: a cDAQ with an NI 9234, a USB-4431 and a USB-6211.
+    handlers
+        Further gRPC services for the same port.
+    token
+        What every call must carry; None lets everybody in who can reach the port.
+
+    Raises
+    ------
+    ConfigurationError
+        When the address cannot be used.
+
+    """
+
+    def __init__(
+        self,
+        world: AnalogueWorld,
+        pace: Pace | None = None,
+        address: str = LOOPBACK,
+        *,
+        catalogue: Catalogue | None = None,
+        handlers: Iterable[grpc.GenericRpcHandler] = (),
+        token: str | None = None,
+    ) -> None:
+        _require_address(address)
+        self.faults = Faults()
+        self._refused: set[str] = set()
+        """Calls that were refused the last time they were made."""
+        self._pace = pace or OnDemandPace()
+        self._rig = Rig(world, self._pace, catalogue or Catalogue())
+        self._system = DaqmxSystem(self._rig)
+        self._workers = ThreadPoolExecutor(_WORKERS, thread_name_prefix="daqmx")
+        guards = () if token is None else (TokenRequired(token),)
+        self._server = grpc.server(self._workers, options=_OPTIONS, interceptors=guards)
+        self._server.add_generic_rpc_handlers(
+            (_Service(self._unary_calls(), self._listening_calls()), *handlers)
+        )
+        try:
+            port = self._server.add_insecure_port(address)
+        except RuntimeError as error:
+            raise ConfigurationError(
+                f"The simulated DAQ cannot listen on {address}: it is taken or does not exist; "
+                f"nothing was started, use another port, or port 0 for a free one"
+            ) from error
+        self.address = f"{address.rpartition(':')[0]}:{port}"
+        with self._rig.changed:
+            self._pace.open(self._rig)
+        self._server.start()
+
+    def __enter__(self) -> Self:
+        """Enter; the server has been running since it was made."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End it."""
+        self.close()
+
+    @property
+    def task_names(self) -> tuple[str, ...]:
+        """The tasks that exist, those of vanished clients included."""
+        with self._rig.changed:
+            return tuple(self._system.tasks)
+
+    def reset(self) -> None:
+        """Clear every task and every fault, as after switching the computer off and on."""
+        with self._rig.changed:
+            self._system.reset()
+            self.faults.clear()
+
+    def let_pass(self, duration_s: float) -> None:
+        """Let rig time pass while nobody asks for samples."""
+        with self._rig.changed:
+            self._rig.advance_to(self._rig.now_s + duration_s)
+
+    def edge(self, terminal: str) -> None:
+        """Raise a terminal, ``"/Dev1/PFI0"`` for example: what waits for it begins."""
+        with self._rig.changed:
+            self._rig.edge(terminal)
+
+    def close(self) -> None:
+        """Stop serving; legal at any time, more than once."""
+        with self._rig.changed:
+            self._system.reset()
+        self._server.stop(grace=None).wait()
+        with self._rig.changed:  # a call that was still under way may have made and begun another task
+            self._system.reset()
+        self._pace.close()
+        self._workers.shutdown(wait=True)
+
+    # --- from a request to its answer ----------------------------------------------------
+
+    def _unary_calls(self) -> dict[str, Handler]:
+        calls: dict[str, Callable[[Any], Fields | bytes]] = {**attribute_calls(self._system)}
+        for name, call in {**CALLS, **DATA_CALLS}.items():
+            calls[name] = partial(call, self._system)
+        return {name: self._answer(name, call) for name, call in calls.items()}
+
+    def _listening_calls(self) -> dict[str, Handler]:
+        return {name: self._listen(name, partial(call, self._system)) for name, call in EVENTS.items()}
+
+    def _answer(self, name: str, call: Callable[[Any], Fields | bytes]) -> Handler:
+        def handle(request: Any, context: grpc.ServicerContext) -> Fields | bytes:
+            with _refusals_reported(context), self._rig.changed:
+                self._check_faults(name)
+                if self.faults.take_restart():
+                    self._system.reset()
+                return call(request)
+
+        return handle
+
+    def _check_faults(self, name: str) -> None:
+        """Fail the call if a rule says so. The first refusal comes at once; to be refused again takes time.
+
+        A call that is let through takes none: a reader would be behind by what had passed.
+        """
+        try:
+            self.faults.check(name, self._rig.now_s)
+        except DaqmxRefusal:  # a server that is gone takes no time: nobody is there
+            if name in self._refused:
+                self._pace.stumble(self._rig)
+            self._refused.add(name)
+            raise
+        self._refused.discard(name)
+
+    def _listen(self, name: str, call: Callable[[Any, grpc.ServicerContext], Listener]) -> Handler:
+        def handle(request: Any, context: grpc.ServicerContext) -> Iterator[Any]:
+            with _refusals_reported(context), self._rig.changed:
+                self.faults.check(name, self._rig.now_s)
+                listener = call(request, context)
+            context.send_initial_metadata(())  # the client waits for it before it goes on
+            yield from listener
+
+        return handle
+
+
+@contextmanager
+def _refusals_reported(context: grpc.ServicerContext) -> Iterator[None]:
+    """Turn a refusal into what the client expects: status UNKNOWN, the code in the trailing metadata."""
+    try:
+        try:
+            yield
+        except ConfigurationError as error:  # the world cannot do what the device could
+            raise DaqmxRefusal(DAQmxErrors.INVALID_ATTRIBUTE_VALUE, str(error)) from error
+    except DaqmxRefusal as refusal:
+        context.set_trailing_metadata(_metadata(refusal))
+        context.abort(grpc.StatusCode.UNKNOWN, str(refusal))
+    except Unavailable as error:
+        context.abort(grpc.StatusCode.UNAVAILABLE, str(error))
+
+
+def _require_address(address: str) -> None:
+    """Refuse what is no ``host:port``: gRPC would take a port beyond the last for another one."""
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdecimal() or int(port) > LAST_PORT:
+        raise ConfigurationError(
+            f"{address!r} is no address to listen on; nothing was started, give HOST:PORT with a port up to "
+            f"{LAST_PORT}, as 127.0.0.1:31763; port 0 takes a free one"
+        )
+
+
+def _metadata(refusal: DaqmxRefusal) -> Metadata:
+    entries = (
+        ("ni-error", refusal.code),
+        ("ni-samps-per-chan-read", refusal.samples_read),
+        ("ni-samps-per-chan-written", refusal.samples_written),
+    )
+    return tuple((key, str(value)) for key, value in entries if value is not None)
+
+
+class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
+    """The methods of the service: a program calls some thirty of 451, so each is made ready when called."""
+
+    def __init__(self, unary: dict[str, Handler], listening: dict[str, Handler]) -> None:
+        self._unary = unary
+        self._listening = listening
+
+    def service(self, handler_call_details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler | None:
+        """Give what answers a call; None where it is another service's."""
+        service, _, name = handler_call_details.method.removeprefix("/").partition("/")
+        method = SERVICE.methods_by_name.get(name) if service == SERVICE.full_name else None
+        return None if method is None else _rpc(method, self._unary, self._listening)
+
+
+def _rpc(method: Any, unary: dict[str, Handler], listening: dict[str, Handler]) -> grpc.RpcMethodHandler:
+    request, response = _message(method.input_type), _message(method.output_type)
+    if method.name in listening:
+        return grpc.unary_stream_rpc_method_handler(
+            listening[method.name], request.FromString, lambda message: message.SerializeToString()
+        )
+
+    def serialise(answer: Fields | bytes) -> bytes:
+        match answer:
+            case bytes():
+                return answer
+            case _:
+                return bytes(response(**answer).SerializeToString())
+
+    handler = unary.get(method.name) or _not_simulated(method.name)
+    return grpc.unary_unary_rpc_method_handler(handler, request.FromString, serialise)
+
+
+def _message(descriptor: Any) -> Any:
+    return getattr(nidaqmx_pb2, descriptor.name)
+
+
+def _not_simulated(name: str) -> Handler:
+    def handle(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - the request does not matter
+        context.abort(grpc.StatusCode.UNIMPLEMENTED, f"{name} is not part of the simulated DAQmx driver.")
+
+    return handle

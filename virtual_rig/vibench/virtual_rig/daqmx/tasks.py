@@ -1,0 +1,355 @@
+"""A simulated DAQmx task: its channels, its states, and the terminals of its clock and trigger."""
+
+import math
+import time
+from enum import IntEnum
+
+from nidaqmx.constants import AcquisitionType, SampleTimingType, TaskMode
+from nidaqmx.error_codes import DAQmxErrors
+
+from vibench.acquisition import AcquisitionError
+
+from .acquisition import Acquisition
+from .channels import Channel, InputChannel, OutputChannel
+from .devices import AnalogInputs, AnalogOutputs, Conversion, Device, Untimed
+from .errors import DaqmxRefusal, unsupported_value
+from .generation import Generation, OutputBuffer
+from .names import expand
+from .rig import Rig
+from .tdms_log import TdmsLog
+from .timing import InputSettings, OutputSettings, Timing, check_memory
+
+_BREATH_S = 1e-4
+_OWN_CLOCKS = ("", "onboardclock")
+_DEFAULT_BUFFERS = ((100.0, 1_000), (10_000.0, 10_000), (1_000_000.0, 100_000), (math.inf, 1_000_000))
+"""Up to that rate, that many samples per channel (NI-DAQmx Help, "How is buffer size determined?")."""
+
+
+class TaskState(IntEnum):
+    """The DAQmx task state model (NI-DAQmx Help, "Task State Model"); each state includes the ones before."""
+
+    UNVERIFIED = 0
+    VERIFIED = 1
+    RESERVED = 2
+    COMMITTED = 3
+    RUNNING = 4
+
+
+class Task:
+    """One task; every method is called with the rig's lock held."""
+
+    def __init__(self, name: str, rig: Rig) -> None:
+        """Begin empty and unverified."""
+        self.name = name
+        self.rig = rig
+        self.state = TaskState.UNVERIFIED
+        self.timing = Timing()
+        self.reading = InputSettings()
+        self.writing = OutputSettings()
+        self.inputs: list[InputChannel] = []
+        self.outputs: list[OutputChannel] = []
+        self.acquisition: Acquisition | None = None
+        self.generation: Generation | None = None
+        self.buffer: OutputBuffer | None = None
+        self.log: TdmsLog | None = None
+        self._rests_in = TaskState.UNVERIFIED
+
+    # --- what it consists of -------------------------------------------------------------
+
+    @property
+    def channels(self) -> list[Channel]:
+        """All channels in the order they were added."""
+        return [*self.inputs, *self.outputs]
+
+    @property
+    def devices(self) -> tuple[Device, ...]:
+        """The devices the channels lie on, each once."""
+        return tuple({channel.device.name: channel.device for channel in self.channels}.values())
+
+    @property
+    def side(self) -> AnalogInputs | AnalogOutputs:
+        """What the device can do on the side this task uses."""
+        self.require_channels()
+        return self.inputs[0].inputs if self.inputs else self.outputs[0].outputs
+
+    @property
+    def stream(self) -> Acquisition | Generation | None:
+        """What runs, once it has been triggered."""
+        return self.acquisition or self.generation
+
+    @property
+    def kind(self) -> SampleTimingType:
+        """The timing in force: what was configured, or what the device does without."""
+        if self.timing.kind is not None:
+            return self.timing.kind
+        is_on_demand = self.side.untimed is Untimed.ON_DEMAND
+        return SampleTimingType.ON_DEMAND if is_on_demand else SampleTimingType.SAMPLE_CLOCK
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate the device really runs at, the next one up that it has [Hz]; -200077 out of its range."""
+        side, asked_hz = self.side, self.timing.requested_hz
+        is_shared = isinstance(side, AnalogInputs) and side.conversion is Conversion.MULTIPLEXED
+        highest = side.rates.maximum_hz / (len(self.channels) if is_shared else 1)
+        lowest = side.rates.minimum_hz
+        asked_hz = max(asked_hz, lowest) if self.timing.kind is None else asked_hz
+        if not lowest * (1 - 1e-9) <= asked_hz <= highest * (1 + 1e-9):
+            allowed = f"{lowest:.6g} to {highest:.6g} samples per second"
+            raise unsupported_value("SampClk_Rate", f"{asked_hz:g}", allowed)
+        return min(highest, side.rates.next_up(asked_hz))
+
+    @property
+    def buffer_size(self) -> int:
+        """Samples per channel of the input buffer."""
+        if self.kind is SampleTimingType.ON_DEMAND:
+            return 0
+        if self.reading.buffer_size is not None:
+            return self.reading.buffer_size
+        if self.timing.mode is AcquisitionType.FINITE:
+            return self.timing.samples
+        usual = next(size for limit_hz, size in _DEFAULT_BUFFERS if self.rate_hz <= limit_hz)
+        return max(usual, self.timing.samples)
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it has been started and not stopped."""
+        return self.state is TaskState.RUNNING
+
+    @property
+    def is_on_chassis(self) -> bool:
+        """Whether its timing engine is only known once it is reserved."""
+        return any(device.chassis for device in self.devices)
+
+    @property
+    def _side_name(self) -> str:
+        return "ai" if self.inputs else "ao"
+
+    def full_terminal(self, name: str) -> str:
+        """Return a terminal with its device: ``"PFI0"`` is one of the task's own, ``"/Dev1/PFI0"``."""
+        self.require_channels()
+        return name if name.startswith("/") else f"/{self.devices[0].clock_name}/{name}"
+
+    @property
+    def start_terminal(self) -> str:
+        """Terminal of its own start trigger."""
+        return self.full_terminal(f"{self._side_name}/StartTrigger")
+
+    @property
+    def _awaited_terminal(self) -> str:
+        """Terminal whose edge makes the task begin; empty: its own start.
+
+        Another task's sample clock begins to tick with that task, so waiting for it is waiting for its start.
+        """
+        if self.timing.trigger_source:
+            return self.timing.trigger_source
+        source = self.timing.clock_source
+        own_clock = self.full_terminal(f"{self._side_name}/SampleClock")
+        is_own = source.lower() in (*_OWN_CLOCKS, own_clock.lower())
+        return "" if is_own else source.replace("SampleClock", "StartTrigger")
+
+    def find(self, names: str) -> list[Channel]:
+        """Return the channels in a list of names; all of them for an empty list."""
+        if not names:
+            return self.channels
+        by_name = {channel.name.lower(): channel for channel in self.channels}
+        wanted = [name.lower() for name in expand(names)]
+        for name in wanted:
+            if name not in by_name:
+                raise DaqmxRefusal(DAQmxErrors.INVALID_CHAN_NAME, f"Channel: {name}\nTask Name: {self.name}")
+        return [by_name[name] for name in wanted]
+
+    def require_channels(self) -> None:
+        """Refuse to go on without channels (-200478)."""
+        if not self.channels:
+            code = DAQmxErrors.CAN_NOT_PERFORM_OP_WHEN_NO_CHANS_IN_TASK
+            raise DaqmxRefusal(code, f"Task Name: {self.name}")
+
+    def require_stopped(self) -> None:
+        """Refuse to change what is running (-200479), and forget what was verified."""
+        if self.is_running:
+            raise DaqmxRefusal(DAQmxErrors.CAN_NOT_PERFORM_OP_WHILE_TASK_RUNNING, f"Task Name: {self.name}")
+        if self.state is TaskState.VERIFIED:
+            self.state = TaskState.UNVERIFIED
+
+    def add(self, channel: Channel) -> None:
+        """Add a channel; a task has one direction and, but for a chassis, one device."""
+        self.require_stopped()
+        if any(other.name.lower() == channel.name.lower() for other in self.channels):
+            raise DaqmxRefusal(DAQmxErrors.VIRTUAL_CHAN_NAME_USED, f"Channel: {channel.name}")
+        if any(device.clock_name != channel.device.clock_name for device in self.devices):
+            raise DaqmxRefusal(DAQmxErrors.MULTI_DEVS_IN_TASK, f"Device: {channel.device.name}")
+        match channel:
+            case InputChannel() if not self.outputs:
+                self.inputs.append(channel)
+            case OutputChannel() if not self.inputs:
+                self.outputs.append(channel)
+            case _:
+                raise DaqmxRefusal(DAQmxErrors.INCONSISTENT_CHANNEL_DIRECTIONS, f"Channel: {channel.name}")
+
+    # --- its states ----------------------------------------------------------------------
+
+    def control(self, action: TaskMode) -> None:
+        """Go to the state an action names."""
+        match action:
+            case TaskMode.TASK_START:
+                self.start()
+            case TaskMode.TASK_STOP:
+                self.stop()
+            case TaskMode.TASK_VERIFY:
+                self._rise(TaskState.VERIFIED)
+            case TaskMode.TASK_RESERVE:
+                self._rise(TaskState.RESERVED)
+            case TaskMode.TASK_COMMIT:
+                self._rise(TaskState.COMMITTED)
+            case _:
+                self.abort()
+
+    def _rise(self, state: TaskState) -> None:
+        self.require_channels()
+        if self.state < state:
+            self._verify()
+            if state >= TaskState.RESERVED:
+                self._reserve()
+            self.state = state
+        if not self.is_running:
+            self._rests_in = self.state
+
+    def _verify(self) -> None:
+        for channel in self.channels:
+            channel.verify()
+        if self.kind is not SampleTimingType.ON_DEMAND:
+            _ = self.rate_hz
+            if awaited := self._awaited_terminal:
+                self.rig.require_terminal(awaited)
+            if self.inputs:
+                check_memory(self.buffer_size, len(self.inputs))
+        self.timing.verify_reference()
+        if self.timing.reference is not None:
+            self.rig.require_terminal(self.timing.reference.terminal)
+
+    def _reserve(self) -> None:
+        for device in self.devices:
+            try:
+                self.rig.reserve(f"{device.name}/{self._side_name}", self)
+            except DaqmxRefusal:
+                if self.state < TaskState.RESERVED:
+                    self.rig.release(self)
+                raise
+
+    def start(self) -> None:
+        """Begin, or wait for the trigger."""
+        self.require_channels()
+        self.require_stopped()
+        self._verify()
+        if self.outputs and self.kind is not SampleTimingType.ON_DEMAND and not self.output_buffer.filled:
+            raise DaqmxRefusal(DAQmxErrors.OUTPUT_BUFFER_EMPTY, f"Task Name: {self.name}")
+        self._reserve()
+        self.state = TaskState.RUNNING
+        if self.kind is SampleTimingType.ON_DEMAND:
+            return
+        if self._awaited_terminal:
+            self.rig.arm(self._awaited_terminal, self._begin)
+            return
+        try:
+            self._begin()
+        except AcquisitionError:  # what is wired to it cannot do what the device could
+            self.stop()
+            raise
+
+    @property
+    def output_buffer(self) -> OutputBuffer:
+        """What has been written, made at the first need."""
+        if self.buffer is None:
+            self.buffer = OutputBuffer(len(self.outputs), self.writing.buffer_size)
+        return self.buffer
+
+    def _begin(self) -> None:
+        if self.inputs:
+            self.acquisition = self._acquire()
+            self.rig.run_acquisition(self.acquisition)
+            self._await_reference_edge()
+        else:
+            self.generation = self._generate()
+            self.rig.run_generation(self.generation)
+        self.rig.edge(self.start_terminal)
+
+    def _acquire(self) -> Acquisition:
+        logging = self.reading.logging
+        self.log = None if logging is None else TdmsLog(logging, self.inputs, self.rate_hz, self.rig.wall_s)
+        sampler = self.rig.world.sample(tuple(channel.wiring() for channel in self.inputs), self.rate_hz)
+        return Acquisition(
+            sampler, len(self.inputs), self.rate_hz, self.rig.now_s, self.timing.total,
+            self.buffer_size, self.rig.pace.overflow, self.timing.reference,
+        )  # fmt: skip
+
+    def _await_reference_edge(self) -> None:
+        if self.timing.reference is not None:
+            self.rig.arm(self.timing.reference.terminal, self._reference_edge)
+
+    def _reference_edge(self) -> None:
+        """Take an edge for the reference trigger; one that comes too early is ignored."""
+        if self.acquisition is not None and not self.acquisition.trigger():
+            self._await_reference_edge()
+
+    def await_reference(self, deadline_s: float) -> bool:
+        """Wait for a reference trigger until a moment of the wall's clock; say whether none is awaited."""
+        acquisition = self.acquisition
+        if acquisition is None:
+            return True
+
+        def is_there() -> bool:
+            return self.acquisition is not acquisition or not acquisition.awaits_trigger
+
+        while not is_there() and (left_s := deadline_s - time.monotonic()) > 0:
+            wait_s = -1.0 if math.isinf(left_s) else left_s
+            self.rig.pace.ask(self.rig, acquisition.enough_before_s, is_there, wait_s)
+            self.rig.changed.wait(_BREATH_S)  # who wants to stop this task is let in
+        return is_there()
+
+    def _generate(self) -> Generation:
+        physical = tuple(channel.physical for channel in self.outputs)
+        return Generation(
+            self.rig.world, physical, self.rate_hz, self.rig.now_s, self.timing.total,
+            self.output_buffer, self.writing.regeneration, self.outputs[0].outputs,
+        )  # fmt: skip
+
+    def is_done(self) -> bool:
+        """Whether it has nothing left to do; raises what ended it, if it failed."""
+        stream = self.stream
+        if stream is None:
+            return not self.is_running or self.kind is SampleTimingType.ON_DEMAND
+        if stream.failure is not None:
+            raise stream.failure
+        return stream.is_done
+
+    def wait_until_done(self, timeout_s: float) -> None:
+        """Wait for the end of a finite task (-200560 if it does not come)."""
+        began_s = time.monotonic()
+        self.await_reference(math.inf if timeout_s < 0 else began_s + timeout_s)
+        until_s = self.stream.time_of(self.stream.total) if self.stream else math.inf
+        left_s = timeout_s if timeout_s < 0 else max(0.0, began_s + timeout_s - time.monotonic())
+        if not self.rig.pace.ask(self.rig, until_s, self.is_done, left_s):
+            code = DAQmxErrors.WAIT_UNTIL_DONE_DOES_NOT_INDICATE_DONE
+            raise DaqmxRefusal(code, f"Task Name: {self.name}")
+
+    def stop(self) -> None:
+        """End what runs and go back to the state before the start; legal in every state."""
+        if not self.is_running:
+            return
+        self.rig.disarm(self._begin)
+        self.rig.disarm(self._reference_edge)
+        if self.stream is not None:
+            self.rig.end(self.stream)
+        if self.generation is not None and self.generation.uses_up_its_buffer:
+            self.buffer = None
+        self.acquisition = self.generation = self.log = None
+        self.state = self._rests_in
+        if self.state < TaskState.RESERVED:
+            self.rig.release(self)
+        self.rig.changed.notify_all()
+
+    def abort(self) -> None:
+        """End what runs and give everything back."""
+        self.stop()
+        self.rig.release(self)
+        self.state = self._rests_in = TaskState.UNVERIFIED

@@ -1,0 +1,408 @@
+"""A simulated Tektronix AFG1022: messages in, replies out, and the voltage at its terminal.
+
+Reconstructed from the IVI driver ``tkafg1k`` (IVI), public drivers tested on a real AFG1022 (drivers) and
+public measurements on an AFG1062 with firmware FV:V1.0.2 (AFG1062); nothing here was compared with the lab's
+own unit. `COMMANDS` names the source of each command.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .afg1022_settings import (
+    MODULATIONS,
+    NOISE,
+    OPEN_AMPLITUDE_RANGE_VPP,
+    OPEN_PEAK_V,
+    BurstMode,
+    ChannelSettings,
+    RunMode,
+    highest_frequency_hz,
+    standard_shape,
+)
+from .arbitrary_memory import EDIT_MEMORY, ArbitraryMemory, big_endian, memory_name
+from .channel_output import ChannelOutput, Panel, shape_of
+from .scpi_command import (
+    CHANNELS,
+    Command,
+    Parameters,
+    action,
+    choice,
+    exactly,
+    none,
+    number,
+    only,
+    report,
+    switch,
+)
+from .scpi_instrument import Quirks, ScpiInstrument
+from .scpi_status import ErrorCode, ScpiError
+from .scpi_value import (
+    AMPLITUDE_UNITS,
+    FREQUENCY_UNITS,
+    NO_UNITS,
+    PERCENT_UNITS,
+    RESISTANCE_UNITS,
+    VOLTAGE_UNITS,
+    as_block,
+    as_number,
+    block,
+    boolean,
+    integer,
+    number_and_unit,
+    text,
+)
+from .terminal_voltage import Relay, Terminal
+
+DEFAULT_SERIAL = "C010101"
+SOUNDING_CHANNEL = 1
+"""The channel whose terminal is wired; channel 2 keeps its settings and plays nothing."""
+
+
+class AFG1022(ScpiInstrument):
+    """The generator: one object behind USB, socket and the analogue world.
+
+    Parameters
+    ----------
+    clock
+        See `ScpiInstrument`.
+    serial
+        Serial number, part of the VISA address.
+    quirks, panel, terminal
+        Habits of the firmware; settings of the front panel; load, clock error and noise of the output.
+
+    """
+
+    maker, model, firmware = "TEKTRONIX", "AFG1022", "SCPI:99.0 FV:V1.0.2"
+
+    def __init__(
+        self,
+        clock: Callable[[], float],
+        *,
+        serial: str = DEFAULT_SERIAL,
+        quirks: Quirks = Quirks(),  # noqa: B008 - frozen
+        panel: Panel = Panel(),  # noqa: B008 - frozen
+        terminal: Terminal = Terminal(),  # noqa: B008 - frozen
+    ) -> None:
+        identity = f"{self.maker},{self.model},{serial},{self.firmware}"
+        super().__init__(clock, identity, quirks, self._table(quirks))
+        self.serial = serial
+        self.memory = self._new_memory()
+        power_on = self._power_on(panel.declared_load_ohm)
+        self._channels: dict[int, ChannelSettings] = dict.fromkeys(range(1, CHANNELS + 1), power_on)
+        self._output = ChannelOutput(terminal, panel, self.memory, power_on)
+        self.frequencies_are_locked = False
+
+    def _table(self, quirks: Quirks) -> tuple[Command, ...]:
+        """Return every command this firmware knows, besides the common ones."""
+        return COMMANDS if quirks.load_is_panel_only else (*COMMANDS, LOAD)
+
+    def _new_memory(self) -> ArbitraryMemory:
+        """Return the memory of waveforms at power-on."""
+        return ArbitraryMemory()
+
+    def _power_on(self, declared_load_ohm: float) -> ChannelSettings:
+        """Return the settings of a channel at power-on."""
+        return ChannelSettings(declared_load_ohm=declared_load_ohm)
+
+    def render(self, start_s: float, interval_s: float, count: int) -> NDArray[np.float64]:
+        """Return the mean voltage at channel 1's terminal over consecutive intervals.
+
+        Parameters
+        ----------
+        start_s
+            Rig time of the first interval [s]; calls move forward in time.
+        interval_s, count
+            Length of the intervals [s] and how many.
+
+        Returns
+        -------
+        NDArray
+            Shape (count,) [V], into the load of ``Terminal``. Commands act at the rig time at which
+            they arrived, or at the end of what was already rendered if that is later.
+
+        """
+        with self.lock:
+            return self._output.render(start_s, interval_s, count)
+
+    # What a command may do
+
+    def settings(self, channel: int) -> ChannelSettings:
+        """Return the settings of channel 1 or 2."""
+        return self._channels[channel]
+
+    def configure(self, channel: int, settings: ChannelSettings) -> None:
+        """Check and take over new settings; raises ScpiError and changes nothing if they are refused."""
+        settings.checked()
+        shape_of(settings, self.memory)
+        previous = self._channels[channel]
+        self._replace(channel, settings)
+        if self.frequencies_are_locked and settings.frequency_hz != previous.frequency_hz:
+            self._follow_frequency(channel)
+
+    def lock_frequencies(self, channel: int, *, locked: bool) -> None:
+        """Let the other channel follow the frequency of this one, or not."""
+        self.frequencies_are_locked = locked
+        if locked:
+            self._follow_frequency(channel)
+
+    def memory_changed(self) -> None:
+        """Let a changed waveform act at once if it is playing."""
+        sounding = self._channels[SOUNDING_CHANNEL]
+        if memory_name(sounding.shape) is not None:
+            self._replace(SOUNDING_CHANNEL, sounding)
+
+    def reset(self) -> None:
+        """Return to the defaults; a load that only the panel can set stays."""
+        self.frequencies_are_locked = False
+        for channel, settings in self._channels.items():
+            load_ohm = settings.declared_load_ohm if self.quirks.load_is_panel_only else 50.0
+            self._replace(channel, self._power_on(load_ohm))
+
+    def trigger(self) -> None:
+        """Start a waiting burst, or sweep."""
+        self._output.trigger(self._channels[SOUNDING_CHANNEL], self.now_s)
+
+    def align_phases(self) -> None:
+        """Start both channels at their start phase now."""
+        self._output.align(self._channels[SOUNDING_CHANNEL], self.now_s)
+
+    def _replace(self, channel: int, settings: ChannelSettings) -> None:
+        previous, self._channels[channel] = self._channels[channel], settings
+        if channel == SOUNDING_CHANNEL:
+            self._output.follow(previous, settings, self.now_s)
+
+    def _follow_frequency(self, leader: int) -> None:
+        """Give the other channels the same frequency, within what their shapes allow."""
+        for channel, follower in self._channels.items():
+            if channel != leader:
+                low, high = follower.frequency_range_hz
+                hz = min(max(self._channels[leader].frequency_hz, low), high)
+                self._replace(channel, replace(follower, frequency_hz=hz))
+
+    # Faults on demand
+
+    def weld_output_relay(self) -> None:
+        """From now on ``OUTP OFF`` is obeyed and reported, and the output stays on all the same."""
+        self._set_relay_stuck(stuck=True)
+
+    def repair_output_relay(self) -> None:
+        """Let the output be what it is set to."""
+        self._set_relay_stuck(stuck=False)
+
+    def _set_relay_stuck(self, *, stuck: bool) -> None:
+        now_s = self.clock()
+        with self.lock:
+            self._output.relay_is_stuck = stuck
+            settings = self._channels[SOUNDING_CHANNEL]
+            self._output.follow(settings, settings, now_s)
+
+    def jump_clock(self, by_s: float) -> None:
+        """Let the generator's clock jump, and with it the phase of what plays [s]."""
+        with self.lock:
+            self._output.jump_clock(by_s)
+
+
+# What the rows of the table do that no kind of row does
+
+
+def with_mode(mode: RunMode, settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
+    """Return settings with a mode switched on, or off if it was on (SCPI has one switch for each mode)."""
+    if wanted:
+        return replace(settings, mode=mode)
+    return replace(settings, mode=RunMode.CONTINUOUS) if settings.mode is mode else settings
+
+
+def modulation_switch(mode: RunMode) -> Command:
+    """Return the row of a modulation: one that the panel has left on is switched off, and none on (-241)."""
+
+    def put(settings: ChannelSettings, wanted: bool) -> ChannelSettings:  # noqa: FBT001
+        if wanted:
+            raise ScpiError(ErrorCode.HARDWARE_MISSING)
+        return with_mode(mode, settings, wanted)
+
+    return switch(f"[SOURce#:]{mode.value}:STATe", "IVI; on: not simulated", lambda s: s.mode is mode, put)
+
+
+class _FrequencyMode(Enum):
+    FIXED = "CW"
+    SWEEP = "SWEep"
+
+
+def _shape_name(parameter: bytes) -> str:
+    word = text(parameter)
+    name = standard_shape(word) or memory_name(word)
+    if name is None:
+        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+    return name
+
+
+def _write_shape(generator: AFG1022, channel: int, parameters: Parameters) -> None:
+    """Select a shape; a frequency that it cannot have is lowered."""
+    settings, name = generator.settings(channel), _shape_name(only(parameters))
+    frequency_hz = min(settings.frequency_hz, highest_frequency_hz(name))
+    generator.configure(channel, replace(settings, shape=name, frequency_hz=frequency_hz))
+
+
+def _ask_shape(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
+    none(parameters)
+    name = generator.settings(channel).shape
+    return b"PRN" if name == NOISE else name.encode("ascii")
+
+
+def _write_phase(generator: AFG1022, channel: int, parameters: Parameters) -> None:
+    """Take ``31DEG``, or radians without a unit; whole degrees are kept, negative ones refused."""
+    full_turn_deg = 360.0
+    angle, unit = number_and_unit(only(parameters))
+    if unit not in ("", "RAD", "DEG"):
+        raise ScpiError(ErrorCode.INVALID_SUFFIX)
+    angle_deg = angle if unit == "DEG" else math.degrees(angle)
+    if not 0 <= angle_deg <= full_turn_deg:
+        raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+    # A hair is added so that 31 degrees, sent in radians, are not truncated to 30.
+    whole = math.floor(angle_deg + 1e-9)
+    generator.configure(channel, replace(generator.settings(channel), phase_deg=whole))
+
+
+def _ask_phase(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
+    none(parameters)
+    return as_number(math.radians(generator.settings(channel).phase_deg))
+
+
+def _write_lock(generator: AFG1022, channel: int, parameters: Parameters) -> None:
+    generator.lock_frequencies(channel, locked=boolean(only(parameters)))
+
+
+def _memory(parameter: bytes) -> str:
+    name = memory_name(text(parameter))
+    if name is None:
+        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+    return name
+
+
+def _edit_memory(parameter: bytes) -> None:
+    if _memory(parameter) != EDIT_MEMORY:
+        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
+
+
+def _load_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
+    target, data = exactly(parameters, 2)
+    generator.memory.load(_memory(target), block(data))
+    generator.memory_changed()
+
+
+def _read_memory(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
+    return as_block(big_endian(generator.memory.codes(_memory(only(parameters)))))
+
+
+def _define_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
+    target, points = exactly(parameters, 2)
+    _edit_memory(target)
+    generator.memory.define(integer(points))
+    generator.memory_changed()
+
+
+def _ask_points(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
+    return str(len(generator.memory.codes(_memory(only(parameters))))).encode("ascii")
+
+
+def _copy_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
+    target, source = exactly(parameters, 2)
+    generator.memory.copy(_memory(source), _memory(target))
+    generator.memory_changed()
+
+
+def _catalogue(generator: AFG1022) -> bytes:
+    return ",".join(f'"{name}"' for name in generator.memory.catalogue).encode("ascii")
+
+
+def load_command(header: str) -> Command:
+    """Return the row of the declared load; high impedance is infinite."""
+    row = number(
+        header, "IVI; drivers contradict each other", "declared_load_ohm", RESISTANCE_UNITS,
+        lambda _: (1.0, 10e3), default=50.0, decimals=0, largest=math.inf,
+    )  # fmt: skip
+
+    def ask(generator: AFG1022, channel: int, parameters: Parameters) -> bytes:
+        assert row.ask is not None
+        reply = row.ask(generator, channel, parameters)
+        is_open = math.isinf(generator.settings(channel).declared_load_ohm)
+        gbk_ohm_sign = b"\xa6\xb8"
+        return reply + gbk_ohm_sign if is_open and generator.quirks.high_impedance_has_ohm_sign else reply
+
+    return replace(row, ask=ask)
+
+
+def _share(settings: ChannelSettings) -> float:
+    return settings.declared_share
+
+
+_DUTY = number(
+    "[SOURce#:]PULSe:DCYCle", "drivers, AFG1062; range assumed", "duty_percent", PERCENT_UNITS,
+    lambda _: (0.1, 99.9), default=50.0, decimals=1,
+)  # fmt: skip
+
+
+def _write_duty(generator: AFG1022, channel: int, parameters: Parameters) -> None:
+    """Set the duty, and complain all the same."""
+    assert _DUTY.write is not None
+    _DUTY.write(generator, channel, parameters)
+    raise ScpiError(ErrorCode.SYNTAX_ERROR)
+
+
+def burst_cycles(most: int, channels: int) -> Command:
+    """Return the row of the number of periods of a burst."""
+    return number(
+        "[SOURce#:]BURSt:NCYCles", "IVI, drivers", "burst_cycles", NO_UNITS, lambda _: (1, most),
+        default=5, decimals=0, channels=channels, largest=math.inf,
+    )  # fmt: skip
+
+
+# fmt: off
+LOAD = load_command("OUTPut#:IMPedance")
+SHARED_COMMANDS = (
+    switch("OUTPut#[:STATe]", "IVI",
+        lambda s: s.relay is Relay.CLOSED,
+        lambda s, on: replace(s, relay=Relay.CLOSED if on else Relay.OPEN)),
+    number("[SOURce#:]FREQuency[:FIXed]", "IVI", "frequency_hz", FREQUENCY_UNITS,
+        lambda s: s.frequency_range_hz, default=1e6, decimals=6),
+    number("[SOURce#:]VOLTage[:LEVel][:IMMediate][:AMPLitude]", "IVI", "amplitude_vpp", AMPLITUDE_UNITS,
+        lambda s: (OPEN_AMPLITUDE_RANGE_VPP[0] * _share(s), OPEN_AMPLITUDE_RANGE_VPP[1] * _share(s)),
+        default=1.0, decimals=4, scale=_share),
+    number("[SOURce#:]VOLTage[:LEVel][:IMMediate]:OFFSet", "IVI", "offset_v", VOLTAGE_UNITS,
+        lambda s: (-OPEN_PEAK_V * _share(s), OPEN_PEAK_V * _share(s)), default=0.0, decimals=4, scale=_share),
+    number("[SOURce#:]FREQuency:STARt", "IVI", "sweep_start_hz", FREQUENCY_UNITS,
+        lambda s: s.frequency_range_hz, default=100e3, decimals=6),
+    number("[SOURce#:]FREQuency:STOP", "IVI", "sweep_stop_hz", FREQUENCY_UNITS,
+        lambda s: s.frequency_range_hz, default=1e6, decimals=6),
+)
+"""What the simulated generators have in common."""
+COMMANDS = (
+    *SHARED_COMMANDS,
+    Command("[SOURce#:]FUNCtion[:SHAPe]", "IVI, but for 45 built-in shapes", _write_shape, _ask_shape),
+    Command("[SOURce#:]PHASe[:ADJust]", "AFG1062", _write_phase, _ask_phase),
+    action("[SOURce#:]PHASe:INITiate", "AFG1062", lambda generator: generator.align_phases()),
+    Command(_DUTY.header, _DUTY.source, _write_duty, _DUTY.ask),
+    Command("[SOURce#:]FREQuency:CONCurrent[:STATe]", "drivers",
+        _write_lock, lambda generator, *_: b"1" if generator.frequencies_are_locked else b"0"),
+    choice("[SOURce#:]FREQuency:MODE", "IVI", _FrequencyMode,
+        lambda s: _FrequencyMode.SWEEP if s.mode is RunMode.SWEEP else _FrequencyMode.FIXED,
+        lambda s, word: with_mode(RunMode.SWEEP, s, word is _FrequencyMode.SWEEP)),
+    switch("[SOURce#:]BURSt[:STATe]", "IVI, drivers",
+        lambda s: s.mode is RunMode.BURST, lambda s, on: with_mode(RunMode.BURST, s, on), channels=1),
+    burst_cycles(50_000, channels=1),
+    choice("[SOURce#:]BURSt:MODE", "IVI, drivers", BurstMode,
+        lambda s: s.burst_mode, lambda s, mode: replace(s, burst_mode=mode), channels=1),
+    *(modulation_switch(mode) for mode in MODULATIONS),
+    Command("DATA[:DATA]", "IVI, drivers", _load_memory, _read_memory),
+    Command("DATA:DEFine", "IVI", _define_memory, None),
+    Command("DATA:POINts", "IVI, drivers", None, _ask_points),
+    Command("DATA:COPY", "IVI, drivers", _copy_memory, None),
+    report("DATA:CATalog", "IVI, drivers", _catalogue),
+)
+"""What an AFG1022 obeys besides the common commands and `LOAD`."""
+# fmt: on

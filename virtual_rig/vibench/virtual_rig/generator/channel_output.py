@@ -1,0 +1,162 @@
+"""The output of one channel: turns changes of settings into the signals of its timeline."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .afg1022_settings import (
+    DC,
+    NOISE,
+    PULSE,
+    RAMP,
+    SINE,
+    SQUARE,
+    BurstMode,
+    ChannelSettings,
+    OwnSweep,
+    RunMode,
+    SweepTrigger,
+)
+from .arbitrary_memory import ArbitraryMemory
+from .periodic_shape import Flat, PeriodicShape, Rectangle, Sine, Table, Triangle
+from .phase_course import UHZ_PER_HZ, PhaseCourse, Spacing, SteadyPhase, SweptPhase, TriggeredSweepPhase
+from .terminal_voltage import Burst, Relay, Signal, Terminal, Timeline
+
+_DEGREES = 360.0
+_PERCENT = 100.0
+
+
+@dataclass(frozen=True)
+class Panel:
+    """What only the front panel can set."""
+
+    declared_load_ohm: float = 50.0
+    """The load the panel shows at power-on; ``math.inf`` for high impedance."""
+    sweep_s: float = 1.0
+    sweep_spacing: Spacing = Spacing.LINEAR
+
+
+def shape_of(settings: ChannelSettings, memory: ArbitraryMemory) -> PeriodicShape | None:
+    """Return the shape that is set; None for noise. An empty user memory is refused."""
+    duty = settings.duty_percent / _PERCENT
+    computed: dict[str, PeriodicShape | None] = {
+        SINE: Sine(),
+        SQUARE: Rectangle(),
+        PULSE: Rectangle(duty),
+        RAMP: Triangle(),
+        DC: Flat(),
+        NOISE: None,
+    }
+    if settings.shape in computed:
+        return computed[settings.shape]
+    return Table(memory.codes(settings.shape), memory.top_code)
+
+
+class ChannelOutput:
+    """Plays what the settings say, from the rig time at which they changed."""
+
+    def __init__(
+        self, terminal: Terminal, panel: Panel, memory: ArbitraryMemory, power_on: ChannelSettings
+    ) -> None:
+        self.relay_is_stuck = False
+        """Whether the output stays on whatever the settings say."""
+        self._panel = panel
+        self._memory = memory
+        carrier = SteadyPhase(round(power_on.frequency_hz * UHZ_PER_HZ), 0.0)
+        self._timeline = Timeline(terminal, Signal(course=carrier, amplitude_vpp=power_on.amplitude_vpp))
+
+    def render(self, start_s: float, interval_s: float, count: int) -> NDArray[np.float64]:
+        """Return the mean terminal voltage over consecutive intervals, shape (count,) [V]."""
+        return self._timeline.render(start_s, interval_s, count)
+
+    def jump_clock(self, by_s: float) -> None:
+        """Let whatever plays jump in phase, as if that time had passed."""
+        self._timeline.jump(by_s)
+
+    def follow(self, previous: ChannelSettings, settings: ChannelSettings, now_s: float) -> None:
+        """Bring the terminal in line with new settings, as of a rig time.
+
+        The phase goes on without a jump unless the start phase itself was changed. Noise is accepted, and
+        the shape before it goes on playing; the built-in DC shape stays at zero whatever the offset (AFG1062,
+        drivers).
+        """
+        at_s, own_s = self._when(now_s)
+        latest = self._timeline.latest
+        waits = settings.mode is RunMode.BURST
+        waiting = Burst(math.inf, math.inf, settings.phase_deg / _DEGREES) if waits else None
+        signal = Signal(
+            relay=Relay.CLOSED if self.relay_is_stuck else settings.relay,
+            course=self._course_after(previous, settings, own_s),
+            shape=shape_of(settings, self._memory) or latest.shape,
+            amplitude_vpp=settings.amplitude_vpp,
+            offset_v=0.0 if settings.shape == DC else settings.offset_v,
+            burst=latest.burst if settings.mode is previous.mode else waiting,
+        )
+        self._timeline.change(signal, at_s)
+
+    def trigger(self, settings: ChannelSettings, now_s: float) -> None:
+        """Start a waiting burst or sweep; while a burst runs, and without either mode, nothing happens.
+
+        A gated burst needs the gate input, which is open.
+        """
+        at_s, own_s = self._when(now_s)
+        latest = self._timeline.latest
+        if settings.mode is RunMode.SWEEP:
+            course = self._swept(settings, latest.course.phase(own_s), own_s, own_s)
+            self._timeline.change(replace(latest, course=course), at_s)
+            return
+        is_waiting = latest.burst is not None and not latest.burst.begin_s <= own_s < latest.burst.end_s
+        if settings.mode is RunMode.BURST and settings.burst_mode is BurstMode.TRIGGERED and is_waiting:
+            start_phase = settings.phase_deg / _DEGREES
+            burst = Burst(own_s, own_s + settings.burst_cycles / settings.frequency_hz, start_phase)
+            course = self._course(settings, start_phase % 1.0, own_s)
+            self._timeline.change(replace(latest, course=course, burst=burst), at_s)
+
+    def align(self, settings: ChannelSettings, now_s: float) -> None:
+        """Let the phase be the start phase now."""
+        at_s, own_s = self._when(now_s)
+        course = self._course(settings, settings.phase_deg / _DEGREES % 1.0, own_s)
+        self._timeline.change(replace(self._timeline.latest, course=course), at_s)
+
+    def _when(self, now_s: float) -> tuple[float, float]:
+        """Return when a command acts: in rig time and in the generator's own time."""
+        at_s = self._timeline.effective(now_s)
+        return at_s, self._timeline.own_time(at_s)
+
+    def _course_after(
+        self, previous: ChannelSettings, settings: ChannelSettings, own_s: float
+    ) -> PhaseCourse:
+        """Return the course of the phase: the same object if nothing of it has changed."""
+        running = self._timeline.latest.course
+        if _course_key(previous) == _course_key(settings):
+            return running
+        turn = (settings.phase_deg - previous.phase_deg) / _DEGREES
+        return self._course(settings, (running.phase(own_s) + turn) % 1.0, own_s)
+
+    def _course(self, settings: ChannelSettings, phase: float, own_s: float) -> PhaseCourse:
+        """Return the course that the mode asks for, passing through a phase [cycles] at a time."""
+        if settings.mode is RunMode.SWEEP:
+            return self._swept(settings, phase, own_s, math.inf)
+        return SteadyPhase.through(round(settings.frequency_hz * UHZ_PER_HZ), phase, own_s)
+
+    def _swept(self, settings: ChannelSettings, phase: float, own_s: float, begin_s: float) -> PhaseCourse:
+        """Return a sweep: one at a trigger, or one after the other."""
+        ends = settings.sweep_start_hz, settings.sweep_stop_hz
+        sweep = settings.sweep or OwnSweep(self._panel.sweep_s, spacing=self._panel.sweep_spacing)
+        if sweep.trigger is SweepTrigger.IMMEDIATE:
+            return SweptPhase(*ends, sweep.sweep_s, sweep.spacing, own_s, phase)
+        return TriggeredSweepPhase(*ends, sweep.sweep_s, sweep.hold_s, sweep.spacing, begin_s, own_s, phase)
+
+
+def _course_key(settings: ChannelSettings) -> tuple[object, ...]:
+    """Everything that the course of the phase depends on."""
+    return (
+        settings.mode,
+        settings.frequency_hz,
+        settings.phase_deg,
+        settings.sweep_start_hz,
+        settings.sweep_stop_hz,
+        settings.sweep,
+    )

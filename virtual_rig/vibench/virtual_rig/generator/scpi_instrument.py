@@ -1,0 +1,194 @@
+"""An instrument that obeys a table of SCPI commands: messages in, replies out, errors in its queue."""
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from .scpi_command import Command, action, report
+from .scpi_header import HeaderPath
+from .scpi_message import Unit, units
+from .scpi_status import BYTE, ErrorCode, ScpiError, Status
+
+LONGEST_REPLY = 1 << 20
+"""Bytes of the answers to one message; the longest that is of use has 17 kB."""
+
+
+@dataclass(frozen=True)
+class Quirks:
+    """Documented habits of the family's firmware; the defaults are what FV:V1.0.2 does.
+
+    Sources: hardware reference, sections 1.1, 1.2 and 1.4.
+    """
+
+    first_identity_after_clear_is_empty: bool = True
+    """The first ``*IDN?`` after ``*CLS`` answers an empty line."""
+    high_impedance_has_ohm_sign: bool = True
+    """``OUTP:IMP?`` at high impedance answers ``9.9E+37`` and an ohm sign in GBK, which is not ASCII."""
+    unknown_is_syntax_error: bool = True
+    """An unknown command queues -102; an unknown query also answers an empty line (else -113, silence)."""
+    out_of_range_becomes_default: bool = True
+    """A number out of range silently sets the parameter's default (else -222, setting unchanged)."""
+    load_is_panel_only: bool = False
+    """``OUTP:IMP`` is unknown: the load can be set at the front panel only (one driver's report)."""
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What the instrument answers to one message; empty when nothing was asked."""
+
+    data: bytes
+    delay_s: float = 0.0
+    """How long the instrument lets its host wait."""
+
+
+class ScpiInstrument:
+    """Any thread may send it messages; they are carried out one after the other.
+
+    Parameters
+    ----------
+    clock
+        Rig time [s]: when a command arrives. It is called outside the instrument's lock, so that it may
+        take a lock that is held while the instrument is asked for its output.
+    identity
+        Answer to ``*IDN?``.
+    commands
+        What it obeys besides the common commands.
+
+    """
+
+    def __init__(
+        self, clock: Callable[[], float], identity: str, quirks: Quirks, commands: tuple[Command, ...]
+    ) -> None:
+        self.quirks = quirks
+        self.status = Status()
+        self.lock = threading.RLock()
+        self.now_s = 0.0
+        """When the message arrived that is carried out."""
+        self.clock = clock
+        self.commands = (*commands, *COMMON_COMMANDS)
+        self._patterns = [(command.pattern, command) for command in self.commands]
+        self._identity = identity
+        self._identity_is_due_empty = False
+        self._next_delay_s = 0.0
+        self._next_is_corrupted = False
+
+    def execute(self, message: bytes) -> Reply:
+        """Carry out one complete message and return its reply."""
+        now_s = self.clock()
+        with self.lock:
+            self.now_s = now_s
+            answers = self._answers(message)
+            if not answers:
+                return Reply(b"")
+            data = b";".join(answers) + b"\n"
+            delay_s, self._next_delay_s = self._next_delay_s, 0.0
+            if self._next_is_corrupted:
+                self._next_is_corrupted = False
+                data = _spoiled(data)
+            return Reply(data, delay_s)
+
+    def report(self, code: ErrorCode) -> None:
+        """Queue an error that the interface has found: an unread reply, or a read without a query."""
+        with self.lock:
+            self.status.report(code)
+
+    def delay_next_reply(self, delay_s: float) -> None:
+        """Let the next reply come late; beyond the host's timeout it is found by the read after."""
+        with self.lock:
+            self._next_delay_s = delay_s
+
+    def corrupt_next_reply(self) -> None:
+        """Spoil the next reply: its first byte and every second one after it, but not its end."""
+        with self.lock:
+            self._next_is_corrupted = True
+
+    def identity(self) -> bytes:
+        """Return who the instrument is; the first time after ``*CLS`` it may say nothing."""
+        is_empty, self._identity_is_due_empty = self._identity_is_due_empty, False
+        return b"" if is_empty else self._identity.encode("ascii")
+
+    def clear_status(self) -> None:
+        """Empty error queue and event register."""
+        self.status.clear()
+        self._identity_is_due_empty = self.quirks.first_identity_after_clear_is_empty
+
+    def reset(self) -> None:
+        """Return to the defaults."""
+
+    def trigger(self) -> None:
+        """Start what waits for a trigger of the bus."""
+
+    def _answers(self, message: bytes) -> list[bytes]:
+        """Carry out every unit of a message in order and collect the answers."""
+        path = HeaderPath()
+        answers: list[bytes] = []
+        room = LONGEST_REPLY
+        for unit in units(message):
+            header, path = (HeaderPath() if unit.starts_line else path).resolve(unit.header)
+            if unit.asks and room < 0:
+                continue
+            try:
+                answers.extend(found := self._obey(header, unit))
+            except ScpiError as error:
+                self.status.report(error.code)
+                continue
+            room -= sum(map(len, found))
+            if found and room < 0:  # nobody fetches them in the meantime (IEEE 488.2, 6.3.1.7)
+                answers.clear()
+                self.status.report(ErrorCode.QUERY_DEADLOCKED)
+        return answers
+
+    def _obey(self, header: str, unit: Unit) -> list[bytes]:
+        """Carry out one unit; return its answer, if it asks."""
+        command, suffix = self._find(header)
+        if command is None or (command.ask if unit.asks else command.write) is None:
+            return self._unknown(unit)
+        if not 1 <= suffix <= command.channels:
+            raise ScpiError(ErrorCode.HEADER_SUFFIX_OUT_OF_RANGE)
+        if unit.asks and command.ask is not None:
+            return [command.ask(self, suffix, unit.parameters)]
+        if command.write is not None:
+            command.write(self, suffix, unit.parameters)
+        return []
+
+    def _find(self, header: str) -> tuple[Command | None, int]:
+        """Return the command of a header, and its numeric suffix."""
+        for pattern, command in self._patterns:
+            suffix = pattern.match(header)
+            if suffix is not None:
+                return command, suffix
+        return None, 1
+
+    def _unknown(self, unit: Unit) -> list[bytes]:
+        """Refuse a header that is not in the table, the way the firmware does."""
+        if not self.quirks.unknown_is_syntax_error:
+            raise ScpiError(ErrorCode.UNDEFINED_HEADER)
+        self.status.report(ErrorCode.SYNTAX_ERROR)
+        return [b""] if unit.asks else []
+
+
+def _spoiled(reply: bytes) -> bytes:
+    """Invert every second byte, from the first on, and leave the newline that frames the reply."""
+    return bytes(byte if place % 2 else byte ^ BYTE for place, byte in enumerate(reply[:-1])) + reply[-1:]
+
+
+def _decimal(value: int) -> bytes:
+    return str(int(value)).encode("ascii")
+
+
+def _next_error(instrument: ScpiInstrument) -> bytes:
+    code = instrument.status.next_error()
+    return f'{int(code)},"{code.text}"'.encode("ascii")
+
+
+COMMON_COMMANDS = (
+    report("*IDN", "IEEE 488.2, 10.14", lambda instrument: instrument.identity()),
+    action("*RST", "IEEE 488.2, 10.32", lambda instrument: instrument.reset()),
+    action("*CLS", "IEEE 488.2, 10.3", lambda instrument: instrument.clear_status()),
+    action("*TRG", "IEEE 488.2, 10.37", lambda instrument: instrument.trigger()),
+    action("*WAI", "IEEE 488.2, 10.39", lambda _: None),
+    Command("*OPC", "IEEE 488.2, 10.18", lambda each, *_: each.status.operation_complete(), lambda *_: b"1"),
+    report("*ESR", "IEEE 488.2, 10.12", lambda instrument: _decimal(instrument.status.take_events())),
+    report("SYSTem:ERRor[:NEXT]", "SCPI-1999, volume 2, 21.8", _next_error),
+)
+"""What every instrument obeys."""

@@ -1,0 +1,217 @@
+"""What comes out of the generator's terminal: the exact mean voltage over consecutive intervals.
+
+A timeline of immutable signals, each valid from the instant of the command that made it. Signals are
+functions of the generator's own time, so rendering in blocks of any size gives the same samples.
+"""
+
+from bisect import bisect_right
+from dataclasses import dataclass, field, replace
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .periodic_shape import PeriodicShape, Sine
+from .phase_course import PhaseCourse, SteadyPhase
+
+Samples = NDArray[np.float64]
+
+OUTPUT_RESISTANCE_OHM = 50.0
+NO_BLOCK = -1
+NOISE_BLOCK = 4096
+"""Samples of noise that one draw of the random generator makes; a block is drawn from its own seed."""
+_CONTINUES = 1e-3
+"""A block whose start is this close (in intervals) to the end of the last one continues it."""
+
+
+class Relay(Enum):
+    """The relay between the generator and its terminal."""
+
+    OPEN = "open"
+    CLOSED = "closed"
+
+
+@dataclass(frozen=True)
+class Burst:
+    """The time during which a burst lets the shape run; outside it the level at the start phase stays."""
+
+    begin_s: float
+    end_s: float
+    start_phase: float
+
+
+@dataclass(frozen=True)
+class Signal:
+    """The open-circuit voltage from one command to the next, in the generator's own time."""
+
+    relay: Relay = Relay.OPEN
+    course: PhaseCourse = field(default_factory=lambda: SteadyPhase(0, 0.0))
+    shape: PeriodicShape = field(default_factory=Sine)
+    amplitude_vpp: float = 0.0
+    """Peak to peak, without load."""
+    offset_v: float = 0.0
+    burst: Burst | None = None
+
+    def breakpoints(self, begin_s: float, end_s: float, interval_s: float) -> Samples:
+        """Return every instant inside (begin, end) at which the signal must be cut."""
+        times = self.course.breakpoints(begin_s, end_s, interval_s)
+        if self.burst is None:
+            return times
+        ends = np.asarray([self.burst.begin_s, self.burst.end_s])
+        return np.concatenate([times, ends[(ends > begin_s) & (ends < end_s)]])
+
+    def means(self, edges_s: Samples) -> Samples:
+        """Return the mean open-circuit voltage of every piece between edges."""
+        start, span = self.course.stretches(edges_s)
+        if self.burst is not None:
+            middle = 0.5 * (edges_s[:-1] + edges_s[1:])
+            runs = (middle >= self.burst.begin_s) & (middle < self.burst.end_s)
+            start = np.where(runs, start, self.burst.start_phase)
+            span = np.where(runs, span, 0.0)
+        return self.offset_v + 0.5 * self.amplitude_vpp * self.shape.mean(start, span)
+
+
+@dataclass(frozen=True)
+class Terminal:
+    """Everything about the output that no command changes."""
+
+    load_ohm: float = 15e3
+    """What the terminal really sees (``math.inf``: nothing); the default is the amplifier's input."""
+    clock_error_ppm: float = 0.0
+    """How fast the generator's clock runs against rig time."""
+    noise_v_per_rt_hz: float = 50e-9
+    """One-sided density of the output's own noise (assumed; the data sheet gives none)."""
+    seed: int = 0
+    clock_offset_s: float = 0.0
+    """What its clock has jumped by since it was switched on."""
+
+    @property
+    def divider(self) -> float:
+        """The share of the open-circuit voltage that reaches the terminal."""
+        return 1 / (1 + OUTPUT_RESISTANCE_OHM / self.load_ohm)
+
+    def own_time(self, time_s: Samples) -> Samples:
+        """Return what the generator's clock says at a rig time."""
+        return time_s + time_s * (self.clock_error_ppm * 1e-6) + self.clock_offset_s
+
+
+class Timeline:
+    """The signals of one output in the order of time, and their samples."""
+
+    def __init__(self, terminal: Terminal, power_on: Signal) -> None:
+        self.terminal = terminal
+        self._since_s: list[float] = [-np.inf]
+        self._signals: list[Signal] = [power_on]
+        self._origin_s = 0.0
+        self._interval_s = 0.0
+        self._rendered = 0
+        """Samples since ``_origin_s``, all of one interval."""
+        self._noise_index = 0
+        self._noise_block = NO_BLOCK, np.empty(0)
+        self._end_s = -np.inf
+
+    @property
+    def latest(self) -> Signal:
+        """The signal that the last command made."""
+        return self._signals[-1]
+
+    def jump(self, by_s: float) -> None:
+        """Let the generator's own clock jump, from what is rendered next on."""
+        self.terminal = replace(self.terminal, clock_offset_s=self.terminal.clock_offset_s + by_s)
+
+    def effective(self, time_s: float) -> float:
+        """Return when a command that arrives at a rig time acts: never before what is already rendered."""
+        return max(time_s, self._end_s, self._since_s[-1])
+
+    def own_time(self, time_s: float) -> float:
+        """Return the generator's own time at a rig time."""
+        return float(self.terminal.own_time(np.asarray(time_s)))
+
+    def change(self, signal: Signal, time_s: float) -> None:
+        """Let a signal begin at a rig time, which ``effective`` has confirmed."""
+        if time_s == self._since_s[-1]:
+            self._signals[-1] = signal
+        else:
+            self._since_s.append(time_s)
+            self._signals.append(signal)
+
+    def render(self, start_s: float, interval_s: float, count: int) -> Samples:
+        """Return the mean terminal voltage over ``count`` intervals from ``start_s``, shape (count,) [V]."""
+        edges_s = self._edges(start_s, interval_s, count)
+        volts = np.zeros(count)
+        if count == 0:
+            return volts
+        noise = self._noise(count)
+        self._forget_before(edges_s[0])
+        until = [*self._since_s[1:], np.inf]
+        for since_s, until_s, signal in zip(self._since_s, until, self._signals, strict=True):
+            if since_s < edges_s[-1] and until_s > edges_s[0] and signal.relay is Relay.CLOSED:
+                volts += self._contribution(signal, edges_s, (since_s, until_s), noise)
+        self._end_s = float(edges_s[-1])
+        return volts * self.terminal.divider
+
+    def _edges(self, start_s: float, interval_s: float, count: int) -> Samples:
+        """Return the ends of the intervals, on one grid for as long as blocks follow each other."""
+        expected_s = self._origin_s + self._rendered * self._interval_s
+        if interval_s != self._interval_s or abs(start_s - expected_s) > _CONTINUES * interval_s:
+            self._origin_s, self._interval_s, self._rendered = start_s, interval_s, 0
+        edges_s = self._origin_s + self._interval_s * np.arange(self._rendered, self._rendered + count + 1)
+        self._rendered += count
+        return np.asarray(edges_s, dtype=np.float64)
+
+    def _contribution(
+        self, signal: Signal, edges_s: Samples, valid: tuple[float, float], noise: Samples
+    ) -> Samples:
+        """Return what one signal adds to the mean of every interval (open circuit) [V]."""
+        begin_s, end_s = max(valid[0], edges_s[0]), min(valid[1], edges_s[-1])
+        first = max(bisect_right(edges_s, begin_s) - 1, 0)
+        last = int(np.searchsorted(edges_s, end_s, side="left"))
+        local = np.clip(edges_s[first : last + 1], begin_s, end_s)
+        own = self.terminal.own_time(local)
+        own_interval_s = self._interval_s * (1 + self.terminal.clock_error_ppm * 1e-6)
+        cuts = signal.breakpoints(float(own[0]), float(own[-1]), own_interval_s)
+        weights = np.diff(local) / self._interval_s
+        means = signal.means(own) if len(cuts) == 0 else _mean_over_pieces(signal, own, cuts)
+        volts = np.zeros(len(edges_s) - 1)
+        # Noise in the mean over one interval: density times the bandwidth 1/(2 interval).
+        rms_v = self.terminal.noise_v_per_rt_hz / np.sqrt(2 * self._interval_s)
+        volts[first:last] = weights * means + np.sqrt(weights) * rms_v * noise[first:last]
+        return volts
+
+    def _noise(self, count: int) -> Samples:
+        """Return unit noise that depends on the seed and the sample's number alone."""
+        begin, self._noise_index = self._noise_index, self._noise_index + count
+        blocks = range(begin // NOISE_BLOCK, (self._noise_index - 1) // NOISE_BLOCK + 1)
+        drawn = np.concatenate([self._drawn(block) for block in blocks])
+        skip = begin - blocks[0] * NOISE_BLOCK
+        return drawn[skip : skip + count]
+
+    def _drawn(self, block: int) -> Samples:
+        """Return a block of unit noise; the last one is kept, for renderings shorter than a block."""
+        if self._noise_block[0] != block:
+            generator = np.random.default_rng((self.terminal.seed, block))
+            self._noise_block = block, generator.standard_normal(NOISE_BLOCK)
+        return self._noise_block[1]
+
+    def _forget_before(self, time_s: float) -> None:
+        """Drop signals that ended before a rig time."""
+        ended = max(bisect_right(self._since_s, time_s) - 1, 0)
+        del self._since_s[:ended], self._signals[:ended]
+
+
+def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samples:
+    """Return the mean over every interval of a signal that must be cut inside them."""
+    times = np.unique(np.concatenate((edges_s, cuts_s)))
+    durations = np.diff(times)
+    interval = np.searchsorted(edges_s, times[:-1], side="right") - 1
+    intervals = len(edges_s) - 1
+    means = signal.means(times)
+    pieces = np.bincount(interval, minlength=intervals)
+    sums = np.bincount(interval, weights=durations * means, minlength=intervals)
+    widths = np.bincount(interval, weights=durations, minlength=intervals)
+    # Edges that coincide (a signal that begins on one) make empty intervals, which weigh nothing.
+    result = np.divide(sums, widths, out=np.zeros_like(sums), where=widths > 0)
+    whole = interval[pieces[interval] == 1]
+    # An uncut interval keeps its mean to the last bit, as if no other interval had been cut.
+    result[whole] = means[pieces[interval] == 1]
+    return np.asarray(result, dtype=np.float64)

@@ -1,0 +1,259 @@
+"""The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
+
+from collections.abc import Mapping
+from contextlib import ExitStack
+from enum import Enum, auto
+from pathlib import Path
+from types import MappingProxyType, TracebackType
+from typing import Self
+
+from vibench.acquisition import AcquisitionError, ConfigurationError
+from vibench.acquisition.recording import DiskTrouble, troubled_disks
+from vibench.acquisition.rig import Rig, VirtualConfig
+
+from ..controller.virtual_controller import controller_of
+from ..daqmx.devices import catalogue_with
+from ..daqmx.rig import OnDemandPace, Pace, WallPace
+from ..daqmx.server import LOOPBACK, DaqServer
+from ..daqmx.token import token_for
+from ..generator.afg1022 import AFG1022
+from ..generator.channel_output import Panel
+from ..generator.keysight_33500b import Keysight33500B
+from ..generator.scpi_instrument import Quirks
+from ..generator.scpi_socket import ScpiSocket
+from ..generator.terminal_voltage import Terminal
+from ..usb.bus import plug_in, unplug
+from ..usb.remote import usb_service
+from ..usb.usbtmc import UsbTmcInstrument
+from ..world.time_grid import FULL_BAND_HZ, relative_clock_ppm
+from ..world.world import World, virtual_section
+from .fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, load_fault_script
+from .faults import RigFaults
+
+_USB_RESOURCE_FIELDS = 5
+REFUSED_S = 1.0
+"""Rig time that every refusal of the disk but the first takes: it is emptied in time for who tries again."""
+
+
+GENERATORS: Mapping[int, type[AFG1022]] = MappingProxyType({0x0699: AFG1022, 0x0957: Keysight33500B})
+"""The simulated generators, by the maker's number in their USB address."""
+
+
+class DiskFaults(Enum):
+    """What becomes of a script's faults of the disk."""
+
+    PLAYED = auto()
+    """This process records, and meets them."""
+    REFUSED = auto()
+    """Another process records, whose disk is out of reach."""
+
+
+class VirtualRig:
+    """Every simulated instrument of a rig, from entering its ``with`` to leaving it.
+
+    Any pyvisa program of this process finds the generator at ``visa_resource``, any nidaqmx program
+    the converter at ``daq_address``. Programs of other processes find both at ``daq_address``: the
+    generator after ``plug_in_remote(daq_address)``, or without it at ``socket_resource``.
+
+    Parameters
+    ----------
+    rig
+        With a ``[virtual]`` section.
+    address
+        ``"host:port"`` to serve on; port 0 takes a free one. Loopback by default; anywhere else, every call
+        must carry `token`.
+    quirks, panel
+        Habits of the generator's firmware, and what only its front panel can set: a load that is told
+        to be 50 ohm there, and cannot be set remotely, doubles the voltage at the amplifier.
+    scpi_port
+        Of `socket_resource`; 0 takes a free one.
+    disk
+        Whether a script of faults may trouble the recordings that this process makes.
+
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        address: str = LOOPBACK,
+        *,
+        quirks: Quirks = Quirks(),  # noqa: B008 - frozen
+        panel: Panel = Panel(),  # noqa: B008 - frozen
+        scpi_port: int = 0,
+        disk: DiskFaults = DiskFaults.PLAYED,
+    ) -> None:
+        virtual = virtual_section(rig)
+        self._script = _script(virtual, disk)
+        self.rig = rig
+        self._address = address
+        self._scpi_port = scpi_port
+        self.token = token_for(address)
+        """What calls from other computers must carry; None on loopback."""
+        self._pace = _pace(virtual)
+        # The generator and the world need each other: the clock is looked up when it is asked for.
+        usb_ids, serial = _address(rig.generator.resource)
+        self.generator = GENERATORS[usb_ids[0]](
+            lambda: self.world.time_s,
+            serial=serial,
+            quirks=quirks,
+            panel=panel,
+            terminal=_terminal(rig, virtual),
+        )
+        """What is behind the USB cable."""
+        self.controller = controller_of(rig, lambda: self.world.time_s)
+        """What closes a fast loop; None where the rig has none."""
+        self.world = World(rig, self.generator, loop=self.controller)
+        """What is behind the terminals."""
+        self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
+        self._running: _Running | None = None
+
+    @property
+    def visa_resource(self) -> str:
+        """VISA name of the generator."""
+        return self._usb.identification.resource_name
+
+    @property
+    def daq_address(self) -> str:
+        """``"host:port"`` of the DAQ server, which serves the generator's USB cable as well."""
+        return self._switched_on.daq.address
+
+    @property
+    def socket_resource(self) -> str:
+        """VISA name of the generator for programs that cannot use the USB bus in memory."""
+        return self._switched_on.socket.resource_name
+
+    @property
+    def controller_resource(self) -> str:
+        """VISA name of the real-time controller's socket; empty without one."""
+        socket = self._switched_on.controller
+        return "" if socket is None else socket.resource_name
+
+    @property
+    def faults(self) -> RigFaults:
+        """What can go wrong, on demand."""
+        return self._switched_on.play.rig
+
+    @property
+    def played_faults(self) -> tuple[PlayedFault, ...]:
+        """What the script of the configuration has done to the rig so far."""
+        return tuple(self._switched_on.play.played)
+
+    def let_pass(self, duration_s: float) -> None:
+        """Let rig time pass while nobody samples; a rig on the wall's clock needs nobody for that."""
+        match self._pace:
+            case OnDemandPace():
+                self._switched_on.daq.let_pass(duration_s)
+
+    def __enter__(self) -> Self:
+        """Switch everything on, or nothing."""
+        with ExitStack() as starting:
+            plug_in(self._usb)
+            starting.callback(unplug, self._usb)
+            daq = starting.enter_context(self._serve())
+            socket = starting.enter_context(self._socket())
+            controller = (
+                None if self.controller is None else starting.enter_context(ScpiSocket(self.controller))
+            )
+            disk = DiskTrouble(lambda: self.let_pass(REFUSED_S))
+            starting.enter_context(troubled_disks(disk))
+            play = FaultPlay(self.world, RigFaults(self.world, self.generator, self._usb, daq, disk))
+            play.begin(self._script)
+            self._running = _Running(daq, socket, controller, play, starting.pop_all())
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Switch everything off."""
+        running, self._running = self._running, None
+        if running is not None:
+            running.closing.close()
+
+    def _socket(self) -> ScpiSocket:
+        try:
+            return ScpiSocket(self.generator, self._scpi_port)
+        except (OSError, OverflowError) as error:
+            raise ConfigurationError(
+                f"port {self._scpi_port} cannot be listened on ({error}); give another, or 0 for a free one"
+            ) from error
+
+    def _serve(self) -> DaqServer:
+        return DaqServer(
+            self.world,
+            self._pace,
+            self._address,
+            catalogue=catalogue_with(self.rig.daq.product, self.rig.daq.device),
+            handlers=(usb_service(self._usb),),
+            token=self.token,
+        )
+
+    @property
+    def _switched_on(self) -> "_Running":
+        if self._running is None:
+            raise AcquisitionError(
+                "The virtual rig is switched off: enter it with 'with VirtualRig(rig) as ...'"
+            )
+        return self._running
+
+
+class _Running:
+    """What exists only while the rig is switched on."""
+
+    def __init__(
+        self,
+        daq: DaqServer,
+        socket: ScpiSocket,
+        controller: ScpiSocket | None,
+        play: FaultPlay,
+        closing: ExitStack,
+    ) -> None:
+        self.daq = daq
+        self.socket = socket
+        self.controller = controller
+        self.play = play
+        self.closing = closing
+
+
+def _pace(virtual: VirtualConfig) -> Pace:
+    match virtual.pace:
+        case "free":
+            return OnDemandPace()
+        case "wall":
+            return WallPace(virtual.speed)
+
+
+def _script(virtual: VirtualConfig, disk: DiskFaults) -> FaultScript:
+    if virtual.faults is None:
+        return FaultScript()
+    script = load_fault_script(Path(virtual.faults))
+    if disk is DiskFaults.REFUSED and any(each.fault in DISK_FAULTS for each in script.faults):
+        raise ConfigurationError(
+            f"{virtual.faults}: {' and '.join(sorted(DISK_FAULTS))} befall the program that records, which "
+            "is not this one. Nothing was started; leave them out, or give the script to 'vibench measure'"
+        )
+    return script
+
+
+def _address(resource: str) -> tuple[tuple[int, int], str]:
+    """Take maker, product and serial number out of ``USB0::0x0699::0x0353::<serial>::INSTR``."""
+    fields = resource.split("::")
+    try:
+        ids = int(fields[1], 0), int(fields[2], 0)
+    except (IndexError, ValueError):
+        ids = 0, 0
+    if not fields[0].startswith("USB") or len(fields) < _USB_RESOURCE_FIELDS or ids[0] not in GENERATORS:
+        raise ConfigurationError(
+            f"generator.resource = {resource!r}: the virtual generator sits on USB; "
+            "give USB0::0x0699::0x0353::<serial>::INSTR (AFG1022) or "
+            "USB0::0x0957::0x2C07::<serial>::INSTR (33522B)"
+        )
+    return ids, fields[3]
+
+
+def _terminal(rig: Rig, virtual: VirtualConfig) -> Terminal:
+    return Terminal(
+        load_ohm=rig.generator.connected_ohm,
+        clock_error_ppm=relative_clock_ppm(virtual.generator_clock_ppm, virtual.converter_clock_ppm),
+        noise_v_per_rt_hz=virtual.generator_noise_v / FULL_BAND_HZ**0.5,
+        seed=virtual.seed,
+    )

@@ -1,0 +1,262 @@
+"""A USB bus in memory: what is plugged in here is found by any program that uses pyvisa-py or PyUSB.
+
+For a generator in another process, one line before (or after) pyvisa opens its resource manager is
+enough::
+
+    from vibench.virtual_rig.usb import usb_bus
+    usb_bus.plug_in_remote("127.0.0.1:31763")
+
+It needs no libusb. While this module's bus is installed, PyUSB sees it *instead of* the machine's own
+USB devices; only a fresh process sees those again.
+"""
+
+import errno
+import importlib
+import itertools
+import sys
+import threading
+from array import array
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import usb.backend
+import usb.backend.libusb1
+import usb.core
+import usb.util
+
+from vibench.acquisition import ConfigurationError
+
+from . import descriptors as usb_descriptors
+from .device import Setup, UsbDevice
+from .remote import RemoteUsbDevice
+
+_GET_DESCRIPTOR = 6
+_REQUEST_TYPE_MASK = 0x60
+
+
+@dataclass(frozen=True, eq=False)
+class _Port:
+    """A place on the bus and the device in it."""
+
+    device: UsbDevice
+    address: int
+
+
+@dataclass(eq=False)
+class _Handle:
+    """A device that a program has opened."""
+
+    port: _Port
+
+
+class UsbBus(usb.backend.IBackend):  # type: ignore[misc] # PyUSB has no types
+    """A PyUSB backend (``usb.backend.IBackend``) whose devices are objects of this process."""
+
+    def __init__(self) -> None:
+        self._ports: list[_Port] = []
+        self._owners: dict[_Port, _Handle] = {}
+        self._addresses = itertools.count(1)
+        self._lock = threading.RLock()
+
+    def plug_in(self, device: UsbDevice) -> None:
+        """Put a device on the bus; its vendor, product and serial must be new there."""
+        name = device.identification.resource_name
+        with self._lock:
+            if any(port.device.identification.resource_name == name for port in self._ports):
+                message = (
+                    f"{name} is already on the virtual USB bus: unplug it first, or give another serial."
+                )
+                raise ConfigurationError(message)
+            self._ports.append(_Port(device, next(self._addresses)))
+
+    def unplug(self, device: UsbDevice) -> None:
+        """Take a device off the bus; programs that hold it open get ENODEV. Legal when it is not there."""
+        with self._lock:
+            self._ports = [port for port in self._ports if port.device is not device]
+
+    # Enumeration and descriptors
+
+    def enumerate_devices(self) -> list[_Port]:
+        """Return everything that is plugged in."""
+        with self._lock:
+            return list(self._ports)
+
+    def get_device_descriptor(self, dev: _Port) -> SimpleNamespace:
+        """Return the device descriptor."""
+        return usb_descriptors.device_descriptor(dev.device.identification, dev.address)
+
+    def get_configuration_descriptor(self, dev: _Port, config: int) -> SimpleNamespace:  # noqa: ARG002
+        """Return a configuration; IndexError past the last."""
+        return usb_descriptors.configuration_descriptor(config)
+
+    def get_interface_descriptor(self, dev: _Port, intf: int, alt: int, config: int) -> SimpleNamespace:  # noqa: ARG002
+        """Return an interface; IndexError past the last."""
+        return usb_descriptors.interface_descriptor(intf, alt)
+
+    def get_endpoint_descriptor(
+        self,
+        dev: _Port,
+        ep: int,
+        intf: int,  # noqa: ARG002 - there is one
+        alt: int,  # noqa: ARG002 - there is one
+        config: int,  # noqa: ARG002 - there is one
+    ) -> SimpleNamespace:
+        """Return an endpoint; IndexError past the last."""
+        return usb_descriptors.endpoint_descriptor(dev.device.identification, ep)
+
+    # Opening and claiming
+
+    def open_device(self, dev: _Port) -> _Handle:
+        """Open a device that is still plugged in."""
+        handle = _Handle(dev)
+        self._present(handle)
+        return handle
+
+    def close_device(self, dev_handle: _Handle) -> None:
+        """Close; a claim that was forgotten ends with it."""
+        self.release_interface(dev_handle, 0)
+
+    def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:  # noqa: ARG002 - there is one
+        """Accept the one configuration."""
+        self._present(dev_handle)
+
+    def get_configuration(self, dev_handle: _Handle) -> int:
+        """Return the one configuration."""
+        self._present(dev_handle)
+        return 1
+
+    def claim_interface(self, dev_handle: _Handle, intf: int) -> None:  # noqa: ARG002 - there is one
+        """Take the interface for one handle alone; EBUSY if another one has it, as with libusb."""
+        self._present(dev_handle)
+        with self._lock:
+            if self._owners.setdefault(dev_handle.port, dev_handle) is not dev_handle:
+                raise usb.core.USBError("Resource busy", errno=errno.EBUSY)
+
+    def release_interface(self, dev_handle: _Handle, intf: int) -> None:  # noqa: ARG002 - there is one
+        """Give the interface back."""
+        with self._lock:
+            if self._owners.get(dev_handle.port) is dev_handle:
+                del self._owners[dev_handle.port]
+
+    # Transfers
+
+    def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002
+        """Send one transfer; return how many bytes went."""
+        device = self._present(dev_handle)
+        with _usb_errors():
+            device.bulk_out(data.tobytes())
+        return len(data) * data.itemsize
+
+    def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: array, timeout: int) -> int:  # type: ignore[type-arg]  # noqa: ARG002
+        """Fill the buffer from one transfer; return how many bytes came."""
+        device = self._present(dev_handle)
+        with _usb_errors():
+            return _fill(buff, device.bulk_in(len(buff), timeout))
+
+    def ctrl_transfer(
+        self,
+        dev_handle: _Handle,
+        bmRequestType: int,
+        bRequest: int,
+        wValue: int,
+        wIndex: int,
+        data: array,  # type: ignore[type-arg]
+        timeout: int,  # noqa: ARG002 - control transfers are instantaneous
+    ) -> int:
+        """Answer requests for string descriptors here, and hand class requests to the device."""
+        device = self._present(dev_handle)
+        setup = Setup(bmRequestType, bRequest, wValue, wIndex, len(data))
+        incoming = usb.util.ctrl_direction(bmRequestType) == usb.util.CTRL_IN
+        if bmRequestType & _REQUEST_TYPE_MASK == usb.util.CTRL_TYPE_STANDARD:
+            return _fill(data, _standard_reply(device, setup))
+        with _usb_errors():
+            reply = device.control(setup, b"" if incoming else data.tobytes())
+        return _fill(data, reply) if incoming else len(data)
+
+    def _present(self, handle: _Handle) -> UsbDevice:
+        """Return the device of a handle, or fail with ENODEV if it was unplugged."""
+        with self._lock:
+            if handle.port not in self._ports:
+                raise usb.core.USBError("No such device (it may have been disconnected)", errno=errno.ENODEV)
+        return handle.port.device
+
+
+def _standard_reply(device: UsbDevice, setup: Setup) -> bytes:
+    """Answer GET_DESCRIPTOR for strings (USB 2.0, 9.4.3); stall anything else, as PyUSB asks no more."""
+    kind, index = divmod(setup.value, 256)
+    if setup.request == _GET_DESCRIPTOR and kind == usb.util.DESC_TYPE_STRING:
+        descriptor = usb_descriptors.string_descriptor(device.identification, index)
+        if descriptor is not None:
+            return descriptor[: setup.length]
+    raise usb.core.USBError("Pipe error", errno=errno.EPIPE)
+
+
+def _fill(buffer: array, data: bytes) -> int:  # type: ignore[type-arg]
+    """Copy received bytes into PyUSB's buffer; return how many."""
+    buffer[: len(data)] = array("B", data)
+    return len(data)
+
+
+class _usb_errors:  # noqa: N801 - reads as a verb where it is used
+    """Turns a device's OSError into what PyUSB's own backends raise.
+
+    No generator: from Python 3.13 on its frame keeps the handle of a session that failed to open.
+    """
+
+    def __enter__(self) -> None:
+        """Nothing to prepare."""
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        match error:
+            case TimeoutError():
+                raise usb.core.USBTimeoutError("Operation timed out", errno=errno.ETIMEDOUT) from error
+            case OSError():
+                raise usb.core.USBError(error.strerror, errno=error.errno) from error
+
+
+_BUS = UsbBus()
+
+
+def _bus(find_library: object = None) -> UsbBus:  # noqa: ARG001 - signature of PyUSB's get_backend
+    return _BUS
+
+
+def install() -> None:
+    """Let PyUSB, and pyvisa-py on top of it, see the virtual bus in this process from now on.
+
+    Without libusb pyvisa-py drops its USB sessions when it is first imported; if that has happened
+    already, they are registered now. Legal at any time, and done by ``plug_in``.
+    """
+    usb.backend.libusb1.get_backend = _bus
+    if "pyvisa_py" in sys.modules and "pyvisa_py.usb" not in sys.modules:
+        importlib.import_module("pyvisa_py.usb")
+
+
+def plug_in(device: UsbDevice) -> None:
+    """Put a device on the virtual bus, so that pyvisa lists and opens it."""
+    _BUS.plug_in(device)
+    install()
+
+
+def unplug(device: UsbDevice) -> None:
+    """Take a device off the virtual bus. Legal when it is not there."""
+    _BUS.unplug(device)
+
+
+def plug_in_remote(address: str) -> RemoteUsbDevice:
+    """Put the generator of a rig in another process on this process's bus.
+
+    Parameters
+    ----------
+    address
+        ``"host:port"`` of the rig's server.
+
+    Raises
+    ------
+    InstrumentLost
+        When no rig answers there.
+
+    """
+    device = RemoteUsbDevice(address)
+    plug_in(device)
+    return device

@@ -1,0 +1,261 @@
+"""The USB test-and-measurement class in front of an instrument: messages wrapped in bulk transfers.
+
+Sources: USBTMC 1.0 (2003) and its USB488 subclass 1.0; section numbers in the docstrings are USBTMC's
+unless they say USB488. Waiting is not lived through: a transfer that would outlast the host's timeout
+fails at once.
+"""
+
+import errno
+import os
+import struct
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import IntEnum, IntFlag
+from typing import NoReturn, Protocol
+
+from ..generator.scpi_instrument import Reply
+from ..generator.scpi_message import LONGEST_MESSAGE
+from ..generator.scpi_status import BYTE, ErrorCode
+from .device import Identification, Setup
+
+VENDOR_ID = 0x0699
+PRODUCT_ID = 0x0353
+"""Shared by AFG1022 and AFG1062."""
+HEADER = struct.Struct("<BBBxIBBxx")
+"""Message id, tag, inverted tag, length, attributes, termination character (table 1 to 4)."""
+ALIGNMENT = 4
+NEVER_MS = 2**32 - 1
+
+
+class MessageId(IntEnum):
+    """What a bulk transfer is (table 2)."""
+
+    OUT = 1
+    REQUEST_IN = 2
+
+
+class Attributes(IntFlag):
+    """Attributes of a bulk header (tables 3, 4 and 9)."""
+
+    END_OF_MESSAGE = 1
+    TERMINATION_CHARACTER = 2
+
+
+SUCCESS = 1
+TRANSFER_NOT_IN_PROGRESS = 0x81
+"""First byte of the answer to a class request (table 16)."""
+
+_CAPABILITIES = bytes([SUCCESS, 0, 0x00, 0x01, 0, 1, 0, 0, 0, 0, 0, 0, 0x00, 0x01, 0b100, 0, *bytes(8)])
+"""USBTMC 1.0 with termination character; USB488 1.0 with 488.2; eight reserved bytes."""
+
+
+class MessageDevice(Protocol):
+    """What stands behind the interface."""
+
+    serial: str
+    maker: str
+    model: str
+
+    def execute(self, message: bytes) -> Reply:
+        """Carry out one complete message and return its reply."""
+
+    def report(self, code: ErrorCode) -> None:
+        """Queue an error that the interface has found."""
+
+
+@dataclass(frozen=True)
+class _Request:
+    """A pending REQUEST_DEV_DEP_MSG_IN."""
+
+    tag: int
+    length: int
+    terminator: bytes
+    """Empty, or the character at which the transfer shall stop."""
+
+
+@dataclass
+class _Flight:
+    """Everything on its way between host and instrument; a device clear starts a new one."""
+
+    message: bytes = b""
+    """Pieces of a message whose end has not come."""
+    reply: bytes = b""
+    """What the host has not fetched yet."""
+    late_ms: float = 0.0
+    """How long the host still has to wait for the reply."""
+    request: _Request | None = None
+    rest: bytes = b""
+    """The part of a transfer that did not fit into the host's buffer."""
+    aborting: bool = False
+    """An aborted transfer still owes its short packet."""
+
+
+class UsbTmcInstrument:
+    """An instrument at the end of a USB cable that can be pulled."""
+
+    def __init__(
+        self,
+        device: MessageDevice,
+        packet_bytes: int = 64,
+        usb_ids: tuple[int, int] = (VENDOR_ID, PRODUCT_ID),
+    ) -> None:
+        self._device = device
+        self._identification = Identification(
+            *usb_ids, device.maker, device.model, device.serial, packet_bytes
+        )
+        self._lock = threading.RLock()
+        self._is_plugged_in = True
+        self._is_hung = False
+        self._flight = _Flight()
+
+    @property
+    def identification(self) -> Identification:
+        """What the descriptors say."""
+        return self._identification
+
+    def pull_cable(self) -> None:
+        """Take the device off the bus: every transfer fails with ENODEV. The instrument itself plays on."""
+        with self._lock:
+            self._is_plugged_in = False
+
+    def plug_cable(self) -> None:
+        """Put the cable back; whatever was in flight is gone."""
+        with self._lock:
+            self._is_plugged_in = True
+            self._flight = _Flight()
+
+    def hang(self) -> None:
+        """Let the instrument take no notice of anybody: every transfer times out, and it plays on."""
+        with self._lock:
+            self._is_hung = True
+
+    def wake(self) -> None:
+        """Let the instrument answer again; whatever was in flight is gone."""
+        with self._lock:
+            self._is_hung = False
+            self._flight = _Flight()
+
+    # Transfers
+
+    def bulk_out(self, data: bytes) -> None:
+        """Take one bulk-OUT transfer: a piece of a message, or a request for a reply (3.2)."""
+        with self._lock:
+            self._check_cable()
+            if len(data) < HEADER.size:
+                _stall()
+            message_id, tag, inverse, length, attributes, terminator = HEADER.unpack_from(data)
+            if tag == 0 or tag ^ inverse != BYTE:
+                _stall()
+            if message_id == MessageId.OUT:
+                payload = data[HEADER.size : HEADER.size + length]
+                self._take(payload, Attributes(attributes & Attributes.END_OF_MESSAGE))
+            elif message_id == MessageId.REQUEST_IN:
+                stops = bool(attributes & Attributes.TERMINATION_CHARACTER)
+                self._flight.request = _Request(tag, length, bytes([terminator]) if stops else b"")
+            else:
+                _stall()
+
+    def bulk_in(self, length: int, timeout_ms: int) -> bytes:
+        """Hand over the reply that was asked for (3.3), or time out.
+
+        A read without a query queues -420 and times out. A reply that is late by longer than the
+        timeout stays in the instrument, that much less late.
+        """
+        with self._lock:
+            self._check_cable()
+            if self._flight.rest:
+                return self._hand_over(length)
+            if self._flight.aborting:
+                self._flight.aborting = False
+                return b""
+            if self._flight.request is None:
+                _time_out()
+            if not self._flight.reply:
+                self._device.report(ErrorCode.QUERY_UNTERMINATED)
+                _time_out()
+            if self._flight.late_ms > timeout_ms and timeout_ms != NEVER_MS:
+                self._flight.late_ms -= timeout_ms
+                _time_out()
+            self._flight.late_ms = 0.0
+            self._flight.rest = self._transfer(self._flight.request)
+            self._flight.request = None
+            return self._hand_over(length)
+
+    def control(self, setup: Setup, data: bytes) -> bytes:  # noqa: ARG002 - no class request carries data
+        """Answer a class request (4.2.1)."""
+        with self._lock:
+            self._check_cable()
+            if setup.request not in _REQUESTS:
+                _stall()
+            return _REQUESTS[setup.request](self, setup.value & BYTE)[: setup.length]
+
+    # Inside
+
+    def _take(self, payload: bytes, attributes: Attributes) -> None:
+        """Collect a message; carry it out when its last piece has come."""
+        self._flight.message += payload
+        if len(self._flight.message) > LONGEST_MESSAGE:
+            self._flight.message = b""
+            _stall()
+        if Attributes.END_OF_MESSAGE in attributes:
+            message, self._flight.message = self._flight.message, b""
+            self._execute(message)
+
+    def _execute(self, message: bytes) -> None:
+        """Carry out a message; an unread reply before it is lost, with -410 (IEEE 488.2, 6.3.2.3)."""
+        if self._flight.reply or self._flight.rest:
+            self._flight.reply = self._flight.rest = b""
+            self._flight.request = None
+            self._device.report(ErrorCode.QUERY_INTERRUPTED)
+        reply = self._device.execute(message)
+        self._flight.reply, self._flight.late_ms = reply.data, 1e3 * reply.delay_s
+
+    def _transfer(self, request: _Request) -> bytes:
+        """Wrap as much of the reply as was asked for; the last piece carries the end-of-message bit."""
+        end = min(request.length, len(self._flight.reply))
+        if request.terminator:
+            found = self._flight.reply.find(request.terminator, 0, end)
+            end = found + 1 if found >= 0 else end
+        payload, self._flight.reply = self._flight.reply[:end], self._flight.reply[end:]
+        attributes = Attributes(0) if self._flight.reply else Attributes.END_OF_MESSAGE
+        padding = bytes(-len(payload) % ALIGNMENT)
+        header = HEADER.pack(
+            MessageId.REQUEST_IN, request.tag, request.tag ^ BYTE, len(payload), attributes, 0
+        )
+        return header + payload + padding
+
+    def _hand_over(self, length: int) -> bytes:
+        transfer, self._flight.rest = self._flight.rest[:length], self._flight.rest[length:]
+        return transfer
+
+    def abort_bulk_in(self, tag: int) -> bytes:
+        """Give up a transfer that the host no longer waits for; the reply stays."""
+        if self._flight.request is None or self._flight.request.tag != tag:
+            return bytes([TRANSFER_NOT_IN_PROGRESS, 0])
+        self._flight.request = None
+        self._flight.rest = b""
+        self._flight.aborting = True
+        return bytes([SUCCESS, tag])
+
+    def _check_cable(self) -> None:
+        if not self._is_plugged_in:
+            raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+        if self._is_hung:
+            _time_out()
+
+
+def _stall() -> NoReturn:
+    raise OSError(errno.EPIPE, os.strerror(errno.EPIPE))
+
+
+def _time_out() -> NoReturn:
+    raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
+
+
+_REQUESTS: Mapping[int, Callable[[UsbTmcInstrument, int], bytes]] = {
+    3: UsbTmcInstrument.abort_bulk_in,  # INITIATE_ABORT_BULK_IN, 4.2.1.4
+    4: lambda *_: bytes([SUCCESS, *bytes(7)]),  # CHECK_ABORT_BULK_IN_STATUS, 4.2.1.5: it is done
+    7: lambda *_: _CAPABILITIES,  # GET_CAPABILITIES, 4.2.1.8
+}
+"""The class requests that pyvisa makes (table 15), by number; each is given the tag. Any other one stalls."""

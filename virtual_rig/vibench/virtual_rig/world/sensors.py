@@ -1,0 +1,209 @@
+"""From motion to volts: the laser vibrometer that watches m0 and the accelerometer on the base."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.acquisition import ConfigurationError
+from vibench.acquisition.rig import AccelerometerConfig, VibrometerConfig
+from vibench.sim.engine.run import native_engine
+from vibench.sim.engine.structures import Structure
+
+from .disturbance import Disturbance, RandomDropouts, overwrite
+from .noise import NoiseStream
+from .recursive_filter import RecursiveFilter
+from .time_grid import USUAL_GRID, TimeGrid
+
+_FIT_BAND = 0.2
+"""The fit covers zero to this part of the grid's rate: what a converter at half the rate can pass."""
+_FIT_FLOOR = 1e-2
+"""Its lower end: below, the exact gain at zero hertz leads."""
+_FIT_POINTS = 64
+_ZEROS = 6
+"""Numerator weights fitted."""
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """An analogue all-pole low-pass of unit gain at zero hertz."""
+
+    poles: tuple[complex, ...]
+    """In the left half plane, complex ones in pairs [rad/s]."""
+
+    @property
+    def delay_s(self) -> float:
+        """Group delay at zero hertz [s]."""
+        return float(-sum(1 / pole for pole in self.poles).real) if self.poles else 0.0
+
+    def response(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Complex gain, shape of ``frequency_hz``."""
+        s = 2j * np.pi * np.asarray(frequency_hz)
+        return np.asarray(np.prod([pole / (pole - s) for pole in self.poles], axis=0), dtype=np.complex128)
+
+
+def first_order(cut_hz: float) -> LowPass:
+    """Build one real pole, -3 dB at ``cut_hz``."""
+    return LowPass((complex(-2 * np.pi * cut_hz),))
+
+
+def resonant(resonance_hz: float, damping_ratio: float) -> LowPass:
+    """Build the response of a mass on a spring, below, at and above its resonance."""
+    omega = 2 * np.pi * resonance_hz
+    imaginary = omega * np.sqrt(1 - damping_ratio**2)
+    pole = complex(-damping_ratio * omega, imaginary)
+    return LowPass((pole, pole.conjugate()))
+
+
+def running_filter(analogue: LowPass, step_s: float) -> RecursiveFilter:
+    """Design a low-pass for a grid of ``step_s``, at rest to begin with.
+
+    The poles are mapped exactly (z = exp(s T)), so a resonance sits where it belongs even close to
+    the grid's Nyquist frequency; one that lies beyond has no place there, and would ring at another. The
+    zeros are the least-squares fit to the analogue response, phase included, with the gain at zero hertz
+    exact.
+    """
+    poles = np.array([pole for pole in analogue.poles if abs(pole.imag) * step_s < np.pi])
+    denominator = np.atleast_1d(np.asarray(np.poly(np.exp(poles * step_s)).real, dtype=np.float64))
+    return RecursiveFilter(_fitted_zeros(analogue, denominator, step_s), denominator)
+
+
+def _fitted_zeros(analogue: LowPass, denominator: NDArray[np.float64], step_s: float) -> NDArray[np.float64]:
+    frequency_hz = np.geomspace(_FIT_FLOOR, _FIT_BAND, _FIT_POINTS) / step_s
+    z = np.exp(-2j * np.pi * frequency_hz * step_s)
+    target = analogue.response(frequency_hz) * np.polynomial.polynomial.polyval(z, denominator)
+    powers = z[:, np.newaxis] ** np.arange(_ZEROS)
+    # The weights sum to the denominator's: unit gain at zero hertz, taken out of the unknowns.
+    total = denominator.sum()
+    reduced = powers[:, 1:] - powers[:, :1]
+    remainder = target - total * powers[:, 0]
+    weight = (1 / frequency_hz)[:, np.newaxis]  # errors as delays: the low end counts as much as the high
+    matrix = np.concatenate([reduced.real * weight, reduced.imag * weight])
+    aim = np.concatenate([remainder.real * weight[:, 0], remainder.imag * weight[:, 0]])
+    weights, *_ = np.linalg.lstsq(matrix, aim)
+    return np.concatenate([[total - weights.sum()], weights])
+
+
+FloatArray = NDArray[np.float64]
+
+ACCELEROMETER_DAMPING_RATIO = 0.02
+"""Of a piezoelectric accelerometer's mounted resonance; assumed, usual for the kind."""
+IEPE_BIAS_V = 10.0
+"""Constant voltage of a powered IEPE sensor; 8 to 12 V is usual."""
+LONGEST_DELAY_S = 5e-3
+"""Of a sensor: what the converter keeps for the beginning of a conversion at its lowest rate."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorParts:
+    """What a stretch of motion is shown with."""
+
+    filter: RecursiveFilter
+    noise: FloatArray
+    """In units of the motion, shape (steps,)."""
+    instead: FloatArray
+    """Shown where it is a number, likewise; empty where there is none."""
+    full_scale: float
+    """In units of the motion."""
+    full_scale_v: float
+
+    def showing(self, motion: FloatArray, volts: FloatArray) -> Structure:
+        """Describe to the native engine that the means of a motion are shown as these volts."""
+        return native_engine().new(
+            "Sensor",
+            filter=self.filter.parts,
+            noise=self.noise,
+            instead=self.instead,
+            full_scale=self.full_scale,
+            full_scale_voltage=self.full_scale_v,
+            motion=motion,
+            volts=volts,
+        )
+
+
+class Sensor(Protocol):
+    """What shows a motion."""
+
+    def parts(self, first_step: int, count: int) -> SensorParts:
+        """Give what the motion is shown with in the next steps."""
+
+
+def shown(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
+    """Output volts for the means of a motion over the next steps, shape (steps,)."""
+    volts = np.empty(len(values))
+    parts = sensor.parts(first_step, len(values))
+    native_engine().call("show", parts.showing(values, volts))
+    return volts
+
+
+class Vibrometer:
+    """A laser vibrometer with its velocity decoder.
+
+    Velocity, the decoder's bandwidth (first order), white noise, dropouts, volts, clipping at full
+    scale, in this order. What is left of the decoder's delay, beyond that of its bandwidth, is a
+    plain delay (``delay_steps``), which the converter's filter applies exactly.
+    """
+
+    def __init__(
+        self,
+        config: VibrometerConfig,
+        noise_density: float,
+        dropouts: RandomDropouts,
+        noise: NoiseStream,
+        grid: TimeGrid = USUAL_GRID,
+    ) -> None:
+        """``noise_density`` in (m/s)/sqrt(Hz)."""
+        if config.delay_s > LONGEST_DELAY_S:
+            raise ConfigurationError(
+                f"vibrometer.delay_s = {config.delay_s} s: the virtual rig can delay by at most "
+                f"{LONGEST_DELAY_S} s; give a smaller delay"
+            )
+        bandwidth = first_order(config.bandwidth_hz)
+        self.delay_steps = (config.delay_s - bandwidth.delay_s) * grid.rate_hz
+        self._filter = running_filter(bandwidth, grid.step_s)
+        self._noise_rms = noise_density * np.sqrt(grid.rate_hz / 2)
+        self._full_scale_m_per_s = config.full_scale_m_per_s
+        self._full_scale_v = config.full_scale_v
+        self._noise = noise
+        self._dropouts = dropouts
+        self._demanded: list[Disturbance] = []
+
+    def disturb(self, disturbance: Disturbance) -> None:
+        """Show a level instead of the velocity for some steps: a dropout or an over-range on demand."""
+        self._demanded.append(disturbance)
+
+    def parts(self, first_step: int, count: int) -> SensorParts:
+        """Give what the velocity [m/s] is shown with in the next steps."""
+        self._demanded = [one for one in self._demanded if one.stop_step > first_step]
+        disturbed = self._dropouts.between(first_step, first_step + count) + self._demanded
+        instead = np.full(count if disturbed else 0, np.nan)
+        overwrite(instead, first_step, self._full_scale_m_per_s, disturbed)
+        noise = self._noise_rms * self._noise.draw(first_step, count)
+        scale = self._full_scale_m_per_s, self._full_scale_v
+        return SensorParts(self._filter, noise, instead, *scale)
+
+
+class Accelerometer:
+    """A piezoelectric accelerometer: its resonance, noise, sensitivity, and clipping at full scale."""
+
+    def __init__(
+        self,
+        config: AccelerometerConfig,
+        noise_m_per_s2: float,
+        noise: NoiseStream,
+        grid: TimeGrid = USUAL_GRID,
+    ) -> None:
+        """``noise_m_per_s2``: rms in ``FULL_BAND_HZ``."""
+        mounted = resonant(config.resonance_hz, ACCELEROMETER_DAMPING_RATIO)
+        self._filter = running_filter(mounted, grid.step_s)
+        self._noise_rms = grid.rms_per_step(noise_m_per_s2)
+        self._sensitivity = config.sensitivity_v_per_m_per_s2
+        self._full_scale_v = config.full_scale_v
+        self._noise = noise
+
+    def parts(self, first_step: int, count: int) -> SensorParts:
+        """Give what the acceleration [m/s2] is shown with in the next steps, without bias."""
+        noise = self._noise_rms * self._noise.draw(first_step, count)
+        scale = self._full_scale_v / self._sensitivity, self._full_scale_v
+        return SensorParts(self._filter, noise, np.empty(0), *scale)

@@ -1,0 +1,332 @@
+"""The analogue world: everything between the generator's terminal and the samples of the converter."""
+
+import heapq
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from itertools import count
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.acquisition import AcquisitionError, ConfigurationError
+from vibench.acquisition.rig import (
+    Rig,
+    VirtualConfig,
+    amplifier_of,
+    fastest_sample_rate_hz,
+    shaker_of,
+    specimen_of,
+)
+from vibench.sim import Specimen
+from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
+
+from ..analogue import Input
+from ..controller.virtual_controller import VirtualController
+from .analogue_output import AnalogueOutput
+from .conversion import Conversion, converter_input
+from .decimation import history_steps
+from .disturbance import Disturbance, RandomDropouts
+from .input_stage import InputStage
+from .loop_cables import LoopCables, PlantParts
+from .noise import NoiseStream
+from .sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
+from .time_grid import PPM, USUAL_GRID, TimeGrid
+from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
+
+
+class EventSchedule:
+    """Actions by the step at which they are due; those of one step keep the order they were given in."""
+
+    def __init__(self, grid: TimeGrid = USUAL_GRID) -> None:
+        self._grid = grid
+        self._due: list[tuple[int, int, Callable[[], None]]] = []
+        self._number = count()
+
+    def add(self, time_s: float, action: Callable[[], None]) -> None:
+        """Let ``action`` happen at a rig time; one that has passed is kept at the next step."""
+        heapq.heappush(self._due, (self._grid.step_at(time_s), next(self._number), action))
+
+    def run_due(self, step: int) -> None:
+        """Do everything that is due at a step."""
+        while self._due and self._due[0][0] <= step:
+            heapq.heappop(self._due)[2]()
+
+    def stop_before(self, step: int) -> int:
+        """Tell how far the world may be computed towards ``step`` without missing one."""
+        return min(step, self._due[0][0]) if self._due else step
+
+
+FloatArray = NDArray[np.float64]
+
+LOWEST_RATE_HZ = 500.0
+"""Slowest conversion: its filter looks back a tenth of a second."""
+HIGHEST_RATE_HZ = 250e3
+"""Fastest conversion; beyond the world's own rate it interpolates."""
+
+_STRETCH_STEPS = 8192
+"""Steps computed in one go: long enough to amortise the calls, short enough to stay in the cache."""
+
+
+class TerminalVoltage(Protocol):
+    """The generator as the amplifier sees it."""
+
+    def render(self, start_s: float, interval_s: float, count: int) -> FloatArray:
+        """Mean terminal voltage over each of ``count`` intervals [V]; calls follow each other in time."""
+
+
+class World:
+    """The simulated rig in rig time, advancing only when asked to.
+
+    Rig time is counted by the converter's clock (see `_time_grid`). Two worlds of one configuration
+    agree bit for bit, whatever sizes of blocks they are read in. Safe to use from several threads;
+    `time_s` never waits, so an instrument may ask for it while it is being rendered.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        terminal: TerminalVoltage,
+        specimen: Specimen | None = None,
+        loop: VirtualController | None = None,
+    ) -> None:
+        """``specimen`` defaults to the one the rig describes; ``loop``: a controller beside the generator."""
+        virtual = virtual_section(rig)
+        self._grid = grid = TimeGrid(virtual.grid_rate_hz)
+        noise = partial(NoiseStream, virtual.seed)
+        self.vibrometer = Vibrometer(
+            rig.vibrometer,
+            virtual.vibrometer_noise_m_per_s_per_rthz,
+            RandomDropouts(virtual.vibrometer_dropouts_per_s, noise("laser dropouts"), grid),
+            noise("vibrometer"),
+            grid,
+        )
+        step_s = grid.physical_step_s(virtual.converter_clock_ppm)
+        self._specimen = specimen or specimen_of(rig)
+        self.plant = LoadedShaker(amplifier_of(rig), shaker_of(rig), self._specimen, step_s)
+        self._accelerometer = Accelerometer(
+            rig.accelerometer, virtual.accelerometer_noise_m_per_s2, noise("accelerometer"), grid
+        )
+        self._terminal = terminal
+        self._gain_db = rig.amplifier.gain_db
+        self._amplifier_noise = noise("amplifier")
+        self._amplifier_noise_v = grid.rms_per_step(virtual.amplifier_noise_v)
+        self._noise = noise
+        self._converter_noise_v = virtual.converter_noise_v
+        self._plan = cables_of(rig, self.vibrometer.delay_steps)
+        self._cables = dict(self._plan)
+        self._amplifier_input = amplifier_input(rig)
+        self._outputs: dict[str, AnalogueOutput] = {}
+        self._loop = None if loop is None else LoopCables(loop)
+        self._conversions: list[Conversion] = []
+        self._history = np.zeros((len(Signal), _history_steps(grid)))
+        self._schedule = EventSchedule(grid)
+        self._step = 0
+        self._unspent_steps = 0.0
+        self._truth: list[FloatArray] | None = None
+        self._turn = threading.RLock()
+
+    @property
+    def time_s(self) -> float:
+        """Rig time: how far the world has been computed [s]."""
+        return self._step * self._grid.step_s
+
+    def advance(self, duration_s: float) -> None:
+        """Let rig time pass; fractions of a step add up until they are one."""
+        with self._turn:
+            wanted = self._unspent_steps + duration_s * self._grid.rate_hz
+            steps = max(round(wanted), 0)
+            self._unspent_steps = wanted - steps
+            self._compute_to(self._step + steps)
+
+    def at(self, time_s: float, action: Callable[[], None]) -> None:
+        """Let something happen at a rig time, to the step; a time that has passed is the next step."""
+        with self._turn:
+            self._schedule.add(time_s, action)
+
+    def sample(self, inputs: tuple[Input, ...], sample_rate_hz: float) -> Conversion:
+        """Begin a conversion now.
+
+        Any rate from 500 Hz to 250 kHz, and to half the grid's on a coarser grid than the usual one; whole
+        divisors of the grid's are the fast case. All inputs share one delay of 40 samples (at most the grid's
+        rate counted), as behind a delta-sigma converter. Raises ConfigurationError when the rate lies
+        outside.
+        """
+        fastest_hz = fastest_sample_rate_hz(self._grid.rate_hz) or HIGHEST_RATE_HZ
+        if not LOWEST_RATE_HZ <= sample_rate_hz <= fastest_hz:
+            raise ConfigurationError(
+                f"A sample rate of {sample_rate_hz:g} Hz is not possible on the virtual rig with its "
+                f"{self._grid.rate_hz:g} steps a second: {LOWEST_RATE_HZ:g} to {fastest_hz:g} Hz is; nothing "
+                "was started, choose one of those"
+            )
+        with self._turn:
+            ratio = self._grid.rate_hz / sample_rate_hz
+            ratio = round(ratio) if abs(ratio - round(ratio)) < PPM else ratio
+            channels = tuple(
+                converter_input(
+                    InputStage(
+                        configured, self._cables.get(configured.physical_channel, OPEN_INPUT), self._grid
+                    ),
+                    ratio,
+                    self._step,
+                    self._converter_noise_v,
+                    self._noise(f"{configured.physical_channel} from step {self._step}"),
+                )
+                for configured in inputs
+            )
+            for channel in channels:
+                channel.begin(self._history, self._step - self._history.shape[1])
+            conversion = Conversion(channels, ratio, self._step, self._go_on_to, self._end)
+            self._conversions.append(conversion)
+            return conversion
+
+    def play(self, physical_channel: str, volts: FloatArray, sample_rate_hz: float) -> None:
+        """Queue samples of an analogue output behind what it still has to play; they start now if idle."""
+        with self._turn:
+            self._output(physical_channel).queue(volts, sample_rate_hz, self._step)
+
+    def unplayed(self, physical_channel: str) -> int:
+        """How many queued samples of that output have not been played yet."""
+        with self._turn:
+            return self._output(physical_channel).unplayed(self._step)
+
+    def silence(self, physical_channel: str) -> None:
+        """Drop what is queued and hold that output at zero."""
+        with self._turn:
+            self._output(physical_channel).drop()
+
+    def set_amplifier_gain_db(self, gain_db: float) -> None:
+        """Turn the amplifier's knob."""
+        with self._turn:
+            self.plant.gain = 10 ** (gain_db / 20)
+
+    def restore_amplifier_gain(self) -> None:
+        """Turn the amplifier's knob to what the rig's configuration says."""
+        self.set_amplifier_gain_db(self._gain_db)
+
+    def widen_gaps(self, by_m: float) -> None:
+        """Move both stops away from m1 by so much against what the rig began with [m]."""
+        began = self._specimen
+        lower, upper = began.gaps_m
+        with self._turn:
+            self.plant.change_specimen(replace(began, gap_m=upper + by_m, lower_gap_m=lower + by_m))
+
+    def disturb_vibrometer(self, duration_s: float, level: float) -> None:
+        """Let the vibrometer show ``level`` (part of full scale) from now on, for a while."""
+        with self._turn:
+            self.vibrometer.disturb(
+                Disturbance(self._step, self._step + self._grid.step_at(duration_s), level)
+            )
+
+    def connect(self, physical_channel: str) -> None:
+        """Plug the cable of an input in, as the rig describes it."""
+        self._plug(physical_channel, self._plan.get(physical_channel, OPEN_INPUT))
+
+    def disconnect(self, physical_channel: str) -> None:
+        """Pull the cable out of an input: it shows nothing, or its own excitation."""
+        self._plug(physical_channel, OPEN_INPUT)
+
+    def reverse(self, physical_channel: str) -> None:
+        """Swap the two wires of an input: it shows the opposite sign."""
+        cable = self._plan.get(physical_channel, OPEN_INPUT)
+        self._plug(physical_channel, replace(cable, attenuation=-cable.attenuation))
+
+    def keep_truth(self) -> None:
+        """Begin to write down what no instrument shows: 72 bytes a step, 7.4 MB a second."""
+        with self._turn:
+            self._truth = []
+
+    def truth(self) -> FloatArray:
+        """Hand over what was written down and go on with a clean sheet, shape (steps, 9).
+
+        Columns as in ``MOTION_COLUMNS`` of `vibench.sim.shaker`; a row belongs to the end of a step.
+        """
+        with self._turn:
+            kept, self._truth = self._truth or [], []
+            return np.concatenate(kept) if kept else np.empty((0, len(MOTION_COLUMNS)))
+
+    def _plug(self, physical_channel: str, cable: Cable) -> None:
+        with self._turn:
+            self._cables[physical_channel] = cable
+            for conversion in self._conversions:
+                conversion.plug(physical_channel, cable)
+
+    def _output(self, physical_channel: str) -> AnalogueOutput:
+        return self._outputs.setdefault(physical_channel, AnalogueOutput(self._grid))
+
+    def _go_on_to(self, step: int) -> None:
+        with self._turn:
+            self._compute_to(step)
+
+    def _end(self, conversion: Conversion) -> None:
+        with self._turn:
+            self._conversions = [other for other in self._conversions if other is not conversion]
+
+    def _compute_to(self, step: int) -> None:
+        while self._step < step:
+            self._schedule.run_due(self._step)
+            stop = self._schedule.stop_before(step)
+            self._compute(min(stop - self._step, _STRETCH_STEPS))
+
+    def _compute(self, steps: int) -> None:
+        first, step_s = self._step, self._grid.step_s
+        drive = np.array(self._terminal.render(first * step_s, step_s, steps), dtype=np.float64)
+        for channel, output in self._outputs.items():
+            played = output.render(first, steps)
+            if channel == self._amplifier_input:
+                drive += played
+        signals = np.empty((len(Signal), steps))
+        signals[Signal.DRIVE] = drive
+        self._move(first, signals)
+        self._step = first + steps
+        self._remember(signals)
+        for conversion in self._conversions:
+            conversion.take(signals, first)
+
+    def _move(self, first: int, signals: FloatArray) -> None:
+        """Fill in what the drive in its row of ``signals`` makes of amplifier and sensors."""
+        steps = signals.shape[1]
+        noise = self._amplifier_noise_v * self._amplifier_noise.draw(first, steps)
+        motion = ShakenMotion.of(steps, steps if self._truth is not None else 0)
+        try:
+            if self._loop is not None and self._loop.is_on:
+                base, m0 = self._accelerometer.parts(first, steps), self.vibrometer.parts(first, steps)
+                plant = PlantParts(self.plant, noise, base, m0)
+                good = self._loop.move(first, self._grid.step_s, plant, motion, signals)
+                self.plant.account(good, steps)
+            else:
+                self.plant.move_into(motion, signals[Signal.DRIVE], noise)
+                signals[Signal.AMPLIFIER] = motion.amplifier_voltage
+                signals[Signal.BASE_ACCELERATION] = shown(
+                    self._accelerometer, motion.base_acceleration, first
+                )
+                signals[Signal.M0_VELOCITY] = shown(self.vibrometer, motion.m0_velocity, first)
+        except MotionFailed as error:
+            raise AcquisitionError(f"{error}. The virtual rig stands still: restart it") from error
+        if self._truth is not None:
+            self._truth.append(motion.ends)
+
+    def _remember(self, signals: FloatArray) -> None:
+        steps, kept = signals.shape[1], self._history.shape[1]
+        if steps >= kept:
+            self._history[:] = signals[:, -kept:]
+        else:
+            self._history[:, :-steps] = self._history[:, steps:]
+            self._history[:, -steps:] = signals
+
+
+def _history_steps(grid: TimeGrid) -> int:
+    """Count the steps that the slowest conversion looks back on when it begins."""
+    return history_steps(grid.rate_hz / LOWEST_RATE_HZ, LONGEST_DELAY_S * grid.rate_hz) + 2
+
+
+def virtual_section(rig: Rig) -> VirtualConfig:
+    """Return how the rig's instruments are simulated; ConfigurationError when they are real."""
+    if rig.virtual is None:
+        raise ConfigurationError(
+            f"The rig {rig.name!r} has no [virtual] section, so its instruments are real and none was "
+            "simulated; add the section, or open the bench with the real instruments"
+        )
+    return rig.virtual
