@@ -168,8 +168,7 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
     from PySide6.QtCore import QEventLoop, QTimer  # noqa: PLC0415 - only where there is a window
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
-    from vibench.gui.page.app_context import AppContext  # noqa: PLC0415
-    from vibench.gui.page.settings import Settings  # noqa: PLC0415
+    from vibench.gui.page.app_context import AppContext, Settings  # noqa: PLC0415
     from vibench.gui.window.page_catalogue import PAGES  # noqa: PLC0415
     from vibench.gui.window.window import Window  # noqa: PLC0415
 

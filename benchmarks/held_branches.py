@@ -60,8 +60,8 @@ from vibench.sim.feedback.plant import LoopTiming, SampledPlant
 from vibench.sim.periodic.balance_branch import balance_branch_within
 from vibench.sim.periodic.balance_solver import balance
 from vibench.sim.periodic.branch import Branch
+from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.drive_path import FrequencyPath
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
 

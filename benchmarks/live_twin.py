@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.check.rule import CheckRule
+from vibench.acquisition.check.admission import CheckRule
 from vibench.acquisition.engine import (
     DRIVING,
     CampaignRequest,

@@ -433,8 +433,7 @@ def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
     os.environ["QT_QPA_PLATFORM"] = "offscreen"
     from PySide6.QtCore import QTimer  # noqa: PLC0415 - of this subject only
 
-    from vibench.gui.page.app_context import AppContext  # noqa: PLC0415
-    from vibench.gui.page.settings import Settings  # noqa: PLC0415
+    from vibench.gui.page.app_context import AppContext, Settings  # noqa: PLC0415
     from vibench.gui.window.open_window import application  # noqa: PLC0415
     from vibench.gui.window.page_catalogue import PAGES  # noqa: PLC0415
     from vibench.gui.window.window import Window  # noqa: PLC0415

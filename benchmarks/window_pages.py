@@ -22,10 +22,8 @@ from PySide6.QtCore import QEventLoop, QTimer
 from PySide6.QtWidgets import QApplication
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.analysis.simulation.progress import SimulationProgress
-from vibench.analysis.simulation.request import SimulatedPoint
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.analysis.simulation.progress import SimulatedPoint, SimulationProgress
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.pages.compare.compare_page import ComparePage
 from vibench.gui.pages.files.files_page import FilesPage
 from vibench.gui.pages.simulate.simulate_page import SimulatePage

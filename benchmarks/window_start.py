@@ -21,7 +21,7 @@ from pathlib import Path
 from vibench.gui.window.open_window import application
 from vibench.gui.page.app_context import AppContext
 from vibench.gui.window.page_catalogue import PAGES
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import Settings
 from vibench.gui.window.window import Window
 app = application(["vibench"])
 window = Window(AppContext(Settings(Path(sys.argv[1]))), PAGES)

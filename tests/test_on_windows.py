@@ -29,7 +29,7 @@ LOCKS = """
 from tests.windows_here import become_windows
 become_windows()
 from pathlib import Path
-from vibench.acquisition.bench.lock import BenchLock
+from vibench.acquisition.bench.bench import BenchLock
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.recording._disk import PositionedFile, is_being_recorded
 from vibench.acquisition.rig import load_rig

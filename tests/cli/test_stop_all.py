@@ -12,7 +12,7 @@ import pytest
 from tests.windows_here import sees_locks
 from vibench.acquisition.stopping.kept_stops import engines_folder
 from vibench.acquisition.stopping.program import Program, announced_programs, facts_of_this_process
-from vibench.sim.operating_system.open_file import OpenFile
+from vibench.sim.operating_system.this import OpenFile
 
 ROOT = Path(__file__).resolve().parents[2]
 DRIVING = """

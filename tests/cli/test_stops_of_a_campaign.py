@@ -18,7 +18,7 @@ from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.engine import Engine, EngineClient, EngineError, EngineState, the_engine
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run import drive_guard
+from vibench.acquisition.run import silence_watch as drive_guard
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 from vibench.cli.exit_code import ExitCode
 

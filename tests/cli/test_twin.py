@@ -9,7 +9,7 @@ from threading import Event
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.check.rule import CheckRule
+from vibench.acquisition.check.admission import CheckRule
 from vibench.acquisition.engine import (
     DRIVING,
     CampaignRequest,

@@ -8,8 +8,7 @@ import pytest
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QColor, QImage, QPainter
 
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.window.event_loop_monitor import BOUND_S
 from vibench.gui.window.open_window import application
 from vibench.gui.window.page_catalogue import PAGES

@@ -19,14 +19,12 @@ from PySide6.QtWidgets import (
     QTabWidget,
 )
 
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.widgets.notice import Notice, NoticeKind
 from vibench.gui.widgets.theme import Tone
-from vibench.gui.window.banner import StateIndicator
+from vibench.gui.window.banner import StateIndicator, StatusField
 from vibench.gui.window.open_window import application
 from vibench.gui.window.page_catalogue import PAGES
-from vibench.gui.window.status_line import StatusField
 from vibench.gui.window.window import Window
 
 SENTENCE = "Simulating; the first answer waits for the program to be made ready, and says so at length. " * 4

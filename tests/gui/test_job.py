@@ -15,10 +15,9 @@ from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import REJECTED
 from vibench.analysis import analyse
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.page.user_actions import ABORT_KEY, OPERATOR_STOP
-from vibench.gui.pages.rig.rig_choice import PACES
+from vibench.gui.pages.rig.rig_page import PACES
 from vibench.gui.widgets.page_names import COMPARE, FILES, RUN, TEST
 from vibench.gui.window.page_catalogue import PAGES
 from vibench.gui.window.window import Window

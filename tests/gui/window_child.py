@@ -8,8 +8,7 @@ from PySide6.QtCore import QTimer
 from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState, Supervision
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.window.open_window import application
 from vibench.gui.window.page_catalogue import PAGES
 from vibench.gui.window.window import Window

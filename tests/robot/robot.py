@@ -36,8 +36,7 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import shipped
 from vibench.acquisition.engine import DRIVING, EngineState
 from vibench.acquisition.plan import Dwell, Measurement
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.plots.plot import Plot
 from vibench.gui.widgets.page_names import TEST
 from vibench.gui.window.open_window import application

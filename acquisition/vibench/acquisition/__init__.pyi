@@ -13,8 +13,7 @@ from .bench.result import (
 from .campaign import (
     run_campaign as run_campaign,
 )
-from .check.admission import check_bench as check_bench, last_check as last_check
-from .check.rule import CheckRule as CheckRule
+from .check.admission import CheckRule as CheckRule, check_bench as check_bench, last_check as last_check
 from .errors import (
     AcquisitionError as AcquisitionError,
     CheckFailed as CheckFailed,
@@ -28,7 +27,6 @@ from .errors import (
 )
 from .host.beside import Beside as Beside
 from .host.chosen import ChosenFrom as ChosenFrom
-from .host.documentation import built_site as built_site, documentation_page as documentation_page
 from .host.extras import (
     naming_its_extra as naming_its_extra,
     need_extra as need_extra,
@@ -39,6 +37,8 @@ from .host.printable import printable as printable, shortened as shortened
 from .host.schema import json_schema as json_schema, schema_line as schema_line
 from .host.shipped import (
     all_shipped as all_shipped,
+    built_site as built_site,
+    documentation_page as documentation_page,
     named as named,
     shipped as shipped,
     shipped_folder as shipped_folder,

@@ -5,9 +5,10 @@ from .comparison.curve import (
     CurveKind as CurveKind,
     CurveOrigin as CurveOrigin,
     curve_difference as curve_difference,
+    curve_peaks as curve_peaks,
+    readings as readings,
 )
-from .comparison.curve_peaks import curve_peaks as curve_peaks, readings as readings
-from .comparison.options import AnalysisOptions as AnalysisOptions
+from .comparison.recording_curves import AnalysisOptions as AnalysisOptions
 from .errors import (
     AnalysisError as AnalysisError,
     InvalidRequest as InvalidRequest,
@@ -22,9 +23,8 @@ from .frequency_response.request import (
 from .frequency_response.resonance import resonances as resonances
 from .frequency_response.results import Estimator as Estimator, FrequencyResponse as FrequencyResponse
 from .frequency_response.transmissibility import transmissibility as transmissibility
-from .model.difference import CurveDifference as CurveDifference
 from .model.draws import DRAWS as DRAWS
-from .model.ensemble import FEWEST_DRAWS as FEWEST_DRAWS
+from .model.ensemble import FEWEST_DRAWS as FEWEST_DRAWS, CurveDifference as CurveDifference
 from .model.measurement_prediction import (
     MeasurementPrediction as MeasurementPrediction,
     predict_measurement as predict_measurement,

@@ -9,7 +9,6 @@ from .exponents.lyapunov_spectrum import (
     lyapunov_spectrum as lyapunov_spectrum,
 )
 from .model.accuracy import Accuracy as Accuracy, AccuracyWord as AccuracyWord
-from .model.against_stops import BaseResponse as BaseResponse, base_response as base_response
 from .model.contact_law import CONTACT_LAWS as CONTACT_LAWS, ContactLaw as ContactLaw
 from .model.drive import (
     Drive as Drive,
@@ -23,7 +22,11 @@ from .model.frozen_model import FrozenModel as FrozenModel
 from .model.hertz import Hertz as Hertz
 from .model.hunt_crossley import HuntCrossley as HuntCrossley
 from .model.linear_gap import LinearGap as LinearGap
-from .model.modes import base_transmissibility as base_transmissibility
+from .model.modes import (
+    BaseResponse as BaseResponse,
+    base_response as base_response,
+    base_transmissibility as base_transmissibility,
+)
 from .model.no_contact import NoContact as NoContact
 from .model.outcome import Outcome as Outcome
 from .model.power_law import PowerLaw as PowerLaw
@@ -36,14 +39,12 @@ from .model.specimen_description import (
     SpecimenTable as SpecimenTable,
     SpecimenWarning as SpecimenWarning,
     UnknownSpecimenError as UnknownSpecimenError,
-    load_specimen as load_specimen,
-    shipped_specimens as shipped_specimens,
-    usual_specimen as usual_specimen,
-)
-from .model.toml_table import (
     UnreadableTomlError as UnreadableTomlError,
     fault_in_words as fault_in_words,
+    load_specimen as load_specimen,
+    shipped_specimens as shipped_specimens,
     toml_table as toml_table,
+    usual_specimen as usual_specimen,
 )
 from .motion.integrate import Impacts as Impacts, Trajectory as Trajectory, integrate as integrate
 from .motion.response import Response as Response, steady_response as steady_response
@@ -56,13 +57,13 @@ from .periodic.branch import (
     BranchEvent as BranchEvent,
     Parameter as Parameter,
 )
-from .periodic.condensation import LinearStructure as LinearStructure, structure_of as structure_of
-from .periodic.continuation import ArcEnd as ArcEnd, ArcSteps as ArcSteps
-from .periodic.drive_path import (
+from .periodic.branch_following import (
     AmplitudePath as AmplitudePath,
     DrivePath as DrivePath,
     FrequencyPath as FrequencyPath,
 )
+from .periodic.condensation import LinearStructure as LinearStructure, structure_of as structure_of
+from .periodic.continuation import ArcEnd as ArcEnd, ArcSteps as ArcSteps
 from .periodic.first_order_balance import (
     FirstOrderState as FirstOrderState,
     first_order_states as first_order_states,

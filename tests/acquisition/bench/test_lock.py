@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import pytest
 
 from vibench.acquisition import open_bench
-from vibench.acquisition.bench.lock import BenchLock
+from vibench.acquisition.bench.bench import BenchLock
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.rig import load_rig
 

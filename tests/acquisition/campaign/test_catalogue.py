@@ -7,8 +7,7 @@ import pytest
 
 from vibench.acquisition import Overload, RecordingError, run_campaign
 from vibench.acquisition.campaign import Refresh, _catalogue as catalogue_module, list_recordings
-from vibench.acquisition.campaign._catalogue import CATALOGUE_NAME
-from vibench.acquisition.campaign._catalogue_entry import _band
+from vibench.acquisition.campaign._catalogue import CATALOGUE_NAME, _band
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, ResonanceTracking, RunState, SineSweep
 from vibench.acquisition.run.run import Run
 

@@ -9,8 +9,7 @@ import pytest
 from vibench.acquisition import RecordingError
 from vibench.acquisition.campaign import JournalPointState, ReasonCode, list_recordings, read_journal
 from vibench.acquisition.campaign._bench_identity import BenchIdentity
-from vibench.acquisition.campaign._journal import Journal, journal_path
-from vibench.acquisition.campaign._journal_database import is_begun
+from vibench.acquisition.campaign._journal import Journal, is_begun, journal_path
 from vibench.acquisition.plan import Campaign, Dwell, Measurement, Point
 
 

@@ -23,8 +23,8 @@ from vibench.acquisition.recording import BranchPointNote, feedback_note
 from vibench.acquisition.rig import confirm_simulated, load_rig, specimen_of
 from vibench.sim.periodic.balance_branch import balance_branch_within
 from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.drive_path import FrequencyPath
 from vibench.sim.periodic.restoring_force import spring_of
 
 from .helic_board import BUSY, on_rig

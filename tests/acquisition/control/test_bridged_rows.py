@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
-from vibench.acquisition.control.bridged_rows import BridgedRows
+from vibench.acquisition.control.feedback_channels import BridgedRows
 from vibench.acquisition.plan import Measurement, ResonanceTracking
 from vibench.acquisition.recording import feedback_note
 from vibench.sim import gong2025

@@ -33,8 +33,8 @@ from vibench.sim.feedback.stability import (
 )
 from vibench.sim.periodic.balance_branch import balance_branch_within
 from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.drive_path import FrequencyPath
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.control.mode_fit import fitted_mode
+from vibench.acquisition.control.resonance_controller import fitted_mode
 from vibench.sim import gong2025
 
 SPECIMEN = gong2025()

@@ -5,11 +5,10 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.acquisition.control.level_control import MeasuredLevel
-from vibench.acquisition.control.phase_search import PhaseError, PhaseSearch
+from vibench.acquisition.control.phase_law import PhaseError, PhaseSearch
 from vibench.acquisition.control.resonance_controller import _phase_error
 from vibench.acquisition.control.settling_controller import SettledState
-from vibench.acquisition.control.steadiness import Judgement
-from vibench.acquisition.control.stroboscope import Periods
+from vibench.acquisition.control.steadiness import Judgement, Periods
 from vibench.acquisition.excitation.resonance_tracking import ResonanceTracking
 from vibench.acquisition.recording import Held, Steadiness
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.control.stroboscope import ORDERS, Stroboscope
+from vibench.acquisition.control.steadiness import ORDERS, Stroboscope
 
 RATE_HZ = 51200.0
 NEAR_HZ = 260.3

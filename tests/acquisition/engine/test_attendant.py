@@ -11,7 +11,7 @@ from time import monotonic
 import pytest
 
 from vibench.acquisition.engine import DRIVING, VIEWER_PATIENCE_S, Attendant, EngineClient, EngineState
-from vibench.acquisition.engine._state import hung_patience_s
+from vibench.acquisition.engine._status import hung_patience_s
 from vibench.sim.operating_system.this import process_start
 
 from .conftest import campaign, until, until_state

@@ -22,7 +22,7 @@ from vibench.acquisition import (
     open_bench,
     open_recording,
 )
-from vibench.acquisition.bench.lock import BenchLock
+from vibench.acquisition.bench.bench import BenchLock
 from vibench.acquisition.engine import (
     DRIVING,
     CampaignRequest,
@@ -35,7 +35,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.engine._address import EngineAddress
 from vibench.acquisition.engine._errors import EngineError
-from vibench.acquisition.engine._state import ConnectionRole
+from vibench.acquisition.engine._status import ConnectionRole
 from vibench.acquisition.engine._verbs import VERBS
 from vibench.acquisition.engine._wire import send
 from vibench.acquisition.errors import InstrumentBusy

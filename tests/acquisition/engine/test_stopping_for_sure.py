@@ -28,10 +28,9 @@ from vibench.acquisition.engine import (
     stop_engine,
     the_engine,
 )
-from vibench.acquisition.engine._admission import GREETING_S, WAITING_MOST
 from vibench.acquisition.engine._announcement import Announcement
-from vibench.acquisition.engine._server import VIEWERS_MOST
-from vibench.acquisition.engine._state import ConnectionRole
+from vibench.acquisition.engine._server import GREETING_S, VIEWERS_MOST, WAITING_MOST
+from vibench.acquisition.engine._status import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.kept_stops import engines_folder

@@ -1,6 +1,6 @@
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.recording._attributes import decoded, encoded
+from vibench.acquisition.recording._layout import decoded, encoded
 
 UTF8 = st.text(st.characters(codec="utf-8", exclude_characters="\0"))
 

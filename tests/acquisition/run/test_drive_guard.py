@@ -21,9 +21,9 @@ from vibench.acquisition.host.beside import Beside
 from vibench.acquisition.plan import Dwell, Measurement, RunState
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
-from vibench.acquisition.run import drive_guard
-from vibench.acquisition.run.drive_guard import DriveGuard
+from vibench.acquisition.run import silence_watch as drive_guard
 from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.silence_watch import DriveGuard
 from vibench.acquisition.stopping.driving import DRIVES_ON
 from vibench.acquisition.stopping.kept_stops import engines_folder
 from vibench.acquisition.stopping.memory_reserve import MEMORY_RESERVE

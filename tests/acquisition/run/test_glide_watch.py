@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition.instruments import Block, Spacing, Sweep
 from vibench.acquisition.rig import Role
-from vibench.acquisition.run.glide_watch import GlideWatch, SweepWatch
+from vibench.acquisition.run.phase_runner import GlideWatch, SweepWatch
 
 RATE = 5120.0
 CHANNELS = (SimpleNamespace(role=Role.M0_VELOCITY), SimpleNamespace(role=Role.DRIVE_VOLTAGE))

@@ -2,7 +2,7 @@
 
 from threading import Event
 
-from vibench.acquisition.stopping.watchdog import Watchdog
+from vibench.acquisition.stopping.program import Watchdog
 
 
 def test_a_look_that_fails_is_not_the_last(caplog):

@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vibench.analysis import InvalidRequest, NotEnoughData
-from vibench.analysis.chaos.divergence import divergence
-from vibench.analysis.chaos.embedding import embedded, nearest_neighbours
+from vibench.analysis.chaos.divergence import divergence, embedded, nearest_neighbours
 from vibench.analysis.chaos.surrogates import surrogate, surrogate_test
 from vibench.analysis.chaos.zero_one import zero_one
 

@@ -16,7 +16,7 @@ from vibench.analysis import (
 )
 from vibench.analysis.dynamics import BranchDiagram, BranchRequest, diagram_of, write_diagram
 from vibench.analysis.report import write_report
-from vibench.analysis.report._laid_branches import laid_branches
+from vibench.analysis.report._report import laid_branches
 from vibench.cli.__main__ import app
 
 

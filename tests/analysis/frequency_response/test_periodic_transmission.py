@@ -64,7 +64,7 @@ def test_lines_are_exact_whatever_the_clocks_and_however_fractional_the_period(o
 
 def test_taking_the_nominal_rate_instead_would_leak():
     """The guard of the test above: with 50 ppm ignored, the same lines are wrong by far more."""
-    from vibench.analysis.frequency_response.repetition import period_spectra
+    from vibench.analysis.frequency_response.periodic import period_spectra
 
     orders = np.arange(3, 300)
     drive = multisine(orders, np.zeros(orders.size), 1000.05, 5000)
@@ -73,7 +73,7 @@ def test_taking_the_nominal_rate_instead_would_leak():
 
 
 def test_the_measured_period_scatters_as_stated():
-    from vibench.analysis.frequency_response.repetition import measured_repetition
+    from vibench.analysis.frequency_response.periodic import measured_repetition
 
     rng = np.random.default_rng(2)
     orders = np.arange(10, 60)

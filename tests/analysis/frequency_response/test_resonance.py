@@ -15,7 +15,7 @@ from vibench.analysis.frequency_response.results import (
     FrequencyResponseSettings,
     converted_frequency_response,
 )
-from vibench.analysis.frequency_response.steady import steady_relative_sd
+from vibench.analysis.frequency_response.transmissibility import steady_relative_sd
 from vibench.analysis.signals.confidence import student_half_width
 from vibench.analysis.signals.quantity import Quantity
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.frequency_response.steady import steady_relative_sd
+from vibench.analysis.frequency_response.transmissibility import steady_relative_sd
 
 FREQUENCY_HZ = np.arange(50.0, 600.0, 2.0)
 RATIO = FREQUENCY_HZ / 94.6

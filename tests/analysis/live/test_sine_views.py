@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.live._drive_tone import drive_tone, drive_turns
 from vibench.analysis.live._portrait import PoincareSection, portrait, portrait_samples
 from vibench.analysis.live._ring import RingWindow
-from vibench.analysis.live._sine_response import SinePoint, look_samples, sine_point, stretch_samples
+from vibench.analysis.live._sine_response import (
+    SinePoint,
+    drive_tone,
+    drive_turns,
+    look_samples,
+    sine_point,
+    stretch_samples,
+)
 from vibench.analysis.live._view import SweepTrace
 
 RATE = 51_200.0

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.analysis import analyse
-from vibench.analysis.model.difference import logarithmic_difference
+from vibench.analysis.model.ensemble import logarithmic_difference
 from vibench.analysis.model.overlay import DwellOverlay, NoiseOverlay, SweepOverlay, equivalent_amplitude
 from vibench.analysis.model.prediction import paper_amplitude_m, predicted
 from vibench.analysis.results.campaign_results import overlay

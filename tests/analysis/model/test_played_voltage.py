@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.analysis.model.channel_noise import channel_noise
-from vibench.analysis.model.played_voltage import PlayedVoltage
+from vibench.analysis.model.draws import PlayedVoltage, channel_noise
 
 RATE = 25_600.0
 TIME_S = np.arange(round(4 * RATE)) / RATE

@@ -16,8 +16,7 @@ from vibench.acquisition import open_recording
 from vibench.analysis import AnalysisError, Simulation, analyse_files, update_model
 from vibench.analysis.hidden_motion import Hidden
 from vibench.analysis.model.draws import stretch_draws
-from vibench.analysis.model_updating.chaos_statistics import chaos_statistics, heard
-from vibench.analysis.model_updating.statistical_numbers import statistical_numbers
+from vibench.analysis.model_updating.statistical_numbers import chaos_statistics, heard, statistical_numbers
 from vibench.sim import gong2025
 
 TRUE = gong2025(gap_m=51e-6)

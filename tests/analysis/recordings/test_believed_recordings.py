@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import open_recording
-from vibench.acquisition.recording._checked_counts import forget_checks
+from vibench.acquisition.recording._seal import forget_checks
 from vibench.analysis import analyse
 from vibench.analysis.dynamics import ChainRequest
 from vibench.analysis.dynamics._chain_computing import _base_of

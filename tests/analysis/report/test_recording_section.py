@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from vibench.analysis.report._recording_section import bench_check_text
+from vibench.analysis.report._report import bench_check_text
 
 STARTED = "2026-05-04T12:30:00+00:00"
 GOOD = {"name": "amplifier gain", "value": "10 dB", "expected": "10 dB within 1 dB", "verdict": "ok"}

@@ -12,10 +12,9 @@ from vibench.analysis import NotEnoughData, analyse
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.frequency_response.noise_response import NoiseAnalysis
 from vibench.analysis.recordings.checks import Verdict, measurement_checks
-from vibench.analysis.sine.drive_frequency import frequency_check
 from vibench.analysis.sine.dwell_analysis import DwellAnalysis
 from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
-from vibench.analysis.sine.sweep_analysis import SweepAnalysis
+from vibench.analysis.sine.sweep_analysis import SweepAnalysis, frequency_check
 from vibench.sim import base_transmissibility, gong2025
 
 RATE = 6400.0

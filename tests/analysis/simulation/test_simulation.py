@@ -9,8 +9,12 @@ import pytest
 from pydantic import ValidationError
 
 from vibench.analysis.simulation.accuracy_cost import MEASURED, cost_sentences
-from vibench.analysis.simulation.progress import SimulationProgress
-from vibench.analysis.simulation.request import SimulatedPoint, SimulationRequest, Trouble
+from vibench.analysis.simulation.progress import (
+    SimulatedPoint,
+    SimulationProgress,
+    SimulationRequest,
+    Trouble,
+)
 from vibench.analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve, simulate
 from vibench.sim import Accuracy, base_transmissibility, gong2025, load_specimen
 

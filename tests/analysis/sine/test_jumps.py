@@ -5,8 +5,7 @@ import pytest
 
 from tests.analysis.sine.sweep_in_memory import sweep_response
 from vibench.analysis import InvalidRequest
-from vibench.analysis.sine.hysteresis import hysteresis
-from vibench.analysis.sine.jumps import jumps
+from vibench.analysis.sine.jumps import hysteresis, jumps
 from vibench.sim import (
     BalanceOptions,
     BifurcationKind,

@@ -11,7 +11,7 @@ from vibench.acquisition.rig import load_rig
 from vibench.analysis import CampaignResults, analyse, result_summary
 from vibench.analysis.kinds.analysis_kind import Result
 from vibench.analysis.report import findings, result_figures
-from vibench.analysis.sine.level_jumps import hysteresis_vpp, level_jumps
+from vibench.analysis.sine.jumps import hysteresis_vpp, level_jumps
 from vibench.analysis.sine.stepped_response import SteppedResponse
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")

@@ -7,7 +7,7 @@ from vibench.acquisition.plan import Dwell, SteppedSine
 from vibench.analysis import Simulation, analyse_files, budgets_of
 from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.recordings.checks import Verdict
-from vibench.analysis.sine.slow_change import slow_change
+from vibench.analysis.sine.dwell import slow_change
 
 A0_M, GAIN, HZ, SECONDS = 1e-6, 5.0, 260.0, 12.5
 

@@ -14,7 +14,7 @@ from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.recordings.channels import Stretch
 from vibench.analysis.recordings.checks import Verdict
-from vibench.analysis.signals.decimation import Decimator
+from vibench.analysis.signals.interpolation import Decimator
 from vibench.analysis.sine.collision_region import collisions
 from vibench.analysis.sine.sweep import SweepSums, drive_phase
 from vibench.analysis.sine.sweep_analysis import measured_sweep, played_check

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_recording
 from vibench.analysis import analyse
-from vibench.analysis.sine.terminal_level import terminal_levels
+from vibench.analysis.sine.dwell_analysis import terminal_levels
 
 
 def test_a_line_in_the_band_reads_its_own_level_re_the_drives_line(dwell_file):

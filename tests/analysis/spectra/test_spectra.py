@@ -8,7 +8,7 @@ from scipy import signal
 from vibench.analysis import InvalidRequest
 from vibench.analysis.signals.quantity import Quantity
 from vibench.analysis.spectra.spectra import amplitude_spectrum, spectral_density
-from vibench.analysis.tones.peaks import peaks
+from vibench.analysis.tones.sine_fit import peaks
 
 RATE = 2048.0
 

@@ -4,7 +4,7 @@ import pytest
 
 from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpectrumRequest
 from vibench.analysis.simulation.map_request import MapRequest
-from vibench.analysis.simulation.request import SimulationRequest
+from vibench.analysis.simulation.progress import SimulationRequest
 from vibench.gui.forms.model_form import JudgedForm
 from vibench.gui.pages.simulate.dynamics_kinds import BRANCHES, CHAIN
 

@@ -15,8 +15,7 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 
 RATE_HZ = 6400.0
 SAMPLES = 64_000

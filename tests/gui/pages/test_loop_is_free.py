@@ -20,8 +20,7 @@ from vibench.acquisition.recording import (
 )
 from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.live import LiveChannel, LiveView
-from vibench.analysis.simulation.progress import SimulationProgress
-from vibench.analysis.simulation.request import SimulatedPoint, SimulatedSignal
+from vibench.analysis.simulation.progress import SimulatedPoint, SimulatedSignal, SimulationProgress
 from vibench.gui.engine_link.live_run import warm_up
 from vibench.gui.pages.queue.draft import with_sweep
 from vibench.gui.widgets.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST

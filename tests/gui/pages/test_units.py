@@ -23,8 +23,7 @@ from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.simulation.map_request import SettledMotion
 from vibench.gui.forms.model_form import JudgedForm
 from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quantity_text
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.pages.test.test_form import TestForm as FormOfATest
 from vibench.gui.pages.test.test_preview import TestPreview as Previewed, preview_test
 from vibench.gui.plots.plot import Plot

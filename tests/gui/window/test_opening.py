@@ -11,7 +11,7 @@ from vibench.acquisition import save_toml, shipped
 from vibench.gui.__main__ import NO_WINDOW, _sign_of_life, main
 from vibench.gui.widgets.page_names import COMPARE, FILES, QUEUE, RIG, TEST
 from vibench.gui.widgets.theme import DARK
-from vibench.gui.window.manual import show_about, show_manual
+from vibench.gui.window.menus import show_about, show_manual
 from vibench.gui.window.settings_dialog import SettingsDialog
 
 

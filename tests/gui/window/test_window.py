@@ -3,8 +3,7 @@
 import pytest
 from PySide6.QtCore import Qt
 
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Settings
+from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.widgets.page_names import RIG, TEST
 from vibench.gui.widgets.theme import DARK
 from vibench.gui.window.page_catalogue import PAGES

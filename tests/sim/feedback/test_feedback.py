@@ -14,8 +14,8 @@ from vibench.sim.feedback.plant import LoopTiming, SampledPlant
 from vibench.sim.model.power_law import PowerLaw
 from vibench.sim.periodic.balance_branch import balance_branch_within
 from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.drive_path import FrequencyPath
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.sim.shaker.loaded_shaker import LoadedShaker
 from vibench.sim.shaker.parts import Amplifier, Shaker

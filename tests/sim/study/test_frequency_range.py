@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.sim.study import frequency_range
-from vibench.sim.study._frequency_range import listed
+from vibench.sim.study._study import listed
 
 
 def test_a_range_includes_its_stop_when_it_is_hit():

@@ -22,9 +22,8 @@ from vibench.sim.study import (
     solve_study,
 )
 from vibench.sim.study._columns import COLUMNS, IDENTITY, NUMBERS, SESSION
-from vibench.sim.study._disk import sole_writer
 from vibench.sim.study._expansion import scene_identity
-from vibench.sim.study._file_store import FileStore, make_file
+from vibench.sim.study._file_store import FileStore, make_file, sole_writer
 from vibench.sim.study._layout import STATE
 from vibench.sim.study._results import results_of
 from vibench.sim.study._run import StudyEnd

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost, open_bench
-from vibench.acquisition.bench.rig_power import RigPower
+from vibench.acquisition.bench.bench import RigPower
 from vibench.acquisition.campaign import ReconnectingBench
 from vibench.acquisition.errors import DataLost, InstrumentBusy
-from vibench.acquisition.recording._disk_room import claim_room
+from vibench.acquisition.recording._preallocate import claim_room
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
 from vibench.virtual_rig.analogue import Coupling, Input

@@ -8,7 +8,7 @@ import pytest
 from vibench.acquisition import ConfigurationError, LimitExceeded, validated
 from vibench.acquisition.plan import Dwell, Measurement, require_within_limits
 from vibench.acquisition.rig import Rig, amplifier_of, highest_carried_hz, load_rig, shaker_of, specimen_of
-from vibench.acquisition.rig._virtual import COARSEST_GRID_RATE_HZ, WATCHED_HZ, level_error
+from vibench.acquisition.rig._configuration import COARSEST_GRID_RATE_HZ, WATCHED_HZ, level_error
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker
 from vibench.virtual_rig.world.sensors import resonant, running_filter
 from vibench.virtual_rig.world.time_grid import TimeGrid

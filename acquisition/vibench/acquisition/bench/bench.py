@@ -1,14 +1,22 @@
 """The bench: all instruments of a rig, opened together or not at all, and left with the generator silent."""
 
-from collections.abc import Callable
-from contextlib import ExitStack
+import os
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from datetime import UTC, datetime
 from enum import StrEnum
+from getpass import getuser
+from hashlib import sha256
 from pathlib import Path
+from threading import Event as Alarm
 from types import TracebackType
-from typing import Self
+from typing import Protocol, Self
 
-from ..errors import AcquisitionError
+from vibench.sim.operating_system.state_folder import shared_folder, state_folder
+from vibench.sim.operating_system.this import is_locked_alone, open_for_all, read_at, write_at
+
+from ..errors import AcquisitionError, InstrumentBusy
 from ..host.chosen import chosen
 from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity, RealTimeController
 from ..rig import (
@@ -28,7 +36,158 @@ from ..rig import (
     output_driver,
 )
 from .result import CheckResult
-from .rig_power import RigPower
+from .simulated_rig import PlayedFault, SimulatedRig, simulated_rig
+
+# One program at a bench: locks that vanish with the process that holds them, however that ends.
+#
+# Each instrument has a file in the user's own state folder and one in a folder that all users of the
+# computer share. Who holds it is written there for the others to read; what counts is the system's lock on
+# the file. The file stays: if it were removed, two programs could each lock a file of that name.
+
+_HOLDER = re.compile(rb"\d{1,10} of [\w.-]{1,32}")
+"""Anybody may write into the file, and what it says is shown."""
+
+
+class BenchLock:
+    """Holds the instruments of a rig for this process. What is virtual or played back needs no lock."""
+
+    def __init__(self, descriptors: list[int]) -> None:
+        self._descriptors = descriptors
+
+    @classmethod
+    def of(cls, rig: Rig) -> "BenchLock":
+        """Take the bench, or refuse with who has it.
+
+        Raises
+        ------
+        InstrumentBusy
+            When another process holds one of its instruments, or something else lies in a lock's place.
+
+        """
+        lock = cls([])
+        if rig.virtual is not None or rig.plays_back:
+            return lock
+        try:
+            for folder in sorted({each.resolve() for each in (state_folder(), shared_folder())}):
+                for name in sorted(set(_instruments(rig))):
+                    key = sha256(name.encode()).hexdigest()[:16]
+                    lock._take(folder / f"vibench-{key}.lock", rig)
+        except BaseException:
+            lock.close()
+            raise
+        return lock
+
+    def _take(self, path: Path, rig: Rig) -> None:
+        try:
+            descriptor = open_for_all(path)
+            self._descriptors.append(descriptor)
+            is_ours = is_locked_alone(descriptor)
+            is_there = os.path.samestat(os.fstat(descriptor), path.stat())
+        except OSError as error:
+            raise InstrumentBusy(
+                f"{rig.name} cannot be marked as in use: {path} is not to be locked ({error}). Nothing was "
+                "opened; have it removed, by its owner or as root, when nobody measures"
+            ) from error
+        if not (is_ours and is_there):
+            raise InstrumentBusy(
+                f"{rig.name} is in use by process {_holder(descriptor)}. Nothing was opened; end that "
+                "program, or let it finish"
+            )
+        try:
+            os.ftruncate(descriptor, 0)
+            write_at(descriptor, f"{os.getpid()} of {getuser()}".encode(), 0)
+        except (OSError, KeyError, ImportError):  # another user's file, a full disk, a user without a name
+            return
+
+    def close(self) -> None:
+        """Give the bench back. Legal at any time."""
+        while self._descriptors:
+            os.close(self._descriptors.pop())
+
+
+def _instruments(rig: Rig) -> Iterator[str]:
+    """Name what can be held, wherever its configuration lies and however that writes it."""
+    for resource in (rig.generator.resource, rig.controller.resource if rig.controller else ""):
+        if resource:
+            yield _plain(resource)
+    yield f"{rig.daq.driver} {rig.daq.server} {rig.daq.device}".casefold()
+
+
+def _plain(resource: str) -> str:
+    """Write a VISA name without what may be left out, and its numbers as decimal ones."""
+    kind, *others = resource.upper().split("::")
+    numbers = [str(int(each, 0)) if re.fullmatch(r"0X[0-9A-F]+", each) else each for each in others]
+    return "::".join(
+        [re.sub(r"(?<=\D)0$", "", kind), *(each for each in numbers if each not in ("0", "INST0"))]
+    )
+
+
+def _holder(descriptor: int) -> str:
+    try:
+        found = _HOLDER.match(read_at(descriptor, 64, 0))
+    except OSError:
+        found = None
+    return found[0].decode() if found else "unknown"
+
+
+class RigPower:
+    """Holds the instruments of a rig, in a ``with``: a virtual one is switched on and off, a real one locked.
+
+    A virtual rig lives in rig time: what happens to it, a script of faults for example, goes on while
+    a bench on it is closed and opened again, because it stays the same rig.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self._virtual: SimulatedRig | None = None
+        self._closing = ExitStack()
+
+    @property
+    def connected(self) -> Rig:
+        """The rig with the addresses at which its instruments answer now."""
+        if self._virtual is None:
+            return self.rig
+        rig, virtual = self.rig, self._virtual
+        controller = rig.controller and rig.controller.model_copy(
+            update={"resource": virtual.controller_resource}
+        )
+        return rig.model_copy(
+            update={
+                "controller": controller,
+                "daq": rig.daq.model_copy(update={"server": virtual.daq_address}),
+                "generator": rig.generator.model_copy(update={"resource": virtual.visa_resource}),
+            }
+        )
+
+    @property
+    def played_faults(self) -> Sequence[PlayedFault]:
+        """What a script has done to the rig so far."""
+        return () if self._virtual is None else self._virtual.played_faults
+
+    def let_pass(self, duration_s: float) -> None:
+        """Let rig time pass on a virtual rig that is not sampled; on every other it passes by itself."""
+        if self._virtual is not None:
+            self._virtual.let_pass(duration_s)
+
+    def idle(self, duration_s: float) -> None:
+        """Wait while nothing is sampled: by the clock, or in rig time on a virtual rig at its own pace."""
+        if self._virtual is not None and self.rig.virtual is not None and self.rig.virtual.pace == "free":
+            self._virtual.let_pass(duration_s)
+        else:
+            Alarm().wait(duration_s)
+
+    def __enter__(self) -> Self:
+        if self.rig.virtual is not None:
+            self._virtual = self._closing.enter_context(simulated_rig(self.rig))
+        else:
+            self._closing.enter_context(closing(BenchLock.of(self.rig)))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._virtual = None
+        self._closing.close()
 
 
 class BenchKind(StrEnum):
@@ -199,3 +358,46 @@ def _leave(closing: ExitStack, error: BaseException | None) -> None:
         while earlier is not None and earlier is not error:
             error.add_note(f"While leaving the bench: {earlier}")
             earlier = earlier.__context__
+
+
+class RunBench(Protocol):
+    """The open instruments of a rig, as `vibench.acquisition.bench.open_bench` gives them."""
+
+    @property
+    def rig(self) -> Rig:
+        """The configuration that the bench was opened from."""
+
+    @property
+    def generator(self) -> FunctionGenerator:
+        """What plays sines and waveforms."""
+
+    @property
+    def output(self) -> AnalogOutput | None:
+        """What plays signals that never repeat; None where the rig has no analogue output."""
+
+    @property
+    def controller(self) -> RealTimeController | None:
+        """What closes a fast loop; None where the rig has no such controller."""
+
+    @property
+    def digitizer(self) -> Digitizer:
+        """What samples."""
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """What is recorded, in the order of the rows of a block."""
+
+    @property
+    def identities(self) -> Mapping[str, Identity]:
+        """Who answered, by the instrument's part in the bench."""
+
+    @property
+    def confirmations(self) -> KnobSheet:
+        """What the operator confirmed by hand."""
+
+    def idle(self, duration_s: float) -> None:
+        """Wait while nothing is sampled [s], in the rig's own time."""
+
+    @property
+    def last_check(self) -> CheckResult | None:
+        """The check that the bench was admitted on; None when it was waived and there was none."""

@@ -1,24 +1,22 @@
 from ._catalogue import (
-    Refresh as Refresh,
-    list_recordings as list_recordings,
-)
-from ._catalogue_entry import (
     UNREADABLE as UNREADABLE,
     CatalogueEntry as CatalogueEntry,
+    Refresh as Refresh,
+    list_recordings as list_recordings,
 )
 from ._estimate import (
     CampaignEstimate as CampaignEstimate,
     estimate_campaign as estimate_campaign,
 )
-from ._event import (
+from ._journal import (
+    JournalPointState as JournalPointState,
+    read_journal as read_journal,
+)
+from ._log import (
     CampaignEvent as CampaignEvent,
     CampaignEventKind as CampaignEventKind,
     CampaignListener as CampaignListener,
     ignore_event as ignore_event,
-)
-from ._journal_point import (
-    JournalPointState as JournalPointState,
-    read_journal as read_journal,
 )
 from ._notice import (
     CommandMessenger as CommandMessenger,

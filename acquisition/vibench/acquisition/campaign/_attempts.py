@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from time import monotonic
 
-from ..bench.protocol import RunBench
+from ..bench.bench import RunBench
 from ..errors import AcquisitionError, InstrumentError, RecordingError
 from ..plan import Point, Retryable, RetryPolicy, RunState
 from ..recording import open_recording
@@ -15,9 +15,8 @@ from ..run.run_measurement import run_measurement
 from ..stopping.stop import StopSwitch
 from ._attempt_files import next_attempt
 from ._bench_identity import BenchIdentity
-from ._event import CampaignEvent, CampaignEventKind, CampaignListener
-from ._journal import Journal
-from ._journal_point import JournalPointState
+from ._journal import Journal, JournalPointState
+from ._log import CampaignEvent, CampaignEventKind, CampaignListener
 from ._opening import require_same_bench
 from ._point_outcome import PointOutcome, PointResult, ReasonCode, reason_code_of
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, Self
 
-from ..bench.protocol import RunBench
+from ..bench.bench import RunBench
 from ..host.toml_file import FrozenModel
 from ..rig import Rig
 

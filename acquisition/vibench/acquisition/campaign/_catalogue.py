@@ -8,14 +8,153 @@ import os
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import astuple, fields
+from dataclasses import astuple, dataclass, fields
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 from ..errors import RecordingError
 from ..host.chosen import chosen
-from ..recording import PART_SUFFIX, SUFFIX
-from ._catalogue_entry import CatalogueEntry, place_below, read_entry
+from ..plan import present_word
+from ..recording import (
+    PART_SUFFIX,
+    SUFFIX,
+    Recording,
+    RecordingState,
+    SealCheck,
+    SealDepth,
+    SealState,
+    open_recording,
+)
+
+UNREADABLE = "unreadable"
+"""State of a file that is no recording, or damaged; its reason says what is wrong."""
+DAMAGED = "damaged"
+"""State of a recording that opens, and is not as it was sealed."""
+GOOD = "good"
+_FREQUENCIES = ("frequency_hz", "start_hz", "stop_hz", "low_hz", "high_hz", "band_start_hz", "band_stop_hz")
+
+
+@dataclass(frozen=True)
+class CatalogueEntry:
+    """One recording of a folder. What it does not have is empty, or None."""
+
+    path: str
+    """Below the folder, with ``/``."""
+    name: str
+    """Of the measurement."""
+    state: str
+    """As in `recording.layout.RecordingState`, ``damaged`` or ``unreadable``."""
+    reason: str
+    verdict: str
+    """``good``, or what to look at: ended early, near full scale, samples lost."""
+    started_utc: str = ""
+    origin: str = ""
+    kind: str = ""
+    """Of the excitation."""
+    amplitude_vpp: float | None = None
+    frequency_low_hz: float | None = None
+    frequency_high_hz: float | None = None
+    duration_s: float | None = None
+    size_bytes: int = 0
+    bench_check: str = ""
+    """What the bench check before it found."""
+    results: str = ""
+    """Names of what analyses have saved, separated by commas."""
+    operator: str = ""
+    notes: str = ""
+    recording_id: str = ""
+    seal: str = ""
+    """As in `recording.SealState`, as far as a quick look shows; or empty."""
+
+    @property
+    def is_bad(self) -> bool:
+        """Whether the file is damaged, or cannot be read."""
+        return self.state in (UNREADABLE, DAMAGED)
+
+
+def place_below(folder: Path, path: Path) -> str:
+    """Say where a recording lies; of a name that is no text, as much as can be said."""
+    return os.fsencode(path.relative_to(folder).as_posix()).decode(errors="replace")
+
+
+def read_entry(where: str, path: Path, size_bytes: int) -> CatalogueEntry:
+    """Read what a catalogue wants to know; a file that cannot be read becomes an entry that says why."""
+    try:
+        with open_recording(path) as recording:
+            return _entry(recording, where, size_bytes)
+    except RecordingError as error:
+        stem, reason = Path(where).name.split(".")[0], str(error).encode(errors="replace").decode()
+        return CatalogueEntry(where, stem, UNREADABLE, reason, "cannot be read", size_bytes=size_bytes)
+
+
+def _entry(recording: Recording, where: str, size_bytes: int) -> CatalogueEntry:
+    said = recording.plan.get("excitation")
+    excitation = said if isinstance(said, dict) else {}
+    low_hz, high_hz = _band(excitation)
+    seal = recording.check_seal(SealDepth.QUICK)
+    is_damaged = seal.state is SealState.DAMAGED
+    return CatalogueEntry(
+        path=where,
+        name=str(recording.plan.get("name", Path(where).name.split(".")[0])),
+        state=DAMAGED if is_damaged else recording.state.value,
+        reason=seal.sentence if is_damaged else recording.reason,
+        verdict=_verdict(recording, seal),
+        started_utc=recording.started_utc,
+        origin=recording.origin.value,
+        kind=present_word(str(excitation.get("kind", ""))),
+        amplitude_vpp=_number(excitation.get("amplitude_vpp")),
+        frequency_low_hz=low_hz,
+        frequency_high_hz=high_hz,
+        duration_s=recording.duration_s,
+        # Room that a growing file has reserved holds nothing yet.
+        size_bytes=min(size_bytes, recording.stored_bytes) if recording.is_growing else size_bytes,
+        bench_check=recording.check_text,
+        results=", ".join(recording.result_names),
+        operator=str(recording.confirmations.get("operator", "")),
+        notes=str(recording.plan.get("notes", "")),
+        recording_id=recording.recording_id,
+        seal=seal.state.value,
+    )
+
+
+def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
+    """Lowest and highest frequency of an excitation, as its plan names them."""
+    grid, listed = excitation.get("grid"), excitation.get("frequencies_hz")
+    tables = (excitation, grid) if isinstance(grid, dict) else (excitation,)
+    named = [table.get(key) for table in tables for key in _FREQUENCIES]
+    found = [
+        number
+        for each in (*named, *(listed if isinstance(listed, list) else ()))
+        if (number := _number(each)) is not None
+    ]
+    return (min(found), max(found)) if found else (None, None)
+
+
+def _number(value: object) -> float | None:
+    """Give a number that a plan says, whatever version wrote it; None for anything else."""
+    try:
+        return float(value) if isinstance(value, int | float) else None
+    except OverflowError:
+        return None
+
+
+def _verdict(recording: Recording, seal: SealCheck) -> str:
+    concerns = [f"damaged: {seal.sentence}"] if seal.state is SealState.DAMAGED else []
+    if recording.state is not RecordingState.COMPLETE:
+        concerns.append(recording.state.value)
+    if seal.state in (SealState.UNSEALED, SealState.SEAL_GONE):
+        concerns.append("no seal" if seal.state is SealState.UNSEALED else "seal gone")
+    if seal.state is SealState.OTHER_KEY:
+        concerns.append("not signed with the key given")
+    roles = ", ".join(dict.fromkeys(each.channel for each in recording.overloads))
+    if roles:
+        concerns.append(f"near full scale: {roles}")
+    lost = sum(each.last_sample - each.first_sample + 1 for each in recording.gaps)
+    if lost:
+        concerns.append(f"{lost} samples lost")
+    return "; ".join(concerns) or GOOD
+
 
 CATALOGUE_NAME = "catalogue.sqlite"
 VERSION = 3

@@ -5,28 +5,219 @@ cut, and one that has not leaves no trace. So at any moment the journal is right
 of the one point that was under way.
 """
 
+import re
 import sqlite3
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
 from datetime import UTC, datetime
+from enum import StrEnum
 from pathlib import Path
 from typing import Self
 
 from ..errors import RecordingError
 from ..host.closed_on_leaving import ClosedOnLeaving
-from ..plan import Campaign, Point
-from ..recording import JOURNAL_SUFFIX, closed_on_error
+from ..plan import Campaign, Measurement, Point
+from ..recording import JOURNAL_SUFFIX, closed_on_error, opened, opened_to_look
 from ._bench_identity import BenchIdentity
-from ._journal_database import (
-    SCHEMA,
-    VERSION,
-    brought_up,
-    connected,
-    require_version,
-    sentences,
-)
-from ._journal_point import JournalPoint, JournalPointState, points_of
 from ._point_outcome import ReasonCode
+
+# The SQLite file of a journal: its tables, how it is opened, and its errors as sentences.
+#
+# docs/campaigns.md describes the tables for a stranger.
+
+VERSION = 2
+
+SEAL_COLUMNS = tuple(
+    f"ALTER TABLE {table} ADD COLUMN seal TEXT NOT NULL DEFAULT ''" for table in ("points", "attempts")
+)
+"""What version 1 lacks."""
+
+SCHEMA = """
+CREATE TABLE campaign (
+    key TEXT PRIMARY KEY,
+    value TEXT NOT NULL
+);
+CREATE TABLE benches (
+    since_utc TEXT NOT NULL,
+    identity_json TEXT NOT NULL
+);
+CREATE TABLE points (
+    name TEXT PRIMARY KEY COLLATE NOCASE,
+    place INTEGER NOT NULL,
+    measurement_json TEXT NOT NULL,
+    chain TEXT NOT NULL,
+    added_after TEXT NOT NULL,
+    state TEXT NOT NULL CHECK (state IN ('queued', 'running', 'done', 'failed', 'interrupted')),
+    why TEXT NOT NULL,
+    reason TEXT NOT NULL,
+    file TEXT NOT NULL,
+    is_followed_up INTEGER NOT NULL,
+    seal TEXT NOT NULL
+);
+CREATE TABLE attempts (
+    name TEXT NOT NULL REFERENCES points (name),
+    number INTEGER NOT NULL,
+    file TEXT NOT NULL,
+    state TEXT NOT NULL CHECK (state IN ('running', 'done', 'failed', 'interrupted')),
+    why TEXT NOT NULL,
+    reason TEXT NOT NULL,
+    begun_utc TEXT NOT NULL,
+    ended_utc TEXT NOT NULL,
+    seal TEXT NOT NULL,
+    PRIMARY KEY (name, number)
+);
+"""
+
+POINTS = """
+SELECT points.*, (SELECT COUNT(*) FROM attempts WHERE attempts.name = points.name) AS attempts,
+    COALESCE((SELECT begun_utc FROM attempts WHERE attempts.name = points.name
+        ORDER BY number DESC LIMIT 1), '') AS begun_utc,
+    COALESCE((SELECT ended_utc FROM attempts WHERE attempts.name = points.name
+        ORDER BY number DESC LIMIT 1), '') AS ended_utc
+FROM points ORDER BY place
+"""
+
+
+def is_begun(path: Path) -> bool:
+    """Whether a journal stands there; one whose program died before its first commit does not."""
+    if not path.is_file():
+        return False
+    with sentences(path), closing(opened_to_look(path)) as connection:
+        return (
+            connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'campaign'").fetchone() is not None
+        )
+
+
+def connected(path: Path) -> sqlite3.Connection:
+    """Open a database to write, so that what it has committed survives a kill and a power cut."""
+    with sentences(path), closed_on_error(opened(path.resolve().as_uri())) as connection:
+        connection.execute("PRAGMA journal_mode = WAL")
+        connection.execute("PRAGMA synchronous = FULL")
+        connection.execute("PRAGMA foreign_keys = ON")
+        return connection
+
+
+def brought_up(connection: sqlite3.Connection) -> None:
+    """Give a journal of version 1 what it lacks, in one transaction."""
+    connection.execute("BEGIN IMMEDIATE")
+    (version,) = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
+    if int(version) < VERSION:
+        for statement in SEAL_COLUMNS:
+            connection.execute(statement)
+        connection.execute("UPDATE campaign SET value = ? WHERE key = 'version'", (str(VERSION),))
+    connection.execute("COMMIT")
+
+
+def require_version(path: Path, connection: sqlite3.Connection) -> None:
+    """Refuse what is no journal, or one of a newer version; raises RecordingError."""
+    try:
+        row = connection.execute("SELECT value FROM campaign WHERE key = 'version'").fetchone()
+    except sqlite3.Error as error:
+        raise RecordingError(
+            f"{path} is no journal of a campaign ({error}). Nothing was changed; give another folder"
+        ) from error
+    if row is None or int(row["value"]) > VERSION:
+        raise RecordingError(
+            f"{path} was written by a newer version of vibench. Nothing was changed; use that version"
+        )
+
+
+@contextmanager
+def sentences(path: Path) -> Iterator[None]:
+    """Let an error of the database become a sentence, and what stands in it that cannot be."""
+    try:
+        yield
+    except (ValueError, TypeError, LookupError) as error:  # pydantic's; columns gone
+        raise RecordingError(
+            f"the journal {path} cannot be understood ({str(error).splitlines()[0]}): it is damaged, or of "
+            "another version. Nothing was changed; put back a copy, or move it away: what lies there is found"
+        ) from error
+    except sqlite3.Error as error:
+        raise RecordingError(
+            f"the journal {path} cannot be read or written ({error}). What was recorded is kept; see that "
+            "the disk has room and the folder may be written, and resume"
+        ) from error
+
+
+class JournalPointState(StrEnum):
+    """Where a point stands."""
+
+    QUEUED = "queued"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    """Stopped by somebody, or by the end of its program."""
+
+
+@dataclass(frozen=True)
+class JournalPoint:
+    """One point as the journal knows it."""
+
+    name: str
+    measurement: Measurement
+    chain: str
+    added_after: str
+    """The point whose result asked for this one; empty when it stood in the plan."""
+    state: JournalPointState
+    reason_code: ReasonCode
+    reason: str
+    file: str
+    """Of the last attempt; a name in the journal's folder, empty before the first."""
+    attempts: int
+    is_followed_up: bool
+    """Whether what its result asks for is in the journal."""
+    begun_utc: str
+    ended_utc: str
+    """Of the last attempt."""
+    seal: str
+    """Of its recording; empty before there is one, and of recordings that had none."""
+
+
+def read_journal(path: Path) -> tuple[JournalPoint, ...]:
+    """Look at a journal, also while its campaign runs; changes nothing.
+
+    Raises
+    ------
+    RecordingError
+        When there is no journal, or it is not one.
+
+    """
+    if not path.is_file():
+        raise RecordingError(f"{path} does not exist, or is no file; give the path of a campaign's journal.")
+    with sentences(path), closing(opened_to_look(path)) as connection:
+        require_version(path, connection)
+        return points_of(connection)
+
+
+def _own_name(file: str) -> str:
+    """Refuse a file outside the journal's folder: what lies there is recovered, and cleared of copies."""
+    if not re.fullmatch(r"([^/\\\0]{1,250}\.h5)?", file):
+        raise ValueError(f"{file[:80]!r} is no name of a recording")
+    return file
+
+
+def points_of(connection: sqlite3.Connection) -> tuple[JournalPoint, ...]:
+    """Every point, in the order in which they are made."""
+    return tuple(
+        JournalPoint(
+            name=row["name"],
+            measurement=Measurement.model_validate_json(row["measurement_json"]),
+            chain=row["chain"],
+            added_after=row["added_after"],
+            state=JournalPointState(row["state"]),
+            reason_code=ReasonCode(row["why"]),
+            reason=row["reason"],
+            file=_own_name(row["file"]),
+            attempts=row["attempts"],
+            is_followed_up=bool(row["is_followed_up"]),
+            begun_utc=row["begun_utc"],
+            ended_utc=row["ended_utc"],
+            seal=row["seal"] if "seal" in row.keys() else "",  # noqa: SIM118 - a row iterates over its values
+        )
+        for row in connection.execute(POINTS)
+    )
 
 
 def journal_path(folder: Path, campaign: str) -> Path:

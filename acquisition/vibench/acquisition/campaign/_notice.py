@@ -18,7 +18,7 @@ from pydantic import Field, PositiveFloat, PositiveInt, SecretStr
 
 from ..errors import ConfigurationError
 from ..host.toml_file import FrozenModel
-from ._event import CampaignEvent, CampaignEventKind, CampaignListener
+from ._log import CampaignEvent, CampaignEventKind, CampaignListener
 
 
 class Security(StrEnum):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import assert_never
 
-from ..bench.protocol import RunBench
+from ..bench.bench import RunBench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
 from ..plan import Campaign, Measurement, Point, played_alike, require_within_limits
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
@@ -17,9 +17,7 @@ from ..run.drive import drive_for
 from ..stopping.stop import StopSwitch
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity, differences
-from ._journal import Journal, journal_path
-from ._journal_database import is_begun
-from ._journal_point import JournalPointState, read_journal
+from ._journal import Journal, JournalPointState, is_begun, journal_path, read_journal
 from ._kept_recording import KeptRecording, looked_at
 from ._point_outcome import ChangedBench, ExistingRecordings, ReasonCode
 

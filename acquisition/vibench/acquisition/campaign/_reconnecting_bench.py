@@ -5,9 +5,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from ..bench.bench import Bench, open_bench
+from ..bench.bench import Bench, RigPower, open_bench
 from ..bench.result import CheckResult
-from ..bench.rig_power import RigPower
 from ..errors import AcquisitionError, CheckFailed
 from ..instruments import Knob
 from ..rig import Confirm, KnobSheet, Rig, load_rig

@@ -5,10 +5,8 @@ from pathlib import Path
 
 from ..errors import RecordingError
 from ..recording import JOURNAL_SUFFIX, SUFFIX, SealDepth, SealKey, SealState, forget_checks, open_recording
-from ._catalogue import recordings_below
-from ._catalogue_entry import UNREADABLE, place_below
-from ._journal_database import is_begun
-from ._journal_point import JournalPoint, JournalPointState, read_journal
+from ._catalogue import UNREADABLE, place_below, recordings_below
+from ._journal import JournalPoint, JournalPointState, is_begun, read_journal
 
 MISSING = "missing"
 """Verdict on a recording that a journal counts on, and that is not there."""

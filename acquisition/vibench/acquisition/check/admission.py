@@ -10,6 +10,7 @@ import re
 import tempfile
 from collections.abc import Callable
 from datetime import UTC, datetime
+from enum import StrEnum
 from math import inf, log10
 from pathlib import Path
 from typing import assert_never
@@ -25,7 +26,18 @@ from ..rig import Rig
 from ..stopping.stop import StopSwitch
 from .bench_report import bench_report
 from .loop import DRIVE_LEFT, LASTING, Lasting
-from .rule import CheckRule
+
+
+class CheckRule(StrEnum):
+    """How fresh the check of a bench must be."""
+
+    FRESH = "fresh"
+    """One that passed within the last ``check_valid_h`` hours, on this very configuration."""
+    NOW = "now"
+    """One made now."""
+    WAIVED = "waived"
+    """None; the recordings say what the last one found, if there was one."""
+
 
 FOLDER = "bench_checks"
 _HASH_DIGITS = 8

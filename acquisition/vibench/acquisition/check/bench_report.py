@@ -17,7 +17,7 @@ from ..plan import CHECK_FREQUENCY_HZ, DriveSource, Measurement, Phase, RunState
 from ..rig import Channel, calibrations
 from ..run.acquisition_loop import BLOCK_S
 from ..run.drive import Drive, drive_for
-from ..run.drive_guard import DriveGuard
+from ..run.silence_watch import DriveGuard
 from ..stopping.stop import Cause, StopSwitch
 from .loop import LoopCheck
 

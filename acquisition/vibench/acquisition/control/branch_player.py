@@ -12,9 +12,9 @@ from ..excitation.steps import LoopTone, Segment
 from ..instruments import LoopBlock, LoopProgram
 from ..plan import Phase, RunState
 from .branch_solver import LoopSetting
-from .closed_loop_check import require_answer
 from .control_action import ControlAction, PhaseSamples
 from .fast_loop import Coefficients, FastLoop
+from .feedback_channels import require_answer
 from .sine_loop import SineLoop
 
 Vector = NDArray[np.float64]

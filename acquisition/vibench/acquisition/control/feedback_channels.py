@@ -5,12 +5,13 @@ from math import pi
 
 import numpy as np
 
-from ..errors import ConfigurationError
+from ..errors import ConfigurationError, LimitExceeded
 from ..instruments import Samples
-from ..recording import bridged, coupling_cut_hz, found_dropouts
-from ..rig import Channel, Role
+from ..plan import needed_vpp
+from ..recording import bridged, coupling_cut_hz, found_dropouts, undecided_from
+from ..rig import Channel, OnTable, Rig, Role
 from .control_action import PhaseSamples
-from .stroboscope import Phasors, Stroboscope
+from .steadiness import Phasors, Stroboscope
 
 
 @dataclass(frozen=True)
@@ -95,3 +96,67 @@ def _row(channels: tuple[Channel, ...], role: Role) -> int:
             "to daq.channels, or use an excitation without feedback"
         )
     return roles.index(role)
+
+
+_REMEMBERED_S = 0.1
+"""Of what was handed on: a drop-out is told, and bridged, by the motion before it."""
+
+
+class BridgedRows:
+    """Hands samples on, but for what may be the beginning of a drop-out: that waits for the next ones."""
+
+    def __init__(self, sample_rate_hz: float) -> None:
+        self._rate_hz = sample_rate_hz
+        self._rows = np.empty((3, 0))
+        self._first = 0
+        self._next = 0
+        """Sample that is handed on next."""
+
+    def take(self, first_sample: int, rows: Samples) -> tuple[int, Samples]:
+        """Take the next samples, shape (3, samples) with the response last; give those handed on."""
+        if first_sample != self._first + self._rows.shape[1]:
+            self._rows, self._first, self._next = self._rows[:, :0], first_sample, first_sample
+        self._rows = np.concatenate([self._rows, rows], axis=1)
+        response = self._rows[-1]
+        dropouts = found_dropouts(response, self._rate_hz)
+        self._rows[-1] = bridged(response, dropouts)
+        begin, stop = self._next - self._first, undecided_from(response, self._rate_hz, dropouts)
+        stop = max(begin, stop)
+        handed_on = self._rows[:, begin:stop].copy()
+        surplus = min(begin, max(0, stop - round(_REMEMBERED_S * self._rate_hz)))
+        first = self._next
+        self._next += stop - begin
+        self._rows, self._first = self._rows[:, surplus:], self._first + surplus
+        return first, handed_on
+
+    def skip(self) -> None:
+        """Leave out what waits: it belongs to what was played before."""
+        self._next = self._first + self._rows.shape[1]
+
+
+LEAST_ANSWER = 0.05
+"""Share of the linear model's acceleration below which the loop is taken to be open. A specimen on its
+resonance holds a light table back to about a fifth."""
+
+
+def require_answer(rig: Rig, frequency_hz: float, setting_vpp: float, acceleration: float) -> None:
+    """Refuse to go on when the base hardly answers.
+
+    Parameters
+    ----------
+    acceleration
+        Amplitude of the base's fundamental, as measured [m/s2].
+
+    Raises
+    ------
+    LimitExceeded
+        The run then ramps down.
+
+    """
+    modelled = setting_vpp / needed_vpp(rig, 1.0, frequency_hz, OnTable.NOTHING)
+    if acceleration < LEAST_ANSWER * modelled:
+        raise LimitExceeded(
+            f"the base moved with {acceleration:.3g} m/s2 at {frequency_hz:g} Hz where the model says "
+            f"{modelled:.3g} m/s2, and feedback needs {LEAST_ANSWER:.0%} of that. It was ramped down and "
+            "its recording kept; look at the accelerometer, its cable and the amplifier"
+        )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .stroboscope import Phasors
+from .steadiness import Phasors
 
 _SURE = 4.0
 """Standard uncertainties from which on a trend is followed instead of averaged away."""

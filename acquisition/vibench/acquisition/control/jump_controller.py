@@ -12,11 +12,10 @@ from ..excitation.steps import Segment
 from ..plan import RunState
 from ..recording import JumpNote, JumpSearchEnd, JumpSide, SegmentLabel
 from .control_action import Controller
+from .dwell_controller import recorded
 from .jump_search import LocatedJump, SettledPoint, is_on_branch, located, side
-from .record import recorded
 from .settling_controller import SettledState, SettlingController
-from .sine_loop import SineLoop
-from .start import glided
+from .sine_loop import SineLoop, glided
 
 RUNGS = 12
 RUNG = 1.2

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..excitation.feedback import BaseLevel
 from ..recording import Held
-from .stroboscope import Phasors
+from .steadiness import Phasors
 
 _DEAD_SHARE = 0.3
 """An error below this share of the tolerance is left alone: every change disturbs the motion."""

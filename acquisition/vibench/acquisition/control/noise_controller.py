@@ -13,8 +13,8 @@ from ..instruments import Samples
 from ..plan import Phase, RunState, ramp
 from ..recording import NoiseNote
 from ..rig import BaseQuantity, OnTable, RigModel
-from .closed_loop_check import LEAST_ANSWER
 from .control_action import ControlAction, Controller
+from .feedback_channels import LEAST_ANSWER
 from .sine_loop import SineLoop
 
 _NEWEST = 0.5

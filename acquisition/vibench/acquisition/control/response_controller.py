@@ -9,11 +9,10 @@ from vibench.sim import PhaseReference
 from ..excitation.held_response import HeldResponse
 from ..plan import RunState, look_s
 from ..recording import Held, HeldResponseNote
-from .closed_loop_check import require_answer
 from .control_action import Controller
+from .feedback_channels import require_answer
 from .level_control import measured_level
-from .sine_loop import SineLoop
-from .start import glided
+from .sine_loop import SineLoop, glided
 
 _PROMPT = 0.8
 """Part of the error, in decibels, that is corrected at once."""

@@ -6,12 +6,11 @@ from ..excitation.settled_sine import SettledSine
 from ..excitation.steps import Segment
 from ..recording import JumpSide, SegmentLabel
 from .control_action import Controller
+from .dwell_controller import recorded
 from .jump_controller import JumpLocator
 from .jump_search import SettledPoint, ratio
-from .record import recorded
 from .settling_controller import SettlingController
-from .sine_loop import SineLoop
-from .start import glided, started
+from .sine_loop import SineLoop, glided, started
 
 
 def step_settled(loop: SineLoop, plan: SettledSine) -> Controller[None]:

@@ -6,13 +6,12 @@ from math import isfinite
 from ..excitation.feedback import BaseLevel, Settling
 from ..plan import LOOK_PERIODS, RunState, look_s
 from ..recording import Held, SettledNote, Steadiness
-from .closed_loop_check import require_answer
 from .control_action import Controller
+from .feedback_channels import require_answer
 from .jump_search import SettledPoint
 from .level_control import LevelControl, MeasuredLevel, measured_level
 from .sine_loop import SineLoop
-from .steadiness import Judgement, in_drives, judged
-from .stroboscope import ORDERS, Phasors
+from .steadiness import ORDERS, Judgement, Phasors, in_drives, judged
 
 _SURE = 2.0
 _SAME_LEVEL = 0.004

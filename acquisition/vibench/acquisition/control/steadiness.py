@@ -1,15 +1,211 @@
 """Whether a motion seen once a period has settled: it repeats after k periods, or keeps its statistics."""
 
+from collections import deque
 from dataclasses import dataclass, replace
-from math import hypot, sqrt
+from math import hypot, pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import kendalltau
 
 from ..excitation.feedback import Settling
 from ..instruments import Samples
 from ..recording import Steadiness
-from .stroboscope import Phasors
+
+# The motion once a drive period: its Fourier coefficients over each period of the recorded drive.
+#
+# The generator's clock as the converter sees it: where the drive's periods begin, block by block.
+
+_MEMORY = 40
+"""Blocks from which the frequency is taken; the line through their phases is then sharp enough."""
+
+
+class DriveClock:
+    """Follows one tone on the recorded drive channel.
+
+    Generator and converter have clocks of their own: some ten parts in a million between them, a
+    tenth of a turn after 40 s at 260 Hz. What was commanded therefore tells the frequency only
+    roughly; the phase of every block is fitted anew, and the line through them is the frequency.
+    """
+
+    def __init__(self, near_hz: float, sample_rate_hz: float) -> None:
+        self._near_hz = near_hz
+        self._rate_hz = sample_rate_hz
+        self._centres_s: deque[float] = deque(maxlen=_MEMORY)
+        self._phases: deque[float] = deque(maxlen=_MEMORY)
+        self.frequency_hz = near_hz
+        """Of the drive in the converter's time, as far as it is known [Hz]."""
+        self.phase_cycles = 0.0
+        """Cycles of the drive's sine at sample 0, modulo 1."""
+
+    def follow(self, drive: Samples, first_sample: int) -> None:
+        """Take in the drive of a block, any unit, shape (samples,): two periods at least."""
+        count = len(drive)
+        centre_s = (first_sample + 0.5 * (count - 1)) / self._rate_hz
+        offset_s = (np.arange(count) - 0.5 * (count - 1)) / self._rate_hz
+        angle = 2 * pi * self._near_hz * offset_s
+        basis = np.stack([np.sin(angle), np.cos(angle), np.ones(count)], axis=1)
+        solution = np.linalg.lstsq(basis, drive)[0]
+        # Cycles of A sin(2 pi (f t + c)) at the block's centre, less what the nominal frequency makes of it.
+        turns = float(np.arctan2(solution[1], solution[0])) / (2 * pi) - self._near_hz * centre_s
+        before = self._phases[-1] if self._phases else turns
+        turns = before + (turns - before + 0.5) % 1.0 - 0.5
+        self._centres_s.append(centre_s)
+        self._phases.append(turns)
+        self._draw_line()
+
+    def starts_s(self, first_s: float, last_s: float) -> Samples:
+        """Give the times between two times at which the drive rises through zero [s]."""
+        first = np.ceil(self.frequency_hz * first_s + self.phase_cycles - 1e-6)
+        last = np.floor(self.frequency_hz * last_s + self.phase_cycles)
+        return np.asarray((np.arange(first, last + 1) - self.phase_cycles) / self.frequency_hz)
+
+    def _draw_line(self) -> None:
+        centre_s, phase = np.array(self._centres_s), np.array(self._phases)
+        mean_s, mean = float(centre_s.mean()), float(phase.mean())
+        away_s = centre_s - mean_s
+        spread = float(away_s @ away_s)
+        slope = float(away_s @ (phase - mean)) / spread if spread > 0 else 0.0
+        self.frequency_hz = self._near_hz + slope
+        self.phase_cycles = mean - slope * mean_s
+
+
+Phasors = NDArray[np.complex128]
+
+ORDERS = 5
+"""Mean and the first four harmonics of a period: what tells one from the next."""
+
+
+@dataclass(frozen=True, eq=False)
+class Periods:
+    """One row for each period of the motion, a drive or several of them long.
+
+    Phases count from the drive's upward zero crossing (a sine is real): of several, from any one.
+    """
+
+    base: Phasors
+    """The base channel at the drive's frequency, unit of the channel, shape (periods,)."""
+    response: Phasors
+    """Orders 0 to 4 of the response channel, unit of the channel, shape (periods, 5)."""
+
+    @property
+    def count(self) -> int:
+        """How many periods there are."""
+        return len(self.base)
+
+    def last(self, count: int) -> "Periods":
+        """Give the newest ``count`` periods."""
+        return Periods(self.base[-count:], self.response[-count:])
+
+
+class Stroboscope:
+    """Cuts blocks into periods as they come; what a block leaves over is kept for the next.
+
+    Parameters
+    ----------
+    drives
+        Periods of the drive in one of the motion.
+
+    """
+
+    def __init__(self, near_hz: float, sample_rate_hz: float, drives: int = 1) -> None:
+        self._rate_hz = sample_rate_hz
+        self._drives = drives
+        self.clock = DriveClock(near_hz, sample_rate_hz)
+        self._left = np.empty((3, 0))
+        self._first = 0
+        self._begun_s: float | None = None
+        self._base: list[Phasors] = []
+        self._response: list[Phasors] = []
+
+    def add(self, first_sample: int, drive: Samples, base: Samples, response: Samples) -> None:
+        """Take in a block, each channel of shape (samples,), that follows the one before without a gap."""
+        block = np.stack([drive, base, response])
+        if self._left.size == 0:
+            self._first = first_sample
+        self._left = np.concatenate([self._left, block], axis=1)
+        self.clock.follow(drive, first_sample)
+        start_s = self._first / self._rate_hz if self._begun_s is None else self._begun_s
+        end_s = (self._first + self._left.shape[1] - 1) / self._rate_hz
+        starts_s = self.clock.starts_s(start_s - 0.25 / self.clock.frequency_hz, end_s)
+        starts_s = starts_s[starts_s >= self._first / self._rate_hz][:: self._drives]
+        if len(starts_s) < 2:
+            return
+        within = (starts_s - self._first / self._rate_hz) * self._rate_hz
+        turns = self.clock.frequency_hz / self._rate_hz
+        self._base.append(_orders(self._left[1], within, turns, 2)[:, 1])
+        self._response.append(_orders(self._left[2], within, turns / self._drives, ORDERS))
+        self._keep_from(starts_s[-1])
+
+    def periods(self) -> Periods:
+        """Give all periods so far."""
+        if not self._base:
+            return Periods(np.empty(0, np.complex128), np.empty((0, ORDERS), np.complex128))
+        return Periods(np.concatenate(self._base), np.concatenate(self._response))
+
+    def forget(self) -> None:
+        """Begin anew with the next period: what was played has changed."""
+        self._base.clear()
+        self._response.clear()
+
+    @staticmethod
+    def noise_of(signal: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
+        """Give the rms that a channel in silence, shape (samples,), shows in the orders of a frequency."""
+        turns = frequency_hz / sample_rate_hz
+        count = int((len(signal) - 1) * turns)
+        if count < 1:
+            return 0.0
+        coefficients = _orders(signal, np.arange(count + 1) / turns, turns, ORDERS)
+        away = coefficients[:, 1:]
+        mean = coefficients[:, 0] - coefficients[:, 0].mean()
+        return float(np.sqrt(np.mean(np.sum(np.abs(away) ** 2, axis=1) + np.abs(mean) ** 2)))
+
+    def _keep_from(self, start_s: float) -> None:
+        self._begun_s = start_s
+        # A sample more than needed: the phase of the next block may shift the start a little to the left.
+        keep = max(0, int(start_s * self._rate_hz) - 1 - self._first)
+        self._left = self._left[:, keep:]
+        self._first += keep
+
+
+def _orders(signal: Samples, starts: Samples, turns: float, orders: int) -> Phasors:
+    """Fourier coefficients over each of the periods that begin at ``starts`` (in samples, not whole).
+
+    The integral up to a place between two samples is a cubic through both of its values and slopes,
+    so that a period need not be a whole number of samples.
+
+    Parameters
+    ----------
+    turns
+        Cycles per sample.
+
+    """
+    sample = np.arange(len(signal))
+    low = np.minimum(starts.astype(np.int64), len(signal) - 2)
+    part = starts - low
+    found = np.empty((len(starts) - 1, orders), np.complex128)
+    length = np.diff(starts)
+    for order in range(orders):
+        rotated: Phasors = np.asarray(signal * np.exp(-2j * pi * order * turns * sample), np.complex128)
+        integral = np.concatenate([[0.0], np.cumsum(0.5 * (rotated[1:] + rotated[:-1]))])
+        at_starts = _hermite(integral, rotated, low, part)
+        scale = 1.0 if order == 0 else 2.0
+        # 1j: a drive A sin(...) that begins at each start shall have the real coefficient A.
+        turned = np.exp(2j * pi * order * turns * starts[:-1]) * (1j if order else 1.0)
+        found[:, order] = scale * np.diff(at_starts) / length * turned
+    return found
+
+
+def _hermite(value: Phasors, slope: Phasors, low: NDArray[np.int64], part: Samples) -> Phasors:
+    left, right = value[low], value[low + 1]
+    at_left, at_right = slope[low], slope[low + 1]
+    return np.asarray(
+        (1 + 2 * part) * (1 - part) ** 2 * left
+        + part * (1 - part) ** 2 * at_left
+        + part**2 * (3 - 2 * part) * right
+        + part**2 * (part - 1) * at_right
+    )
+
 
 _THIRDS = 3
 _FEWEST_TURNS = 2

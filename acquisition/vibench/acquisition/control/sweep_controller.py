@@ -6,8 +6,7 @@ from ..recording import ExcursionNote, Held, SegmentLabel, SweepNote
 from .control_action import Controller
 from .gain_estimator import GainEstimator
 from .settling_controller import SettlingController
-from .sine_loop import SineLoop
-from .start import followed, started, tracked
+from .sine_loop import SineLoop, followed, started, tracked
 
 
 def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:

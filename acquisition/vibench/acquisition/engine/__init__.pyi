@@ -18,14 +18,12 @@ from ._client import (
 )
 from ._engine import (
     Engine as Engine,
+    JobQueue as JobQueue,
 )
 from ._errors import (
     EngineError as EngineError,
     EngineGone as EngineGone,
     EngineSilent as EngineSilent,
-)
-from ._job_queue import (
-    JobQueue as JobQueue,
 )
 from ._live_twin import (
     TwinSwitch as TwinSwitch,
@@ -45,21 +43,19 @@ from ._start import (
     left_alone as left_alone,
     start_engine as start_engine,
 )
-from ._state import (
+from ._status import (
     DRIVING as DRIVING,
     LONGEST_PATIENCE_S as LONGEST_PATIENCE_S,
     VIEWER_PATIENCE_S as VIEWER_PATIENCE_S,
-    EngineState as EngineState,
-    Supervision as Supervision,
-)
-from ._status import (
     ArmedPlan as ArmedPlan,
     BenchFacts as BenchFacts,
     EngineMessage as EngineMessage,
+    EngineState as EngineState,
     EngineStatus as EngineStatus,
     MessageKind as MessageKind,
     RowStatus as RowStatus,
     RunStatus as RunStatus,
+    Supervision as Supervision,
     TwinStatus as TwinStatus,
 )
 from ._stop_engine import (

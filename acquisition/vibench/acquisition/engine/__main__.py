@@ -9,11 +9,10 @@ from types import FrameType
 
 from ..stopping.stop import Cause
 from ..stopping.stop_on_signal import heeded_signals, signal_name
-from ._engine import Engine
-from ._job_queue import JobQueue
+from ._engine import Engine, JobQueue
 from ._request_handler import RequestHandler
 from ._server import LOOPBACK, serving, spoken
-from ._state import Supervision
+from ._status import Supervision
 
 PARENT_INTERVAL_S = 0.2
 """How often an engine that was left alone sees whether it has done what it was left with [s]."""

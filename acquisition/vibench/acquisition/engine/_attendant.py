@@ -10,8 +10,8 @@ from time import monotonic
 from typing import IO
 
 from ._address import EngineAddress
-from ._connection import Hello
-from ._state import ConnectionRole
+from ._client import Hello
+from ._status import ConnectionRole
 
 TOLD_EVERY_S = 0.02
 """More often a sign of life says nothing new [s]."""

@@ -6,11 +6,11 @@ from typing import Annotated
 from pydantic import Field
 
 from ..campaign import AfterFailure, ChangedBench, ExistingRecordings
-from ..check.rule import CheckRule
+from ..check.admission import CheckRule
 from ..host.toml_file import FrozenModel
 from ..plan import Campaign
 from ._live_twin import TwinSwitch
-from ._state import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, Supervision
+from ._status import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, Supervision
 
 
 class CampaignRequest(FrozenModel):

@@ -16,17 +16,18 @@ from ..host.beside import Beside
 from ..instruments import Block
 from ..plan import Campaign, RunState, measured_s
 from ._sample_buffer import SampleBuffer
-from ._state import EngineState, Supervision
 from ._status import (
     ArmedPlan,
     BenchFacts,
     ChannelFacts,
     ChannelLevel,
     EngineMessage,
+    EngineState,
     EngineStatus,
     MessageKind,
     RowStatus,
     RunStatus,
+    Supervision,
     TwinStatus,
 )
 

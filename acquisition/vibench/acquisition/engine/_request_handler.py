@@ -9,31 +9,31 @@ from typing import TypeVar
 
 from ..bench.bench import Bench
 from ..campaign import planned_recordings
-from ..check.admission import require_on_record
-from ..check.rule import CheckRule
+from ..check.admission import CheckRule, require_on_record
 from ..errors import CheckFailed
 from ..instruments import Knob
 from ..plan import LimitCheck, played_alike, require_within_limits
 from ..rig import Confirm, KnobSheet, Rig
 from ..run.drive import drive_for
+from ..stopping.program import INTERVAL_S
 from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
-from ..stopping.watchdog import INTERVAL_S
 from ._campaign_request import CampaignRequest
-from ._engine import Engine
+from ._engine import Engine, JobQueue
 from ._errors import EngineError
-from ._job_queue import JobQueue
 from ._live_twin import TwinSwitch
 from ._sample_buffer import SampleSlice
-from ._state import (
+from ._status import (
     DRIVING,
     SOUNDING,
     VIEWER_PATIENCE_S,
+    ArmedPlan,
     EngineState,
+    EngineStatus,
     Supervision,
+    TwinStatus,
     hung_patience_s,
     patience_s,
 )
-from ._status import ArmedPlan, EngineStatus, TwinStatus
 from ._verbs import Verb
 
 Answer = TypeVar("Answer")

@@ -12,7 +12,7 @@ from ._address import EngineAddress
 from ._announcement import Announcement, announced_engines
 from ._client import EngineClient
 from ._errors import EngineGone
-from ._state import ConnectionRole, Supervision
+from ._status import ConnectionRole, Supervision
 
 LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""

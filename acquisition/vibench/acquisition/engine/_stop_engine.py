@@ -16,7 +16,7 @@ from ..stopping.stop import StopLevel
 from ._announcement import Announcement
 from ._client import EngineClient
 from ._errors import EngineError, EngineGone, EngineSilent
-from ._state import SOUNDING, EngineState
+from ._status import SOUNDING, EngineState
 
 PATIENCE_S = 1.0
 """How long an engine may take to answer; it takes milliseconds [s]."""

@@ -34,8 +34,7 @@ from ..stopping.stop import StopLevel
 from ._campaign_request import CampaignRequest
 from ._live_twin import TwinSwitch
 from ._sample_buffer import SampleSlice
-from ._state import DRIVING, EngineState
-from ._status import ArmedPlan, EngineStatus, TwinStatus
+from ._status import DRIVING, ArmedPlan, EngineState, EngineStatus, TwinStatus
 from ._wire import Message
 
 P = ParamSpec("P")

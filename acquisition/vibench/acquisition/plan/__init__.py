@@ -39,11 +39,6 @@ from ..excitation.stepped_sine import FrequencySteps, SteppedSine
 from ..excitation.steps import Segment, Step
 from ..excitation.streamed_noise import StreamedNoise
 from ..excitation.white_noise import WhiteNoise
-from ._axis import (
-    Range,
-    RangeSpacing,
-)
-from ._base_motion import BaseMotion, base_motion
 from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign, played_alike
 from ._check_level import (
     check_amplitude_vpp,
@@ -64,7 +59,7 @@ from ._limits import (
     require_within_limits,
     shortest_ramp_s,
 )
-from ._loads import needed_vpp, predicted_loads
+from ._loads import BaseMotion, base_motion, needed_vpp, predicted_loads
 from ._loop_time import (
     LOOK_PERIODS,
     fast_loop_time_s,
@@ -76,15 +71,13 @@ from ._measurement_preview import (
     MeasurementPreview,
     preview_measurement,
 )
-from ._run_state import (
-    RunState,
-)
 from ._schedule import (
     CHECK_FREQUENCY_HZ,
     CHECK_QUIET_S,
     CHECK_S,
     HUSH_S,
     Phase,
+    RunState,
     duration_s,
     half_cosine,
     known_phases,
@@ -95,6 +88,8 @@ from ._schedule import (
     stairs,
 )
 from ._sweep import (
+    Range,
+    RangeSpacing,
     SweepAxis,
 )
 

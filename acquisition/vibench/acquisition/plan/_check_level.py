@@ -7,7 +7,6 @@ from ..excitation.steps import Segment, Tone
 from ..recording import SegmentLabel
 from ..rig import BaseQuantity, ComplexArray, Rig, RigModel
 from ._measurement import Measurement
-from ._run_state import RunState
 from ._schedule import (
     CHECK_FRACTION,
     CHECK_FREQUENCY_HZ,
@@ -16,6 +15,7 @@ from ._schedule import (
     CHECK_QUIET_S,
     CHECK_SETTLE_S,
     Phase,
+    RunState,
 )
 
 TOUCH_SHARE = 0.25

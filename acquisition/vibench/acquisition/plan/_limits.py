@@ -4,11 +4,14 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 
 import numpy as np
+from pydantic import ValidationError
 
-from ..errors import LimitExceeded
+from ..errors import ConfigurationError, LimitExceeded
 from ..excitation.plan import AbstractExcitation
+from ..recording import open_recording
 from ..rig import (
     LARGEST_LEVEL_ERROR,
     BaseQuantity,
@@ -23,7 +26,30 @@ from ..rig import (
 from ._drive_source import DriveSource, drive_source_of, lowest_setting_vpp
 from ._loads import Loads, needed_vpp, predicted_loads
 from ._measurement import Measurement, OnOverload
-from ._played_back import require_own_plan
+
+_PLAYED = {"excitation", "ramp_s", "ramp_step_s"}
+"""What of a plan is heard in its recording."""
+
+
+def require_own_plan(measurement: Measurement, rig: Rig) -> None:
+    """Refuse to play a recording back under a plan that it was not made with: it would be called its result.
+
+    Raises ConfigurationError. What was imported, or planned by another version, has no plan to compare.
+    """
+    path = rig.daq.options.get("recording")
+    if not rig.plays_back or not isinstance(path, str):
+        return
+    with open_recording(Path(path)) as recording:
+        try:
+            made = Measurement.model_validate(dict(recording.plan))
+        except ValidationError:
+            return
+    if made.model_dump(include=_PLAYED) != measurement.model_dump(include=_PLAYED):
+        raise ConfigurationError(
+            f"{path} was made with the plan of {made.name!r}, a {made.excitation.kind} whose numbers are not "
+            f"those of {measurement.name!r}. Nothing was played back; give the plan that it was made with"
+        )
+
 
 RAMP_PERIODS = 3.0
 """A ramp must take this many periods of the shaker's suspension, or it shakes like a step."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import StrEnum
 from itertools import takewhile
 from math import ceil, cos, pi
 
@@ -9,7 +10,36 @@ from ..excitation.plan import AbstractFeedback
 from ..excitation.steps import Play, Segment, Step, Tone
 from ..recording import SegmentLabel
 from ._measurement import Measurement
-from ._run_state import RunState
+
+
+class RunState(StrEnum):
+    """Where a run stands.
+
+    ::
+
+        idle -> checking -> armed -> ramping_up -> settling -> recording -> ramping_down -> finished
+                    |          |          ^            (next waveform)           |
+                    |          |          +--------------------------------------+
+                    |          |     (held: any of these stays as it is for a while)
+                    |          +-> ramping_down -> stopped    (asked to stop)
+                    +-> failed <- from every state            (limit, check, driver, disk)
+
+    From ``armed`` to ``ramping_down`` the generator's output may be on; in every other state it is off,
+    but for the low-level part of ``checking``.
+    """
+
+    IDLE = "idle"
+    CHECKING = "checking"
+    ARMED = "armed"
+    RAMPING_UP = "ramping_up"
+    SETTLING = "settling"
+    RECORDING = "recording"
+    HELD = "held"
+    RAMPING_DOWN = "ramping_down"
+    FINISHED = "finished"
+    STOPPED = "stopped"
+    FAILED = "failed"
+
 
 CHECK_FREQUENCY_HZ = 160.0
 """The bench check's sine: where accelerometers are calibrated (159.2 Hz, 1000 rad/s, ISO 16063-21)."""

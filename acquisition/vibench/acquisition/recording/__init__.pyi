@@ -1,11 +1,6 @@
-from ._checked_counts import (
-    forget_checks as forget_checks,
-)
 from ._disk import (
-    sole_use as sole_use,
-)
-from ._disk_trouble import (
     DiskTrouble as DiskTrouble,
+    sole_use as sole_use,
     troubled_disks as troubled_disks,
 )
 from ._dropouts import (
@@ -56,15 +51,6 @@ from ._layout import (
     part_of as part_of,
     tmp_of as tmp_of,
 )
-from ._noted_seals import (
-    JOURNAL_SUFFIX as JOURNAL_SUFFIX,
-    closed_on_error as closed_on_error,
-    opened as opened,
-    opened_to_look as opened_to_look,
-)
-from ._opening import (
-    name_now as name_now,
-)
 from ._overview import (
     BIN_SAMPLES as BIN_SAMPLES,
     CountOverview as CountOverview,
@@ -80,6 +66,7 @@ from ._reader import (
     RecordedBlock as RecordedBlock,
     Recording as Recording,
     RecordingDescription as RecordingDescription,
+    name_now as name_now,
     open_recording as open_recording,
 )
 from ._recover import (
@@ -90,19 +77,22 @@ from ._results import (
     SavedResult as SavedResult,
 )
 from ._seal import (
+    JOURNAL_SUFFIX as JOURNAL_SUFFIX,
     KEY_VARIABLE as KEY_VARIABLE,
     SealCheck as SealCheck,
     SealDepth as SealDepth,
     SealKey as SealKey,
     SealState as SealState,
+    closed_on_error as closed_on_error,
+    forget_checks as forget_checks,
+    opened as opened,
+    opened_to_look as opened_to_look,
     seal_key as seal_key,
-)
-from ._segment_label import (
-    SegmentLabel as SegmentLabel,
 )
 from ._tables import (
     REJECTED as REJECTED,
     EventKind as EventKind,
+    SegmentLabel as SegmentLabel,
 )
 from ._writer import (
     RecordingWriter as RecordingWriter,

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 
-from vibench.sim.operating_system.open_file import Buffer
+from vibench.sim.operating_system.this import Buffer
 
 from ..errors import RecordingError
 from ._disk import Disk

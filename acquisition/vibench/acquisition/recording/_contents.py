@@ -11,9 +11,17 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from ..errors import RecordingError
 from ..instruments import Identity
-from ._attributes import Attribute, read_attributes, read_text_dataset
 from ._header import ROLE_PATTERN, ChannelHeader
-from ._layout import CONFIGURATION, ROLE_WIDTH, TEXT_WIDTH, Origin, RecordingState
+from ._layout import (
+    CONFIGURATION,
+    ROLE_WIDTH,
+    TEXT_WIDTH,
+    Attribute,
+    Origin,
+    RecordingState,
+    read_attributes,
+    read_text_dataset,
+)
 
 DEEPEST_JSON = 40
 """Lists and objects in one another; a plan has about five."""

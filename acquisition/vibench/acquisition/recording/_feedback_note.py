@@ -11,8 +11,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from ..errors import RecordingError
-from ._segment_label import SegmentLabel
-from ._tables import Event
+from ._tables import Event, SegmentLabel
 
 VERSION: Final = 1
 

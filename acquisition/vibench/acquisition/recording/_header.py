@@ -9,8 +9,7 @@ from typing import ClassVar
 
 from ..errors import RecordingError
 from ..instruments import Identity
-from ._attributes import Attribute, json_text
-from ._layout import RESERVED_NAMES, ROLE_WIDTH, Origin
+from ._layout import RESERVED_NAMES, ROLE_WIDTH, Attribute, Origin, json_text
 from ._provenance import Provenance, collect_provenance
 
 ROLE_PATTERN = re.compile(r"[a-z][a-z0-9_]*")

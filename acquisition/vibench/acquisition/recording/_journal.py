@@ -9,9 +9,8 @@ import numpy as np
 from ..errors import RecordingError
 from ..instruments import Overload
 from . import _layout as layout
-from ._attributes import encoded, json_text
 from ._committer import Batch
-from ._layout import Column
+from ._layout import Column, encoded, json_text
 from ._preallocate import TablePlaces
 
 Cell = str | int | float

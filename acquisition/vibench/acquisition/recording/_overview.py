@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 
 from . import _layout as layout
-from ._attributes import read_attributes, write_attributes
 from ._counts import Counts
+from ._layout import read_attributes, write_attributes
 
 BIN_SAMPLES = 128
 """A picture 1000 columns wide needs no more than 128 000 samples to be read: 10 ms for four channels."""

@@ -11,13 +11,12 @@ from typing import TypeVar
 
 import h5py
 
-from vibench.sim.operating_system.open_file import sync_file
-from vibench.sim.operating_system.this import sync_folder
+from vibench.sim.operating_system.this import sync_file, sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout
-from ._disk_room import extend_room, release_room
 from ._finalise import rename
+from ._preallocate import extend_room, release_room
 
 Answer = TypeVar("Answer")
 

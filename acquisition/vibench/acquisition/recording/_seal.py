@@ -10,7 +10,9 @@ import hashlib
 import hmac
 import json
 import os
-from collections.abc import Iterator, Mapping
+import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -24,7 +26,11 @@ from vibench.sim.hdf5_files.door import walk
 
 from ..errors import RecordingError
 from . import _layout as layout
-from ._attributes import READ_KINDS, read_attributes, read_text_dataset, write_attributes, write_text_dataset
+from ._counts import Counts
+from ._layout import READ_KINDS, read_attributes, read_text_dataset, write_attributes, write_text_dataset
+
+if TYPE_CHECKING:
+    from hashlib import _Hash as Hash
 
 MANIFEST = "manifest_json"
 SHA256, HMAC, KEY_ID = "sha256", "hmac_sha256", "key_id"
@@ -41,8 +47,6 @@ KEY_VARIABLE = "VIBENCH_SEAL_KEY"
 """Names the file with the key, for every command and program."""
 SHORTEST_KEY = 16
 
-if TYPE_CHECKING:
-    from hashlib import _Hash as Hash
 
 Manifest = dict[str, dict[str, str]]
 ChannelStates = dict[str, list["Hash"]]
@@ -329,3 +333,136 @@ def _signature_check(text: str, signed: list[str], key: SealKey | None, seal: st
 
 def _sha256(raw: bytes) -> str:
     return hashlib.sha256(raw).hexdigest()
+
+
+# Seals listed in the journals of campaigns: they reveal another recording under the same name.
+#
+# The check of a seal asks for them, so that every command identifies recordings by this one rule.
+
+JOURNAL_SUFFIX = ".campaign.sqlite"
+
+_NOTED = """
+SELECT seal, name FROM points WHERE file = :file AND seal != ''
+UNION SELECT seal, name FROM attempts WHERE file = :file AND seal != ''
+"""
+
+
+def noted_seals(path: Path) -> Mapping[str, str]:
+    """Return the points that a recording was made for, by the seal that a journal in its folder noted.
+
+    Empty where no journal knows the file. A journal that cannot be read notes nothing: `vibench
+    verify` reports it.
+    """
+    noted: dict[str, str] = {}
+    file = path.name.encode(errors="replace").decode()  # a name that is no text stands in no journal
+    for journal in sorted(path.parent.glob(f"*{JOURNAL_SUFFIX}")):
+        with suppress(sqlite3.Error), closing(opened_to_look(journal)) as connection:
+            noted |= connection.execute(_NOTED, {"file": file}).fetchall()
+    return noted
+
+
+def opened(uri: str) -> sqlite3.Connection:
+    """Open a database; its transactions are begun and ended by hand.
+
+    Parameters
+    ----------
+    uri
+        Address of the file with its mode, as SQLite spells it.
+
+    """
+    connection = sqlite3.connect(uri, uri=True, isolation_level=None)
+    connection.row_factory = sqlite3.Row
+    return connection
+
+
+@contextmanager
+def closed_on_error(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
+    """Close a new connection if its first use fails: Windows lets nobody move or delete an open file.
+
+    Parameters
+    ----------
+    connection
+        Just opened.
+
+    Raises
+    ------
+    sqlite3.Error
+        Whatever the first use raised, after closing.
+
+    """
+    try:
+        yield connection
+    except BaseException:
+        connection.close()
+        raise
+
+
+def opened_to_look(path: Path) -> sqlite3.Connection:
+    """Open a database to read it, also where nothing may be written."""
+    address = path.resolve().as_uri()
+    try:
+        # One that may write tidies up behind itself when it was the last to look.
+        with closed_on_error(opened(f"{address}?mode=rw")) as connection:
+            connection.execute("PRAGMA query_only = ON")
+            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
+            return connection
+    except sqlite3.OperationalError:
+        return opened(f"{address}?mode=ro")
+
+
+# Counts that are as they were when the seal was checked: each piece is hashed again as it is read.
+#
+# A check reads a recording from end to end, and an analysis reads it again. So that what is read is what
+# was checked, the state of each channel's checksum before every piece is kept, by the seal, for as long as
+# this process lives: whatever file carries that seal is held against it.
+
+_KNOWN: dict[str, ChannelStates] = {}
+"""By seal. About 20 kB for a recording of a minute."""
+
+
+def remember(seal: str, states: ChannelStates) -> None:
+    """Hold what carries this seal against these states from now on."""
+    _KNOWN[seal] = states
+
+
+def forget_checks() -> None:
+    """Hold nothing against what was read before: all is looked at anew."""
+    _KNOWN.clear()
+
+
+def was_checked(seal: str) -> bool:
+    """Whether a file with this seal was found intact as a whole by this process."""
+    return seal in _KNOWN
+
+
+class CheckedCounts:
+    """Reads the channels of one open file, and keeps the last piece of each."""
+
+    def __init__(self) -> None:
+        self._last: dict[str, tuple[int, Counts]] = {}
+
+    def read(self, seal: str, dataset: h5py.Dataset, begin: int, end: int) -> Counts:
+        """Give a range of a channel; raises ValueError where it is not what was checked."""
+        known = _KNOWN.get(seal)
+        if known is None:
+            return np.asarray(dataset[begin:end], dtype=np.int32)
+        counts = np.empty(end - begin, dtype=np.int32)
+        for number in range(begin // PIECE_ITEMS, -(-end // PIECE_ITEMS)):
+            first = number * PIECE_ITEMS
+            piece = self._piece(known[dataset.name], dataset, number)
+            low, high = max(begin, first), min(end, first + len(piece))
+            counts[low - begin : high - begin] = piece[low - first : high - first]
+        return counts
+
+    def _piece(self, states: "Sequence[Hash]", dataset: h5py.Dataset, number: int) -> Counts:
+        held, counts = self._last.get(dataset.name, (-1, None))
+        if held == number and counts is not None:
+            return counts
+        first = number * PIECE_ITEMS
+        piece = np.ascontiguousarray(dataset[first : first + PIECE_ITEMS], dtype=np.int32)
+        digest = states[number].copy()
+        digest.update(piece.data)
+        if digest.digest() != states[number + 1].digest():
+            raise ValueError("they are no longer what they were when the seal was checked")
+        self._last[dataset.name] = (number, piece)
+        return piece

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..instruments import Overload
 from . import _layout as layout
-from ._attributes import decoded
 from ._contents import json_object
 from ._journal import Number
-from ._layout import Column, RecordingState, Table
+from ._layout import Column, RecordingState, Table, decoded
 
 Columns = dict[str, NDArray[Any]]
 
@@ -239,3 +238,27 @@ def gaps(columns: Columns) -> tuple[Gap, ...]:
         Gap(int(first), int(last))
         for first, last in zip(*(columns[column.name] for column in layout.GAPS.columns), strict=True)
     )
+
+
+class SegmentLabel(StrEnum):
+    """What is played while a segment is recorded."""
+
+    REALISATION = "realisation"
+    NOISE = "noise"
+    SWEEP = "sweep"
+    DWELL = "dwell"
+    STEP = "step"
+    """A frequency of the plan's list, or a level."""
+    SEARCH = "search"
+    """A frequency that was added to localise a jump."""
+    RESONANCE = "resonance"
+    BRANCH = "branch"
+    """A point of a branch that a fast loop holds."""
+    PERTURBED = "perturbed"
+    """Such a point while what is played is changed a little: what tells its stability."""
+    CHECK = "check"
+    """The small sine before the first ramp."""
+    LEAD_IN = "lead_in"
+    """Tones on the way to a dwell."""
+    RAMP_UP = "ramp_up"
+    RAMP_DOWN = "ramp_down"

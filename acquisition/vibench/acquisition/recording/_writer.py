@@ -9,6 +9,7 @@
 """
 
 import hashlib
+import os
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -16,24 +17,46 @@ from typing import Self
 
 import numpy as np
 
-from vibench.sim.operating_system.open_file import Buffer
+from vibench.sim.operating_system.this import Buffer
 
 from ..errors import RecordingError
 from ..host.log import LOG
 from ..instruments import Block, Samples
 from . import _layout as layout
-from ._attributes import encoded
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer
 from ._counts import Counts, CountScale
-from ._descriptor_reserve import DescriptorReserve
-from ._disk import Disk
-from ._disk_trouble import open_disk
+from ._disk import Disk, open_disk
 from ._finalise import discard, finalise, whereabouts
 from ._header import RecordingHeader
 from ._journal import Journal, Number
-from ._layout import RecordingState
+from ._layout import RecordingState, encoded
 from ._preallocate import ITEM_BYTES, MARGIN_S, RESERVE_AHEAD_S, Places, preallocate
 from ._seal import SealKey, seal_key
+
+RESERVED = 8
+"""The recording and its copy, the folder, what is opened to look at the disk; and the journal's after it."""
+
+
+class DescriptorReserve:
+    """Open descriptors of no use but to be given back."""
+
+    def __init__(self) -> None:
+        self._held: list[int] = []
+        try:
+            for _ in range(RESERVED):
+                self._held.append(os.open(os.devnull, os.O_RDONLY))
+        except OSError as error:
+            self.close()
+            raise RecordingError(
+                f"this process may open no more files ({error}), and a recording needs {RESERVED} to be "
+                "finished. Nothing was recorded; raise its limit (ulimit -n), or close other programs"
+            ) from error
+
+    def close(self) -> None:
+        """Give them back. Legal at any time."""
+        while self._held:
+            os.close(self._held.pop())
+
 
 QUEUE_S = 10.0
 """Seconds of samples that may wait for the disk; the slowest sync measured took 0.12 s."""

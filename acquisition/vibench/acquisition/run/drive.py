@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Protocol
 
-from ..bench.protocol import RunBench
+from ..bench.bench import RunBench
 from ..errors import ConfigurationError
 from ..excitation.steps import Tone
 from ..instruments import LoopBlock

@@ -11,7 +11,7 @@ from ..plan import RunState
 from ..recording import RecordingState
 from ..stopping.stop import Cause
 from .acquisition_loop import SampleSink
-from .drive_guard import DriveGuard
+from .silence_watch import DriveGuard
 
 
 @dataclass(frozen=True, eq=False)

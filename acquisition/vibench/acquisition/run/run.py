@@ -4,14 +4,17 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
-from ..bench.protocol import RunBench
+from ..bench.bench import RunBench
 from ..control.control_action import Controller, phase_samples
 from ..control.controllers import CONTROLLERS, feedback_controller
 from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded, RunStalled
+from ..excitation.plan import AbstractFeedback
+from ..excitation.steps import Tone
 from ..host.closed_on_leaving import ClosedOnLeaving
-from ..instruments import Block
+from ..instruments import Block, FunctionGenerator
 from ..plan import (
     CHECK_S,
     DriveSource,
@@ -32,15 +35,52 @@ from ..rig import Channel, KnobSheet
 from ..stopping.memory_reserve import MEMORY_RESERVE
 from ..stopping.stop import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
 from .acquisition_loop import AcquisitionLoop, SampleSink
-from .command_time import require_time_for_commands
 from .drive import Drive, drive_for
-from .drive_guard import DriveGuard
 from .ending import Ending, Outcome, Progress
-from .glide_watch import GlideWatch
 from .limit_monitor import LimitMonitor
 from .low_level_check import LowLevelCheck, judged, require_checkable
-from .phase_runner import PhaseRunner, Stopped
-from .silence_watch import SilenceWatch
+from .phase_runner import GlideWatch, PhaseRunner, Stopped
+from .silence_watch import DriveGuard, SilenceWatch
+
+ROOM = 1.25
+"""A step of a glide must be longer than a setting takes by this factor: not all take the same time."""
+_MOST_COMMANDS = 2
+"""For one change of tone: amplitude and frequency."""
+
+
+def require_time_for_commands(measurement: Measurement, generator: FunctionGenerator) -> float:
+    """Refuse a glide whose steps are too short; return how much longer a plan of settled tones will take [s].
+
+    Raises ConfigurationError when a step is shorter than the generator takes for a setting, measured now.
+    """
+    step_s = measurement.excitation.glide_step_s
+    if step_s is not None:
+        latency_s = _commands_of_a_step(measurement) * generator.measured_latency_s()
+        if step_s < ROOM * latency_s:
+            raise ConfigurationError(
+                f"step_s = {step_s:g} s is too short: the generator takes {latency_s:.3g} s for a setting, "
+                f"and the drive would fall behind the plan. Nothing was played; give step_s of at least "
+                f"{_rounded_up(ROOM * latency_s):.2f} s, or shorten generator.settle_s if the instrument "
+                "allows it"
+            )
+        return 0.0
+    settled = sum(phase.state is RunState.SETTLING for phase in known_phases(measurement))
+    return settled * _MOST_COMMANDS * generator.measured_latency_s() if settled > 1 else 0.0
+
+
+def _commands_of_a_step(measurement: Measurement) -> int:
+    """Frequency, and amplitude where that changes too: under feedback it may at any step."""
+    if isinstance(measurement.excitation, AbstractFeedback):
+        return _MOST_COMMANDS
+    levels = {
+        step.play.level for step in islice(measurement.excitation.steps(), 2) if isinstance(step.play, Tone)
+    }
+    return len(levels)
+
+
+def _rounded_up(step_s: float) -> float:
+    """Give a hundredth of a second more, at most."""
+    return -(-step_s // 0.01) * 0.01
 
 
 def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None] | None:

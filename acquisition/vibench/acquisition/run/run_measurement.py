@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from ..bench.protocol import RunBench
+from ..bench.bench import RunBench
 from ..host.chosen import chosen
 from ..plan import Measurement
 from ..recording import create_recording

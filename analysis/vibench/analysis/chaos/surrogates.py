@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..signals.arrays import Reals
-from .embedding import embedded, neighbours_apart
+from .divergence import embedded, neighbours_apart
 
 SURROGATES = 39
 """The smallest statistic of 40 then has a chance of 1/40 = 0.025 if the series is linear noise."""

@@ -5,14 +5,16 @@ ratios of displacements, so they share one axis. What each of them is stands in 
 of a colliding specimen is not its Response I.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+import scipy
 
 from ..errors import NotEnoughData
 from ..live import column_starts, envelope
-from ..model.difference import CurveDifference, logarithmic_difference
+from ..model.ensemble import CurveDifference, logarithmic_difference
 from ..signals.arrays import Reals
 from ..tables import Labelled
 
@@ -149,3 +151,139 @@ def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
         (curve.magnitude[shared], np.nan_to_num(curve.relative_sd[shared])),
         (other.magnitude, np.nan_to_num(other.relative_sd)),
     )
+
+
+# The peaks of a curve, placed between its points, with the width at half power where it is seen.
+#
+# Curves read at a few frequencies: what stands beside the markers.
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One curve at the markers."""
+
+    name: str
+    magnitudes: tuple[float, ...]
+    """One for each marker; NaN outside of the curve."""
+    decibel: float
+    """The last over the first; NaN where either is missing."""
+
+
+def readings(curves: Sequence[Curve], frequencies_hz: Sequence[float]) -> tuple[Reading, ...]:
+    """Read every curve at every frequency."""
+    return tuple(_reading(each, np.asarray(frequencies_hz, dtype=np.float64)) for each in curves)
+
+
+def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> Reading:
+    values = curve.at(frequency_hz).magnitude
+    ratio = float(20 * np.log10(values[-1] / values[0])) if values.size else float("nan")
+    return Reading(curve.name, tuple(float(value) for value in values), ratio)
+
+
+_LEAST_RISE_DB = 3.0
+"""A peak stands above the valley beside it by at least so much ..."""
+_LEAST_RISE_SD = 8.0
+"""... and by so many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
+_CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
+"""Chaotic motion makes many peaks: one with so many others within so many half widths is no mode."""
+_CROWD_RISE = 0.3
+"""Others count that rise by this share of what a peak must rise by."""
+_USUAL_HALF_WIDTH = 0.01
+"""Of the frequency; for a peak that does not fall by 3 dB on both sides."""
+_HALF_POWER = 1 / np.sqrt(2)
+_PER_NEPER_DB = 20 / np.log(10)
+
+
+@dataclass(frozen=True)
+class CurvePeak:
+    """One peak of a curve."""
+
+    frequency_hz: float
+    """Of the parabola through the highest point and its neighbours, in logarithms."""
+    magnitude: float
+    relative_sd: float
+    """Of the magnitude; NaN where nothing is known of it."""
+    half_power_width_hz: float | None
+    """Where the curve falls by 3 dB on both sides; None where a neighbour comes first."""
+
+    @property
+    def damping_ratio(self) -> float | None:
+        """Half the width over the frequency: the damping ratio of a single linear mode."""
+        width_hz = self.half_power_width_hz
+        return None if width_hz is None else 0.5 * width_hz / self.frequency_hz
+
+
+def curve_peaks(curve: Curve, most: int = 6) -> tuple[CurvePeak, ...]:
+    """Find the highest resonance peaks, in the order of frequency.
+
+    Branches have none, because they fold there; nor has a stretch where the motion is chaotic.
+
+    Parameters
+    ----------
+    curve
+        Measured or predicted.
+    most
+        How many are given.
+
+    """
+    known = np.isfinite(curve.magnitude) & (curve.magnitude > 0)
+    frequency_hz, height = curve.frequency_hz[known], np.log(curve.magnitude[known])
+    if height.size < 3 or not curve.is_single_valued:
+        return ()
+    spread = np.nan_to_num(curve.relative_sd[known])
+    least = _LEAST_RISE_DB / _PER_NEPER_DB
+    places, found = scipy.signal.find_peaks(height, prominence=_CROWD_RISE * least)
+    rise = found["prominences"] / np.maximum(least, _LEAST_RISE_SD * spread[places])
+    others_hz = frequency_hz[places[rise > _CROWD_RISE]]
+    clear = places[rise > 1.0]
+    peaks: list[CurvePeak] = []
+    for place in clear[np.argsort(-height[clear])]:
+        if len(peaks) == most:
+            break
+        peak, half_width_hz = _peak(frequency_hz, height, curve.relative_sd[known], int(place))
+        away = np.abs(others_hz - peak.frequency_hz) / half_width_hz
+        # It is itself one of them.
+        if all(np.count_nonzero(away < reach) <= count for count, reach in _CROWDS):
+            peaks.append(peak)
+    return tuple(sorted(peaks, key=lambda each: each.frequency_hz))
+
+
+def _peak(frequency_hz: Reals, height: Reals, spread: Reals, place: int) -> tuple[CurvePeak, float]:
+    """Measure a peak; gives it, and the larger of its two half widths [Hz]."""
+    x, y = np.log(frequency_hz[place - 1 : place + 2]), height[place - 1 : place + 2]
+    # The parabola by divided differences: a chaotic curve has thousands of peaks to be looked at.
+    (left, right), (before, after) = np.diff(y) / np.diff(x), np.diff(x)
+    bend, slope, top = (
+        (right - left) / (before + after),
+        (left * after + right * before) / (before + after),
+        y[1],
+    )
+    offset = float(np.clip(-slope / (2 * bend), x[0] - x[1], x[2] - x[1])) if bend < 0 else 0.0
+    peak = float(top + slope * offset + bend * offset**2)
+    at_hz = float(np.exp(x[1] + offset))
+    ends_hz = _ends_hz(frequency_hz, height, place, peak + float(np.log(_HALF_POWER)))
+    found = CurvePeak(
+        frequency_hz=at_hz,
+        magnitude=float(np.exp(peak)),
+        relative_sd=float(spread[place]),
+        half_power_width_hz=None if ends_hz is None else ends_hz[1] - ends_hz[0],
+    )
+    if ends_hz is None:
+        return found, _USUAL_HALF_WIDTH * at_hz
+    return found, max(at_hz - ends_hz[0], ends_hz[1] - at_hz)
+
+
+def _ends_hz(frequency_hz: Reals, height: Reals, place: int, level: float) -> tuple[float, float] | None:
+    ends = []
+    for step in (-1, 1):
+        here = place
+        while 0 <= here + step < height.size and height[here + step] > level:
+            if height[here + step] > height[place]:
+                return None
+            here += step
+        if not 0 <= here + step < height.size:
+            return None
+        share = (height[here] - level) / (height[here] - height[here + step])
+        ends.append(frequency_hz[here] + share * (frequency_hz[here + step] - frequency_hz[here]))
+    low_hz, high_hz = sorted(map(float, ends))
+    return low_hz, high_hz

@@ -6,12 +6,11 @@ from ._branch_lines import (
 from ._branch_request import (
     BranchMethod as BranchMethod,
     BranchRequest as BranchRequest,
-)
-from ._chain_answer import (
-    ChainAnswer as ChainAnswer,
-    ChainRun as ChainRun,
+    recorded_level as recorded_level,
 )
 from ._chain_computing import (
+    ChainAnswer as ChainAnswer,
+    ChainRun as ChainRun,
     chain_answer as chain_answer,
     chain_runs as chain_runs,
 )
@@ -38,9 +37,6 @@ from ._map_words import (
     map_caption as map_caption,
     motion_classes as motion_classes,
     motion_words as motion_words,
-)
-from ._recorded_level import (
-    recorded_level as recorded_level,
 )
 from ._specimen_choice import (
     ContactWord as ContactWord,

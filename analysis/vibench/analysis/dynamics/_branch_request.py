@@ -4,6 +4,7 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Self
 
+import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
 
 from vibench.sim import (
@@ -19,6 +20,8 @@ from vibench.sim import (
 )
 from vibench.sim.branches import MotionSearch
 
+from ..errors import NotEnoughData
+from ..signals.arrays import Reals
 from ._specimen_choice import SpecimenChoice
 
 EXACT_ENOUGH = 1e-4
@@ -173,3 +176,38 @@ class BranchRequest(SpecimenChoice):
             f"at {self.places} places from {self.starts} random states each, seed {self.seed}, up to "
             f"{self.most_periods} drive periods long."
         )
+
+
+MOST_BINS = 100
+
+
+def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple[float, float], ...]:
+    """Give pairs of frequency [Hz] and amplitude [m] of a sweep or of steps, ascending, 100 at most.
+
+    Parameters
+    ----------
+    frequency_hz, drive_amplitude_m
+        As measured, in any order, up and down together; shape (n,). In each bin stands the median, so that
+        one bad interval does not bend the level.
+
+    Raises
+    ------
+    NotEnoughData
+        When the drive had fewer than two frequencies.
+
+    """
+    known = np.isfinite(frequency_hz) & np.isfinite(drive_amplitude_m) & (drive_amplitude_m > 0.0)
+    place, level = frequency_hz[known], drive_amplitude_m[known]
+    if place.size < 2 or np.ptp(place) < 1e-3 * float(place.max()):
+        raise NotEnoughData(
+            "this recording holds no drive over a range of frequencies; take a stepped sine or a sweep"
+        )
+    bins = min(MOST_BINS, place.size)
+    edges = np.linspace(place.min(), place.max(), bins + 1)
+    owner = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, bins - 1)
+    pairs = [
+        (float(np.median(place[owner == k])), float(np.median(level[owner == k])))
+        for k in range(bins)
+        if bool(np.any(owner == k))
+    ]
+    return tuple(pairs)

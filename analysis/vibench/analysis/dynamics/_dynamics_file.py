@@ -16,7 +16,7 @@ from ..errors import InvalidRequest
 from ..exchange import new_file
 from ._branch_lines import BranchDiagram, BranchLine, LineEvent
 from ._branch_request import BranchRequest
-from ._chain_answer import ChainAnswer
+from ._chain_computing import ChainAnswer
 from ._spectrum_request import ExponentSpectrum
 
 BRANCHES_FORMAT, SPECTRUM_FORMAT = "vibench branches", "vibench spectrum"

@@ -30,7 +30,7 @@ from ._source import (
 from ._source_channel import (
     SourceChannel as SourceChannel,
 )
-from ._uff_functions import (
+from ._uff import (
     FunctionAxis as FunctionAxis,
     FunctionType as FunctionType,
     UniversalFunction as UniversalFunction,

@@ -15,9 +15,9 @@ from typing import TextIO
 
 import numpy as np
 
+from ._alignment import told_rate_hz
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._source_channel import SourceChannel, TableSource
-from ._time_axis import told_rate_hz
 
 TIME_FORMAT = "%.9f"
 """Nanoseconds since the recording's first sample."""

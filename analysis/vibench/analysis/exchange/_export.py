@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, Protocol
 
 from ..errors import InvalidRequest
-from ..recordings.intact import require_intact
+from ..recordings.facts import require_intact
 from ._csv import write_csv_samples
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_path, write_facts
@@ -16,8 +16,7 @@ from ._mat import require_small, write_mat
 from ._new_file import new_file, require_unused
 from ._nexus import write_nexus
 from ._result_export import matlab_results, result_paths, write_result_tables
-from ._uff import write_uff
-from ._uff_functions import UniversalFunction, write_uff_functions
+from ._uff import UniversalFunction, write_uff, write_uff_functions
 from ._wav import require_sound, write_wav
 
 

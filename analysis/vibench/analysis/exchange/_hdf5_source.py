@@ -15,8 +15,8 @@ from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, walk
 
 from ..errors import UnusableData
 from ..signals.arrays import Reals
+from ._alignment import told_rate_hz
 from ._source_channel import SourceChannel, text_of
-from ._time_axis import told_rate_hz
 
 FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")

@@ -30,12 +30,11 @@ from vibench.acquisition.recording import (
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Flags, Reals
-from ._alignment import align
+from ._alignment import Piece, align
 from ._excerpt import BLOCK_SAMPLES, TransferObserver, unobserved
 from ._mapping import ChannelMapping, ImportMapping
 from ._source import Source, channel_blocks, find_channel, opened_source
 from ._source_channel import SourceChannel
-from ._time_axis import Piece
 
 
 @dataclass(frozen=True)

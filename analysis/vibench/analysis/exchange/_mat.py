@@ -20,12 +20,12 @@ from vibench.acquisition.recording import ChannelHeader
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals
+from ._alignment import told_rate_hz
 from ._excerpt import Excerpt, TransferObserver, unobserved
 from ._facts_document import facts_document
 from ._hdf5_source import Hdf5Source, opened_hdf5
 from ._mat_elements import require_whole
 from ._source_channel import SourceChannel, TableSource
-from ._time_axis import told_rate_hz
 
 LARGEST_BYTES = 2**31
 """A MATLAB 5 file counts the bytes of a variable with 31 bits, and many a reader those of the file."""

@@ -14,13 +14,13 @@ from vibench.acquisition import shortened
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
+from ._alignment import TimeAxis, time_axis, time_unit
 from ._csv import opened_csv
 from ._excerpt import BLOCK_SAMPLES
 from ._hdf5_source import opened_hdf5
 from ._mat import opened_mat
 from ._source_channel import SourceChannel
 from ._tdms_source import opened_tdms
-from ._time_axis import TimeAxis, time_axis, time_unit
 from ._uff import opened_uff
 from ._wav import opened_wav
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
+from ._alignment import told_rate_hz
 from ._source_channel import SourceChannel
-from ._time_axis import told_rate_hz
 
 SIGNATURE = b"TDSm"
 """First bytes of every segment (NI, TDMS File Format Internal Structure)."""

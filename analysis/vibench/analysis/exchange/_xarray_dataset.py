@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vibench.acquisition.recording import ChannelHeader, Recording
 
 from ..errors import InvalidRequest
-from ..recordings.intact import require_checked
+from ..recordings.facts import require_checked
 from ._excerpt import excerpt
 
 if TYPE_CHECKING:

@@ -18,9 +18,18 @@ from ..sine.tracked_resonance import (
     tracked_resonances,
 )
 from ..tables import table
-from .drawn import DrawnFigure
 from .stepped_sine import tracked_caption
-from .style import BOUNDS, MEASURED, PREDICTED, SIMULATED, legend_above, new_figure, prefixed, styled
+from .style import (
+    BOUNDS,
+    MEASURED,
+    PREDICTED,
+    SIMULATED,
+    DrawnFigure,
+    legend_above,
+    new_figure,
+    prefixed,
+    styled,
+)
 
 _HEIGHT_IN = 4.2
 _MARGIN = 0.15

@@ -3,8 +3,7 @@
 from ..recordings.channel_levels import ChannelLevel
 from ..recordings.facts import RecordingFacts
 from ..tables import table
-from .drawn import DrawnFigure
-from .style import MEASURED, new_figure, prefixed, styled
+from .style import MEASURED, DrawnFigure, new_figure, prefixed, styled
 
 _ROW_IN = 0.85
 _FRAME_IN = 0.6

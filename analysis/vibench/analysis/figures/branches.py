@@ -14,13 +14,13 @@ from ..dynamics import BranchDiagram, BranchLine
 from ..signals.arrays import Reals
 from ..sine.tracked_resonance import TrackedResonance
 from ..tables import Table, table
-from .drawn import DrawnFigure
 from .style import (
     COLLIDING,
     LEVELS,
     MEASURED,
     PREDICTED,
     SIMULATED,
+    DrawnFigure,
     frequency_axis,
     legend_above,
     magnitude_axis,

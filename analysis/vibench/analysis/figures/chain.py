@@ -10,7 +10,6 @@ from matplotlib.ticker import MaxNLocator
 
 from ..dynamics import ChainAnswer, ChainDrive, ChainRun
 from ..tables import Table, table
-from .drawn import DrawnFigure
 from .style import (
     BOUNDS,
     COLLIDING,
@@ -18,6 +17,7 @@ from .style import (
     LINEAR,
     MEASURED,
     SIMULATED,
+    DrawnFigure,
     legend_above,
     magnitude_axis,
     new_figure,

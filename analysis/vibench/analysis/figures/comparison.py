@@ -8,16 +8,15 @@ from matplotlib.axes import Axes
 
 from vibench.acquisition import printable
 
-from ..comparison.curve import Curve, CurveKind, CurveOrigin, curve_difference
-from ..comparison.curve_peaks import curve_peaks
+from ..comparison.curve import Curve, CurveKind, CurveOrigin, curve_difference, curve_peaks
 from ..errors import InvalidRequest
-from ..model.difference import CurveDifference
+from ..model.ensemble import CurveDifference
 from ..tables import Table, table
-from .drawn import DrawnFigure
 from .style import (
     BOUNDS,
     LEVELS,
     MEASURED,
+    DrawnFigure,
     frequency_axis,
     legend_above,
     magnitude_axis,

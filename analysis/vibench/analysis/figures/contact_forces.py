@@ -11,8 +11,7 @@ from vibench.sim import PowerLaw, RigidStops, Specimen, spring_of
 
 from ..signals.arrays import Reals
 from ..tables import Table, table
-from .drawn import DrawnFigure
-from .style import MEASURED, SIMULATED, new_figure, styled
+from .style import MEASURED, SIMULATED, DrawnFigure, new_figure, styled
 
 _COLUMNS = 3
 _BEFORE_M, _BEYOND_M = 2e-6, 1.5e-6

@@ -8,12 +8,12 @@ from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.periodic import PeriodicFrequencyResponse
 from ..signals.arrays import Reals
 from ..tables import table
-from .drawn import DrawnFigure
 from .style import (
     BOUNDS,
     LINEAR,
     MEASURED,
     SIMULATED,
+    DrawnFigure,
     frequency_axis,
     legend_above,
     magnitude_axis,

@@ -12,13 +12,13 @@ from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import COLUMN_HZ, DwellAnalysis, spectrum_columns
 from ..tables import Table, plus_minus, table
-from .drawn import DrawnFigure
 from .ensemble_band import band_columns, draw_band, run_text, simulated_label
 from .marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
 from .style import (
     COLLIDING,
     MEASURED,
     SIMULATED,
+    DrawnFigure,
     legend_above,
     magnitude_axis,
     new_figure,

@@ -7,8 +7,7 @@ from vibench.acquisition.plan import Measurement, SignalPreview
 from ..signals.arrays import Reals
 from ..signals.envelope import envelope
 from ..tables import table
-from .drawn import DrawnFigure
-from .style import PREDICTED, frequency_axis, new_figure, prefixed, styled
+from .style import PREDICTED, DrawnFigure, frequency_axis, new_figure, prefixed, styled
 
 _HEIGHT_IN = 2.3
 _SAMPLES_PER_CYCLE = 8

@@ -8,8 +8,7 @@ from vibench.sim import Parameter
 from ..dynamics import ExponentSpectrum
 from ..signals.arrays import Reals
 from ..tables import Table, table
-from .drawn import DrawnFigure
-from .style import BOUNDS, LEVELS, MEASURED, legend_above, new_figure, styled
+from .style import BOUNDS, LEVELS, MEASURED, DrawnFigure, legend_above, new_figure, styled
 
 _HEIGHT_IN = 5.2
 

@@ -22,8 +22,7 @@ from ..recordings.facts import specimen_of
 from ..sine.held_branch import HeldBranch, branch_sentences, held_branch
 from ..sine.stepped_response import SteppedSineAnalysis
 from ..tables import named, table
-from .drawn import DrawnFigure
-from .style import MEASURED, SIMULATED, legend_above, new_figure, prefixed, styled
+from .style import MEASURED, SIMULATED, DrawnFigure, legend_above, new_figure, prefixed, styled
 
 _HEIGHT_IN = 4.4
 _ROOM_HZ = 1.0

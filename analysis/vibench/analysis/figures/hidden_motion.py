@@ -6,13 +6,13 @@ from matplotlib.axes import Axes
 from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, measured_gaps
 from ..signals.arrays import Reals
 from ..tables import Table, table
-from .drawn import DrawnFigure
 from .style import (
     BOUNDS,
     COLLIDING,
     MEASURED,
     PREDICTED,
     SIMULATED,
+    DrawnFigure,
     legend_above,
     new_figure,
     prefixed,

@@ -2,12 +2,10 @@
 
 import numpy as np
 
-from ..sine.hysteresis import Hysteresis, hysteresis
-from ..sine.jumps import Jump
+from ..sine.jumps import Hysteresis, Jump, hysteresis
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import table
-from .drawn import DrawnFigure
-from .style import COLLIDING, LEVELS, legend_above, magnitude_axis, new_figure, styled
+from .style import COLLIDING, LEVELS, DrawnFigure, legend_above, magnitude_axis, new_figure, styled
 
 _HEIGHT_IN = 3.4
 

@@ -25,11 +25,11 @@ from ..dynamics import (
 from ..signals.arrays import Reals
 from ..tables import Table, table
 from .branches import draw_line
-from .drawn import DrawnFigure
 from .map_quantities import SHOWN
 from .style import (
     LEVELS,
     MEASURED,
+    DrawnFigure,
     frequency_axis,
     legend_above,
     magnitude_axis,

@@ -8,8 +8,7 @@ from matplotlib.axes import Axes
 from ..chaos.verdict import MotionKind, MotionVerdict
 from ..sine.dwell_analysis import DwellAnalysis
 from ..tables import Table, named, table
-from .drawn import DrawnFigure
-from .style import BOUNDS, SIMULATED, legend_above, new_figure, prefixed, styled
+from .style import BOUNDS, SIMULATED, DrawnFigure, legend_above, new_figure, prefixed, styled
 
 _PANEL_IN = 2.9
 _COLUMNS = 3

@@ -17,13 +17,22 @@ from vibench.acquisition.plan import (
 
 from ..model.overlay import RESPONSE_I, RESPONSE_II, SteppedSineOverlay
 from ..signals.arrays import Flags, Reals
-from ..sine.level_jumps import hysteresis_vpp, level_jumps
+from ..sine.jumps import hysteresis_vpp, level_jumps
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.tracked_resonance import feedback_sentences, noted_jumps
 from ..tables import named, plus_minus, table
-from .drawn import DrawnFigure
 from .ensemble_band import band_columns, run_text, simulated_label
-from .style import LINEAR, MEASURED, PREDICTED, SIMULATED, legend_above, magnitude_axis, new_figure, styled
+from .style import (
+    LINEAR,
+    MEASURED,
+    PREDICTED,
+    SIMULATED,
+    DrawnFigure,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    styled,
+)
 
 _HEIGHT_IN = 4.6
 _ATTRIBUTES = {RESPONSE_I: "response_i", RESPONSE_II: "response_ii"}

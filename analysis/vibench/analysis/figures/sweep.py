@@ -10,7 +10,6 @@ from ..sine.collision_region import Collisions
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import Table, named, plus_minus, table
-from .drawn import DrawnFigure
 from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from .hysteresis import jumps_text
 from .style import (
@@ -20,6 +19,7 @@ from .style import (
     PREDICTED,
     SIMULATED,
     TERMINAL,
+    DrawnFigure,
     legend_above,
     magnitude_axis,
     new_figure,

@@ -7,8 +7,17 @@ from matplotlib.figure import Figure
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import Table, table
 from ..tones.order_tracking import order_label
-from .drawn import DrawnFigure
-from .style import COLLIDING, LEVELS, MEASURED, legend_above, magnitude_axis, new_figure, prefixed, styled
+from .style import (
+    COLLIDING,
+    LEVELS,
+    MEASURED,
+    DrawnFigure,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    prefixed,
+    styled,
+)
 
 _HEIGHT_IN = 6.0
 _RANGE_DB = 80.0

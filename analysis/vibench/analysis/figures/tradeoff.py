@@ -6,8 +6,7 @@ from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark.figures import AccuracyBenchmark
 
 from ..tables import table
-from .drawn import DrawnFigure
-from .style import BOUNDS, LEVEL_STYLES, LEVELS, legend_above, new_figure, styled
+from .style import BOUNDS, LEVEL_STYLES, LEVELS, DrawnFigure, legend_above, new_figure, styled
 
 _MARKERS = {"DOP853": "x", "LSODA": "+", "Radau": "1"}
 _LEAST = 1e-14

@@ -10,7 +10,6 @@ from ..model.prediction import linear_transmissibility
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..tables import Table, named, plus_minus, table
-from .drawn import DrawnFigure
 from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from .marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
 from .style import (
@@ -19,6 +18,7 @@ from .style import (
     MEASURED,
     PREDICTED,
     SIMULATED,
+    DrawnFigure,
     frequency_axis,
     legend_above,
     magnitude_axis,

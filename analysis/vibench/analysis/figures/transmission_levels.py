@@ -6,9 +6,17 @@ from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.request import MagnitudeScale
 from ..recordings.facts import specimen_of
 from ..tables import table
-from .drawn import DrawnFigure
 from .marked_resonances import label_resonances, mark_resonances, model_resonances
-from .style import LEVEL_STYLES, LEVELS, frequency_axis, legend_above, magnitude_axis, new_figure, styled
+from .style import (
+    LEVEL_STYLES,
+    LEVELS,
+    DrawnFigure,
+    frequency_axis,
+    legend_above,
+    magnitude_axis,
+    new_figure,
+    styled,
+)
 
 _HEIGHT_IN = 4.0
 

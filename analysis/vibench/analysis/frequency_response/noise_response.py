@@ -19,14 +19,12 @@ from ..spectra.spectra import DensitySums
 from ..tables import Labelled
 from ..tones.drive_level import NoiseDriveLevel, noise_drive_level
 from .distortion import scatters_beyond_noise
-from .estimators import coherence, least_squares
 from .mode import Resonance
-from .periodic import PeriodicFrequencyResponse, PeriodicSums
-from .repetition import Repetition
+from .periodic import PeriodicFrequencyResponse, PeriodicSums, Repetition
 from .request import FrequencyResponseRequest
 from .resonance import resonances, scattered_resonances
 from .results import Estimator, FrequencyResponse, converted_frequency_response
-from .transmissibility import FrequencyResponseSums
+from .transmissibility import FrequencyResponseSums, coherence, least_squares
 
 Noise = WhiteNoise | OddMultisine | StreamedNoise
 _BLOCK = 1 << 19

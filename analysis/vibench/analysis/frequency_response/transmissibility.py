@@ -1,6 +1,7 @@
 """Transmission from noise records: response over drive by averaged spectra, with bounds."""
 
 from dataclasses import replace
+from math import ceil
 
 import numpy as np
 
@@ -9,15 +10,184 @@ from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE, coherence_significance, relative_sd, student_half_width
 from ..signals.window import Window
 from ..spectra.segment_spectra import SegmentSpectra, SpectralAverages, pieces
-from .estimators import (
-    coherence,
-    drive_referenced,
-    drive_referenced_relative_sd,
-    least_squares,
-    named_estimator,
-)
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
-from .steady import steady_relative_sd
+
+_ENOUGH_FREEDOM = 24.0
+"""Degrees of freedom of a line's variance with which it is known to a third."""
+_FREEDOM = 96.0
+"""Of the noises that are found over neighbouring lines: a small one shows in a part of these only."""
+_FEWEST_FREEDOM = 4.0
+"""Of all lines together, below which neighbours tell no more than the line."""
+_ROUNDS = 40
+_NOTHING = 1e-300
+_FAINT = 1e-12
+"""Of a variance, or of a shape, over what its neighbours have on average."""
+
+
+def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
+    """Give the standard deviation of ln(magnitude) with which lines are weighted in a fit.
+
+    One of two realisations is now and then a hundredth of the true one: as a weight it takes a few lines for
+    the whole truth. What is level over neighbouring lines is not the relative scatter, but the noise of both
+    sensors, and that of the base itself: y - H x has a + b |H|^2 + c |dH|^2, with dH from line to line, since
+    what does not repeat leaks by as much as a resonance rings on. They are found over lines enough, by
+    maximum likelihood of variances that are chi-square distributed.
+
+    Parameters
+    ----------
+    relative_sd
+        As each line tells it for itself, shape (lines,).
+    value
+        Response over drive H, in the units in which the sensors' noise is level; shape (lines,).
+    power
+        Mean square of the drive that the estimates rest on, to any scale, shape (lines,).
+    freedom
+        Degrees of freedom of each line's own variance.
+
+    """
+    # Averages that overlap nearly wholly are worth hardly more than one.
+    freedom = max(freedom, 1.0)
+    lines = min(ceil(_FREEDOM / freedom), value.size)
+    if freedom >= _ENOUGH_FREEDOM or lines * freedom <= _FEWEST_FREEDOM:
+        return relative_sd
+    gain = np.abs(value) ** 2
+    with np.errstate(invalid="ignore"):
+        variance = relative_sd**2 * gain * power
+        steps = np.nan_to_num(np.abs(np.gradient(value)) ** 2)
+    known = np.isfinite(variance)
+    shapes = np.where(known, [np.ones_like(gain), gain, steps], 0.0)
+    # Stretches overlap by half; between their middles sizes are interpolated.
+    last = value.size - lines
+    firsts = np.append(np.arange(0, last, max(lines // 2, 1)), last)
+    around = firsts[:, None] + np.arange(lines)
+    sizes = _sizes(np.where(known, variance, 0.0)[around], shapes[:, around])
+    places, middles = np.arange(value.size), firsts + (lines - 1) / 2
+    smooth = sum(np.interp(places, middles, size) * shape for size, shape in zip(sizes, shapes, strict=True))
+    # A square over a variance of n degrees of freedom is n / (n - 2) on average, Student's.
+    wider = lines * freedom / (lines * freedom - 2)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where(known, np.sqrt(wider * smooth / (gain * power)), np.nan)
+
+
+def _sizes(variance: Reals, shapes: Reals) -> Reals:
+    """Give how much of each shape a row of variances holds, shape (shapes, rows); none is below zero.
+
+    Fevotte, Bertin and Durrieu 2009 (Neural Comput. 21, 793-830): their updates raise the likelihood of
+    chi-square distributed values in every round.
+    """
+    level = np.maximum(variance.mean(axis=1), _NOTHING)[:, None]
+    heights = np.maximum(shapes.mean(axis=2, keepdims=True), _NOTHING)
+    variance, shapes = variance / level, shapes / heights
+    sizes = np.full((*shapes.shape[:2], 1), 1 / len(shapes))
+    for _ in range(_ROUNDS):
+        inverse = 1 / np.maximum(np.sum(sizes * shapes, axis=0), _FAINT)
+        seen = np.sum(shapes * variance * inverse**2, axis=2, keepdims=True)
+        sizes = sizes * np.sqrt(seen / np.maximum(np.sum(shapes * inverse, axis=2, keepdims=True), _FAINT))
+    return np.asarray(sizes * level / heights)[..., 0]
+
+
+def named_estimator(estimator: Estimator | str) -> Estimator:
+    """Turn a name into an estimator; raises InvalidRequest when no estimator has that name."""
+    try:
+        return Estimator(estimator)
+    except ValueError as unknown:
+        raise InvalidRequest(
+            f"estimator {estimator!r} is not known; use one of {', '.join(Estimator)}"
+        ) from unknown
+
+
+def coherence(s_xx: Reals, s_yy: Reals, s_xy: Complexes) -> Reals:
+    """|S_xy|^2 / (S_xx S_yy), 0 where a channel is dead."""
+    power = s_xx * s_yy
+    ratio = np.divide(np.abs(s_xy) ** 2, power, out=np.zeros_like(power), where=power > 0)
+    return np.asarray(np.clip(ratio, 0.0, 1.0))
+
+
+def h1(s_xx: Reals, s_xy: Complexes) -> Complexes:
+    """S_xy / S_xx."""
+    return _ratio(s_xy, s_xx.astype(np.complex128))
+
+
+def h2(s_yy: Reals, s_xy: Complexes) -> Complexes:
+    """S_yy / conj(S_xy)."""
+    return _ratio(s_yy.astype(np.complex128), np.conj(s_xy))
+
+
+def hv(s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float) -> Complexes:
+    """Total least squares with r = S_nn / S_mm, response noise over drive noise, in the channels' units.
+
+    [S_yy - r S_xx + sqrt((S_yy - r S_xx)^2 + 4 r |S_xy|^2)] / (2 conj(S_xy)); r to infinity is h1, r = 0
+    is h2. Without r the answer would depend on the units of the channels.
+    """
+    difference = s_yy - noise_ratio * s_xx
+    root = np.sqrt(difference**2 + 4 * noise_ratio * np.abs(s_xy) ** 2)
+    # Where the difference is negative the sum cancels; the conjugate form of the quadratic does not.
+    stable = np.divide(
+        4 * noise_ratio * np.abs(s_xy) ** 2,
+        root - difference,
+        out=np.zeros_like(root),
+        where=(root - difference) > 0,
+    )
+    numerator = np.where(difference > 0, difference + root, stable)
+    return _ratio(numerator.astype(np.complex128), 2 * np.conj(s_xy))
+
+
+def least_squares(
+    estimator: Estimator, s_xx: Reals, s_yy: Reals, s_xy: Complexes, noise_ratio: float | None
+) -> Complexes:
+    """h1, h2 or hv by its name.
+
+    Raises InvalidRequest for the drive-referenced estimator, which needs a third channel, and for hv without
+    its ratio.
+    """
+    match estimator, noise_ratio:
+        case Estimator.H1, _:
+            return h1(s_xx, s_xy)
+        case Estimator.H2, _:
+            return h2(s_yy, s_xy)
+        case Estimator.HV, float(ratio):
+            return hv(s_xx, s_yy, s_xy, ratio)
+        case _:
+            raise InvalidRequest(
+                f"{estimator.value} is not made of two channels alone; use h1, h2, or hv with a noise ratio"
+            )
+
+
+def drive_referenced(s_rx: Complexes, s_ry: Complexes) -> Complexes:
+    """S_ry / S_rx: the reference acts as an instrument, noise on x and y averages out."""
+    return _ratio(s_ry, s_rx)
+
+
+def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: float) -> Reals:
+    """Relative standard deviation of the drive-referenced estimate.
+
+    Var(H) = S_vv S_rr / (n |S_rx|^2) with the residual v = y - H x (instrumental variables; Wellstead
+    1981, Automatica 17, 669-673), half of it in each of magnitude and phase.
+
+    Parameters
+    ----------
+    products
+        Averaged products of x, y, r in this order, shape (3, 3, lines), any common scale.
+    value
+        The estimate H, shape (lines,).
+    n_eff
+        Independent averages.
+
+    """
+    s_xx, s_yy, s_rr = (products[i, i].real for i in range(3))
+    s_xy, s_rx = products[0, 1], products[2, 0]
+    magnitude2 = np.abs(value) ** 2
+    residual = np.maximum(s_yy - 2 * np.real(np.conj(value) * s_xy) + magnitude2 * s_xx, 0.0)
+    bottom = 2 * n_eff * magnitude2 * np.abs(s_rx) ** 2
+    variance = np.divide(residual * s_rr, bottom, out=np.full_like(bottom, np.inf), where=bottom > 0)
+    return np.asarray(np.sqrt(variance))
+
+
+def _ratio(numerator: Complexes, denominator: Complexes) -> Complexes:
+    """Divide; a line without any drive has no transmission and gives NaN."""
+    missing = np.full_like(numerator, complex(np.nan, np.nan))
+    return np.asarray(np.divide(numerator, denominator, out=missing, where=denominator != 0))
+
 
 _LEAST_SEGMENTS = 2
 _DRIVE, _RESPONSE, _REFERENCE = range(3)

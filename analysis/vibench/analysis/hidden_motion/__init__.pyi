@@ -30,6 +30,7 @@ from ._hidden_motion import (
     TrackedMotion as TrackedMotion,
     hidden_motion as hidden_motion,
     hidden_motion_in_samples as hidden_motion_in_samples,
+    keep_hidden_motion as keep_hidden_motion,
     parameter_rows as parameter_rows,
 )
 from ._hidden_view import (
@@ -38,21 +39,14 @@ from ._hidden_view import (
     HiddenViewRequest as HiddenViewRequest,
     hidden_view as hidden_view,
 )
-from ._kept_motion import (
-    keep_hidden_motion as keep_hidden_motion,
-)
-from ._live_motion import (
+from ._live_twin import (
     LiveMotion as LiveMotion,
     LiveState as LiveState,
-)
-from ._live_twin import (
     LiveTwin as LiveTwin,
-)
-from ._numbers import (
-    Numbers as Numbers,
 )
 from ._parameters import (
     Hidden as Hidden,
+    Numbers as Numbers,
     value_of as value_of,
     with_values as with_values,
 )

@@ -15,11 +15,10 @@ from scipy.stats import t as student
 
 from ..signals.arrays import Reals
 from ..tables import Labelled, plus_minus, unit_of
-from ._estimation import Estimate, estimate
+from ._estimation import NEAR, Estimate, estimate, looked_for, search_start
 from ._filtering import LOSS_LIMIT, FilterState, motion_model, run_filter
 from ._parameters import PRIOR_SD, Hidden, scale_of, value_of, with_values
 from ._prepared_motion import PreparedMotion
-from ._search_start import NEAR, looked_for, search_start
 from ._tracking import acquire
 from ._tracking_model import TrackedSpecimen
 

@@ -7,21 +7,19 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vibench.acquisition.recording import Recording
+from vibench.acquisition.recording import Recording, ResultArray
 from vibench.sim import Specimen
 
 from ..errors import InvalidRequest
-from ..recordings.channels import ProgressObserver, Unobserved
-from ..recordings.facts import specimen_of
-from ..recordings.intact import require_checked
+from ..recordings.channels import BASE, RESPONSE, ProgressObserver, Unobserved
+from ..recordings.facts import require_checked, specimen_of
 from ..signals.arrays import Reals, Samples
 from ..tables import Labelled
 from ._collisions import Collisions, collisions_of, joined_collisions
 from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
 from ._filtering import motion_model
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, not_believed, with_unit
-from ._numbers import Numbers
-from ._parameters import Hidden
+from ._parameters import Hidden, Numbers
 from ._prepared_motion import ChannelNoise, PreparedMotion, motion_in_samples, prepared_motion
 from ._tracking import NotFollowed, TrackedPiece, follow
 from ._tracking_model import TrackedSpecimen, tracked_specimen
@@ -384,3 +382,60 @@ def _sentences(motion: HiddenMotion) -> Iterator[str]:
         else:
             untold.setdefault(parameter.not_determined, []).append(label)
     yield from (f"Not determined, {', '.join(labels)}: {why}." for why, labels in untold.items())
+
+
+RESULT = "hidden_motion"
+_TIME, _IMPACT, _FREE = "time", "impact_time", "free_impact_time"
+
+
+def keep_hidden_motion(recording: Recording, motion: HiddenMotion) -> str:
+    """Save a hidden motion beside the samples it came from; gives the name of the result.
+
+    Exports take it along (`vibench export --results`). Not followed samples are NaN.
+
+    Raises
+    ------
+    RecordingError
+        When the recording is not finished, or the disk refuses.
+
+    """
+    arrays = {**_channels(motion), **_tracked_impacts(motion), **_free_impacts(motion)}
+    settings = {"told": motion.to_dict(), "sentences": list(motion.sentences)}
+    return recording.save_results(RESULT, arrays, settings, (BASE, RESPONSE))
+
+
+def _channels(motion: HiddenMotion) -> dict[str, ResultArray]:
+    def along(values: Samples, unit: str) -> ResultArray:
+        return ResultArray(values.astype(np.float32, copy=False), unit, (_TIME,))
+
+    return {
+        _TIME: ResultArray(motion.time_s, "s"),
+        "p": along(motion.tracked.p, "m"),
+        "p_sd": along(motion.tracked.p_sd, "m"),
+        "p_rate": along(motion.tracked.rate, "m s-1"),
+        "p_without_contact_model": along(motion.free.p, "m"),
+        "p_without_contact_model_sd": along(motion.free.p_sd, "m"),
+    }
+
+
+def _tracked_impacts(motion: HiddenMotion) -> dict[str, ResultArray]:
+    found = motion.tracked.collisions
+    return {
+        _IMPACT: ResultArray((motion.first_sample + found.samples) / motion.sample_rate_hz, "s"),
+        "impact_side": ResultArray(found.sides, "1", (_IMPACT,)),
+        "impact_impulse": ResultArray(found.impulses, "N s", (_IMPACT,)),
+        "impact_penetration": ResultArray(found.penetrations_m, "m", (_IMPACT,)),
+        "impact_duration": ResultArray(found.durations_s, "s", (_IMPACT,)),
+        "impact_speed_before": ResultArray(found.speeds_before, "m s-1", (_IMPACT,)),
+        "impact_speed_after": ResultArray(found.speeds_after, "m s-1", (_IMPACT,)),
+    }
+
+
+def _free_impacts(motion: HiddenMotion) -> dict[str, ResultArray]:
+    found = motion.free.impacts
+    return {
+        _FREE: ResultArray((motion.first_sample + found.samples) / motion.sample_rate_hz, "s"),
+        "free_impact_side": ResultArray(found.sides, "1", (_FREE,)),
+        "free_impact_impulse": ResultArray(found.impulses, "N s", (_FREE,)),
+        "free_impact_p": ResultArray(found.p, "m", (_FREE,)),
+    }

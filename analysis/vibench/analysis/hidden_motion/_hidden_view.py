@@ -12,7 +12,7 @@ from vibench.sim import UnknownSpecimenError, load_specimen
 from ..errors import InvalidRequest
 from ..signals.arrays import Reals, Samples
 from ..tables import Labelled
-from ._numbers import Numbers
+from ._parameters import Numbers
 
 LONGEST_VIEW_S = 2.0
 """Of a picture: worked out in about a second."""

@@ -6,7 +6,9 @@ accelerometer's coupling is a state of the filter. Nothing here waits or sleeps.
 """
 
 from concurrent.futures import Executor, Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -16,16 +18,49 @@ from vibench.sim import Specimen
 
 from ..recordings.channels import BASE, RESPONSE
 from ..signals.arrays import Reals
+from ..tables import Labelled
 from ._change_watch import BLOCK_S, ChangeWatch, KnownNumber, Level
 from ._filtering import LOSS_LIMIT, Filtered, FilterState, MotionModel, motion_model, run_filter
 from ._forecast import LEARNT_S, Forecast, Forecaster
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen
-from ._live_motion import LiveMotion, LiveState
 from ._parameters import Hidden, with_values
 from ._prepared_motion import ChannelNoise, PreparedMotion, dark_samples, require_channels, white_noise
 from ._sensor_correction import HALF_LENGTH, sensor_correction
 from ._tracking import ACQUISITION_S, acquire, believed
 from ._tracking_model import STATES, TrackedSpecimen, tracked_specimen
+
+
+class LiveState(StrEnum):
+    """What of the hidden motion is known at the moment."""
+
+    WAITING = "waiting"
+    """Too little has been measured, or nothing moves enough to be told."""
+    TRACKED = "tracked"
+    LOST = "lost"
+    """What is measured does not fit the specimen's numbers: nothing is shown as motion."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiveMotion(Labelled):
+    """The newest of the hidden motion."""
+
+    OWN_UNITS: ClassVar = {"p": "m"}
+
+    state: LiveState
+    why: str
+    """Where it is not tracked."""
+    first: int
+    """Number in the recording of the first sample of ``p``."""
+    p: Reals
+    """Relative displacement, NaN where it was not followed [m]."""
+    forecast: Forecast | None
+    """Under a sine only."""
+    gaps_m: tuple[float, float]
+    level: float
+    """Of the last block; 1 when nothing but noise is left."""
+    limit: float
+    """Beyond which a block lies out; NaN while the usual level is being learnt."""
+
 
 HELD_S = 3.0
 """Of motion that is held for finding numbers in."""

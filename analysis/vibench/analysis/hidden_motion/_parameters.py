@@ -81,3 +81,11 @@ def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> Tra
         lower_gap_m=new[Hidden.LOWER_GAP],
     )
     return TrackedSpecimen(specimen, new[Hidden.FORCE], new[Hidden.EXPONENT], new[Hidden.LOSS])
+
+
+class Numbers(StrEnum):
+    """Which gaps, m1, springs, dampers and contact law the motion is tracked with."""
+
+    FOUND = "found"
+    """Those that the collisions tell, where they tell them."""
+    AS_DESCRIBED = "as described"

@@ -15,17 +15,18 @@ from ..model.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts
-from ..sine.drive_frequency import frequency_check
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import (
     DwellAnalysis,
     DwellPlan,
+    TerminalLevel,
     bound_frequencies_hz,
     measured_dwell,
     settled_envelope,
+    terminal_levels,
 )
 from ..sine.dwell_motion import IrregularMotion, dwell_motion, irregular_motion
-from ..sine.terminal_level import TerminalLevel, terminal_levels
+from ..sine.sweep_analysis import frequency_check
 from ..tables import named
 from ..uncertainty.quantities import dwell_budgets
 from .analysis_kind import AnalysisKind, Json

@@ -18,8 +18,7 @@ from ..model.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts
-from ..sine.drive_frequency import frequency_check
-from ..sine.level_jumps import level_summary
+from ..sine.jumps import level_summary
 from ..sine.stepped_response import (
     SteppedResponse,
     SteppedSineAnalysis,
@@ -27,6 +26,7 @@ from ..sine.stepped_response import (
     settled_check,
     stepped_response,
 )
+from ..sine.sweep_analysis import frequency_check
 from ..tables import named
 from ..uncertainty.quantities import stepped_budgets
 from .analysis_kind import AnalysisKind, Json

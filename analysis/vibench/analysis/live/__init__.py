@@ -19,18 +19,16 @@ of three samples is in every picture. Samples come in volts or channel units; no
 """
 
 from ..recordings.channels import RESPONSE
-from ._envelope import (
-    column_starts,
-    envelope,
-    zigzag,
-)
 from ._levels import (
     OVER_SHARE,
     Level,
     LevelVerdict,
 )
 from ._outline import (
+    column_starts,
+    envelope,
     outline,
+    zigzag,
 )
 from ._overview import (
     THUMBNAIL_COLUMNS,

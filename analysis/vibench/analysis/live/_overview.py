@@ -27,8 +27,7 @@ from vibench.acquisition.recording import (
 from ..errors import InvalidRequest
 from ..recordings.channels import RESPONSE
 from ..signals.arrays import Reals
-from ._envelope import Samples, column_starts, envelope
-from ._outline import outline, period_of, reach_of, widened
+from ._outline import Samples, column_starts, envelope, outline, period_of, reach_of, widened
 
 _COARSER = 16
 """Bins of one level in one bin of the next."""

@@ -7,9 +7,8 @@ from scipy import fft
 
 from ..signals.arrays import Reals
 from ..tables import Labelled
-from ._drive_tone import drive_tone, drive_turns
 from ._ring import RingWindow
-from ._sine_response import displacement_of, look_samples
+from ._sine_response import displacement_of, drive_tone, drive_turns, look_samples
 
 SHOWN_PERIODS = 20
 _EDGE_PERIODS = 25

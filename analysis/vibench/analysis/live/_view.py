@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from ..frequency_response.results import FrequencyResponse
 from ..recordings.channels import BASE, DRIVE, RESPONSE
 from ..signals.arrays import Reals
-from ._envelope import Samples, column_starts
 from ._impacts import ImpactCounter
 from ._levels import Level, LevelMeters
-from ._outline import outline
+from ._outline import Samples, column_starts, outline
 from ._portrait import PoincareSection, Portrait, portrait, portrait_samples
 from ._ring import Ring
 from ._sine_response import SinePoint, look_samples, sine_point, stretch_samples

@@ -4,11 +4,12 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import islice
 from typing import Generic, TypeVar
 
 import numpy as np
+import scipy
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import BridgedChannel, Recording
@@ -18,12 +19,10 @@ from vibench.sim.shaker.sampled_voltage import SampledMotion, follow_voltage
 
 from ..errors import UnusableData
 from ..recordings.channels import BASE, DRIVE, RESPONSE, RecordedChannels
-from ..signals.arrays import Reals
-from .channel_noise import ChannelNoise, channel_noise
+from ..signals.arrays import Complexes, Reals
 from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
 from .ensemble import FEWEST_DRAWS, Quantity, ensemble_curves
 from .escape import Ending
-from .played_voltage import PlayedVoltage, above_noise
 from .shaker_fit import FittedShaker
 from .simulated_channels import (
     HIGHEST_PART,
@@ -32,6 +31,115 @@ from .simulated_channels import (
     lowest_frequency_hz,
     under_base_motion,
 )
+
+_FRAME_SAMPLES = 1 << 15
+"""Within which a drive's lines stand apart from noise: half a second to a second."""
+_LEVEL_LINES = 256
+"""Over which the level of noise is taken: of their median, which a few lines of the drive hardly move."""
+_SURELY = 20.0
+"""Power of a line over that of noise, which exceeds it once in 5e8 lines."""
+
+
+class PlayedVoltage:
+    """A recorded voltage without its converter's noise, as far as that can be told.
+
+    The converter's noise did not shake the table: simulated under the voltage as recorded, with as much added
+    for what is not known of it, a weak motion is lifted twice too much by noise. Frame by frame and line by
+    line the part that is likely stays (Wiener's filter; all of what surely is no noise), and what that leaves
+    open is drawn: draws scatter as far as the voltage is not known, and their power is that of the recording
+    less the converter's.
+    """
+
+    def __init__(self, volts: Reals, converter_rms_v: float) -> None:
+        self._volts, self._own_v = volts, converter_rms_v
+        frame = min(_FRAME_SAMPLES, max(4, volts.size // 2))
+        self._frames = scipy.signal.ShortTimeFFT(scipy.signal.windows.hann(frame, sym=False), frame // 2, 1.0)
+
+    @cached_property
+    def _likely(self) -> tuple[Complexes, Reals]:
+        """Lines of each frame, shape (lines, frames): the likely part, and its share of what was recorded."""
+        lines = self._frames.stft(self._volts)
+        own = self._own_v**2 * float(np.sum(self._frames.win**2))
+        power = np.abs(lines) ** 2
+        # The median of exponentially distributed powers is log 2 of their mean.
+        level = np.concatenate(
+            [
+                np.broadcast_to(np.median(each, axis=0) / np.log(2.0), each.shape)
+                for each in np.array_split(power, max(1, len(power) // _LEVEL_LINES))
+            ]
+        )
+        total = np.maximum(level, own)
+        share = np.where(power > _SURELY * total, 1.0, 1.0 - own / np.where(total > 0.0, total, 1.0))
+        return share * lines, share
+
+    def drawn(self, rng: np.random.Generator) -> Reals:
+        """Give a voltage that may have been played, shape (samples,) [V]."""
+        if self._own_v == 0.0:
+            return self._volts
+        lines, share = self._likely
+        own = self._frames.stft(self._own_v * rng.standard_normal(self._volts.size))
+        return np.asarray(self._frames.istft(lines + np.sqrt(share) * own, k1=self._volts.size).real)
+
+
+def above_noise(volts: Reals, rms: float) -> Reals:
+    """Give what surely is voltage and no noise of its channel, which would shake a simulated table."""
+    spectrum = np.fft.rfft(volts)
+    spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * rms**2] = 0.0
+    return np.asarray(np.fft.irfft(spectrum, volts.size))
+
+
+_BLOCK_S = 0.05
+_BLOCKS = 200
+"""Looked at, evenly over the recording; the whole first and last second besides."""
+_BAND = (0.2, 0.4)
+"""Part of the sample rate that shows a channel's own noise: no mode reaches there, and only impacts do."""
+_ALIKE = 6.0
+"""Standard deviations of a block's power, of so many lines, between blocks of one level."""
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """White noise of each channel, rms per sample in its physical unit."""
+
+    rms: dict[str, float]
+    converter_v: float
+    """The least of them at a converter's input: the converter's own [V]."""
+
+
+def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
+    """Take the quietest stretch of each channel: recordings begin in silence, or nearly."""
+    rate, samples = recording.sample_rate_hz, recording.samples
+    length = max(16, round(_BLOCK_S * rate))
+    ends = np.concatenate([np.arange(0, rate, length), samples - np.arange(length, rate + length, length)])
+    starts = np.unique(np.concatenate([ends, np.linspace(0, samples - length, _BLOCKS)]).astype(int))
+    starts = starts[(starts >= 0) & (starts <= samples - length)]
+    rms = {
+        role: _quiet([_white(recording.read(role, int(at), int(at) + length)) for at in starts], length)
+        for role in roles
+    }
+    volts = [rms[role] / abs(recording.channel(role).physical_per_volt) for role in roles]
+    return ChannelNoise(rms, min(volts))
+
+
+def _quiet(rms: list[float], length: int) -> float:
+    """Give the level of the blocks that are as quiet as the quietest: alone it is some per cent too low."""
+    if not rms:
+        return 0.0
+    power = np.square(rms)
+    lines = (_BAND[1] - _BAND[0]) * length
+    alike = power <= power.min() * (1.0 + _ALIKE / np.sqrt(lines))
+    return float(np.sqrt(np.mean(power[alike]))) if np.isfinite(power.min()) else float(np.inf)
+
+
+def _white(samples: Reals) -> float:
+    """Rms of white noise of the density that a block shows far above all motion; infinite across a hole."""
+    if np.isnan(samples).any():
+        return np.inf
+    power = np.abs(np.fft.rfft(samples * np.hanning(samples.size))) ** 2
+    low, high = (round(part * samples.size) for part in _BAND)
+    # The mean power of a bin is the variance times the sum of the squared taper.
+    return float(np.sqrt(np.mean(power[low:high]) / np.sum(np.hanning(samples.size) ** 2)))
+
 
 DRAWS = 16
 """Of a colliding motion: its band of 95 % is then known to a fifth of its width."""

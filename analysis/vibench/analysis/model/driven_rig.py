@@ -14,8 +14,7 @@ from vibench.sim.shaker.parts import Amplifier, Shaker
 from vibench.sim.shaker.sampled_voltage import DrivenTable
 
 from ..errors import UnusableData
-from ..recordings.channels import BASE, DRIVE, RESPONSE
-from ..recordings.sensor_gain import sensor_gain
+from ..recordings.channels import BASE, DRIVE, RESPONSE, sensor_gain
 from ..signals.arrays import Reals
 
 AMPLIFIER = "amplifier_voltage"

@@ -14,15 +14,20 @@ from ..signals.arrays import Reals
 from ..signals.envelope import Envelope
 from ..sine.collision_region import Collisions, collisions
 from ..sine.dwell import DwellResponse
-from ..sine.dwell_analysis import DwellAnalysis, bound_frequencies_hz, settled_envelope, spectrum_columns
+from ..sine.dwell_analysis import (
+    DwellAnalysis,
+    TerminalLevel,
+    bound_frequencies_hz,
+    settled_envelope,
+    spectrum_columns,
+    terminal_levels,
+)
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
-from ..sine.terminal_level import TerminalLevel, terminal_levels
 from ..tables import Labelled
-from .difference import CurveDifference, logarithmic_difference
 from .draws import Drawn, SimulatedRun
-from .ensemble import MIXED, EnsembleCurve, Quantity, ensemble_curves
+from .ensemble import MIXED, CurveDifference, EnsembleCurve, Quantity, ensemble_curves, logarithmic_difference
 from .escape import Ending, EscapeRate, escape_rate
 from .prediction import ResponsePrediction, paper_amplitude_m, predicted
 

@@ -14,8 +14,7 @@ from vibench.sim.shaker.parts import Shaker
 from ..errors import UnusableData
 from ..frequency_response.noise_response import NoiseAnalysis, repeated_response, streamed_response
 from ..frequency_response.results import FrequencyResponse
-from ..recordings.channels import BASE, DRIVE, RecordedChannels, Stretch
-from ..recordings.sensor_gain import coupled_gain
+from ..recordings.channels import BASE, DRIVE, RecordedChannels, Stretch, coupled_gain
 from ..signals.arrays import Complexes, Flags, Reals
 from ..tables import plus_minus
 from .driven_rig import AMPLIFIER

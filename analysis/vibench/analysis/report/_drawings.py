@@ -12,7 +12,6 @@ from vibench.acquisition.plan import Family, excitation_text, rows_by_kind
 from ..figures.backbone import backbone_figure
 from ..figures.bench_levels import bench_levels_figure
 from ..figures.distortion import distortion_figure
-from ..figures.drawn import DrawnFigure
 from ..figures.dwells import dwells_figure
 from ..figures.excitation import excitation_figure
 from ..figures.held_branch import held_branch_figure
@@ -25,6 +24,7 @@ from ..figures.stepped_sine import (
     SteppedLook,
     stepped_sine_figure,
 )
+from ..figures.style import DrawnFigure
 from ..figures.sweep import sweep_figure
 from ..figures.sweep_orders import sweep_orders_figure
 from ..figures.transmission import transmission_figure

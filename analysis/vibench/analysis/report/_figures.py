@@ -3,7 +3,6 @@
 from ..figures.branches import branches_figure, draw_line
 from ..figures.chain import chain_figure
 from ..figures.contact_forces import contact_forces_figure
-from ..figures.drawn import DrawnFigure
 from ..figures.exponent_spectrum import exponent_spectrum_figure
 from ..figures.maps import map_figure
 from ..figures.style import (
@@ -14,6 +13,7 @@ from ..figures.style import (
     MEASURED,
     SIMULATED,
     TERMINAL,
+    DrawnFigure,
     frequency_axis,
     legend_above,
     magnitude_axis,

@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from vibench.acquisition import printable
 
-from ..figures.drawn import DrawnFigure
+from ..figures.style import DrawnFigure
 
 Rows = tuple[tuple[str, str], ...]
 LONGEST_CAPTION = 280

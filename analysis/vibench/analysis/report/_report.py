@@ -1,25 +1,242 @@
 """The report of a campaign, or of one recording, as one self-contained HTML file."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from datetime import datetime, timedelta
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from vibench.sim import Parameter
 from vibench.sim.maps import MapResults
 
-from ..dynamics import BranchDiagram
+from ..comparison.curve import Curve, CurveKind, CurveOrigin
+from ..dynamics import BranchDiagram, RecordedLevel
 from ..errors import NotEnoughData
+from ..figures.branches import branches_figure
 from ..figures.hidden_motion import hidden_impacts_figure, hidden_motion_figure
+from ..figures.maps import map_figure
+from ..figures.style import DrawnFigure
 from ..hidden_motion import HiddenMotion
+from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult
-from ..recordings.checks import Verdict
+from ..recordings.checks import Check, Verdict
+from ..recordings.facts import RecordingFacts
 from ..results.campaign_results import AnalysisFailure, CampaignResults, FailedStep
+from ..results.compared_recording import drive_level
+from ..sine.tracked_resonance import lost_levels, tracked_resonances
 from ._drawings import DRAWINGS, figures_together, recording_figures, result_sentence
 from ._findings import limits
-from ._laid_branches import laid_branches, laid_maps
 from ._page import Agreement, Card, Fold, Page, ReportTable, write_page
-from ._recording_section import bench_table, channel_table, check_table, measured_table, version_table
 from ._result_tables import uncertainty_table
 from ._summary import summary
+
+
+def laid_maps(results: CampaignResults, maps: Sequence[MapResults]) -> Iterator[DrawnFigure]:
+    """Draw each map, with the levels and Responses I of everything that was measured under many sines."""
+    levels = [
+        RecordedLevel(each.analysis.facts.name, level, tuple(_measured(each, CurveKind.RESPONSE_I)))
+        for each in results.in_order
+        if len(level := drive_level(each)) > 1
+    ]
+    for number, found in enumerate(maps, start=1):
+        drawn = map_figure(found, levels=levels if found.plan.is_over_drive else ())
+        yield replace(drawn, name=f"map_{number}")
+
+
+def _measured(result: AnyResult, *kinds: CurveKind) -> Iterator[Curve]:
+    measured = ANALYSES[result.kind].curves(
+        result.analysis.facts.name, CurveOrigin.MEASURED, result.analysis.response
+    )
+    return (curve for curve in measured if not kinds or curve.response in kinds)
+
+
+def laid_branches(results: CampaignResults, diagrams: Sequence[BranchDiagram]) -> Iterator[DrawnFigure]:
+    """Draw each diagram along frequency over everything that was measured under sines of many frequencies."""
+    levels = [(each, level) for each in results.in_order if len(level := drive_level(each)) > 1]
+    for number, diagram in enumerate(diagrams, start=1):
+        if diagram.request.resonance_band_hz is not None:
+            yield replace(_laid_backbone(results, diagram), name=f"branches_{number}")
+            continue
+        if diagram.request.along is not Parameter.FREQUENCY or not levels:
+            yield replace(branches_figure(diagram), name=f"branches_{number}")
+            continue
+        curves = [curve for result, _ in levels for curve in _measured(result)]
+        drawn = branches_figure(diagram, curves)
+        said = " ".join(_level_sentence(diagram, result, level) for result, level in levels)
+        yield replace(drawn, name=f"branches_{number}", caption=f"{drawn.caption} {said}")
+
+
+def _laid_backbone(results: CampaignResults, diagram: BranchDiagram) -> DrawnFigure:
+    """Draw a phase resonance beneath those that were tracked around it."""
+    low_hz, high_hz = diagram.request.resonance_band_hz or (0.0, 0.0)
+    facts = [each.analysis.facts for each in results.in_order]
+    bands = [each.measurement.excitation.band_hz for each in facts]
+    near = [
+        each.feedback
+        for each, band in zip(facts, bands, strict=True)
+        if band[0] < high_hz and low_hz < band[1]
+    ]
+    tracked = [each for notes in near for each in tracked_resonances(notes)]
+    drawn = branches_figure(diagram, tracked=tracked)
+    said = [_lost_sentence(diagram, level) for notes in near for level in lost_levels(notes)]
+    return replace(drawn, caption=" ".join((drawn.caption, *said)))
+
+
+def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
+    """Say what the model has at a level at which no resonance was found: multipliers, or no motion."""
+    sizes: list[float] = []
+    for line in diagram.lines:
+        above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
+        sizes += line.largest_multiplier[1:][above[1:] != above[:-1]].tolist()
+    told = f"At {level_m_per_s2:g} m/s² no periodic motion was locked on;"
+    if not sizes:
+        return f"{told} none of these branches has one there."
+    multipliers = ", ".join(f"{each:.3g}" for each in sizes)
+    return f"{told} the largest multiplier of the model's is {multipliers}."
+
+
+def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tuple[float, float], ...]) -> str:
+    """Say by what factor a recording's level lies above the branches', where both are."""
+    request = diagram.request
+    ratios = [
+        amplitude / request.path.drive(frequency)[1]
+        for frequency, amplitude in level
+        if request.start <= frequency <= request.stop
+    ]
+    name = result.analysis.facts.name
+    if not ratios:
+        return f"{name} was driven outside of these frequencies."
+    low, high = np.min(ratios), np.max(ratios)
+    return f"The base of {name} moved {low:.2g} to {high:.2g} times as far as that of the branches."
+
+
+def measured_table(facts: RecordingFacts) -> ReportTable:
+    """Say what was played, when, and how it ended."""
+    plan = facts.measurement
+    reason = f": {facts.reason}" if facts.reason else ""
+    rows = (
+        ("excitation", excitation_text(plan.excitation.model_dump(mode="json"))),
+        ("ramps", f"{plan.ramp_s:g} s, half cosine"),
+        ("started", f"{facts.started_utc} UTC"),
+        ("length", f"{facts.duration_s:.2f} s, {facts.sample_rate_hz:.6g} samples/s"),
+        ("ended", f"{facts.state.value}{reason}"),
+        ("file", f"{facts.path.name}, id {facts.recording_id}"),
+        *((("notes", plan.notes),) if plan.notes else ()),
+    )
+    return ReportTable("Recording", (), rows)
+
+
+def excitation_text(plan: Mapping[str, Any]) -> str:
+    """Say a plan in one line, all its numbers included."""
+    rest = [
+        f"{key} = {value}" for key, value in plan.items() if key != "kind" and not isinstance(value, list)
+    ]
+    return f"{str(plan['kind']).replace('_', ' ')}: {', '.join(rest)}"
+
+
+def bench_table(facts: RecordingFacts) -> ReportTable:
+    """Say which bench it was, who answered, and what was confirmed by hand."""
+    rows = [("bench", str(facts.bench.get("name", "not named")))]
+    rows += [
+        (part, f"{who.maker} {who.model}, serial {who.serial}, firmware {who.firmware}")
+        for part, who in facts.instruments.items()
+    ]
+    rows += [(name, str(value)) for name, value in facts.confirmations.items()]
+    rows += [
+        (part, _named(facts.bench[part]))
+        for part in ("amplifier", "shaker", "vibrometer", "accelerometer")
+        if part in facts.bench
+    ]
+    specimen = facts.bench.get("specimen")
+    if specimen:
+        rows.append(
+            (
+                "specimen",
+                ", ".join(
+                    f"{k} = {_value(v)}" for k, v in specimen.items() if v is not None and k != "sources"
+                ),
+            )
+        )
+    rows.append(("bench check", bench_check_text(facts)))
+    rate = f"{facts.sample_rate_hz:.6g} samples/s, {facts.requested_sample_rate_hz:.6g} asked for"
+    rows.append(("sample rate", rate))
+    return ReportTable("Bench", (), tuple(rows))
+
+
+def bench_check_text(facts: RecordingFacts) -> str:
+    """Say how the last check of the whole bench came out, how long before, and what it did not like."""
+    check = facts.bench_check
+    if not check:
+        return "none"
+    before = datetime.fromisoformat(facts.started_utc) - datetime.fromisoformat(str(check["checked"]))
+    odd = [
+        f"{each['name']} {each['value']} ({each['verdict']}; expected {each['expected']})"
+        for each in check["findings"]
+        if each["verdict"] != "ok"
+    ]
+    head = f"{check['verdict']}, {before / timedelta(hours=1):.1f} h before"
+    return ": ".join([head, "; ".join(odd)]) if odd else head
+
+
+def _named(part: Mapping[str, Any]) -> str:
+    plain = [f"{key} = {value}" for key, value in part.items() if isinstance(value, (int, float))]
+    head = f"{part.get('model', '')}, serial {part.get('serial') or 'not given'}"
+    return ", ".join([head, *plain])
+
+
+def _value(value: Any) -> str:
+    match value:
+        case {"value": number, "source": source}:
+            return f"{number:g} ({source})"
+        case _:
+            return str(value)
+
+
+_HEADINGS = "channel, input, sensor, serial, sensitivity, range, coupling, calibrated, delay"
+
+
+def channel_table(facts: RecordingFacts) -> ReportTable:
+    """Say how every channel was set and calibrated."""
+    rows = tuple(
+        (
+            each.header.role.replace("_", " "),
+            each.header.physical_channel,
+            each.header.long_name,
+            each.header.serial or "–",
+            "–"
+            if each.header.sensitivity is None
+            else f"{each.header.sensitivity:.5g} {each.header.sensitivity_unit}",
+            f"±{each.header.range_v:g} V",
+            each.header.coupling,
+            each.header.calibration_date or "–",
+            f"{1e6 * each.header.delay_s:g} µs",
+        )
+        for each in facts.channels
+    )
+    return ReportTable("Channels", tuple(_HEADINGS.split(", ")), rows)
+
+
+def version_table(facts: RecordingFacts) -> ReportTable:
+    """Say which programs made the recording."""
+    provenance = facts.provenance
+    packages = ", ".join(f"{name} {which}" for name, which in dict(provenance.get("packages", {})).items())
+    rows = (
+        ("packages", packages),
+        ("commit", str(provenance.get("commit") or "not from a checkout")),
+        ("python", str(provenance.get("python", ""))),
+        ("platform", str(provenance.get("platform", ""))),
+    )
+    return ReportTable("Versions that made the recordings", (), rows)
+
+
+def check_table(checks: tuple[Check, ...]) -> ReportTable:
+    """Verdict, what, and text of each check."""
+    rows = tuple((each.verdict.value, each.what, each.text) for each in checks)
+    return ReportTable("Checks", (), rows)
+
 
 CHANGE_A_CONCLUSION = frozenset({"How it ended", "Seal", "Overloads", "Drop-outs", "Drive level"})
 """Checks whose warnings say that a result is wrong or not the planned one; those of others qualify it."""

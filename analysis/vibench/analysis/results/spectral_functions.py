@@ -14,7 +14,7 @@ from ..frequency_response.noise_response import NoiseResponse
 from ..frequency_response.request import FrequencyResponseRequest, FrequencyResponseView
 from ..kinds.analyses import ANALYSES
 from ..kinds.noise import NOISE_FAMILY
-from ..recordings.intact import require_checked
+from ..recordings.facts import require_checked
 from ..signals.quantity import Quantity
 from ..signals.window import hop_samples
 from ..spectra.spectra import DensitySums

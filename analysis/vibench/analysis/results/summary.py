@@ -4,9 +4,8 @@ from collections.abc import Iterator
 
 from ..kinds.analyses import ANALYSES
 from ..kinds.analysis_kind import AnyResult, Json
-from ..model.difference import CurveDifference
 from ..model.draws import SimulatedRun
-from ..model.ensemble import EnsembleCurve
+from ..model.ensemble import CurveDifference, EnsembleCurve
 from ..model.escape import EscapeRate
 from ..recordings.facts import RecordingFacts
 from ..tables import named, plain

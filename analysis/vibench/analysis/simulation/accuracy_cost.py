@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from vibench.sim import Accuracy, PowerLaw
 
-from .request import Exponent, SimulationRequest
+from .progress import Exponent, SimulationRequest
 
 MACHINE = "one core of a 2-core AMD EPYC"
 """Where it was measured; `vibench tradeoff` measures it anew on any machine."""

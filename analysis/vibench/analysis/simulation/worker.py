@@ -35,7 +35,7 @@ from ..dynamics import (
     spectrum_points,
 )
 from .map_request import MapRequest, MotionRequest, map_pictures, settled_motion
-from .request import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+from .progress import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 
 Tell = Callable[[tuple[PartialResult, ...]], None]
 Cancelled = Callable[[], bool]

@@ -1,11 +1,16 @@
 """Where a response jumps along a sweep, up or down, and how well its frequency is known."""
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from ..errors import InvalidRequest
 from ..signals.arrays import Flags, Reals
+from ..tables import Labelled
+from .stepped_response import SteppedResponse
+from .sweep import SweepResponse
 
 _SIDE = 12
 """Intervals on either side that a straight line is laid through."""
@@ -148,3 +153,146 @@ def _jump(places: tuple[int, int, int], time_s: Reals, frequency_hz: Reals, loga
         after=after,
         standard_errors=float(abs(size[at]) / error[at]) if 0 < at < size.size else 0.0,
     )
+
+
+JUMP_FACTOR = 2.0
+"""Response II that changes by more than this between two levels has jumped: a linear one does not change."""
+
+_UNSTEADY = 0.05
+"""Relative uncertainty of Response II above which a step may hold two motions; NaN is above it too."""
+
+
+@dataclass(frozen=True)
+class LevelJump:
+    """Response II changed by a factor between two levels that follow each other."""
+
+    direction: str
+    """``"up"`` or ``"down"``: which way the level went."""
+    before_vpp: float
+    after_vpp: float
+    before_m: float
+    """Amplitude of the base there [m]."""
+    after_m: float
+    factor: float
+    """Response II after over before."""
+
+
+def level_jumps(response: SteppedResponse, factor: float = JUMP_FACTOR) -> tuple[LevelJump, ...]:
+    """Find the jumps of a stepped level, in the order of time; none is looked for across a turning point.
+
+    A step during which the motion jumped shows a mean of both: the jump is that from the step before it to
+    the one after it.
+    """
+    steps = list(
+        zip(
+            response.direction,
+            response.amplitude_vpp.tolist(),
+            response.drive_amplitude_m.tolist(),
+            response.response_ii.tolist(),
+            strict=True,
+        )
+    )
+    steady = response.sd_response_ii < _UNSTEADY * response.response_ii
+    for place in range(len(steps) - 2, 0, -1):
+        (way, *_, before), (_, *_, now), (other, *_, after) = steps[place - 1 : place + 2]
+        if not steady[place] and way == other and min(before, after) < now < max(before, after):
+            del steps[place]
+    found = []
+    for (way, before_vpp, before_m, before), (other, after_vpp, after_m, after) in pairwise(steps):
+        if way == other and before > 0 and not 1 / factor <= after / before <= factor:
+            found.append(LevelJump(way, before_vpp, after_vpp, before_m, after_m, after / before))
+    return tuple(found)
+
+
+def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
+    """Tell how far the level of the jump up lies above that of the fall back, at least and at most [V].
+
+    None when the motion did not jump up going up and fall going down.
+    """
+    rises = [each for each in jumps if each.direction == "up" and each.factor > 1]
+    falls = [each for each in jumps if each.direction == "down" and each.factor < 1]
+    if not rises or not falls:
+        return None
+    rise, fall = rises[0], falls[-1]
+    return rise.before_vpp - fall.before_vpp, rise.after_vpp - fall.after_vpp
+
+
+def level_summary(response: SteppedResponse) -> dict[str, object]:
+    """Give levels and jumps as JSON can hold them."""
+    jumps = level_jumps(response)
+    return {
+        "amplitude_vpp": response.amplitude_vpp,
+        "jumps": [asdict(each) for each in jumps],
+        "hysteresis_vpp": hysteresis_vpp(jumps),
+    }
+
+
+_POINTS = 1000
+_APART_DB = 1.5
+_SMOOTHED_POINTS = 21
+"""Two per cent of the band: chaos scatters from point to point, and that is no hysteresis."""
+_PER_BEL_DB = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Hysteresis(Labelled):
+    """What depends on the direction of a sweep; arrays of shape (points,)."""
+
+    frequency_hz: Reals
+    up: Reals
+    down: Reals
+    """Response II."""
+    differs: Flags
+    """Where the two lie more than 1.5 dB apart in the mean over two per cent of the band."""
+    pairs: tuple[tuple[Jump, Jump], ...]
+    """Each jump upwards with the nearest one downwards of the opposite step: (up sweep, down sweep)."""
+
+    @property
+    def widths_hz(self) -> tuple[tuple[float, float, float], ...]:
+        """Width of each pair, with its lower and upper bound: jump of the up sweep minus that of the down."""
+        return tuple(
+            (
+                up.frequency_hz - down.frequency_hz,
+                up.lower_hz - down.upper_hz,
+                up.upper_hz - down.lower_hz,
+            )
+            for up, down in self.pairs
+        )
+
+
+def hysteresis(
+    up: SweepResponse, down: SweepResponse, up_jumps: tuple[Jump, ...], down_jumps: tuple[Jump, ...]
+) -> Hysteresis:
+    """Compare an up with a down sweep where both have been.
+
+    Raises InvalidRequest when the directions are not up and down, or the two share no frequency.
+    """
+    if not (up.sweep_rate_hz_per_s > 0 > down.sweep_rate_hz_per_s):
+        raise InvalidRequest("hysteresis needs an up sweep and a down sweep, in this order")
+    low = max(float(up.frequency_hz.min()), float(down.frequency_hz.min()))
+    high = min(float(up.frequency_hz.max()), float(down.frequency_hz.max()))
+    if low >= high:
+        raise InvalidRequest("the two sweeps share no frequency; compare sweeps of the same range")
+    frequency_hz = np.linspace(low, high, _POINTS)
+    curves = [_read(each, frequency_hz) for each in (up, down)]
+    apart_db = _PER_BEL_DB * np.log10(curves[0] / curves[1])
+    together = uniform_filter1d(apart_db, _SMOOTHED_POINTS, mode="nearest")
+    differs = np.asarray(np.abs(together) > _APART_DB)
+    return Hysteresis(frequency_hz, curves[0], curves[1], differs, _pairs(up_jumps, down_jumps))
+
+
+def _read(sweep: SweepResponse, frequency_hz: Reals) -> Reals:
+    order = np.argsort(sweep.frequency_hz)
+    return np.asarray(np.interp(frequency_hz, sweep.frequency_hz[order], sweep.response_ii[order]))
+
+
+def _pairs(up: tuple[Jump, ...], down: tuple[Jump, ...]) -> tuple[tuple[Jump, Jump], ...]:
+    """Pair jumps of opposite sign: what steps up in time going up steps down in time coming back."""
+    pairs, free = [], list(down)
+    for jump in up:
+        opposite = [each for each in free if each.decibel * jump.decibel < 0]
+        if opposite:
+            nearest = min(opposite, key=lambda each: abs(each.frequency_hz - jump.frequency_hz))
+            free.remove(nearest)
+            pairs.append((jump, nearest))
+    return tuple(pairs)

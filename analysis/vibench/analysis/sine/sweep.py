@@ -15,7 +15,7 @@ from scipy import fft
 from ..errors import InvalidRequest, NotEnoughData, UnusableData
 from ..recordings.channels import far_from
 from ..signals.arrays import Complexes, Flags, Reals
-from ..signals.decimation import Decimator, decimation_factor
+from ..signals.interpolation import Decimator, decimation_factor
 from ..signals.quantity import Quantity, converted_signal, disturbed_samples
 from ..tables import Labelled
 from ..tones.noise_lift import noise_lift

@@ -12,6 +12,7 @@ from vibench.sim import Specimen, base_transmissibility
 from ..errors import NotEnoughData, UnusableData
 from ..recordings.channels import Channels, only_stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
+from ..signals.arrays import Reals
 from ..spectra.spectrogram import Spectrogram, SpectrogramSums
 from .collision_region import Collisions
 from .dwell import LEAST_CLEAR
@@ -133,3 +134,21 @@ def measured_sweep(
         phase_rad=np.angle(np.exp(1j * found.phase_rad) / sensors),
     )
     return corrected, picture.spectrogram()
+
+
+_SAME = 1e-3
+"""Of a frequency; two clocks differ by a tenth of it."""
+
+
+def frequency_check(found_hz: Reals, planned_hz: Reals) -> Check:
+    """Compare each frequency, as measured on the drive, with the nearest of the plan [Hz]."""
+    nearest = planned_hz[np.argmin(np.abs(found_hz[:, np.newaxis] - planned_hz), axis=1)]
+    off = np.abs(found_hz / nearest - 1)
+    worst = int(np.argmax(off))
+    if off[worst] <= _SAME:
+        return Check("Drive frequency", Verdict.PASSED, "as planned")
+    text = (
+        f"the drive was at {found_hz[worst]:.6g} Hz, which the plan does not have; nearest is "
+        f"{nearest[worst]:.6g} Hz. Results are of what was played"
+    )
+    return Check("Drive frequency", Verdict.WARNING, text)

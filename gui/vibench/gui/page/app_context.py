@@ -1,11 +1,15 @@
 """What all pages share: the bridge, what is meant, settings, background work, and the way to the window."""
 
 from collections.abc import Callable, Mapping
+from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QByteArray, QObject, QSettings, QStandardPaths, Signal
 
 from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S, start_engine
+from vibench.acquisition.plan import Campaign, Measurement
+from vibench.acquisition.rig import Rig
 
 from ..background.background import Background
 from ..engine_link.bridge import Bridge
@@ -13,8 +17,128 @@ from ..engine_link.engine_line import Starter
 from ..widgets.notice import Notice
 from ..widgets.theme import LIGHT, THEMES, Theme
 from ..widgets.units import CHOICES, UNITS
-from .selection import Selection
-from .settings import Remembered, Settings
+
+if TYPE_CHECKING:
+    from vibench.analysis import MeasurementPrediction
+
+
+class Remembered(StrEnum):
+    """Keys of the settings file."""
+
+    GEOMETRY = "window/geometry"
+    SPLITTERS = "window/splitters"
+    THEME = "window/theme"
+    PAGE = "window/page"
+    BENCH = "rig/configuration"
+    TEST = "test/last"
+    CAMPAIGN = "queue/last"
+    FOLDER = "recordings/folder"
+    PATIENCE = "run/patience_s"
+    FONT = "window/font_points"
+    UNITS = "window/units"
+    RECENT = "files/recent"
+    SCENES = "simulate/scene"
+
+
+class Settings:
+    """An INI file that people may read and delete."""
+
+    def __init__(self, path: Path) -> None:
+        self._store = QSettings(str(path), QSettings.Format.IniFormat)
+
+    def text(self, key: Remembered, otherwise: str = "") -> str:
+        """Text that was kept, or ``otherwise``."""
+        value = self._store.value(key.value)
+        return value if isinstance(value, str) and value else otherwise
+
+    def number(self, key: Remembered, otherwise: float, low: float, high: float) -> float:
+        """Give a number that was kept, between its bounds; ``otherwise`` where it is none."""
+        try:
+            return min(max(float(self.text(key)), low), high)
+        except ValueError:
+            return otherwise
+
+    def keep_text(self, key: Remembered, value: str) -> None:
+        """Keep a text."""
+        self._store.setValue(key.value, value)
+
+    def state(self, key: Remembered, name: str = "") -> QByteArray:
+        """Shape of a window or splitter that was kept, empty when there is none."""
+        value = self._store.value(f"{key.value}/{name}" if name else key.value)
+        return value if isinstance(value, QByteArray) else QByteArray()
+
+    def keep_state(self, key: Remembered, state: QByteArray, name: str = "") -> None:
+        """Keep the shape of a window or splitter."""
+        self._store.setValue(f"{key.value}/{name}" if name else key.value, state)
+
+    def forget_layout(self) -> None:
+        """Drop shapes, for a window that comes up as new."""
+        for key in (Remembered.GEOMETRY, Remembered.SPLITTERS):
+            self._store.remove(key.value)
+
+
+def default_settings_path() -> Path:
+    """Where the settings file lies for this user."""
+    folder = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.GenericConfigLocation)
+    return Path(folder) / "vibench" / "window.ini"
+
+
+class Selection(QObject):
+    """Values that several pages work on; each is whole and valid, or None."""
+
+    rig_changed = Signal()
+    measurement_changed = Signal()
+    campaign_changed = Signal()
+
+    def __init__(self, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._rig: Rig | None = None
+        self._measurement: Measurement | None = None
+        self._campaign: Campaign | None = None
+        self._prediction: MeasurementPrediction | None = None
+
+    @property
+    def rig(self) -> Rig | None:
+        """The rig that was chosen, open or not."""
+        return self._rig
+
+    @property
+    def measurement(self) -> Measurement | None:
+        """The test on the Test page; None while something in it is not allowed."""
+        return self._measurement
+
+    @property
+    def prediction(self) -> "MeasurementPrediction | None":
+        """What the specimen is predicted to do under the test; None while nobody knows."""
+        return self._prediction
+
+    @property
+    def campaign(self) -> Campaign | None:
+        """The campaign on the Queue page."""
+        return self._campaign
+
+    def choose_rig(self, rig: Rig | None) -> None:
+        """Mean another rig."""
+        if rig != self._rig:
+            self._rig = rig
+            self.rig_changed.emit()
+
+    def choose_measurement(self, measurement: Measurement | None) -> None:
+        """Mean another test."""
+        if measurement != self._measurement:
+            self._measurement, self._prediction = measurement, None
+            self.measurement_changed.emit()
+
+    def keep_prediction(self, prediction: "MeasurementPrediction") -> None:
+        """Keep what is predicted of the test."""
+        self._prediction = prediction
+
+    def choose_campaign(self, campaign: Campaign | None) -> None:
+        """Mean another campaign."""
+        if campaign != self._campaign:
+            self._campaign = campaign
+            self.campaign_changed.emit()
+
 
 USUAL_PATIENCE_S = 2.0
 MOST_RECENT = 12

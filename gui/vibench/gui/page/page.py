@@ -11,9 +11,8 @@ from PySide6.QtWidgets import QLayout, QSplitter, QWidget
 
 from ..widgets.boxes import Scrolled, column, title_of
 from ..widgets.theme import Theme
-from .app_context import AppContext
+from .app_context import AppContext, Remembered
 from .file_kind import FileKind
-from .settings import Remembered
 
 
 @dataclass(frozen=True)

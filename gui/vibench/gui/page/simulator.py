@@ -7,7 +7,7 @@ from multiprocessing.context import SpawnProcess
 
 from PySide6.QtCore import QObject, QTimer
 
-from vibench.analysis.simulation.request import PartialResult
+from vibench.analysis.simulation.progress import PartialResult
 from vibench.analysis.simulation.worker import Asked, Begin, Cancel, Ended, Grown, Order, serve
 
 if sys.platform == "win32":

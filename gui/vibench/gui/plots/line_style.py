@@ -3,10 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from math import ceil
 
+import numpy as np
 import pyqtgraph as pg
+from numpy.typing import ArrayLike
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QPen
+from PySide6.QtGui import QColor, QPainter, QPen, QTransform
+from PySide6.QtWidgets import QStyleOptionGraphicsItem, QWidget
 
 from ..widgets.theme import Colour, Theme
 
@@ -81,3 +85,64 @@ def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
     colour: QColor = pg.mkColor(line_style.colour(theme))
     colour.setAlphaF(line_style.filled or 0.25)
     return colour
+
+
+class _LogicalCurve(pg.PlotCurveItem):  # type: ignore[misc] # untyped library
+    """Paints a line of one pixel of the screen once more beside and below itself, where pixels are small.
+
+    A pen of two pixels looks the same and takes three times as long: Qt draws such lines as areas.
+    """
+
+    def paint(self, painter: QPainter, option: QStyleOptionGraphicsItem, widget: QWidget | None) -> None:
+        """Draw as many times as a pixel of the layout has pixels of the screen."""
+        super().paint(painter, option, widget)
+        ratio = painter.device().devicePixelRatioF()
+        place = painter.transform()
+        for step in range(1, ceil(ratio)):
+            for right, down in ((step, 0), (0, step)):
+                painter.setTransform(place * QTransform.fromTranslate(right / ratio, down / ratio))
+                super().paint(painter, option, widget)
+        painter.setTransform(place)
+
+
+class LogicalLine(pg.PlotDataItem):  # type: ignore[misc] # untyped library
+    """pyqtgraph's own curve with another painter of its line."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.curve.setParentItem(None)
+        self.curve: pg.PlotCurveItem = _LogicalCurve()
+        self.curve.setParentItem(self)
+
+
+_INSIDE = "enclosed"
+
+
+class Band:
+    """An area between a lower and an upper line: one outline, there and back, filled."""
+
+    def __init__(self, of: str) -> None:
+        self.of = of
+        """Name of the curve whose bounds it shows."""
+        self._edges = np.empty((3, 0))
+        self.item = pg.PlotDataItem(pen=None, fillLevel=_INSIDE)
+
+    def set_data(self, across: ArrayLike, low: ArrayLike, high: ArrayLike) -> None:
+        """Draw the area; where an edge is not finite there is none."""
+        x, below, above = (np.asarray(values, dtype=np.float64) for values in (across, low, high))
+        self._edges = np.stack((x, below, above))
+        drawn = np.isfinite(below) & np.isfinite(above)
+        there, back = np.flatnonzero(drawn), np.flatnonzero(drawn)[::-1]
+        self.item.setData(np.concatenate((x[there], x[back])), np.concatenate((below[there], above[back])))
+
+    def at(self, across: float) -> tuple[float, float] | None:
+        """Give the bounds at the place that is nearest; None where there are none."""
+        x, below, above = self._edges
+        if x.size == 0:
+            return None
+        place = int(np.argmin(np.abs(x - across)))
+        return (float(below[place]), float(above[place])) if np.isfinite(below[place]) else None
+
+    def paint(self, shade: object) -> None:
+        """Fill it with a colour."""
+        self.item.setFillBrush(shade)

@@ -14,10 +14,8 @@ from ..widgets.hint import paint_hint
 from ..widgets.theme import Theme
 from ..widgets.units import UNITS
 from .axis import AxisItem, Blankness, Grid, PlotAxis, Scale
-from .band import Band
 from .legend import LegendEntry, LegendLine
-from .line_style import SIGNS, LineStyle, curve_pen, shade_of, straight_pen
-from .logical_line import LogicalLine
+from .line_style import SIGNS, Band, LineStyle, LogicalLine, curve_pen, shade_of, straight_pen
 from .plot_actions import add_actions
 from .reading import Reading
 from .upright_marks import Rules, Stripes

@@ -10,8 +10,7 @@ from PySide6.QtCore import QCoreApplication, Qt, QTimer
 from PySide6.QtGui import QFont, QFontDatabase
 from PySide6.QtWidgets import QApplication, QLabel, QStyleFactory
 
-from ..page.app_context import AppContext
-from ..page.settings import Remembered, Settings, default_settings_path
+from ..page.app_context import AppContext, Remembered, Settings, default_settings_path
 from .page_catalogue import PAGES
 from .window import Window
 

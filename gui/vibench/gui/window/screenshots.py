@@ -18,8 +18,7 @@ from vibench.acquisition.engine import EngineState, Supervision, start_engine
 from vibench.acquisition.plan import Dwell, Hold, Measurement, SineSweep
 from vibench.analysis.live import RowSpacing
 
-from ..page.app_context import AppContext
-from ..page.settings import Remembered, Settings
+from ..page.app_context import AppContext, Remembered, Settings
 from ..pages.compare.compare_page import ComparePage
 from ..pages.files.files_page import FilesPage
 from ..pages.maps.maps_page import MapsPage

@@ -11,8 +11,7 @@ from vibench.acquisition.engine import LONGEST_PATIENCE_S, VIEWER_PATIENCE_S
 from vibench.sim import FrozenModel
 
 from ..forms.model_form import JudgedForm
-from ..page.app_context import AppContext
-from ..page.settings import Remembered
+from ..page.app_context import AppContext, Remembered
 from ..widgets.boxes import filled
 from ..widgets.theme import THEMES
 from ..widgets.units import UNITS

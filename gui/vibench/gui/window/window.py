@@ -21,23 +21,20 @@ from vibench.acquisition import ConfigurationError
 from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
 
 from ..engine_link.engine_line import Urgency
-from ..page.app_context import AppContext
+from ..page.app_context import AppContext, Remembered
 from ..page.file_kind import file_kind
 from ..page.page import Page
-from ..page.settings import Remembered
 from ..page.user_actions import UserActions
 from ..widgets.boxes import filled, row
 from ..widgets.notice import Notice, NoticeKind, notice_of
 from ..widgets.page_names import RUN
 from ..widgets.theme import Theme, palette, style_sheet
-from .banner import Banner
+from .banner import NEXT_STEPS, Banner, StatusField, StatusLine, indicator_of, status_fields
 from .event_loop_monitor import EventLoopMonitor
 from .menus import AbortKey, build_menus
 from .message_strip import MessageStrip
 from .navigation_bar import NavigationBar
 from .page_catalogue import PageEntry
-from .state_indicator import NEXT_STEPS, indicator_of, status_fields
-from .status_line import StatusField, StatusLine
 
 SPAN_S = 1.0
 MOST_DROPPED = 20

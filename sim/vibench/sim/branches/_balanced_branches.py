@@ -7,9 +7,9 @@ from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from ..periodic.balance_branch import balance_branch_within, orbit_guess
 from ..periodic.balance_solver import BalanceOptions, balance, first_order_guesses
+from ..periodic.branch_following import DrivePath
 from ..periodic.condensation import structure_of
 from ..periodic.continuation import ArcSteps
-from ..periodic.drive_path import DrivePath
 from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet
 from ..periodic.period_map import OrbitShape
 from ..periodic.restoring_force import PowerSpring, spring_of

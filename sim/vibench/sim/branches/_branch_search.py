@@ -10,7 +10,7 @@ import numpy as np
 from ..kernels.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
-from ..periodic.drive_path import DrivePath
+from ..periodic.branch_following import DrivePath
 from ._found_branch import BranchOrigin, FoundBranch, known_among
 from ._motion_search import MotionSearch
 

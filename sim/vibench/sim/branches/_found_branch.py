@@ -11,9 +11,8 @@ from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from ..motion.poincare import state_scales
 from ..periodic.branch import Branch
-from ..periodic.branch_following import parameter_value
+from ..periodic.branch_following import DrivePath, parameter_value
 from ..periodic.continuation import ArcEnd
-from ..periodic.drive_path import DrivePath
 from ..periodic.period_map import OrbitShape
 
 INTERPOLATED = 0.06

@@ -9,8 +9,8 @@ from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from ..motion.poincare import state_scales
 from ..periodic.branch import BifurcationKind, BranchEvent
+from ..periodic.branch_following import DrivePath
 from ..periodic.continuation import ArcSteps
-from ..periodic.drive_path import DrivePath
 from ..periodic.orbit_branch import periodic_branch_within
 from ..periodic.period_map import OrbitShape, PeriodMap
 from ..periodic.shooting import PeriodicOrbit, ShootingEnd, periodic_orbit

@@ -11,7 +11,7 @@ from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Drive, Harmonic
 from ..model.outcome import Outcome
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.integrate import (
     MAX_IMPACT_RATE_HZ,
     ROUNDING,

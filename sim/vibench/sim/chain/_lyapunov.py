@@ -17,7 +17,7 @@ from ..kernels.arrays import Floats, Table
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain

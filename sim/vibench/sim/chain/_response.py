@@ -13,7 +13,7 @@ from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ..motion.response import Response, steady_response, whole_periods
 from ._base_force import longest_window_s

@@ -9,11 +9,10 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model.bound_modes import PULL, RATE, ROW, SHAPE, bound_motion
 from ..model.drive import Harmonic
 from ..model.hertz import Hertz
 from ..model.linear_gap import LinearGap
-from ..model.modes import harmonic_motion, modal_form
+from ..model.modes import PULL, RATE, ROW, SHAPE, bound_motion, harmonic_motion, modal_form
 from ..model.no_contact import NoContact
 from ..model.power_law import PowerLaw
 from ..model.rigid_stops import RigidStops

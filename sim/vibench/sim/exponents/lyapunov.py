@@ -19,7 +19,7 @@ from ..model.drive import Harmonic
 from ..model.modes import modal_form
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.flow_derivative import flow_derivative
 from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ..motion.poincare import state_scales

@@ -21,7 +21,7 @@ from ..model.drive import Harmonic
 from ..model.modes import state_matrix
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ..motion.poincare import state_scales
 from .blocking import BlockedMean, blocked_mean

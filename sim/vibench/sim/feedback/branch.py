@@ -16,9 +16,9 @@ from ..model.state import VY, VZ, Y, Z
 from ..periodic.balance_branch import balance_branch_within
 from ..periodic.balance_solver import balance
 from ..periodic.branch import BifurcationKind, Branch
+from ..periodic.branch_following import FrequencyPath
 from ..periodic.condensation import structure_of
 from ..periodic.continuation import ArcEnd
-from ..periodic.drive_path import FrequencyPath
 from ..periodic.harmonic_balance import BalanceEnd
 from ..periodic.orbit_branch import periodic_branch_within
 from ..periodic.period_map import PeriodMap

@@ -12,14 +12,12 @@ from ._expansion import (
     map_solver as map_solver,
 )
 from ._map import (
+    QUANTITIES as QUANTITIES,
     Map as Map,
+    Quantity as Quantity,
     Range as Range,
     Refinement as Refinement,
     Spacing as Spacing,
-)
-from ._quantities import (
-    QUANTITIES as QUANTITIES,
-    Quantity as Quantity,
 )
 from ._results import (
     Audit as Audit,

@@ -31,8 +31,7 @@ from ..study import (
     predecessors,
 )
 from ._columns import contact_energy_j, labels_of, section_cells
-from ._map import Map
-from ._quantities import OF_SPECIMEN, START
+from ._map import OF_SPECIMEN, START, Map
 from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 
 JUMP = 0.1

@@ -1,6 +1,7 @@
 """The specimen without contact, solved exactly: state matrix, modes, transmissibility. SI units."""
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -8,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..kernels.arrays import Complex, Table, Vector
-from .specimen import Specimen
-from .state import VX
+from .specimen import JOIN, Specimen, bound_matrices
+from .state import VX, VZ, X, Z
 
 
 def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:
@@ -201,3 +202,83 @@ def harmonic_motion(specimen: Specimen, omega: float, amplitude_m: float) -> tup
     displacement = base_transmissibility(specimen, omega / (2.0 * np.pi))[0, :3] * base
     force = (specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0]) * base
     return np.concatenate([displacement, 1j * omega * displacement]), force
+
+
+# How a specimen answers its base when p is free, and when the stops decide p: closed forms. SI units.
+#
+# The stops push m1 and m2 apart with equal and opposite forces, so x follows from the base U and from p
+# alone: x = stuck U + lever p, with ``stuck`` the answer while m1 sticks to m2 and ``lever`` that of x to a
+# p forced by the stops. While collisions hold abs(p) at about the gap, abs(x) is at most abs(stuck U) +
+# abs(lever) gap, as far as the fundamental carries the motion.
+
+
+@dataclass(frozen=True, eq=False)
+class BaseResponse:
+    """Phasors per unit of base displacement, each of shape (n,); time goes as exp(+i w t)."""
+
+    free_p: Complex
+    """p without contact, over U."""
+    free_x: Complex
+    """x without contact, over U."""
+    stuck_x: Complex
+    """x while m1 sticks to m2, over U."""
+    lever: Complex
+    """x over a p that the stops bring about while the base rests."""
+
+
+def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
+    """Answer of x and p at each of the frequencies, shape (n,) [Hz]; zero and above."""
+    free = base_transmissibility(specimen, frequency_hz)
+    omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    dynamic = (
+        specimen.stiffness_matrix
+        - omega[:, None, None] ** 2 * specimen.mass_matrix
+        + 1j * omega[:, None, None] * specimen.damping_matrix
+    )
+    apart = np.linalg.solve(dynamic, np.array([[0.0], [1.0], [-1.0]]))[:, :, 0]
+    lever = apart[:, 0] / (apart[:, 1] - apart[:, 2])
+    return BaseResponse(free[:, 3], free[:, 0], free[:, 0] - lever * free[:, 3], lever)
+
+
+# The specimen with m1 held on m2 by a rigid stop: two bodies, solved exactly. SI units.
+#
+# While m1 sticks to a stop, m1 and m2 move as one: y = z + side * gap, and the spring and damper between
+# them are inside a rigid body. What is left is linear with two displacements, x and z, and one condition:
+# the stop can only push. The native engine follows the motion and finds where that condition ends.
+#
+# The motion is one table (kernels copy every array they are handed): a term a row, modes first, the drive
+# last.
+
+RATE = 0
+"""Column of l_j [1/s]."""
+SHAPE = slice(1, 7)
+"""Columns of the motion of a unit phasor in x, y, z, vx, vy, vz; y without the gap, which is a constant."""
+ROW = slice(7, 13)
+"""Columns of the left row, which reads x, z, vx, vz of a state and nothing else; zero for the drive."""
+PULL = 13
+"""Column of what a unit phasor adds to the force k2 (z - x) + c2 (vz - vx) by which m2 pulls at m0 [N]."""
+COLUMNS = 14
+
+PLACES = [X, Z, VX, VZ]
+"""Where the four unknowns of the bound motion stand in a state."""
+
+
+def bound_motion(specimen: Specimen, omega: float, amplitude_m: float) -> Complex:
+    """Diagonalise the bound motion under U = amplitude sin(omega t): shape (n+1, COLUMNS), n is 2 to 4.
+
+    Raises ValueError when two bound modes coincide.
+    """
+    mass, damping, stiffness = bound_matrices(specimen)
+    modes = diagonal_form(mass, stiffness, damping)
+    dynamic = stiffness - omega**2 * mass + 1j * omega * damping
+    base = -1j * amplitude_m * (specimen.stiffnesses[0] + 1j * omega * specimen.dampings[0])
+    displacement = np.linalg.solve(dynamic, np.array([base, 0.0]))
+    spread = np.zeros((4, 6))
+    spread[:2, :3], spread[2:, 3:] = JOIN.T, JOIN.T
+    table = np.zeros((len(modes.rates) + 1, COLUMNS), dtype=np.complex128)
+    table[:, RATE] = np.append(modes.rates, 1j * omega)
+    table[:, SHAPE] = np.vstack([modes.shapes, [*displacement, *(1j * omega * displacement)]]) @ spread
+    table[:-1, ROW][:, PLACES] = modes.rows
+    x, z, vx, vz = table[:, SHAPE][:, PLACES].T
+    table[:, PULL] = specimen.stiffnesses[2] * (z - x) + specimen.dampings[2] * (vz - vx)
+    return table

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Generic, NamedTuple, TypeVar
 
 from pydantic import ConfigDict
@@ -89,3 +90,18 @@ def require_positive(name: str, value: float, unit: str) -> None:
     if not 0.0 < value < math.inf:
         msg = f"{name} {value} {unit} is not allowed: it must be positive and finite."
         raise ValueError(msg)
+
+
+Choice = TypeVar("Choice", bound=StrEnum)
+
+
+def chosen(kind: type[Choice], word: str) -> Choice:
+    """Take the member of an enum that a user names, by itself or by its word.
+
+    Raises ValueError when the enum has no such word.
+    """
+    try:
+        return kind(word)
+    except ValueError:
+        msg = f"{kind.__name__} {word!r} is not allowed: give one of {', '.join(kind)}."
+        raise ValueError(msg) from None

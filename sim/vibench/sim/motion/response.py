@@ -11,7 +11,7 @@ from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from ..model.word import chosen
+from ..model.stops import chosen
 from .integrate import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
 
 WHOLE = 1e-9

@@ -14,7 +14,7 @@ from ..engine.run import RunRecord, most_impacts
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Sampled
 from ..model.specimen import Specimen
-from ..model.word import chosen
+from ..model.stops import chosen
 from .base_motion import sampled_motion
 from .integrate import MAX_IMPACT_RATE_HZ, start_motion
 

@@ -1,6 +1,8 @@
 """The functions of the system that runs this program."""
 
+import os
 import sys
+from pathlib import Path
 
 if sys.platform == "win32":
     from .windows import (
@@ -56,3 +58,66 @@ __all__ = [
     "usual_state_folder",
     "write_at",
 ]
+
+
+Buffer = bytes | memoryview
+
+
+class OpenFile:
+    """An existing file, open to be written; its marks vanish with the process, however that ends.
+
+    Raises
+    ------
+    OSError
+        When it cannot be opened.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._descriptor = open_to_write(path)
+
+    def lock_in_use(self) -> None:
+        """Mark it as used; others may read. Raises OSError where another process has it alone."""
+        lock_in_use(self._descriptor)
+
+    def lock_sole_writer(self) -> None:
+        """Mark it as written by this process alone; others may read. Raises OSError where one writes it."""
+        lock_sole_writer(self._descriptor)
+
+    def is_locked_alone(self) -> bool:
+        """Take it for this process alone; False where another uses it."""
+        return is_locked_alone(self._descriptor)
+
+    def write(self, offset: int, data: Buffer) -> None:
+        """Put ``data`` at ``offset``, in the system's cache at least; a short write is continued."""
+        rest = memoryview(data).cast("B")
+        while len(rest):
+            written = write_at(self._descriptor, rest, offset)
+            rest, offset = rest[written:], offset + written
+
+    def sync(self) -> None:
+        """Return when everything written so far would survive a power cut."""
+        sync_data(self._descriptor)
+
+    @property
+    def has_a_name(self) -> bool:
+        """Whether it stands in a folder: what was removed can never be found again."""
+        return os.fstat(self._descriptor).st_nlink > 0
+
+    def reserve(self, offset: int, size: int) -> None:
+        """Allocate blocks where the system can; elsewhere the check of free space must do."""
+        allocate(self._descriptor, offset, size)
+
+    def close(self) -> None:
+        """Release the file and its marks."""
+        os.close(self._descriptor)
+
+
+def sync_file(path: Path) -> None:
+    """Push a closed file, and its name, to the disk."""
+    descriptor = open_to_write(path)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+    sync_folder(path.parent)

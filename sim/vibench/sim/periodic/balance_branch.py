@@ -10,10 +10,9 @@ from ..model.drive import Harmonic
 from ..model.state import Y, Z
 from .balance_solver import BalanceOptions, Guess, described
 from .branch import Branch
-from .branch_following import OrbitReport, follow_both_ways, parameter_value, range_scale
+from .branch_following import DrivePath, OrbitReport, follow_both_ways, parameter_value, range_scale
 from .condensation import LinearStructure
 from .continuation import ArcSteps
-from .drive_path import DrivePath
 from .floquet import Motion, crossings, multipliers, transition
 from .frequency_time import phasors_of
 from .harmonic_balance import (

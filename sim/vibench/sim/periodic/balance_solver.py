@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..kernels.arrays import Complex
-from ..model.word import chosen
+from ..model.stops import chosen
 from .condensation import Harmonics, LinearStructure, condense
 from .first_order_balance import first_order_states
 from .frequency_time import force_harmonics, force_tail

@@ -7,20 +7,21 @@ import numpy as np
 
 from ..kernels.arrays import Table, Vector
 from ..model.drive import Harmonic
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.poincare import state_scales
 from .branch import Branch, Parameter, ParameterWord
 from .branch_following import (
+    DrivePath,
     Family,
     OrbitReport,
     branch_range,
     follow,
     follow_both_ways,
     parameter_value,
+    path_from,
     range_scale,
 )
 from .continuation import ArcSteps
-from .drive_path import DrivePath, path_from
 from .period_map import PeriodMap
 from .shooting import PeriodicOrbit, ShootingEnd, described_orbit
 

@@ -17,12 +17,11 @@ from ..kernels.arrays import Table, Vector
 from ..model.drive import Harmonic
 from ..model.modes import base_transmissibility
 from ..model.specimen import Specimen
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.poincare import state_scales
 from .branch import Branch
-from .branch_following import Family, OrbitReport, follow
+from .branch_following import AmplitudePath, DrivePath, Family, OrbitReport, follow
 from .continuation import ArcSteps, correct
-from .drive_path import AmplitudePath, DrivePath
 from .frequency_time import phasors_of
 from .orbit_branch import OrbitFamily
 from .period_map import OrbitShape, PeriodMap

@@ -17,7 +17,7 @@ from ..model.no_contact import NoContact
 from ..model.power_law import PowerLaw
 from ..model.specimen import Specimen
 from ..model.state import Y, Z
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.integrate import Trajectory, integrate, start_motion
 from ..motion.poincare import state_scales
 from .branch import NEUTRAL, BifurcationKind

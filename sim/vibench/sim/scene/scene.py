@@ -10,7 +10,7 @@ from pydantic import ConfigDict
 from ..model.accuracy import Accuracy
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..motion.response import WHOLE
 from .prediction import State
 

@@ -1,10 +1,6 @@
 from ._answers import (
     prediction_at as prediction_at,
 )
-from ._arrays import (
-    Arrays as Arrays,
-    PointAnswer as PointAnswer,
-)
 from ._axes import (
     Grid as Grid,
     StudyAxis as StudyAxis,
@@ -38,20 +34,12 @@ from ._file_reading import (
     read_plan as read_plan,
     read_sessions as read_sessions,
 )
-from ._frequency_range import (
-    frequency_range as frequency_range,
-)
-from ._grid_plan import (
-    GridPlan as GridPlan,
-)
 from ._layout import (
     PointState as PointState,
 )
-from ._plausibility_warnings import (
-    plausibility_warnings as plausibility_warnings,
-)
-from ._progress import (
+from ._point_scheduler import (
     Cancelled as Cancelled,
+    GridPlan as GridPlan,
     StudyObserver as StudyObserver,
     StudyProgress as StudyProgress,
 )
@@ -76,7 +64,9 @@ from ._solve import (
     store_of as store_of,
 )
 from ._store import (
+    Arrays as Arrays,
     MemoryStore as MemoryStore,
+    PointAnswer as PointAnswer,
     Store as Store,
 )
 from ._study import (
@@ -84,6 +74,8 @@ from ._study import (
     Start as Start,
     Study as Study,
     StudyObservable as StudyObservable,
+    frequency_range as frequency_range,
+    plausibility_warnings as plausibility_warnings,
 )
 from ._threads import (
     ThreadExecutor as ThreadExecutor,

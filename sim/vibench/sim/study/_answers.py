@@ -6,10 +6,9 @@ import numpy as np
 
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.outcome import Outcome
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..scene.prediction import Ensemble, FoundMotion, Method, MotionKind, ScenePrediction, StartMemory
 from ..scene.shares import EscapeRate, Share
-from ._arrays import Arrays
 from ._columns import (
     ENDED,
     ENSEMBLE_NUMBERS,
@@ -29,6 +28,7 @@ from ._columns import (
     Cell,
     Column,
 )
+from ._store import Arrays
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:

@@ -21,12 +21,12 @@ from ..scene.side_by_side import Solved, solve_in_lanes
 from ..scene.solve import solve_scene
 from ..scene.states_alone import lanes_are_worth_it
 from ._answers import cells_of, cut_text
-from ._arrays import Arrays, PointAnswer
 from ._axes import Grid
 from ._columns import CONTINUES, DURATION, FINAL_STATE, IDENTITY, IDENTITY_DIGITS, MESSAGE, PHASE, TAKEN, Cell
 from ._executor import Solver
 from ._layout import PointState
 from ._point_scheduler import NOBODY
+from ._store import Arrays, PointAnswer
 from ._study import AXES_OF_SPECIMEN, GivenStart, Start, Study
 
 _scenes = TypeAdapter(Scene)

@@ -10,10 +10,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from . import _layout as layout
-from ._arrays import Arrays
 from ._errors import StudyError
-from ._grid_plan import GridPlan
 from ._layout import PointState
+from ._point_scheduler import GridPlan
+from ._store import Arrays
 
 if TYPE_CHECKING:
     import h5py

@@ -4,13 +4,18 @@ How long each point of a study will take: first as planned, then as its neighbou
 """
 
 import heapq
-from collections.abc import Iterator
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.arrays import Floats
-from ._axes import Grid
+from ..model.frozen_model import FrozenModel
+from ._axes import Grid, StudyAxis, grid_of
+from ._columns import Column
 
 SHORTEST_S = 1e-6
 """No point is thought to take less: it keeps ratios finite."""
@@ -180,3 +185,54 @@ class PointScheduler:
                 number = int(self._after[number])
                 behind[number] = sum_s
         return behind
+
+
+@dataclass(frozen=True)
+class StudyProgress:
+    """How much is done, and how long the rest will take."""
+
+    points: int
+    """That are wanted: of a study all, of a map more as it is refined."""
+    kept: int
+    """With an answer; those of earlier sessions too."""
+    failed: int
+    """Of these, how many have an error for an answer, or a run that did not reach its end."""
+    elapsed_s: float
+    """Since this session began."""
+    left_s: float | None
+    """Until everything has an answer, as far as can be told; None before the first answer."""
+
+
+StudyObserver = Callable[[StudyProgress], None]
+"""Told in the thread that runs the study, after every batch of answers."""
+Cancelled = Callable[[], bool]
+"""Asked in the thread that runs the study, several times a second."""
+
+
+class GridPlan(FrozenModel, ABC):
+    """What is to be computed, completely: two equal plans have equal answers."""
+
+    called: ClassVar[str]
+    """How messages call such a plan."""
+    format: ClassVar[str]
+    """How its files call themselves."""
+
+    @property
+    @abstractmethod
+    def axes(self) -> tuple[StudyAxis, ...]:
+        """Dimensions of the results, in order."""
+
+    @property
+    @abstractmethod
+    def columns(self) -> tuple[Column, ...]:
+        """What is kept of each point."""
+
+    @property
+    def grid(self) -> Grid:
+        """All points."""
+        return grid_of(self.axes)
+
+    def differences(self, other: Self) -> tuple[str, ...]:
+        """Names of what differs between two plans."""
+        mine, theirs = self.model_dump(mode="json"), other.model_dump(mode="json")
+        return tuple(name for name in mine if mine[name] != theirs[name])

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from ..kernels.arrays import Floats
 from ..scene.prediction import ScenePrediction
 from ._answers import prediction_at
-from ._arrays import Arrays, states
 from ._axes import StudyAxis
 from ._columns import CONTINUES, ENDED, MESSAGE
 from ._errors import InvalidStudy
 from ._expansion import continued_from
 from ._file_reading import Plan, Session, read_arrays, read_plan, read_sessions
 from ._layout import PointState
+from ._store import Arrays, states
 from ._study import GivenStart, Start, Study
 
 Value = float | str

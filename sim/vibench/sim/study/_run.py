@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from ..kernels.arrays import Floats
 from ..scene.scene import Scene
 from ..scene.side_by_side import Solved
-from ._arrays import Arrays, PointAnswer, is_failed, states
 from ._axes import Grid
 from ._columns import TAKEN
 from ._executor import Bundle, Executor, Reply
 from ._expansion import Expansion
 from ._layout import PointState
-from ._point_scheduler import Costs, PointScheduler
-from ._progress import Cancelled, StudyObserver, StudyProgress
-from ._store import Store
+from ._point_scheduler import Cancelled, Costs, PointScheduler, StudyObserver, StudyProgress
+from ._store import Arrays, PointAnswer, Store, is_failed, states
 from ._study import Study
 
 MOST_IN_BUNDLE = 64

@@ -6,13 +6,12 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
-from ..model.word import chosen
+from ..model.stops import chosen
 from ..scene.solve import solve_scene
 from ._errors import ClusterLost
 from ._executor import Executor, Solver
 from ._expansion import study_solver
-from ._grid_plan import GridPlan
-from ._progress import Cancelled, StudyObserver
+from ._point_scheduler import Cancelled, GridPlan, StudyObserver
 from ._results import StudyResults, open_study, results_of
 from ._run import run_study
 from ._store import MemoryStore, Store

@@ -1,5 +1,7 @@
 """A study: every combination of contact laws, dampings, gaps, amplitudes, starts and frequencies."""
 
+import math
+from collections.abc import Iterable, Iterator
 from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -21,9 +23,86 @@ from ..model.specimen_description import ContactWord, SpecimenTable, usual_speci
 from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
 from ._axes import FREQUENCY, MODEL, START, StudyAxis
 from ._columns import COLUMNS, Column
-from ._frequency_range import listed
-from ._grid_plan import GridPlan
 from ._layout import FORMAT
+from ._point_scheduler import GridPlan
+
+LONGEST = 1_000_000
+"""Values of all ranges together; more is a slip of the pen."""
+WHOLE = 1e-9
+"""A range this close to a whole number of steps includes its stop."""
+
+
+def frequency_range(start: float, stop: float, step: float) -> tuple[float, ...]:
+    """List start, start + step, ... up to stop, which is included when it is hit.
+
+    Raises ValueError when nothing, or too much, would be listed.
+
+    Parameters
+    ----------
+    start, stop, step
+        All in the same unit, Hz by habit.
+
+    Returns
+    -------
+    tuple of float
+        Ascending.
+
+    """
+    if not (0.0 < step < math.inf and math.isfinite(start) and math.isfinite(stop) and start <= stop):
+        raise ValueError(
+            f"a range from {start:g} to {stop:g} in steps of {step:g} is not allowed:"
+            " start must not lie above stop, and the step must be positive"
+        )
+    steps = (stop - start) / step
+    if steps >= LONGEST:
+        raise ValueError(f"a range of {steps:.3g} values is too long: at most {LONGEST}")
+    return tuple(start + step * k for k in range(math.floor(steps * (1.0 + WHOLE) + WHOLE) + 1))
+
+
+def listed(given: object) -> object:
+    """Replace tables with start, stop and step by their values; anything else is left to its validator."""
+    match given:
+        case {
+            "start": float() | int() as start,
+            "stop": float() | int() as stop,
+            "step": float() | int() as step,
+            **rest,
+        } if not rest:
+            return frequency_range(_number(start), _number(stop), _number(step))
+        case {"start": start, "stop": stop, "step": step, **rest} if not rest:
+            raise ValueError(
+                f"a range from {start!r} to {stop!r} in steps of {step!r} is not allowed: give three numbers"
+            )
+        case list() | tuple():
+            return _flattened(given)
+        case _:
+            return given
+
+
+def _number(given: float) -> float:
+    """Take a number of a file; whole ones may have hundreds of digits."""
+    try:
+        return float(given)
+    except OverflowError as error:
+        raise ValueError(
+            "a range has a number of more than 300 digits; give one that can be a frequency"
+        ) from error
+
+
+def _flattened(given: list[object] | tuple[object, ...]) -> object:
+    values: list[object] = []
+    for each in given:
+        match listed(each):
+            case tuple() as some:
+                values.extend(some)
+            case one:
+                values.append(one)
+        if len(values) > LONGEST:
+            raise ValueError(f"ranges of more than {LONGEST} values together are too long; widen their steps")
+    if all(isinstance(value, (int, float)) for value in values):
+        return sorted(set(values))  # type: ignore[type-var]
+    return values
+
 
 MOST_POINTS = 10_000_000
 """A file of 2 GB: a range that asks for more is a slip of the pen."""
@@ -213,3 +292,37 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
         if values is None
         else StudyAxis(name, values, units, long_name)
     )
+
+
+MOST_GAPS = 1000.0
+"""A base that moves by more gaps was hardly meant: 45 mm at the paper's gap, past any shaker's stroke."""
+WIDEST_M = 0.1
+"""A wider clearance was hardly meant: a specimen on a shaker is not much larger."""
+_MICRO = 1e-6
+
+
+def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]) -> Iterator[str]:
+    """Say what looks wrong; it can be computed all the same.
+
+    Parameters
+    ----------
+    amplitudes_m
+        Of the base displacement [m], in any order.
+    gaps_m
+        Clearances at stops [m], in any order; infinite where there is no stop.
+
+    """
+    gaps_m = tuple(gaps_m)
+    largest_m, narrowest_m = max(amplitudes_m, default=0.0), min(gaps_m)
+    if largest_m > MOST_GAPS * narrowest_m:
+        yield (
+            f"an amplitude of {largest_m:g} m is {largest_m / narrowest_m:.2g} times the gap of "
+            f"{narrowest_m:g} m and is predicted as given; if {largest_m:g} micrometres were meant, "
+            f"give {_MICRO * largest_m:g}"
+        )
+    widest_m = max((each for each in gaps_m if math.isfinite(each)), default=0.0)
+    if widest_m > WIDEST_M:
+        yield (
+            f"a gap of {widest_m:g} m is wide for a specimen on a shaker and is predicted as given; if "
+            f"{widest_m:g} micrometres were meant, give {_MICRO * widest_m:g}"
+        )

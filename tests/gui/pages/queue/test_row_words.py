@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.engine import EngineState, RowStatus
-from vibench.gui.pages.queue.row_words import entry_rows, point_rows, preview_campaign
+from vibench.gui.pages.queue.draft import entry_rows, point_rows, preview_campaign
 
 CAMPAIGNS = Path(__file__).resolve().parents[4] / "campaigns"
 

@@ -3,8 +3,7 @@
 import pytest
 
 from vibench.acquisition import shipped
-from vibench.gui.page.app_context import AppContext
-from vibench.gui.page.settings import Remembered, Settings
+from vibench.gui.page.app_context import AppContext, Remembered, Settings
 from vibench.gui.pages.rig.rig_page import RigPage
 
 

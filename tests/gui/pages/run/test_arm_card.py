@@ -5,7 +5,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QFont
 
 from vibench.acquisition.engine import ArmedPlan, EngineState, EngineStatus, Supervision
-from vibench.gui.pages.run.arm_card import UNREAD
+from vibench.gui.pages.run.run_page import UNREAD
 from vibench.gui.widgets.page_names import RUN
 
 LINES = tuple(

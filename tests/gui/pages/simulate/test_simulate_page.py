@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis.simulation.accuracy_cost import MEASURED
-from vibench.analysis.simulation.request import SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
+from vibench.analysis.simulation.progress import SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.gui.widgets.theme import DARK
 from vibench.sim import Accuracy, Ensemble, FoundMotion, MotionKind, Share, StartMemory

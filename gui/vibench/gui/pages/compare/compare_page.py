@@ -4,19 +4,22 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import (
     QFileDialog,
+    QGroupBox,
+    QPushButton,
     QSplitter,
     QTabWidget,
     QVBoxLayout,
     QWidget,
 )
 
-from vibench.analysis import ComparedRecording, Curve, compare_recording
+from vibench.analysis import AnalysisOptions, ComparedRecording, Curve, compare_recording
 from vibench.analysis.dynamics import branch_curves
 
 from ...background.background import Job
+from ...forms.model_form import JudgedForm
 from ...page.app_context import AppContext
 from ...page.file_kind import FileKind
 from ...page.page import Page, SideAndPicture
@@ -25,11 +28,65 @@ from ...widgets.new_path import new_path
 from ...widgets.notice import Notice, NoticeKind, notice_of
 from ...widgets.page_names import COMPARE
 from ...widgets.push_button import push_button
-from .analysis_panel import AnalysisPanel
+from ...widgets.timed_bar import TimedBar
 from .curve_list import CurveList, PairBox
-from .curve_plots import CurvePlots
-from .export_elsewhere import exported_elsewhere
-from .number_tables import PEAK_HEADINGS, NumberTable, marker_headings, marker_rows, peak_rows
+from .curve_plots import PEAK_HEADINGS, CurvePlots, NumberTable, marker_headings, marker_rows, peak_rows
+
+
+def exported_elsewhere(
+    path: Path,
+    curves: tuple[Curve, ...],
+    recordings: tuple[ComparedRecording, ...],
+    pair: tuple[Curve, Curve] | None,
+    markers_hz: tuple[float, ...],
+) -> Path:
+    """Write what the path's ending names, and give the path written, as `write_comparison` does."""
+    from vibench.analysis.report import write_comparison  # noqa: PLC0415 - loading it takes most of a second
+
+    return write_comparison(path, curves, recordings, pair, markers_hz)
+
+
+class AnalysisPanel(QGroupBox):
+    """The options, the button that applies them, and a bar while it is done."""
+
+    wanted = Signal()
+    """Analyse all recordings anew."""
+    cancelled = Signal()
+
+    def __init__(self) -> None:
+        super().__init__("Analysis")
+        self.form = JudgedForm(AnalysisOptions, "analysis")
+        self._again = QPushButton("Anal&yse again")
+        self._again.setAccessibleName("Analyse again")
+        self._again.setToolTip("Analyse all recordings with these options")
+        self._again.clicked.connect(lambda _checked=False: self.wanted.emit())
+        self._bar = TimedBar("Recordings analysed", "analysed")
+        self._cancel = QPushButton("Cance&l")
+        self._cancel.setAccessibleName("Cancel the analysis")
+        self._cancel.setToolTip("Forget what has not been analysed yet")
+        self._cancel.clicked.connect(lambda _checked=False: self.cancelled.emit())
+        filled(QVBoxLayout(self), self.form, row(self._again, (self._bar, 1), self._cancel))
+        for widget in (self._bar, self._cancel):
+            # Their place is kept: what begins or ends must move nothing.
+            policy = widget.sizePolicy()
+            policy.setRetainSizeWhenHidden(True)
+            widget.setSizePolicy(policy)
+        self.form.changed.connect(self._judge)
+        self.show_progress(0, 0)
+
+    def options(self) -> AnalysisOptions | None:
+        """Give the options; None while they are not allowed, which the form then says."""
+        return self.form.value
+
+    def show_progress(self, done: int, asked: int) -> None:
+        """Say how many recordings are analysed; the bar is there only while some are not."""
+        self._bar.show_done(done, asked)
+        for widget in (self._bar, self._cancel):
+            widget.setVisible(done < asked)
+
+    def _judge(self) -> None:
+        self._again.setEnabled(self.form.value is not None)
+
 
 REPORT = "Report (*.html)"
 FILTERS = f"SVG (*.svg);;PDF (*.pdf);;PNG (*.png);;Numbers as CSV (*.csv);;{REPORT}"

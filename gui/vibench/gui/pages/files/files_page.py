@@ -21,10 +21,9 @@ from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, ke
 
 from ...background.background import Job
 from ...forms.field_edge import LineField
-from ...page.app_context import AppContext
+from ...page.app_context import AppContext, Remembered
 from ...page.file_kind import FileKind
 from ...page.page import Page, Shown
-from ...page.settings import Remembered
 from ...widgets.boxes import Scrolled, column, filled, row
 from ...widgets.elided_label import ElidedLabel
 from ...widgets.new_path import new_path
@@ -32,9 +31,8 @@ from ...widgets.notice import Notice, NoticeKind, notice_of
 from ...widgets.page_names import COMPARE, FILES
 from ...widgets.push_button import push_button
 from ...widgets.units import SentenceLabel
-from .file_words import facts_text
 from .listing import Levels, Listing, exported, listed, made_levels, noted, thumbnails
-from .recording_table import CampaignChoice, RecordingTable
+from .recording_table import CampaignChoice, RecordingTable, facts_text
 from .spectrogram_view import Pictures
 
 EXPORTS = "Universal file (*.uff);;MATLAB (*.mat);;Text (*.csv)"

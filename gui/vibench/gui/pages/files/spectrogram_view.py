@@ -28,8 +28,8 @@ from ...widgets.boxes import filled
 from ...widgets.elided_label import ElidedLabel
 from ...widgets.theme import Theme
 from ...widgets.units import plain_unit
-from .file_words import role_text
 from .hidden_motion_view import CHOOSE, HiddenMotionView
+from .recording_table import role_text
 from .time_histories import RecordingTimeHistories
 
 _WAIT_MS = 250

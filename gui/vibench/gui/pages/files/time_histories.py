@@ -16,7 +16,7 @@ from ...plots.line_style import LIMIT, Dash, LineStyle, curve_style
 from ...plots.plot import Plot
 from ...widgets.theme import Theme
 from ...widgets.units import plain_unit
-from .file_words import role_text
+from .recording_table import role_text
 
 LEAST_SAMPLES = 8
 """The closest look."""

@@ -15,7 +15,7 @@ from vibench.analysis.simulation.map_request import (
     SettledMotion,
     settled_motion,
 )
-from vibench.analysis.simulation.request import PartialResult, Trouble
+from vibench.analysis.simulation.progress import PartialResult, Trouble
 
 from ...background.background import Job
 from ...forms.editor import Choice
@@ -28,8 +28,7 @@ from ...widgets.notice import Notice, NoticeKind
 from ...widgets.page_names import MAPS, SIMULATE
 from ...widgets.push_button import push_button
 from ...widgets.units import SentenceLabel
-from .map_plot import COLOURINGS, MapPlot
-from .motion_view import MotionView
+from .map_plot import COLOURINGS, MapPlot, MotionView
 
 MAP_SHARE = 640
 """Of 1000, of the height; the rest is for the motion at a point."""

@@ -27,11 +27,10 @@ from vibench.acquisition.rig import Rig
 
 from ...background.background import LatestRequest
 from ...forms.editor import Choice
-from ...page.app_context import AppContext
+from ...page.app_context import AppContext, Remembered
 from ...page.file_kind import FileKind
 from ...page.history import History
 from ...page.page import Page, Shown, SideAndPicture
-from ...page.settings import Remembered
 from ...page.user_actions import UserActions
 from ...widgets.boxes import boxed, column, filled, row
 from ...widgets.clock import clock
@@ -41,8 +40,15 @@ from ...widgets.push_button import push_button
 from ...widgets.read_table import ReadTable
 from ...widgets.timed_bar import ProgressBar
 from ...widgets.units import SentenceLabel
-from .draft import moved_up, with_measurement, with_sweep, without
-from .row_words import CampaignPreview, point_rows, preview_campaign
+from .draft import (
+    CampaignPreview,
+    moved_up,
+    point_rows,
+    preview_campaign,
+    with_measurement,
+    with_sweep,
+    without,
+)
 from .sweep_form import SweepForm
 
 LOOK_MS = 50

@@ -1,28 +1,213 @@
 """The Rig page: choose a configuration, see the instruments, confirm the knobs, open, check."""
 
+import warnings
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
 
-from PySide6.QtWidgets import QVBoxLayout, QWidget
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFileDialog,
+    QFormLayout,
+    QGroupBox,
+    QLabel,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
 
-from vibench.acquisition import BenchReport, Finding, InstrumentList, Verdict, list_rig_instruments, shipped
+from vibench.acquisition import (
+    BenchReport,
+    ConfigurationError,
+    Finding,
+    InstrumentList,
+    Verdict,
+    all_shipped,
+    list_rig_instruments,
+    printable,
+    shipped,
+)
 from vibench.acquisition.engine import EngineClient, EngineState, EngineStatus
+from vibench.acquisition.instruments import Knob
+from vibench.acquisition.rig import KnobSheet, Rig, load_rig
+from vibench.sim import SpecimenWarning
 
-from ...page.app_context import AppContext
+from ...forms.editor import Choice
+from ...forms.field_edge import LineField
+from ...page.app_context import AppContext, Remembered
 from ...page.file_kind import FileKind
 from ...page.page import Page, SideAndPicture
-from ...page.settings import Remembered
 from ...page.user_actions import UserActions
 from ...widgets.boxes import boxed, column, filled
 from ...widgets.clock import moment_text
+from ...widgets.elided_label import plain_tip
 from ...widgets.notice import Notice, NoticeKind, notice_of
 from ...widgets.page_names import RIG
 from ...widgets.push_button import push_button
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel, fitted_unit
-from .knob_sheet import KnobSheetForm
-from .rig_choice import RigChoice
+
+PACES = {"wall": "in real time, as a bench would", "free": "as fast as this computer can"}
+"""How fast a simulated bench runs."""
+
+
+class RigChoice(QWidget):
+    """Names of configurations; what cannot be read is said and not chosen."""
+
+    chosen = Signal()
+    refused = Signal(object)
+    """The ConfigurationError of a file that cannot be read."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._paths: list[Path] = []
+        self._rig: Rig | None = None
+        self._complaint = self._warning = ""
+        self._box = Choice()
+        self._box.setAccessibleName("Hardware configuration")
+        self._box.setToolTip("What hangs on this computer; a simulated rig runs anywhere")
+        own = QPushButton("Own file…")
+        own.setToolTip("Open a hardware configuration of your own")
+        own.clicked.connect(self._ask)
+        self.pace = Choice()
+        self.pace.setAccessibleName("Pace of the simulated rig")
+        self.pace.setToolTip("How fast the simulated instruments run; a real bench has its own pace")
+        for words in PACES.values():
+            self.pace.addItem(words)
+        self._form = QFormLayout(self)
+        self._form.setContentsMargins(0, 0, 0, 0)
+        for text, line, buddy in (
+            ("Configuration", self._box, self._box),
+            ("Runs", self.pace, self.pace),
+        ):
+            label = QLabel(text)
+            label.setBuddy(buddy)
+            self._form.addRow(label, line)
+        self._form.addRow(own)
+        for path in sorted(all_shipped("hardware_configs"), key=lambda each: "virtual" not in each.stem):
+            self._add(path)
+        self._box.currentIndexChanged.connect(self._load)
+        self.pace.currentIndexChanged.connect(self.chosen)
+
+    @property
+    def path(self) -> Path | None:
+        """The chosen file."""
+        row = self._box.currentIndex()
+        return self._paths[row] if 0 <= row < len(self._paths) else None
+
+    @property
+    def complaint(self) -> str:
+        """Why the chosen file cannot be used; empty where it can."""
+        return self._complaint
+
+    @property
+    def warning(self) -> str:
+        """What its specimen may not be meant to be."""
+        return self._warning
+
+    @property
+    def rig(self) -> Rig | None:
+        """The chosen rig, at the chosen pace."""
+        if self._rig is None or self._rig.virtual is None:
+            return self._rig
+        pace = list(PACES)[self.pace.currentIndex()]
+        return self._rig.model_copy(update={"virtual": self._rig.virtual.model_copy(update={"pace": pace})})
+
+    def choose(self, path: Path) -> None:
+        """Choose a file, listed or not."""
+        if path not in self._paths:
+            self._add(path)
+        row = self._paths.index(path)
+        if row == self._box.currentIndex():
+            self._load()
+        else:
+            self._box.setCurrentIndex(row)
+
+    def _add(self, path: Path) -> None:
+        self._paths.append(path)
+        self._box.addItem(printable(path.stem.replace("_", " ")))
+        self._box.setItemData(self._box.count() - 1, plain_tip(str(path)), Qt.ItemDataRole.ToolTipRole)
+
+    def _ask(self) -> None:
+        given, _ = QFileDialog.getOpenFileName(self, "Hardware configuration", "", "Configurations (*.toml)")
+        if given:
+            self.choose(Path(given))
+
+    def _load(self) -> None:
+        path = self.path
+        self._rig, self._complaint, self._warning = None, "", ""
+        if path is not None:
+            with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:
+                try:
+                    self._rig = load_rig(path)
+                except ConfigurationError as error:
+                    self._complaint = str(error)
+                    self.refused.emit(error)
+            self._warning = "; ".join(str(each.message) for each in warned)
+        is_simulated = self._rig is not None and self._rig.virtual is not None
+        self._form.setRowVisible(1, is_simulated)
+        self.chosen.emit()
+
+
+class KnobSheetForm(QGroupBox):
+    """A tick for every knob, and who has looked."""
+
+    changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__("Settings made by hand")
+        self._note = QLabel("Look at each knob, then tick it. No instrument can report these.")
+        self._note.setWordWrap(True)
+        self._note.setProperty("rank", "second")
+        self._operator = LineField()
+        self._operator.setAccessibleName("Who has looked")
+        self._operator.setToolTip("Your name; it goes into every recording")
+        self._operator.textChanged.connect(self.changed)
+        label = QLabel("Seen by")
+        label.setBuddy(self._operator)
+        self._ticks: dict[Knob, QCheckBox] = {}
+        self._layout = QVBoxLayout(self)
+        self._layout.addWidget(self._note)
+        form = QFormLayout()
+        form.addRow(label, self._operator)
+        self._layout.addLayout(form)
+
+    @property
+    def ticks(self) -> tuple[QCheckBox, ...]:
+        """A tick for every knob of the rig."""
+        return tuple(self._ticks.values())
+
+    @property
+    def operator_field(self) -> LineField:
+        """Where the name is typed."""
+        return self._operator
+
+    def show_rig(self, rig: Rig | None) -> None:
+        """Ask about the knobs of another rig; nothing is confirmed yet."""
+        for tick in self._ticks.values():
+            self._layout.removeWidget(tick)
+            tick.deleteLater()
+        knobs = () if rig is None or rig.virtual is not None else rig.knobs
+        self._ticks = {knob: self._tick(knob) for knob in knobs}
+        self.setVisible(bool(knobs))
+
+    def sheet(self) -> KnobSheet | None:
+        """Say what was confirmed; None while a knob or the name is missing."""
+        operator = self._operator.text().strip()
+        if not self._ticks or not operator or not all(tick.isChecked() for tick in self.ticks):
+            return None
+        return KnobSheet(operator=operator, confirmed=datetime.now(UTC), knobs=tuple(self._ticks))
+
+    def _tick(self, knob: Knob) -> QCheckBox:
+        tick = QCheckBox(f"{knob.instrument}: {knob.setting} at {knob.value}")
+        tick.setAccessibleName(f"{knob.instrument}: {knob.setting} is at {knob.value}")
+        tick.setToolTip("Ticked: somebody has seen that this knob stands there")
+        tick.toggled.connect(self.changed)
+        # Between the note and the name.
+        self._layout.insertWidget(self._layout.count() - 1, tick)
+        return tick
 
 
 def finding_name(finding: Finding) -> str:

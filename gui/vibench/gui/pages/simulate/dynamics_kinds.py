@@ -14,7 +14,7 @@ from vibench.analysis.dynamics import (
     SpectrumPoint,
     SpectrumRequest,
 )
-from vibench.analysis.simulation.request import PartialResult
+from vibench.analysis.simulation.progress import PartialResult
 
 from .dynamics_view import DynamicsKind
 

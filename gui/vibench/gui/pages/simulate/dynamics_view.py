@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QLayout, QVBoxLayout, QWidget
 
 from vibench.analysis import Curve
 from vibench.analysis.dynamics import SpecimenChoice
-from vibench.analysis.simulation.request import PartialResult, Trouble
+from vibench.analysis.simulation.progress import PartialResult, Trouble
 from vibench.analysis.simulation.worker import Asked
 
 from ...forms.model_form import JudgedForm

@@ -13,13 +13,16 @@ from PySide6.QtWidgets import (
 )
 
 from vibench.analysis.simulation.accuracy_cost import cost_sentences
-from vibench.analysis.simulation.progress import MOTION_COLUMNS, SimulationProgress
-from vibench.analysis.simulation.request import PartialResult, SimulationRequest
+from vibench.analysis.simulation.progress import (
+    MOTION_COLUMNS,
+    PartialResult,
+    SimulationProgress,
+    SimulationRequest,
+)
 
 from ...forms.model_form import JudgedForm
-from ...page.app_context import AppContext
+from ...page.app_context import AppContext, Remembered
 from ...page.page import Page, Shown, SideAndPicture
-from ...page.settings import Remembered
 from ...page.simulator import Simulator
 from ...widgets.boxes import boxed, column, filled, row
 from ...widgets.notice import Notice, NoticeKind

@@ -3,16 +3,20 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QHBoxLayout, QTableWidgetItem, QWidget
 
-from vibench.acquisition.plan import MeasurementPreview
+from vibench.acquisition.plan import LimitCheck, LimitSide, MeasurementPreview
 
 from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale
+from ...plots.bar_delegate import SHARE_ROLE, BarDelegate
 from ...plots.line_style import Dash, LineStyle, curve_style
 from ...plots.plot import Plot
 from ...plots.signal_curve import SignalCurve
 from ...widgets.boxes import filled
+from ...widgets.read_table import ReadTable
 from ...widgets.theme import Theme
+from ...widgets.units import fitted_unit
 
 if TYPE_CHECKING:
     from vibench.analysis import MeasurementPrediction
@@ -85,3 +89,53 @@ class PreviewPlots(QWidget):
         self.spectrum.show_everything()
         shown = seen.spectrum_hz >= min(_LEAST_HZ, float(seen.spectrum_hz[-1]))
         self._lines.setData(seen.spectrum_hz[shown], np.maximum(seen.spectrum_v[shown], floor_v))
+
+
+_USED = 0
+_LEAST_LETTERS = 10
+_SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
+
+
+class LimitTable(ReadTable):
+    """One row a limit, the most used first."""
+
+    def __init__(self) -> None:
+        super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
+        self.setItemDelegateForColumn(_USED, BarDelegate(self))
+        # In a small window the limits are scrolled to: what they are of must be read in any.
+        self.horizontalHeader().setMinimumSectionSize(_LEAST_LETTERS * self.fontMetrics().averageCharWidth())
+
+    def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
+        """Show what was held against the rig."""
+        units = [fitted_unit(check.unit, check.limit) for check in checks]
+        self.show_rows(
+            [
+                (
+                    f"{100 * check.use:.1f} %",
+                    f"{_mark(check)}{_short(check.what)}",
+                    unit.text(check.value),
+                    f"{_SIGNS[check.side]} {unit.text(check.limit)}",
+                )
+                for check, unit in zip(checks, units, strict=True)
+            ],
+            [f"{check.what}\nLimit from: {check.source}{_remedy(check)}" for check in checks],
+        )
+        for row, check in enumerate(checks):
+            item = self.item(row, _USED)
+            if isinstance(item, QTableWidgetItem):
+                item.setData(SHARE_ROLE, float(check.use))
+                item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
+
+
+def _remedy(check: LimitCheck) -> str:
+    return "" if check.is_kept else f"\nTo do: {check.remedy}"
+
+
+def _mark(check: LimitCheck) -> str:
+    if check.is_kept:
+        return ""
+    return "✖ " if check.forbids else "⚠ "
+
+
+def _short(what: str) -> str:
+    return what.removeprefix("the ").replace("(at ", "(").replace("(about, at ", "(about, ").replace("_", " ")

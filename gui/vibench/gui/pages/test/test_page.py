@@ -18,11 +18,10 @@ from vibench.acquisition.rig import BaseQuantity, Rig
 
 from ...background.background import LatestRequest
 from ...forms.editor import Choice
-from ...page.app_context import AppContext
+from ...page.app_context import AppContext, Remembered
 from ...page.file_kind import FileKind
 from ...page.history import History
 from ...page.page import Page, Shown, SideAndPicture
-from ...page.settings import Remembered
 from ...page.user_actions import UserActions
 from ...widgets.boxes import boxed, column, filled, row
 from ...widgets.clock import clock
@@ -30,10 +29,8 @@ from ...widgets.notice import Notice, NoticeKind, notice_of
 from ...widgets.page_names import TEST
 from ...widgets.push_button import push_button
 from ...widgets.units import SentenceLabel, fitted_unit
-from .library import NamedTest, load_test, own_tests, shipped_tests
-from .limit_table import LimitTable
-from .preview_plots import PredictionPlot, PreviewPlots
-from .test_form import TestForm
+from .preview_plots import LimitTable, PredictionPlot, PreviewPlots
+from .test_form import NamedTest, TestForm, load_test, own_tests, shipped_tests
 from .test_preview import TestPrediction, TestPreview, predict_test, preview_test
 
 _SHOWN = {
