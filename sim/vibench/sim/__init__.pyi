@@ -39,12 +39,14 @@ from .model.specimen_description import (
     SpecimenTable as SpecimenTable,
     SpecimenWarning as SpecimenWarning,
     UnknownSpecimenError as UnknownSpecimenError,
-    UnreadableTomlError as UnreadableTomlError,
-    fault_in_words as fault_in_words,
     load_specimen as load_specimen,
     shipped_specimens as shipped_specimens,
-    toml_table as toml_table,
     usual_specimen as usual_specimen,
+)
+from .model.toml_table import (
+    UnreadableTomlError as UnreadableTomlError,
+    fault_in_words as fault_in_words,
+    toml_table as toml_table,
 )
 from .motion.integrate import Impacts as Impacts, Trajectory as Trajectory, integrate as integrate
 from .motion.response import Response as Response, steady_response as steady_response

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from ..model.accuracy import Accuracy
 from ..model.drive import Sampled, Sweep
@@ -37,6 +36,8 @@ def sampled_motion(drive: Sampled) -> BaseMotion:
     """Cut a sampled drive at its samples."""
     interval = 1.0 / drive.sample_rate_hz
     # In units of the interval: the spline of the sample numbers is exact about where the knots are.
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415 - harmonic drives do without scipy
+
     spline = CubicSpline(np.arange(len(drive.displacement_m), dtype=np.float64), drive.displacement_m)
     return BaseMotion(interval, np.ascontiguousarray(spline.c[::-1].T / interval ** np.arange(4)))
 

@@ -111,7 +111,6 @@ def integrate(
         run = NativeRun(specimen, drive, start, accuracy.tolerance, start_time_s=start_time_s)
         outcome = run.advance(end, record)
     else:
-        # Through the package: only such drives need scipy's splines.
         run, outcome = integrate_cubics(specimen, drive, float(start_time_s), end, accuracy, start, record)
     is_whole = outcome is Outcome.REACHED_END
     # A sample that rounding puts at, or a hair beyond, the very end.
