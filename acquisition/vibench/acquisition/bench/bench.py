@@ -361,7 +361,7 @@ def _leave(closing: ExitStack, error: BaseException | None) -> None:
 
 
 class RunBench(Protocol):
-    """The open instruments of a rig, as `vibench.acquisition.bench.open_bench` gives them."""
+    """The open instruments of a rig, as `vibench.acquisition.open_bench` gives them."""
 
     @property
     def rig(self) -> Rig:

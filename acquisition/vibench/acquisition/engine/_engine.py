@@ -96,7 +96,7 @@ class Engine:
         return () if self._reconnecting is None else self._reconnecting.played_faults
 
     def open(self, rig: Rig, confirm: Confirm | None = None) -> None:
-        """Open the bench of a rig; ``confirm`` as `vibench.acquisition.bench.open_bench` takes it."""
+        """Open the bench of a rig; ``confirm`` as `vibench.acquisition.open_bench` takes it."""
         try:
             self._reconnecting = ReconnectingBench(rig, confirm)
             self._reconnecting.__enter__()

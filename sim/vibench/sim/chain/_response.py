@@ -71,7 +71,7 @@ def chain_response(
 ) -> ChainResponse:
     """Drive a chain for a while and say how large the motion of every mass is at the end.
 
-    The defaults are those of `vibench.sim.motion.steady_response`, which also answers for one cell. A long
+    The defaults are those of `vibench.sim.steady_response`, which also answers for one cell. A long
     chain settles more slowly than a cell.
 
     Parameters

@@ -129,7 +129,7 @@ def first_order_states(
     Parameters
     ----------
     structure, spring
-        What is shaken: `vibench.sim.periodic.structure_of` a specimen, and its power law.
+        What is shaken: `vibench.sim.periodic.condensation.structure_of` a specimen, and its power law.
     frequency_hz, amplitude_m
         Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
 

@@ -146,7 +146,7 @@ class ScenePrediction:
     method: Method
     accuracy: str
     response_i_error: float | None = None
-    """Relative, as the next three; see `vibench.sim.scene.solve_scene`."""
+    """Relative, as the next three; see `vibench.sim.scene.solve.solve_scene`."""
     response_ii_error: float | None = None
     relative_i_error: float | None = None
     relative_ii_error: float | None = None
