@@ -64,6 +64,38 @@ void test_products_keep_what_they_round_off() {
   }
 }
 
+// Parabolas whose peak is known to the last digit, on either side, with bounds that are too large.
+void test_no_touch_is_missed_and_none_is_seen_before_the_gap_has_closed() {
+  constexpr double GAP = 45e-6, LENGTH = 4e-5;
+  for (int n = 0; n < 20000; n++) {
+    double side = n % 2 ? 1.0 : -1.0, bend = std::exp(draw(std::log(10.0), std::log(5e4))), at = draw(1e-6, LENGTH);
+    Room room{n % 3 || side < 0 ? GAP : INFINITE, n % 3 || side > 0 ? GAP : INFINITE, draw(1, 30) * bend, GAP};
+    double over = std::exp(draw(std::log(1e-16), std::log(1e-7)));
+    auto touch = [&](double peak) {
+      double series[AHEAD] = {side * (peak - 0.5 * bend * at * at), side * bend * at, -0.5 * side * bend};
+      return first_contact(series, LENGTH, room);
+    };
+    double before = std::sqrt(2 * over / bend), found = touch(GAP + over);
+    if (before < at) {
+      expect(found > 0 && found <= at - before + 1e-14, "a touch is found where the gap closes", found);
+      double early = 0.5 * bend * ((at - found) * (at - found) - before * before);
+      expect(early < 2e-16, "a touch is not called before the gap has closed", early);
+    }
+    expect(touch(GAP - larger(over, 1e-15)) == NEVER, "a peak short of the stop is no touch", over);
+
+    double speed = std::exp(draw(std::log(1e-6), 0)), pull = 1e5, back = 2 * speed / pull;
+    double leaving[AHEAD] = {side * GAP, -side * speed, 0.5 * side * pull};
+    found = first_contact(leaving, LENGTH, {GAP, GAP, draw(1, 10) * pull, GAP});
+    if (back < 0.999 * LENGTH && speed * speed / (2 * pull) < GAP)
+      expect(std::fabs(found - back) * speed < 1e-16 + 1e-9 * back * speed, "a stop that was left is met again", found);
+    else if (back > 1.001 * LENGTH && speed * LENGTH - 0.5 * pull * LENGTH * LENGTH < GAP)
+      expect(found == NEVER, "a stop that is being left is no touch", found);
+  }
+  double across[AHEAD] = {0.5 * GAP, -10.0};
+  double far = first_contact(across, LENGTH, {GAP, GAP, 1.0, GAP});
+  expect(std::fabs(far - 0.15 * GAP) < 1e-15, "the far stop is watched", far);
+}
+
 // Newton's method is used where p provably does not turn. It must agree with the full search.
 void test_a_touch_is_the_one_that_the_careful_search_finds() {
   constexpr double GAP = 45e-6, LENGTH = 4e-5;
@@ -296,6 +328,7 @@ void test_motions_of_a_batch_are_those_of_runs(const Tables &tables) {
 int main(int count, char **names) {
   test_elementary_functions_are_those_of_libm();
   test_products_keep_what_they_round_off();
+  test_no_touch_is_missed_and_none_is_seen_before_the_gap_has_closed();
   test_a_touch_is_the_one_that_the_careful_search_finds();
   test_changes_become_orthonormal_and_a_lost_one_is_replaced();
   test_lanes_go_their_own_ways_by_masks();

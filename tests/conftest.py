@@ -98,7 +98,6 @@ LONG = (
     "tests/acquisition/run/test_stream_on_virtual_rig.py",
     "tests/analysis/sine/test_collision_region.py",
     "tests/virtual_rig/rig/test_fault_script.py",
-    "tests/sim/exponents/test_dynamical_exponents.py",
     "tests/acquisition/check/test_admission.py",
     "tests/analysis/chaos/test_witnesses.py",
     "tests/analysis/frequency_response/test_transmission_of_the_specimen.py",

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from vibench.sim import (
@@ -26,8 +25,6 @@ from vibench.sim import (
     steady_response,
 )
 from vibench.sim.chain import band_frequencies_hz, chain_of
-from vibench.sim.contact.contact import step_factor
-from vibench.sim.contact.flow import CVX, STAGES, WIDTH, WORK_ROWS, R, W, contact_error
 from vibench.sim.scene.shares import wilson_share
 
 pytestmark = pytest.mark.timeout(300)
@@ -269,23 +266,6 @@ def test_perfect_rigid_stops_lose_nothing_in_any_number_of_impacts(duration_s):
     np.testing.assert_allclose(energy, energy[0], rtol=2e-15 * run.impacts.count)
 
 
-@settings(max_examples=60, deadline=None)
-@given(
-    size=st.sampled_from([1e80, 1e120, 1e155, 1e200, 1e300, math.inf, math.nan]),
-    stage=st.integers(5, STAGES - 1),
-    place=st.sampled_from([W, R, CVX]),
-    sign=st.sampled_from([-1.0, 1.0]),
-    tolerance=st.sampled_from([level.tolerance for level in Accuracy]),
-)
-def test_a_stage_that_ran_away_is_never_an_accepted_step(size, stage, place, sign, tolerance):
-    work = np.zeros((WORK_ROWS, WIDTH))
-    work[stage, place] = sign * size
-    for step in (1e-12, 1e-6, 1e-3):
-        error = contact_error(work, step, 1e-3, 0.1, tolerance)
-        assert not error <= 1.0
-        assert step_factor(error) < 1.0
-
-
 @pytest.mark.parametrize(
     ("contact", "size"),
     [*((contact, size) for contact in STOPS for size in (1e20, 1e100, 1e200, 1e300)), ("power:47", 1e200)],
@@ -309,7 +289,7 @@ def test_a_run_ends_in_a_sentence_when_its_steps_are_used_up(contact, monkeypatc
     assert integrate(specimen, DRIVE, 1.0).outcome is Outcome.REACHED_END
     run = integrate(specimen, DRIVE, 1000.0)
     assert run.outcome is Outcome.TOO_LONG
-    assert "cut its duration" in run.outcome.text
+    assert "run shorter" in run.outcome.text
     assert 1.0 < run.end_time_s < 1000.0
 
 

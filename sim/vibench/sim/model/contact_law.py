@@ -1,8 +1,8 @@
 """The laws of contact between m1 and its stops: each a file of its own, its place in the union, and its row.
 
 A law that yields, F = (k1 d + k d^(3/2)) (1 + loss dd/dt) at the indentation d, needs nothing else: the
-kernels, the independent solution and harmonic balance take its `stops`. A force of another shape needs a
-room of its own beside `vibench.sim.contact`.
+native engine, the independent solution and harmonic balance take its `stops`. A force of another shape
+needs a type of its own in native/contact.hpp.
 """
 
 from collections.abc import Mapping
