@@ -63,7 +63,7 @@ FILES = {
     "mistaken.toml": CAMPAIGN.replace("frequency_hz", "frequncy_hz"),
     "mine.py": SCRIPT,
 }
-OURS = ("VIBENCH", "PYTHON", "NUMBA")
+OURS = ("VIBENCH", "PYTHON")
 TYPED = (
     "vibench examples",
     "vibench measure quikc --out mine",
@@ -93,11 +93,7 @@ def main() -> None:
             (folder / file).write_text(text, encoding="utf-8")
         began_s, programs = time.monotonic(), Path(name) / "venv" / ("Scripts" if os.name == "nt" else "bin")
         environment = {
-            **{
-                key: value
-                for key, value in os.environ.items()
-                if not key.startswith(("VIBENCH", "PYTHON", "NUMBA"))
-            },
+            **{key: value for key, value in os.environ.items() if not key.startswith(("VIBENCH", "PYTHON"))},
             "PATH": os.pathsep.join((str(programs), os.environ["PATH"])),
             "HOME": str(home),
             "COLUMNS": "110",

@@ -86,7 +86,6 @@ def examine(each: Installation, folder: Path) -> None:
     kept = {name: value for name, value in os.environ.items() if name not in {"PYTHONPATH", "VIRTUAL_ENV"}}
     environment = {
         **kept,
-        "NUMBA_CACHE_DIR": str(folder / "cache"),
         "VIBENCH_STATE_DIR": str(folder / "state"),
         "QT_QPA_PLATFORM": "offscreen",
     }

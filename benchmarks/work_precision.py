@@ -30,7 +30,7 @@ from vibench.sim.accuracy_benchmark.figures import MOTIONS, Regime
 from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
 from vibench.sim.accuracy_benchmark.measuring import settled_state
 from vibench.sim.accuracy_benchmark.plain_equations import Place, law_of, numbers_of, rates_at
-from vibench.sim.kernels.arrays import Floats
+from vibench.sim.model.arrays import Floats
 from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.study import software
 

@@ -37,7 +37,6 @@ FOR_OUR_PROGRAMS = (
     "vibench.acquisition.first_day",
     "vibench.sim.engine",
     "vibench.sim.feedback",
-    "vibench.sim.kernels",
     "vibench.sim.shaker",
     "vibench.sim.hdf5_files",
     "vibench.sim.operating_system",
@@ -171,10 +170,10 @@ def loaded_by(program):
 @pytest.mark.parametrize(
     ("program", "heavy"),
     [
-        ("import vibench.sim, vibench.sim.study, vibench.acquisition.rig", {"numba", "scipy", "h5py"}),
-        ("from vibench.acquisition.plan import Measurement", {"numba", "pyvisa", "nidaqmx", "grpc"}),
-        ("from vibench.acquisition.engine import EngineClient", {"pyvisa", "nidaqmx", "grpc", "numba"}),
-        ("from vibench.virtual_rig import plug_in_remote", {"numba", "nidaqmx"}),
+        ("import vibench.sim, vibench.sim.study, vibench.acquisition.rig", {"scipy", "h5py"}),
+        ("from vibench.acquisition.plan import Measurement", {"pyvisa", "nidaqmx", "grpc"}),
+        ("from vibench.acquisition.engine import EngineClient", {"pyvisa", "nidaqmx", "grpc"}),
+        ("from vibench.virtual_rig import plug_in_remote", {"nidaqmx"}),
         ("import vibench.cli", {"numpy", "typer"}),
         (
             "import vibench.gui.window.page_catalogue",

@@ -12,7 +12,7 @@ from vibench.sim.study import Study, StudyResults
 from .case import Case, ExponentsBy
 from .options import AMPLITUDES_M, WITH_EXPONENT
 from .responses import Reals, Responses, responses
-from .textbook_methods import ode45, textbook_exponent
+from .textbook_methods import ode45, textbook_exponents
 
 PIECE_WISE, CONTINUOUS = "hertz", "power:5"
 WEAK_M, MODERATE_M, HIGHER_M, STRONG_M = AMPLITUDES_M
@@ -88,15 +88,11 @@ class Reading:
         kept_s = self.case.duration_s - settle_s
 
         def follow() -> Reals:
-            points = zip(curve.frequency_hz, curve.collides, curve.exponent_per_s, strict=True)
-            return np.array(
-                [
-                    textbook_exponent(specimen, Harmonic(f, amplitude_m), ode45(), kept_s, settle_s)
-                    if collides or model != PIECE_WISE
-                    else exact
-                    for f, collides, exact in points
-                ]
-            )
+            is_followed = curve.collides | (model != PIECE_WISE)
+            drives = [Harmonic(f, amplitude_m) for f in curve.frequency_hz[is_followed]]
+            found = curve.exponent_per_s.copy()
+            found[is_followed] = textbook_exponents(specimen, drives, ode45(), kept_s, settle_s)
+            return found
 
         key = ("ode45", specimen, amplitude_m, self.case.frequencies_hz)
         return self.evidence.remembered(key, follow)

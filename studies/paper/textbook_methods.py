@@ -6,6 +6,7 @@ every impact, and to the exponent of chaos. Dormand and Prince's pair is control
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,9 +15,9 @@ from numpy.typing import ArrayLike
 from scipy.integrate import RK45
 
 from vibench.sim import Harmonic, Specimen
-from vibench.sim.accuracy_benchmark.plain_equations import Law, Place, law_of, numbers_of, rates
-from vibench.sim.kernels.arrays import Floats
-from vibench.sim.kernels.compile import kernel
+from vibench.sim.accuracy_benchmark.plain_equations import Place, law_of, numbers_of, rates
+
+from .responses import Reals
 
 APART_M = 1e-11
 """Distance of the neighbour that gives an exponent; far below any indentation, far above rounding."""
@@ -31,11 +32,11 @@ SLOWEST_PER_S = 1e-9
 class Tableau(NamedTuple):
     """Numbers of a method (Hairer, Norsett and Wanner, Solving ODEs I, sections II.1 and II.5)."""
 
-    nodes: Floats
-    stages: Floats
+    nodes: Reals
+    stages: Reals
     """Shape (stages, stages), strictly lower."""
-    result: Floats
-    error: Floats
+    result: Reals
+    error: Reals
     """Zero where the method states none."""
 
 
@@ -90,137 +91,105 @@ def ode45(relative: float = 1e-3, absolute: float = 1e-6, longest_s: float = 3.0
     return TextbookMethod(name, _DORMAND_PRINCE, longest_s, relative, absolute)
 
 
-def textbook_state(
-    specimen: Specimen, drive: Harmonic, method: TextbookMethod, duration_s: float, initial_state: ArrayLike
-) -> Floats:
-    """Follow a motion from time zero and return its state at the end, shape (6,); NaN when it is lost.
+def textbook_states(
+    specimen: Specimen, drive: Harmonic, method: TextbookMethod, duration_s: float, initial_states: ArrayLike
+) -> Reals:
+    """Follow motions from time zero and return their states at the end, shape (n, 6); NaN when one is lost.
 
-    ``initial_state`` is x, y, z, vx, vy, vz, absolute [m, m/s]. Raises ValueError for rigid stops.
+    ``initial_states`` has shape (n, 6): x, y, z, vx, vy, vz, absolute [m, m/s]. Raises ValueError for rigid
+    stops.
     """
-    states = np.array(initial_state, dtype=np.float64).reshape(1, 6)
-    _marched(states, duration_s, duration_s, *_in_numbers(specimen, drive, method))
-    return states.reshape(6)
+    states = np.array(initial_states, dtype=np.float64).T
+    drives = [drive] * states.shape[1]
+    ends, _ = _marched(states[:, np.newaxis], duration_s, duration_s, specimen, drives, method)
+    return ends[:, 0].T
 
 
-def textbook_exponent(
+def textbook_exponents(
     specimen: Specimen,
-    drive: Harmonic,
+    drives: Sequence[Harmonic],
     method: TextbookMethod,
     duration_s: float = 25.0,
     settle_s: float = 5.0,
-) -> float:
-    """Return the largest exponent of what a method makes of a motion from rest [1/s]; NaN when it is lost.
+) -> Reals:
+    """Return the largest exponents of what a method makes of motions from rest [1/s]; NaN when one is lost.
 
     The mean rate over ``duration_s``, after ``settle_s``, at which a neighbour parts that takes the very same
-    steps. Regular motions have it to about 1 / ``duration_s``. Raises ValueError for rigid stops.
+    steps. Regular motions have it to about 1 / ``duration_s``. Shape (n,), one for each drive; all motions
+    are followed together. Raises ValueError for rigid stops.
     """
-    states = np.zeros((2, 6))
-    states[1] = APART_M / math.sqrt(6.0) * _scales(drive)
-    return _marched(states, settle_s + duration_s, settle_s, *_in_numbers(specimen, drive, method))
+    states = np.zeros((6, 2, len(drives)))
+    states[:, 1] = APART_M / math.sqrt(6.0) * _scales(drives)
+    return _marched(states, settle_s + duration_s, settle_s, specimen, drives, method)[1]
 
 
-def _scales(drive: Harmonic) -> Floats:
-    return np.repeat([1.0, 2.0 * np.pi * drive.frequency_hz], 3)
+def _scales(drives: Sequence[Harmonic]) -> Reals:
+    speeds = [2.0 * math.pi * drive.frequency_hz for drive in drives]
+    return np.repeat([np.ones(len(drives)), speeds], 3, axis=0)
 
 
-def _in_numbers(
-    specimen: Specimen, drive: Harmonic, method: TextbookMethod
-) -> tuple[Tableau, tuple[float, float, float], Floats, Law, Floats]:
-    steps = (method.longest_s, method.relative, method.absolute)
-    return method.tableau, steps, _scales(drive), law_of(specimen), numbers_of(specimen, drive)
+def _largest(change: Reals, one: Reals, other: Reals, floor: float) -> Reals:
+    """Size of changes beside the larger of two states, component by component."""
+    beside = np.maximum(np.maximum(np.abs(one), np.abs(other)), floor)
+    return np.asarray(np.max(np.abs(change) / beside, axis=0))
 
 
-@kernel
-def _add(state: Floats, step_s: float, weights: Floats, slopes: Floats, count: int, sums: Floats) -> None:
-    """Write state + step * (weights @ slopes) into sums; loops, for each array of a product takes memory."""
-    for k in range(6):
-        total = 0.0
-        for number in range(count):
-            total += weights[number] * slopes[number, k]
-        sums[k] = state[k] + step_s * total
+def _next_steps(step_s: Reals, error: Reals, failures: Reals, method: TextbookMethod) -> Reals:
+    """Give the lengths to try after a step, as `ode45` does; ``failures`` came one after the other."""
+    if method.relative == math.inf:
+        return np.full_like(step_s, method.longest_s)
+    # A step without error grows by the most; after one whose error is no number follows a tenth.
+    part = 1.25 * (error / method.relative) ** 0.2
+    shorter = np.where(failures > 0, 0.5, np.fmax(0.1, 1.0 / np.maximum(part, 0.2)))
+    longer = np.where(failures > 0, step_s, np.minimum(method.longest_s, step_s / np.maximum(part, 0.2)))
+    return np.where(error <= method.relative, longer, shorter * step_s)
 
 
-@kernel
-def _slopes_of(
-    state: Floats, time_s: float, step_s: float, tableau: Tableau, law: Law, numbers: Floats, slopes: Floats
-) -> None:
-    at = np.empty(6)
-    for number in range(len(tableau.nodes)):
-        _add(state, step_s, tableau.stages[number], slopes, number, at)
-        slopes[number] = rates(time_s + tableau.nodes[number] * step_s, at, Place.ANYWHERE, law, numbers)
-
-
-@kernel
-def _largest(change: Floats, one: Floats, other: Floats, floor: float) -> float:
-    """Size of a change beside the larger of two states, component by component."""
-    found = 0.0
-    for k in range(6):
-        found = max(found, abs(change[k]) / max(abs(one[k]), abs(other[k]), floor))
-    return found
-
-
-@kernel
-def _next_step(step_s: float, error: float, failures: int, steps: tuple[float, float, float]) -> float:
-    """Give the length to try after a step, as `ode45` does, after so many that failed one after the other."""
-    longest_s, relative, _ = steps
-    if relative == np.inf:
-        return longest_s
-    if not error <= relative:
-        return step_s * (0.5 if failures > 0 else max(0.1, 0.8 * (relative / error) ** 0.2))
-    if failures > 0:
-        return step_s
-    wanted = 1.25 * (error / relative) ** 0.2
-    return min(longest_s, step_s / wanted if wanted > 0.2 else 5.0 * step_s)
-
-
-@kernel
-def _read(states: Floats, scale: Floats) -> float:
-    """Give the logarithm of how far the neighbour has parted, and bring it back to where it began."""
-    apart: float = np.sqrt((((states[1] - states[0]) / scale) ** 2).sum()) / APART_M
-    states[1] = states[0] + (states[1] - states[0]) / apart
-    return float(np.log(apart))
-
-
-@kernel
 def _marched(
-    states: Floats,
+    states: Reals,
     until_s: float,
     settle_s: float,
-    tableau: Tableau,
-    steps: tuple[float, float, float],
-    scale: Floats,
-    law: Law,
-    numbers: Floats,
-) -> float:
-    """Take a state to a time, and its neighbour if there is one; give the mean rate at which they part."""
-    longest_s, relative, absolute = steps
-    count, has_neighbour, failures = len(tableau.nodes), len(states) > 1, 0
-    slopes, after, change, nothing = np.zeros((count, 6)), np.zeros(6), np.zeros(6), np.zeros(6)
-    floor = absolute / relative if relative < np.inf else 1.0
-    time_s, read_s, growth, since_s = 0.0, 0.0, 0.0, until_s if settle_s > 0.0 else 0.0
-    first = rates(0.0, states[0], Place.ANYWHERE, law, numbers)
-    fastest = _largest(first, states[0], states[0], floor)
-    step_s = min(longest_s, 0.8 * relative**0.2 / max(fastest, SLOWEST_PER_S))
-    while time_s < until_s:
-        step_s = min(step_s, until_s - time_s)
-        _slopes_of(states[0], time_s, step_s, tableau, law, numbers, slopes)
-        _add(states[0], step_s, tableau.result, slopes, count, after)
-        _add(nothing, step_s, tableau.error, slopes, count, change)
-        error = _largest(change, states[0], after, floor)
-        is_good = error <= relative
-        if time_s + step_s == time_s or (is_good and not abs(after[1]) < LOST_M):
-            states[:] = np.nan
-            return np.nan
-        if is_good:
-            if has_neighbour:
-                _slopes_of(states[1], time_s, step_s, tableau, law, numbers, slopes)
-                _add(states[1], step_s, tableau.result, slopes, count, states[1])
-            states[0] = after
-            time_s += step_s
-        step_s = _next_step(step_s, error, failures, steps)
-        failures = 0 if is_good else failures + 1
-        if is_good and has_neighbour and time_s >= read_s + READING_S:
-            growth += _read(states, scale) * (read_s >= settle_s)
-            since_s = min(since_s, time_s) if time_s >= settle_s else since_s
-            read_s = time_s
-    return growth / (read_s - since_s)
+    specimen: Specimen,
+    drives: Sequence[Harmonic],
+    method: TextbookMethod,
+) -> tuple[Reals, Reals]:
+    """Take states, and neighbours if there are any, to a time; return them and the rates at which they part.
+
+    ``states`` has shape (6, 1 or 2, motions); the second of two is the neighbour.
+    """
+    tableau, law, scales = method.tableau, law_of(specimen), _scales(drives)
+    numbers = np.transpose([numbers_of(specimen, drive) for drive in drives])
+    has_neighbour, count = states.shape[1] > 1, len(drives)
+    floor = method.absolute / method.relative if method.relative < math.inf else 1.0
+    slopes = np.zeros((len(tableau.nodes), *states.shape))
+    rows = slopes.reshape(len(slopes), -1)
+    time_s, read_s, growth, failures = np.zeros((4, count))
+    since_s = np.full(count, until_s if settle_s > 0.0 else 0.0)
+    first = rates(time_s, states[:, 0], Place.ANYWHERE, law, numbers)
+    fastest = np.maximum(_largest(first, states[:, 0], states[:, 0], floor), SLOWEST_PER_S)
+    step_s = np.minimum(method.longest_s, 0.8 * method.relative**0.2 / fastest)
+    while np.any(running := time_s < until_s):
+        step_s = np.minimum(step_s, np.where(running, until_s - time_s, 0.0))
+        for number, node in enumerate(tableau.nodes):
+            at = states + step_s * (tableau.stages[number, :number] @ rows[:number]).reshape(states.shape)
+            slopes[number] = rates(time_s + node * step_s, at, Place.ANYWHERE, law, numbers)
+        after = states + step_s * (tableau.result @ rows).reshape(states.shape)
+        change = step_s * (tableau.error @ rows).reshape(states.shape)[:, 0]
+        error = _largest(change, states[:, 0], after[:, 0], floor)
+        is_good = error <= method.relative
+        is_lost = running & ((time_s + step_s == time_s) | (is_good & ~(np.abs(after[1, 0]) < LOST_M)))
+        states = np.where(is_lost, np.nan, np.where(is_good, after, states))
+        time_s = np.where(is_lost, until_s, np.where(is_good, time_s + step_s, time_s))
+        step_s = _next_steps(step_s, error, failures, method)
+        failures = np.where(is_good, 0.0, failures + 1.0)
+        is_read = running & is_good & ~is_lost & (time_s >= read_s + READING_S)
+        if has_neighbour and np.any(is_read):
+            parted = (states[:, 1] - states[:, 0]) / scales
+            apart = np.where(is_read, np.sqrt((parted**2).sum(axis=0)) / APART_M, 1.0)
+            growth += np.log(apart) * (read_s >= settle_s)
+            states[:, 1] = states[:, 0] + scales * parted / apart
+            since_s = np.where(is_read & (time_s >= settle_s), np.minimum(since_s, time_s), since_s)
+            read_s = np.where(is_read, time_s, read_s)
+    lasted = np.where(np.isnan(states[0, 0]), np.nan, read_s - since_s)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return states, growth / lasted

@@ -9,7 +9,7 @@ import typer
 
 from vibench.cli.__main__ import COMMANDS
 
-HEAVY = {"numpy", "scipy", "numba", "matplotlib", "h5py", "pydantic", "pyvisa", "nidaqmx", "grpc", "PySide6"}
+HEAVY = {"numpy", "scipy", "matplotlib", "h5py", "pydantic", "pyvisa", "nidaqmx", "grpc", "PySide6"}
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -51,7 +51,7 @@ def test_a_prediction_without_a_file_needs_neither_scipy_nor_h5py(point):
     )
     loaded = process.stderr.partition("loaded ")[2].split()
     assert "vibench.sim.scene" in loaded
-    assert {"scipy", "h5py", "numba", "matplotlib"}.isdisjoint(loaded)
+    assert {"scipy", "h5py", "matplotlib"}.isdisjoint(loaded)
 
 
 def test_a_group_reads_its_own_commands(vibench_here, tmp_path):

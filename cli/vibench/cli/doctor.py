@@ -4,6 +4,7 @@ import os
 import platform
 import re
 import shutil
+import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -15,7 +16,8 @@ from vibench.acquisition import MissingLibrary, need_extra, shipped_folder
 from vibench.acquisition.instruments import PlugInKind, plug_in_names
 from vibench.acquisition.recording import KEY_VARIABLE
 from vibench.acquisition.rig import TOKEN_VARIABLE
-from vibench.sim.kernels.clock import advance_clock
+from vibench.sim.engine.library import EngineError
+from vibench.sim.engine.run import native_engine
 from vibench.sim.operating_system.state_folder import LOCK_VARIABLE, VARIABLE as STATE_VARIABLE, state_place
 
 from .output import console, print_json
@@ -32,7 +34,6 @@ VARIABLES: Mapping[str, str] = MappingProxyType(
         TOKEN_VARIABLE: "token of a virtual rig that is served to other computers",
         KEY_VARIABLE: "file with the key that seals of recordings are signed with",
         "OPENBLAS_NUM_THREADS": "threads of linear algebra; 1 if absent, since the matrices are small",
-        "NUMBA_CACHE_DIR": "folder for compiled kernels; beside the sources if absent",
         "QT_QPA_PLATFORM": "how Qt draws the window; 'offscreen' where there is no display",
         "PYQTGRAPH_QT_LIB": "binding of the window's plots; PySide6 if absent",
     }
@@ -46,6 +47,7 @@ def doctor(as_json: AsJson = False) -> None:
     sections = {
         "vibench": installation(),
         "libraries": dict(libraries()),
+        "engine": dict(engine()),
         "folders": dict(folders()),
         "instruments": dict(instruments()),
         "plug-ins": {kind.value: ", ".join(plug_in_names(kind)) for kind in PlugInKind},
@@ -95,17 +97,21 @@ def libraries() -> Iterator[tuple[str, str]]:
             yield name, f"{NOT_INSTALLED}{f' (extra {smallest})' if smallest else ''}"
 
 
+def engine() -> Iterator[tuple[str, str]]:
+    """Load the native engine, and give its place, its family and whether it answers a known scene."""
+    try:
+        loaded = native_engine()
+    except (EngineError, OSError, subprocess.CalledProcessError) as error:
+        yield "library", f"cannot be used: {error}"
+        return
+    yield "library", str(loaded.path)
+    yield "processor family", loaded.family
+    yield "self-test", "passed"
+
+
 def folders() -> Iterator[tuple[str, str]]:
-    """Give where vibench keeps what it learns and compiles, and whether it may write there."""
-    # Where numba writes in truth: it falls back on a folder of the user if the first is not writable.
-    compiled: str | None = advance_clock.stats.cache_path  # type: ignore[attr-defined]
+    """Give where vibench keeps what it learns, and whether it may write there."""
     yield "state", _place(state_place())
-    if compiled is None:
-        nowhere = "kept nowhere, so that every program compiles anew; NUMBA_CACHE_DIR names a folder for them"
-        yield "compiled kernels", nowhere
-    else:
-        folder = Path(compiled).parent
-        yield "compiled kernels", f"{_place(folder)}, {_size_mb(folder):.0f} MB"
     yield "this folder", _place(Path.cwd())
 
 
@@ -113,10 +119,6 @@ def _place(folder: Path) -> str:
     standing = next(each for each in (folder, *folder.parents) if each.exists())
     may = "writable" if standing.is_dir() and os.access(standing, os.W_OK) else "NOT writable"
     return f"{folder}, {may}, {shutil.disk_usage(standing).free / 1e9:.1f} GB free"
-
-
-def _size_mb(folder: Path) -> float:
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 1e6
 
 
 def instruments() -> Iterator[tuple[str, str]]:

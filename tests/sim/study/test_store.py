@@ -149,7 +149,7 @@ def test_sessions_say_who_computed_which_point(small, tmp_path):
     computed_in(path, small)
     results = open_study(path)
     assert len(results.sessions) == 2
-    assert "numba" in json.loads(results.sessions[0].software_json)
+    assert "numpy" in json.loads(results.sessions[0].software_json)
     assert results.sessions[1].executor == "2 thread(s)"
     was_done = first.state == PointState.DONE
     np.testing.assert_array_equal(results.values(SESSION), np.where(was_done, 0.0, 1.0))

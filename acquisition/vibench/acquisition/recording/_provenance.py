@@ -13,8 +13,10 @@ from pathlib import Path
 
 import h5py
 
+from vibench.sim.engine.library import native_digest
+
 CHECKOUT = Path(__file__).resolve().parents[4]
-PACKAGES = ("vibench", "numpy", "scipy", "numba", "h5py", "pydantic", "pyvisa", "pyvisa-py", "nidaqmx")
+PACKAGES = ("vibench", "numpy", "scipy", "h5py", "pydantic", "pyvisa", "pyvisa-py", "nidaqmx")
 GIT_PATIENCE_S = 5.0
 
 
@@ -29,7 +31,7 @@ class Provenance:
     process: int
     python: str
     packages: Mapping[str, str]
-    """Version of each package that has a say in the data."""
+    """Version of each package that has a say in the data; of the native engine the digest of its sources."""
     commit: str
     """Git commit when run from a checkout (``+changes`` when files differ from it), else empty."""
 
@@ -49,7 +51,7 @@ def collect_provenance() -> Provenance:
 
 @cache
 def _package_versions() -> Mapping[str, str]:
-    found = {"hdf5": str(h5py.version.hdf5_version)}
+    found = {"hdf5": str(h5py.version.hdf5_version), "native engine": native_digest()}
     for name in PACKAGES:
         try:
             found[name] = version(name)

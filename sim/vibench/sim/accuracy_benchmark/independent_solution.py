@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from .plain_equations import (

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from ..exponents.lyapunov import lyapunov_exponent
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats
 from ..motion.flow_derivative import flow_derivative
 from ..motion.integrate import integrate
 from ..motion.poincare import smallest_period, state_scales, stroboscopic_section

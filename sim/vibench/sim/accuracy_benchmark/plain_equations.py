@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels.arrays import Floats
-from ..kernels.compile import kernel
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.no_contact import NoContact
 from ..model.power_law import PowerLaw
@@ -43,17 +42,15 @@ class Law(NamedTuple):
     exponent: float = 1.0
     loss: float = 0.0
     reference: float = 1.0
-    powers: Floats = np.zeros(0)
-    forces: Floats = np.zeros(0)
-    """Of each power at the reference [N]."""
+    terms: tuple[tuple[int, float], ...] = ()
+    """Each power, and its force at the reference [N]."""
     beside: float = 0.0
     """Of a linear spring that is pressed together with the stop [N/m]."""
 
 
 def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:
     """Give d/dt of the state for as long as m1 stays at a place."""
-    where = int(place)
-    return lambda time_s, state: rates(time_s, state, where, law, numbers)
+    return lambda time_s, state: rates(time_s, state, place, law, numbers)
 
 
 def law_of(specimen: Specimen) -> Law:
@@ -63,8 +60,7 @@ def law_of(specimen: Specimen) -> Law:
         case NoContact():
             return Law(np.inf, np.inf)
         case PowerLaw(reference=reference, terms=terms):
-            powers, forces = np.array(terms, dtype=np.float64).T.copy()
-            return Law(np.inf, np.inf, reference=reference, powers=powers, forces=forces)
+            return Law(np.inf, np.inf, reference=reference, terms=terms)
         case RigidStops():
             msg = "Rigid stops push with no finite force: give a law that yields, such as hertz."
             raise ValueError(msg)
@@ -80,7 +76,7 @@ def numbers_of(specimen: Specimen, drive: Harmonic) -> Floats:
 
 def place_of(state: Floats, law: Law) -> Place:
     """Say where m1 is."""
-    if len(law.powers) > 0:
+    if law.terms:
         return Place.ANYWHERE
     below, above = _depths(state, law)
     if above > 0.0:
@@ -107,31 +103,28 @@ def _depths(state: Floats, law: Law) -> tuple[float, float]:
     return -p - law.lower, p - law.upper
 
 
-@kernel
-def _stop_force(depth: float, rate: float, law: Law) -> float:
-    still: float = law.stiffness * depth**law.exponent + law.beside * depth
-    return still * (1.0 + law.loss * rate)
+def _stop_force(depth: Floats, rate: Floats, law: Law) -> Floats:
+    return (law.stiffness * depth**law.exponent + law.beside * depth) * (1.0 + law.loss * rate)
 
 
-@kernel
-def rates(time_s: float, state: Floats, place: int, law: Law, numbers: Floats) -> Floats:
-    """d/dt of x, y, z, vx, vy, vz. On a stop the force ends at depth zero; in flight there is none."""
+def rates(time_s: float | Floats, state: Floats, place: Place, law: Law, numbers: Floats) -> Floats:
+    """d/dt of x, y, z, vx, vy, vz. On a stop the force ends at depth zero; in flight there is none.
+
+    ``state`` has shape (6,), or (6, ..., n) for n motions, each with its time and its column of ``numbers``.
+    """
     m0, m1, m2, k0, k1, k2, c0, c1, c2, amplitude, omega, phase = numbers
     x, y, z, vx, vy, vz = state
-    base = amplitude * np.sin(omega * time_s + phase)
-    base_rate = amplitude * omega * np.cos(omega * time_s + phase)
-    p, rate, push = y - z, vy - vz, 0.0
-    if p > law.upper and place != Place.FLIGHT:
-        push = _stop_force(p - law.upper, rate, law)
-    if -p > law.lower and place != Place.FLIGHT:
-        push = -_stop_force(-p - law.lower, -rate, law)
-    for power, force in zip(law.powers, law.forces):  # noqa: B905 - numba's zip has no strict
-        push += force * (p / law.reference) ** power
-    inner = k1 * p + c1 * rate + push
-    outer = k2 * (z - x) + c2 * (vz - vx)
-    found = np.empty(6)
-    found[0], found[1], found[2] = vx, vy, vz
-    found[3] = (outer + k0 * (base - x) + c0 * (base_rate - vx)) / m0
-    found[4] = -inner / m1
-    found[5] = (inner - outer) / m2
-    return found
+    angle = omega * time_s + phase
+    base, base_rate = amplitude * np.sin(angle), amplitude * omega * np.cos(angle)
+    p, rate = y - z, vy - vz
+    inner = k1 * p + c1 * rate
+    # A step that an implicit method only tries may lead beyond all numbers.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if place is not Place.FLIGHT and law.stiffness > 0.0:
+            inner = inner + _stop_force(np.maximum(p - law.upper, 0.0), rate, law)
+            inner = inner - _stop_force(np.maximum(-p - law.lower, 0.0), -rate, law)
+        for power, force in law.terms:
+            inner = inner + force * (p / law.reference) ** power
+        outer = k2 * (z - x) + c2 * (vz - vx)
+        ahead = (outer + k0 * (base - x) + c0 * (base_rate - vx)) / m0
+        return np.array([vx, vy, vz, ahead, -inner / m1, (inner - outer) / m2])

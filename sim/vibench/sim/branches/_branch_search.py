@@ -7,7 +7,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from ..periodic.branch_following import DrivePath

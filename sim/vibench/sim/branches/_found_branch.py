@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from ..motion.poincare import state_scales

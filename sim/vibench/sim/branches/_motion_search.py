@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.arrays import Floats, Vector
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats, Vector
 from ..model.drive import Harmonic
 from ..model.modes import base_transmissibility
 from ..model.outcome import Outcome

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..kernels.arrays import Vector
+from ..model.arrays import Vector
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from ..motion.poincare import state_scales

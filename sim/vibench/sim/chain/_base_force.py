@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Table
+from ..model.arrays import Table
 from ..model.drive import Drive, Harmonic, LinearSweep, LogarithmicSweep, Sampled
 from ..model.specimen import Specimen
 from ..motion.base_motion import sampled_motion

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels.arrays import Complex
+from ..model.arrays import Complex
 from ..model.specimen import Specimen
 from ._chain import MASSES_PER_CELL, Chain
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..exponents.blocking import blocked_mean
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.power_law import PowerLaw
 from ..model.specimen import Specimen
 from ._chain import MASSES_PER_CELL, Chain

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import MOST_IMPACTS, SPARE_IMPACTS
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.arrays import Floats
 from ..model.drive import Drive, Harmonic
 from ..model.outcome import Outcome
 from ..model.stops import chosen

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..exponents.blocking import BlockedMean, blocked_mean
-from ..kernels.arrays import Floats, Table
 from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.arrays import Floats, Table
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.stops import chosen

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Complex
+from ..model.arrays import Complex
 from ._chain import MASSES_PER_CELL, Chain
 from ._dispersion import seen_from_outside
 

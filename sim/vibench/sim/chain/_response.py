@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import Watch
-from ..kernels.arrays import Complex, Floats
 from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.arrays import Complex, Floats
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen

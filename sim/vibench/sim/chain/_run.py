@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from ..engine.run import Watch, native_engine
 from ..engine.scene import collision_structure, fill_drive, power_structure
-from ..kernels.arrays import Complex, Floats
 from ..model.accuracy import Accuracy
+from ..model.arrays import Complex, Floats
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ._base_force import Pieces

@@ -8,8 +8,8 @@ import numpy as np
 from ..engine.run import native_engine
 from ..engine.scene import fill_cell
 from ..engine.structures import Structure
-from ..kernels.arrays import Table, Vector
 from ..model.accuracy import Accuracy
+from ..model.arrays import Table, Vector
 from ..model.drive import Drive, Harmonic
 from ._chain import MASSES_PER_CELL, Chain
 

@@ -11,7 +11,6 @@ import threading
 import time
 from dataclasses import asdict, dataclass
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Self
 
@@ -154,7 +153,6 @@ def cost_ledger() -> CostLedger:
         platform.node(),
         platform.machine(),
         platform.python_version(),
-        version("numba"),
         physics_digest(),
     )
     name = hashlib.sha256("\n".join(about).encode()).hexdigest()[:16]

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 
 FEWEST_BLOCKS = 16
 """With fewer independent blocks an error is itself known to less than 20 per cent."""

@@ -13,8 +13,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.modes import modal_form
 from ..model.outcome import Outcome

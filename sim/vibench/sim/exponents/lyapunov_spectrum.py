@@ -15,8 +15,8 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import DIRECTIONS
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.modes import state_matrix
 from ..model.outcome import Outcome

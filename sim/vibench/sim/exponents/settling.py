@@ -11,7 +11,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..motion.poincare import smallest_period
 from .blocking import blocked_mean
 from .tangent_run import TangentRun

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import GrowthReadings, NativeRun, RunRecord, most_impacts
-from ..kernels.arrays import Floats, Table
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats, Table
 from ..model.drive import Harmonic
 from ..model.modes import modal_form
 from ..model.outcome import Outcome

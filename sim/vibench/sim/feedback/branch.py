@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
 from ..model.state import VY, VZ, Y, Z

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
 from scipy.optimize import fmin
 
-from ..kernels.arrays import Table, Vector
+from ..model.arrays import Table, Vector
 from .plant import SampledPlant
 
 

@@ -5,7 +5,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Table
+from ..model.arrays import Table
 from .law import LinearLaw
 from .plant import SampledPlant
 

@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 from scipy.linalg import block_diag, expm
 
-from ..kernels.arrays import Table, Vector
+from ..model.arrays import Table, Vector
 from ..model.specimen import Specimen
 from ..shaker.parts import Amplifier, Shaker
 

@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from ..kernels.arrays import Table, Vector
+from ..model.arrays import Table, Vector
 
 Complexes = NDArray[np.complex128]
 _HALF = 4

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..motion.poincare import state_scales
 from ..scene.prediction import MotionKind, ScenePrediction

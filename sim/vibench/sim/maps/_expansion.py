@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.batch import batches_pay
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..scene.measured_cost import expected_cost_s, longest_cost_s
 from ..scene.prediction import MotionKind

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..scene.prediction import MotionKind
 from ..scene.shares import UNSURE, Count, Share, shares_of, wilson_share
 from ..study import GridResults, PointState, end_phase, read_arrays, read_plan, read_sessions

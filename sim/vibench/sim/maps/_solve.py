@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..study import (
     Arrays,
     Cancelled,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..kernels.arrays import Complex, Table, Vector
+from .arrays import Complex, Table, Vector
 from .specimen import JOIN, Specimen, bound_matrices
 from .state import VX, VZ, X, Z
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.run import DIRECTIONS, NativeRun, RunRecord, most_impacts
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 
 from ..engine.cubic_run import CubicRun
 from ..engine.run import NativeRun, RunRecord, most_impacts
-from ..kernels.arrays import Floats, Table, Vector
 from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.arrays import Floats, Table, Vector
 from ..model.drive import Drive, Harmonic, Sampled, Sweep
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen

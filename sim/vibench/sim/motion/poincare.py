@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen

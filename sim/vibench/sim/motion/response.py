@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from numpy.typing import ArrayLike
 
 from ..engine.run import NativeRun, RunRecord, Watch, most_impacts
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen

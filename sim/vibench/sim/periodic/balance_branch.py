@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.arrays import Table, Vector
+from ..model.arrays import Table, Vector
 from ..model.drive import Harmonic
 from ..model.state import Y, Z
 from .balance_solver import BalanceOptions, Guess, described

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..kernels.arrays import Complex
+from ..model.arrays import Complex
 from ..model.stops import chosen
 from .condensation import Harmonics, LinearStructure, condense
 from .first_order_balance import first_order_states

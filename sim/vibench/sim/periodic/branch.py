@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Complex, Floats
+from ..model.arrays import Complex, Floats
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..kernels.arrays import Vector
+from ..model.arrays import Vector
 from ..model.drive import Harmonic
 from .branch import POINTWISE, BifurcationKind, Branch, BranchEvent, Parameter
 from .continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace

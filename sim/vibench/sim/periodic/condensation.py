@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Complex, Vector
+from ..model.arrays import Complex, Vector
 from ..model.specimen import Specimen
 
 Matrix = NDArray[np.float64]

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..kernels.arrays import Complex, Floats
+from ..model.arrays import Complex, Floats
 from .condensation import LinearStructure, condense
 from .restoring_force import PowerSpring
 

@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Complex, Floats
+from ..model.arrays import Complex, Floats
 from .condensation import Harmonics, LinearStructure
 from .frequency_time import grid_size, motion_on_grid, waveform
 from .restoring_force import RestoringForce

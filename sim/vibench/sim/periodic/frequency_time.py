@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels.arrays import Complex, Floats
+from ..model.arrays import Complex, Floats
 from .condensation import Harmonics
 from .restoring_force import RestoringForce
 

@@ -13,7 +13,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..kernels.arrays import Complex, Table, Vector
+from ..model.arrays import Complex, Table, Vector
 from .condensation import Condensed, Harmonics, LinearStructure, condense
 from .frequency_time import ForceHarmonics, force_harmonics, grid_size, waveform
 from .restoring_force import RestoringForce

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.arrays import Table, Vector
+from ..model.arrays import Table, Vector
 from ..model.drive import Harmonic
 from ..model.stops import chosen
 from ..motion.poincare import state_scales

@@ -15,7 +15,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..kernels.arrays import Complex, Vector
+from ..model.arrays import Complex, Vector
 from .branch import NEUTRAL, BifurcationKind
 
 COMPLEX_PART = 1e-6

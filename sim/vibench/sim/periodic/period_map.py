@@ -15,8 +15,8 @@ from typing import Literal
 
 import numpy as np
 
-from ..kernels.arrays import Table, Vector
 from ..model.accuracy import Accuracy
+from ..model.arrays import Table, Vector
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.rigid_stops import RigidStops

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..kernels.arrays import Table, Vector
+from ..model.arrays import Table, Vector
 from ..model.drive import Harmonic
 from ..model.modes import base_transmissibility
 from ..model.specimen import Specimen

@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.no_contact import NoContact
 from ..model.power_law import PowerLaw
 from ..model.rigid_stops import RigidStops

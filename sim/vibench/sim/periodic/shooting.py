@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Complex, Floats, Table, Vector
+from ..model.arrays import Complex, Floats, Table, Vector
 from ..model.drive import Harmonic
 from ..model.no_contact import NoContact
 from ..model.power_law import PowerLaw

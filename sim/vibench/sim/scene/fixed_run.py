@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from .followed_run import FollowedRun, Stretch
 from .observed_window import (

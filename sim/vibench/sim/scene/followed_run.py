@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..engine.batch import BatchedMotion, follow_batch
 from ..engine.run import DIRECTIONS, MOST_STEPS, NativeRun, RunRecord, Watch, most_impacts
 from ..exponents.tangent_run import energy_metric
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen

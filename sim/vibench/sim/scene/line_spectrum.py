@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from .observed_window import ObservedWindow, samples_between, states_of
 
 LEAST_RATE_HZ = 20_000.0

@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Complex, Floats
+from ..model.arrays import Complex, Floats
 from ..model.drive import Harmonic
 from ..model.modes import harmonic_motion, modal_form
 from ..model.no_contact import NoContact

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..engine.run import Watch
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..motion.response import WHOLE
 from .followed_run import FollowedRun, Samples, Stretch
 

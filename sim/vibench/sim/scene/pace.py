@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats
 from ..model.contact_law import ContactLaw
 from ..model.power_law import PowerLaw
 from ..model.specimen import Specimen

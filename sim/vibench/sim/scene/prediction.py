@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from .shares import EscapeRate, Share
 

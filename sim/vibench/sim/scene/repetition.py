@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from .prediction import MotionKind
 
 MOST_PERIODS = 32

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..kernels.arrays import Complex, Floats
+from ..model.arrays import Complex, Floats
 from .observed_window import Block
 from .quantiles import student_quantile
 

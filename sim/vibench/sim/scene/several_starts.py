@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.run import Watch
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import Y, Z

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..exponents.lyapunov import LyapunovEstimate, Precision, lyapunov_exponent
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from .ensemble import ErrorOf, lasting
 from .fixed_run import SceneRun, run_for

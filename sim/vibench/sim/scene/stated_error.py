@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..engine.run import Watch
-from ..kernels.arrays import Floats
 from ..model.accuracy import Accuracy
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from .fixed_run import SceneRun, leads
 from .followed_run import FollowedRun

@@ -12,7 +12,7 @@ from typing import TypeVar, cast
 import numpy as np
 
 from ..engine.batch import batches_pay, is_batchable
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from .followed_run import FollowedRun, Stretch, follow_together

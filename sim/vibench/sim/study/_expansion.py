@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..scene.measured_cost import expected_cost_s
 from ..scene.scene import Given, Rest, Scene

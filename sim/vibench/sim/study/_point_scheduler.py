@@ -12,7 +12,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..model.frozen_model import FrozenModel
 from ._axes import Grid, StudyAxis, grid_of
 from ._columns import Column

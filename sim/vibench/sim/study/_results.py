@@ -8,7 +8,7 @@ from typing import Generic
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..scene.prediction import ScenePrediction
 from ._answers import prediction_at
 from ._axes import StudyAxis

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.arrays import Floats
+from ..model.arrays import Floats
 from ..scene.scene import Scene
 from ..scene.side_by_side import Solved
 from ._axes import Grid

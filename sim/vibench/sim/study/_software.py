@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from ..engine.sources import physics_digest
 
-PACKAGES = ("vibench", "numpy", "scipy", "numba")
+PACKAGES = ("vibench", "numpy", "scipy")
 
 
 @cache
