@@ -365,9 +365,8 @@ COMMANDS = {
     "warm": Place(
         "warm",
         "warm",
-        "Compile the simulation, and the virtual rig where it is installed, before the first use.",
+        "Say that nothing needs compiling: the simulation was compiled when vibench was built.",
         Panel.INSTALLATION,
-        space_mb=SIMULATION_MB,
     ),
     "doctor": Place(
         "doctor",

@@ -9,13 +9,8 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 
-import numpy as np
-
 from vibench.acquisition import follow_parent
 from vibench.analysis import AnalysisError, CampaignResults, analyse_files, merged_results
-from vibench.sim import Accuracy, Harmonic, gong2025, steady_response
-from vibench.sim.shaker.parts import Amplifier, Shaker
-from vibench.sim.shaker.sampled_voltage import DrivenTable, follow_voltage
 
 
 class Analyst:
@@ -67,19 +62,10 @@ def second_process(name: str, draws: int) -> Iterator[Analyst]:
     """Keep an analyst at work while inside; what it has not begun when an error leaves is dropped."""
     # A fresh interpreter: a fork would copy the threads' locks of the instrument libraries.
     pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_follow)
-    pool.submit(_compile)
     try:
         yield Analyst(pool, name, draws)
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _compile() -> None:
-    """Have the simulation compiled while the first measurement runs."""
-    specimen = gong2025()
-    steady_response(specimen, Harmonic(260.0, 5e-6), Accuracy.QUICK, duration_s=0.2, window_s=0.1)
-    table = Shaker(0.1, 1e4, 20.0, 5.0, 2.0, 1e-4)
-    follow_voltage(DrivenTable(Amplifier(), table, specimen), np.zeros(100), 51_200.0)
 
 
 def _follow() -> None:

@@ -38,10 +38,7 @@ def demo(
         leave_output_to_json()
     folder = unused(Path("vibench_demo")) if out is None else out
     campaign = load_campaign(shipped("campaigns/paper.toml"))
-    console.print(
-        "The experiment of Gong et al. (2025), section 5, on a virtual rig. The first time, the simulation"
-    )
-    console.print("is compiled: it starts slowly and then runs many times faster than real time.")
+    console.print("The experiment of Gong et al. (2025), section 5, on a virtual rig.")
     console.print()
     with second_process(campaign.name, draws) as analyst:
 

@@ -21,7 +21,7 @@ MOST_AT_ONCE = 200
 
 
 class Simulator(QObject):
-    """One process for as long as the page lives: compiling once is enough.
+    """One process for as long as the page lives: to start it once is enough.
 
     Parameters
     ----------

@@ -177,7 +177,7 @@ def _timed(run: Callable[[], object]) -> float:
 
 
 def _costs(motion: Motion, start: Floats) -> dict[Accuracy, float]:
-    """Least processor time of each level over simulated time; the first round compiles and is not kept."""
+    """Least processor time of each level over simulated time; not of the first round, which makes tables."""
     best = dict.fromkeys(LEVELS, math.inf)
     for repeat in range(REPEATS + 1):
         for level in LEVELS:

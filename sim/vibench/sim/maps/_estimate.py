@@ -63,7 +63,7 @@ class MapEstimate:
             f"{self.points} points at most, {self.coarse_points} of them in the first picture; all are "
             f"planned as {self.work_s:.2g} s of one core, as such points took here lately. With "
             f"{self.workers} worker(s): the first picture after {self.first_s:.2g} s, everything after "
-            f"{self.all_s:.2g} s, or {self.most_s:.2g} s if no motion repeats, without compiling; "
+            f"{self.all_s:.2g} s, or {self.most_s:.2g} s if no motion repeats; "
             f"more than {self.most_useful_workers} workers would wait. The file takes "
             f"{self.file_bytes / 1e6:.1f} MB. Motions are followed {self.followed}."
         )

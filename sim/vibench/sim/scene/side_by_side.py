@@ -21,8 +21,8 @@ class Solved:
 
     prediction: ScenePrediction
     taken_s: float
-    """Processor time of this thread for it [s]; of what was followed together, its part. NaN when compiling
-    was part of it."""
+    """Processor time of this thread for it [s]; of what was followed together, its part. NaN when what a
+    process pays once was part of it."""
 
 
 def solve_scenes(scenes: Sequence[Scene]) -> list[Solved]:

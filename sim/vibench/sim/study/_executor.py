@@ -1,6 +1,6 @@
 """The boundary between the queue and whatever computes: threads here, processes elsewhere.
 
-What a scene costs, without what a process pays once: the compilation of its kernels.
+What a scene costs, without what a process pays once: modules loaded, tables of its law.
 """
 
 import math
@@ -72,13 +72,13 @@ TOGETHER: dict[Solver, Callable[[Sequence[Scene]], Sequence[Solved]]] = {
 """Solvers that answer several scenes in less time than one after the other."""
 
 _solved_before: set[Kind] = set()
-"""Kinds of scenes whose kernels this process has compiled."""
+"""Kinds of scenes for which this process is prepared."""
 
 
 def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
     """Solve scenes, together if the solver can, and say what each cost this thread.
 
-    A scene that begins before one of its kind has ended may have compiled kernels, or waited for them: its
+    A scene that begins before one of its kind has ended may have loaded modules and made tables: its
     time says nothing.
     """
     together = TOGETHER.get(solver)
@@ -98,15 +98,15 @@ def _timed(scene: Scene, solver: Solver) -> Solved:
 def _noted(
     scenes: Sequence[Scene], solver: Solver, solve: Callable[[Sequence[Scene]], Sequence[Solved]]
 ) -> Iterator[Solved]:
-    """Solve scenes, and learn what they cost from those whose kernels were compiled before."""
+    """Solve scenes, and learn what they cost from those that were prepared for before."""
     kinds: list[Kind] = [
         (solver, type(each.specimen.contact), each.observe, type(each.duration)) for each in scenes
     ]
-    are_compiled = [kind in _solved_before for kind in kinds]
+    are_prepared = [kind in _solved_before for kind in kinds]
     found = solve(scenes)
     _solved_before.update(kinds)
-    for scene, is_compiled, each in zip(scenes, are_compiled, found, strict=True):
+    for scene, is_prepared, each in zip(scenes, are_prepared, found, strict=True):
         # To plan a closed form takes about as long as to evaluate it.
-        if is_compiled and each.prediction.method is not Method.CLOSED_FORM:
+        if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
             learn_cost(scene, each.taken_s, solver)
-        yield Solved(each.prediction, each.taken_s if is_compiled else math.nan)
+        yield Solved(each.prediction, each.taken_s if is_prepared else math.nan)

@@ -178,7 +178,7 @@ class _Session:
         if answers and not self.is_unfinished:
             self._scheduler.release(self._points.wanted(self._store.arrays))
         if answers and math.isnan(self._first_s):
-            # Workers spend their first moments on compiling: what comes after tells their pace.
+            # Workers spend their first moments on starting: what comes after tells their pace.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
     def progress(self) -> StudyProgress:

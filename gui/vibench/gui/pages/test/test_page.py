@@ -196,7 +196,7 @@ class TestPage(Page):
             return
         self.summary.setText("…")
         self._looking.ask(TestPreview(measurement, rig))
-        self.prediction_note.setText("◌ simulating; the first time compiles the simulation, up to a minute")
+        self.prediction_note.setText("◌ simulating")
         self._predicting.ask(TestPreview(measurement, rig))
 
     def _looked(self, seen: MeasurementPreview) -> None:
