@@ -21,7 +21,7 @@ from vibench.acquisition.campaign import (
 )
 from vibench.acquisition.errors import CheckFailed, RecordingError
 from vibench.acquisition.plan import Campaign, Dwell, Measurement
-from vibench.acquisition.recording import RecordingState, SealDepth, SealState
+from vibench.acquisition.recording import RecordingState, SealDepth, SealState, recover
 from vibench.acquisition.stopping.stop import Cause, StopRequest, StopSwitch
 
 
@@ -380,3 +380,31 @@ def test_a_complete_point_whose_end_the_disk_refuses_is_not_recorded_twice(bench
     made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
     assert outcomes(made)["two"] == (PointOutcome.KEPT, "two.h5")
     assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
+
+
+def test_a_complete_recording_counts_whatever_the_journal_says_of_its_attempt(bench, tmp_path):
+    """The journal could not be written after the recovery; or the user recovered it, as the error says."""
+    refused_by_the_disk(bench, tmp_path, None)
+    (tmp_path / "two.h5.tmp").rmdir()
+    recover(tmp_path / "two.h5.part")
+    failed = read_journal(tmp_path / "c.campaign.sqlite")[1]
+    assert (failed.state, failed.file) == (JournalPointState.FAILED, "two.h5")
+    planned = planned_recordings(CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    assert [each.is_complete for each in planned] == [True, True, False]
+    made = run_campaign(bench, CAMPAIGN, tmp_path, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.KEPT, "two.h5")
+    assert sorted(each.name for each in tmp_path.glob("*.h5*")) == ["one.h5", "three.h5", "two.h5"]
+
+
+def test_a_recording_that_was_away_and_is_back_is_not_made_again(bench, folder):
+    (folder / "two.h5").rename(folder / "two.away")
+    with pytest.raises(RecordingError, match="gone"):
+        run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME, on_event=leave)
+    (folder / "two.away").rename(folder / "two.h5")
+    made = run_campaign(bench, CAMPAIGN, folder, ExistingRecordings.RESUME)
+    assert outcomes(made)["two"] == (PointOutcome.KEPT, "two.h5")
+
+
+def leave(event):
+    """End the campaign as soon as it has looked through the folder."""
+    raise RecordingError("the folder is gone")

@@ -27,8 +27,8 @@ PROGRAM_ENDED = "its program ended in the middle of it"
 def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
     """Bring a journal that is gone on with up to date with the files beside it.
 
-    A point that was running is done when its recording is complete (only the word in the journal was
-    missing), and interrupted otherwise; what was left of its recording becomes a readable file. A
+    A point whose recording is complete is done, whatever the journal says: its last word may be missing. One
+    that was running is interrupted otherwise; what was left of its recording becomes a readable file. A
     done point is queued again when its recording has been taken away, or is not as it was sealed: that
     one stays where it is, and the next attempt is made beside it. To read a folder may take minutes: after a
     stop the rest is left for the next resume, since no other point will be made.
@@ -47,10 +47,11 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
                 found = looked_at(path, point.measurement, SealDepth.WHOLE)
                 if found.damage:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
-            case JournalPointState.RUNNING | JournalPointState.FAILED | JournalPointState.INTERRUPTED if (
-                has_part or point.state is JournalPointState.RUNNING
-            ):  # where the disk refused its end, it may be complete
-                journal.end(point.name, *_ended(path, point.measurement, errors))
+            case state if point.file:
+                ended = _ended(path, point.measurement, errors)
+                # An error that the journal noted does not say what stands on the disk.
+                if has_part or state is JournalPointState.RUNNING or ended[0] is JournalPointState.DONE:
+                    journal.end(point.name, *ended)
 
 
 def found_recordings(
@@ -303,8 +304,10 @@ def _resumable(campaign: Campaign, points: tuple[Point, ...], folder: Path) -> t
         found = {
             each.name: folder / each.file
             for each in known
-            if each.state is JournalPointState.DONE
-            and not looked_at(folder / each.file, each.measurement, SealDepth.QUICK).damage
+            if each.file
+            for kept in [looked_at(folder / each.file, each.measurement, SealDepth.QUICK)]
+            if (kept.is_complete and kept.is_of_this_plan)
+            or (each.state is JournalPointState.DONE and not kept.damage)
         }
         wanted = [(each.name, each.measurement) for each in known]
     return tuple(
