@@ -50,7 +50,11 @@ def put_down(stop: str, reason: str) -> None:
         pass
     finally:
         os.close(descriptor)
-    os.replace(coming, stop)  # noqa: PTH105 - as above
+    try:
+        os.replace(coming, stop)  # noqa: PTH105 - as above
+    except OSError:  # a network folder may report an error of a rename that was made
+        if not os.path.exists(stop):  # noqa: PTH110 - as above
+            raise
 
 
 def fate_of(stop: str, is_alive: Callable[[], bool] = lambda: True) -> Fate:

@@ -241,17 +241,24 @@ def attack(shard: Shard) -> Tally:
     return tally
 
 
+def built_library(folder: Path) -> Path:
+    """Compile the library whose system calls fail."""
+    library = folder / "system_calls.so"
+    source = Path(__file__).with_name("system_calls.c")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl", "-lpthread"], check=True)
+    return library
+
+
 def attack_calls(shard: Shard) -> Tally:
     """Let exact system calls kill or fail; each number is one campaign, and what is counted are faults."""
     tally = shard.tally("calls")
-    with tempfile.TemporaryDirectory(prefix="vibench_calls_") as folder:
-        library = Path(folder) / "system_calls.so"
-        source = Path(__file__).with_name("system_calls.c")
-        subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source, "-ldl", "-lpthread"], check=True)
-        with KilledCampaigns(library) as runs:
-            for number, chance in shard.chances(tally):
-                if said := attacked(runs, chance, tally, kinds=CALL_KINDS):
-                    tally.findings.append(Finding("calls", shard.seed, number, tuple(said[:5]), ""))
+    with (
+        tempfile.TemporaryDirectory(prefix="vibench_calls_") as folder,
+        KilledCampaigns(built_library(Path(folder))) as runs,
+    ):
+        for number, chance in shard.chances(tally):
+            if said := attacked(runs, chance, tally, kinds=CALL_KINDS):
+                tally.findings.append(Finding("calls", shard.seed, number, tuple(said[:5]), ""))
     return tally
 
 

@@ -193,7 +193,7 @@ def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> t
         with closing(_opened(folder, chosen(Refresh, refresh))) as connection:
             _update(folder, connection)
             return _entries(connection)
-    except (sqlite3.OperationalError, PermissionError):
+    except (sqlite3.OperationalError, OSError):  # a disk that is full or read-only
         with closing(_prepared(sqlite3.connect(":memory:", isolation_level=None))) as connection:
             _update(folder, connection)
             return _entries(connection)

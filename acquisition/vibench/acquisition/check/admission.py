@@ -18,6 +18,7 @@ from typing import assert_never
 from pydantic import ValidationError
 
 from vibench.sim.operating_system.state_folder import state_folder
+from vibench.sim.operating_system.this import rename
 
 from ..bench.bench import Bench, BenchKind
 from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, judged, rig_digest
@@ -97,7 +98,7 @@ def _write(result: CheckResult, *, passed: bool) -> Path:
         descriptor, name = tempfile.mkstemp(prefix=path.name, suffix=".tmp", dir=path.parent)
         with os.fdopen(descriptor, "w", encoding="utf-8") as file:
             file.write(result.model_dump_json(indent=2))
-        Path(name).replace(path)
+        rename(Path(name), path)
     except OSError as error:
         raise RecordingError(
             f"The result of the bench check cannot be kept in {error.filename} ({error.strerror}). The bench "

@@ -17,7 +17,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from vibench.sim.operating_system.this import sync_file, sync_folder
+from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
 from ..host.log import LOG
@@ -189,15 +189,6 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     return final
 
 
-def rename(unfinished: Path, final: Path) -> None:
-    """Give a whole file its name; network folders report errors of renames that were made."""
-    try:
-        os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
-    except OSError:
-        if unfinished.exists() or not final.exists():
-            raise
-
-
 def whereabouts(part: Path, error: Exception) -> str:
     """Say where the committed samples are after an error of the disk, and what to do."""
     try:
@@ -220,8 +211,9 @@ def discard(part: Path) -> None:
         part.unlink()
         sync_folder(part.parent)
     except OSError as error:
-        name = part.with_suffix("").name
-        LOG.warning("%s is complete; %s could not be deleted (%s)", name, part.name, error)
+        if part.exists():
+            name = part.with_suffix("").name
+            LOG.warning("%s is complete; %s could not be deleted (%s)", name, part.name, error)
 
 
 def _largest_size(part: Path) -> int:

@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from vibench.sim.operating_system.this import allocate, open_to_write, sync_folder
+from vibench.sim.operating_system.this import allocate, open_to_write, rename, sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout
@@ -139,7 +139,7 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
             places = _write_layout(file, header, capacity, reserved)
         _claim(made, places)
         _require_whole(made, header)
-        made.rename(part)
+        rename(made, part)
         sync_folder(part.parent)
     # HDF5 reports a failing disk as one or the other.
     except (OSError, RuntimeError) as error:

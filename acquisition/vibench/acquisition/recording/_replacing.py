@@ -11,11 +11,10 @@ from typing import TypeVar
 
 import h5py
 
-from vibench.sim.operating_system.this import sync_file, sync_folder
+from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout
-from ._finalise import rename
 from ._preallocate import extend_room, release_room
 
 Answer = TypeVar("Answer")
@@ -38,12 +37,15 @@ def replace_with_change(path: Path, room: int, change: Callable[[h5py.File], Ans
             for _ in range(ATTEMPTS):
                 before = _fingerprint(path)
                 tmp, answer = _changed_copy(path, room, change)
-                if _fingerprint(path) == before:
-                    rename(tmp, path)
-                    with suppress(OSError):  # after a power cut either file is there, and both are whole
-                        sync_folder(path.parent)
-                    return answer
-                tmp.unlink()
+                try:
+                    if _fingerprint(path) == before:
+                        rename(tmp, path)
+                        with suppress(OSError):  # after a power cut either file is there, and both are whole
+                            sync_folder(path.parent)
+                        return answer
+                finally:
+                    with suppress(OSError):  # a rename has taken it
+                        tmp.unlink()
     except RecordingError:
         raise
     except (OSError, RuntimeError) as error:

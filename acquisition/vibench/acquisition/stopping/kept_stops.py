@@ -12,7 +12,7 @@ from pathlib import Path
 from stat import S_IMODE, S_ISREG
 
 from vibench.sim.operating_system.state_folder import state_folder
-from vibench.sim.operating_system.this import process_start
+from vibench.sim.operating_system.this import process_start, rename
 from vibench.stop_files import stop_path, taken_path
 
 from .driving import DRIVES_ON
@@ -65,7 +65,7 @@ class KeptStops:
             self._press(level, self._reason(path) if S_ISREG(found.st_mode) else SILENT_REASON)
             taken = Path(taken_path(str(path)))
             with suppress(OSError):
-                path.replace(taken)
+                rename(path, taken)
                 self._taken.add(taken)
         self.confirm()
 

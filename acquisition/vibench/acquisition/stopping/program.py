@@ -13,7 +13,7 @@ from typing import TypeVar
 from pydantic import BaseModel, ConfigDict
 
 from vibench.sim.operating_system.processes import Place, is_process, place_of
-from vibench.sim.operating_system.this import OpenFile, process_start
+from vibench.sim.operating_system.this import OpenFile, process_start, rename
 
 from ..errors import AcquisitionError
 from .kept_stops import KeptStops, engines_folder
@@ -314,7 +314,8 @@ def _write(program: Program) -> Path:
     descriptor = os.open(coming, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
     with os.fdopen(descriptor, "w", encoding="utf-8") as file:
         file.write(program.model_dump_json())
-    return coming.replace(path)  # whole, or not there
+    rename(coming, path)  # whole, or not there
+    return path
 
 
 def _sweep() -> None:

@@ -2,8 +2,10 @@
 
 import errno
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from vibench.sim.operating_system.this import rename
 
 from ..errors import InvalidRequest
 
@@ -35,11 +37,12 @@ def new_file(path: Path) -> Iterator[Path]:
     try:
         yield unfinished
         require_unused(path)  # another program may have been as busy
-        unfinished.rename(path)
+        rename(unfinished, path)
     except OSError as error:
         mend = "choose another folder" if error.errno in _REFUSED else "make room and try again"
         raise InvalidRequest(
             f"{path} could not be written: {error}; nothing was kept of it, so {mend}"
         ) from error
     finally:
-        unfinished.unlink(missing_ok=True)
+        with suppress(OSError):
+            unfinished.unlink()

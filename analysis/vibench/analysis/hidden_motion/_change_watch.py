@@ -19,6 +19,7 @@ from pydantic import ValidationError
 from vibench.acquisition.rig import Rig
 from vibench.sim import FrozenModel, Specimen
 from vibench.sim.operating_system.state_folder import state_folder
+from vibench.sim.operating_system.this import rename
 
 from ._parameters import Hidden
 
@@ -90,7 +91,7 @@ def keep_baseline(baseline: Baseline, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     coming = path.with_suffix(".coming")
     coming.write_text(baseline.model_dump_json(indent=2), encoding="utf-8")
-    coming.replace(path)
+    rename(coming, path)
 
 
 class ChangeWatch:

@@ -52,6 +52,7 @@ __all__ = [
     "open_to_write",
     "process_start",
     "read_at",
+    "rename",
     "sync_data",
     "sync_folder",
     "usual_shared_folder",
@@ -121,3 +122,13 @@ def sync_file(path: Path) -> None:
     finally:
         os.close(descriptor)
     sync_folder(path.parent)
+
+
+def rename(unfinished: Path, final: Path) -> None:
+    """Rename a file, replacing `final`; ignore an error of a rename that was made, as on network folders."""
+    made = unfinished.stat()
+    try:
+        os.replace(unfinished, final)  # noqa: PTH105 - the pair of os.fsync
+    except OSError:
+        if not final.exists() or not os.path.samestat(made, final.stat()):
+            raise

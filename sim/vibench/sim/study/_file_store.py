@@ -9,7 +9,6 @@ After this nothing but bytes at known places is written: HDF5 itself has closed 
 can catch it between two steps.
 """
 
-import os
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -22,7 +21,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..operating_system.this import OpenFile, sync_file, sync_folder
+from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
 from . import _layout as layout
 from ._axes import StudyAxis
 from ._columns import (
@@ -112,7 +111,7 @@ def make_file(path: Path, plan: GridPlan) -> None:
         with h5py.File(making, "w", libver=layout.LIBVER, locking=False) as file:
             _fill(file, plan)
         sync_file(making)
-        os.replace(making, path)  # noqa: PTH105 - the pair of os.fsync
+        rename(making, path)
         sync_folder(path.parent)
     except OSError as error:
         _discard(making, path)

@@ -1,0 +1,135 @@
+"""A system call that did its work and reports an error, or did not: the program looks at the disk."""
+
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from vibench.acquisition.campaign import JournalPointState, read_journal
+
+from . import recordings_kills
+from .recordings_corpus import good_recordings
+from .recordings_kills import CALLS, FAULTS, LIBRARY, ROOT, WHEN, KilledCampaigns, at_the_end, built_library
+
+pytestmark = pytest.mark.skipif(
+    sys.platform != "linux" or shutil.which("cc") is None, reason="preloads a C library"
+)
+
+ARMED = f"""
+import ctypes, os, sys
+from pathlib import Path
+folder, call, when, fault = Path(sys.argv[1]), *map(int, sys.argv[2:])
+def arm():
+    ctypes.CDLL(os.environ["{LIBRARY}"]).arm(call, 1, when, fault, bytes(folder))
+"""
+EXPORT = """
+from vibench.analysis.exchange._new_file import new_file
+with new_file(folder / "file") as path:
+    path.write_text("all of it")
+    arm()
+"""
+STOP = """
+from vibench.stop_files import put_down
+arm()
+put_down(str(folder / "file"), "all of it")
+"""
+ANNOUNCEMENT = """
+from vibench.sim.operating_system.this import rename
+(folder / "file.coming").write_text("all of it")
+arm()
+rename(folder / "file.coming", folder / "file")
+"""
+RESULT = """
+import h5py
+from vibench.acquisition.recording._replacing import replace_with_change
+arm()
+replace_with_change(folder / "dwell.h5", 1000, lambda file: file.attrs.__setitem__("note", "all of it"))
+"""
+CATALOGUE = """
+from vibench.acquisition.campaign import list_recordings
+first = list_recordings(folder)
+arm()
+print(len(first), len(list_recordings(folder, "all")))
+"""
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return built_library(tmp_path_factory.mktemp("library"))
+
+
+def ended(library, code, folder, call, when, fault="ENOSPC"):
+    arguments = (folder, list(CALLS).index(call), WHEN.index(when), FAULTS[fault])
+    return subprocess.run(
+        [sys.executable, "-c", ARMED + code, *map(str, arguments)],
+        env={**os.environ, "LD_PRELOAD": str(library), LIBRARY: str(library)},
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize("code", [EXPORT, STOP, ANNOUNCEMENT])
+def test_a_file_is_reported_as_written_exactly_when_it_is_there(library, tmp_path, code):
+    refused = ended(library, code, tmp_path, "rename", "before")
+    assert "No space left on device" in refused.stderr
+    assert not (tmp_path / "file").exists()
+    for left in tmp_path.iterdir():
+        left.unlink()
+    made = ended(library, code, tmp_path, "rename", "after")
+    assert (made.returncode, made.stderr) == (0, "")
+    assert [each.name for each in tmp_path.iterdir()] == ["file"]
+    assert (tmp_path / "file").read_text() == "all of it"
+
+
+def test_an_export_whose_leftover_cannot_be_removed_is_an_export(library, tmp_path):
+    made = ended(library, EXPORT, tmp_path, "unlink", "before")
+    assert (made.returncode, made.stderr) == (0, "")
+    assert (tmp_path / "file").read_text() == "all of it"
+
+
+@pytest.mark.parametrize("when", WHEN)
+def test_a_result_is_reported_as_added_exactly_when_it_is_in_the_recording(library, tmp_path, when):
+    path = tmp_path / "dwell.h5"
+    path.write_bytes(good_recordings()["dwell.h5"])
+    made = ended(library, RESULT, tmp_path, "rename", when)
+    assert (made.returncode == 0) == (b"all of it" in path.read_bytes()) == (when == "after")
+    assert [each.name for each in tmp_path.iterdir()] == ["dwell.h5"]
+
+
+@pytest.mark.parametrize("when", WHEN)
+def test_recordings_are_listed_where_their_catalogue_cannot_be_removed(library, tmp_path, when):
+    (tmp_path / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])
+    listed = ended(library, CATALOGUE, tmp_path, "unlink", when)
+    assert (listed.stdout, listed.stderr) == ("1 1\n", "")
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_rename_that_was_made_ends_no_campaign_whatever_it_reports(library, tmp_path, number):
+    recordings_kills.laid(tmp_path, "virtual_rig_streaming")
+    with KilledCampaigns(library) as runs:
+        run = runs.run(tmp_path, kind="rename after ENOSPC", number=number)
+    assert (run["code"], run["err"]) == (0, "")
+    assert at_the_end(tmp_path / "out", 2) == []
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_point_that_was_recovered_when_the_journal_failed_is_not_recorded_twice(library, tmp_path, when):
+    recordings_kills.laid(tmp_path, "virtual_rig_streaming")
+    out = tmp_path / "out"
+    with KilledCampaigns(library) as runs:
+        refused = runs.run(tmp_path, kind="ftruncate before ENOSPC", number=4)
+        assert "All committed samples are safe in out/weak.h5.part" in refused["err"]
+        # The seventh synchronisation of a resume is the commit that would count the recovered recording.
+        refused = runs.run(tmp_path, "--resume", kind=f"fsync {when} EIO", number=7)
+        assert "the journal out/killed.campaign.sqlite cannot be read or written" in refused["err"]
+        assert [path.name for path in out.glob("*.h5*")] == ["weak.h5"]
+        assert read_journal(out / "killed.campaign.sqlite")[0].state is JournalPointState.FAILED
+        resumed = runs.run(tmp_path, "--resume")
+    assert (resumed["code"], resumed["err"]) == (0, "")
+    assert at_the_end(out, 2) == []
