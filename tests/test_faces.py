@@ -44,7 +44,7 @@ FOR_OUR_PROGRAMS = (
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
 )
-ONE_FILE_ROOMS = ("errors", "tables", "analogue", "command", "stop_files")
+ONE_FILE_ROOMS = ("errors", "figure_choices", "tables", "analogue", "command", "stop_files")
 
 
 def sources():

@@ -22,10 +22,10 @@ from ..dynamics import (
     motion_classes,
     motion_words,
 )
+from ..figure_choices import SHOWN
 from ..signals.arrays import Reals
 from ..tables import Table, table
 from .branches import draw_line
-from .map_quantities import SHOWN
 from .style import (
     LEVELS,
     MEASURED,

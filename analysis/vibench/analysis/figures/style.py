@@ -18,8 +18,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, LogFormatter, NullLoc
 
 from vibench.acquisition import printable
 
+from ..figure_choices import ImageKind
 from ..tables import Table, write_tables
-from .image_kind import ImageKind
 
 MEASURED = "#1b1b1b"
 SIMULATED = "#d55e00"

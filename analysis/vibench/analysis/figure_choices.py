@@ -1,4 +1,15 @@
-"""Quantities of a map; options of commands name them where matplotlib is not installed."""
+"""What is chosen before a figure is drawn; options of commands name it where matplotlib is not installed."""
+
+from enum import StrEnum
+
+
+class ImageKind(StrEnum):
+    """Formats that a figure is written in; the value is the files' suffix."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+
 
 SHOWN = {
     "response_i": "Response I of m0 over A0",
