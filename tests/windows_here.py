@@ -51,7 +51,7 @@ def windows() -> ModuleType:
     runtime.locking, runtime.LK_NBLCK = locking, 2
     sys.modules["msvcrt"] = runtime
     os.O_BINARY = 0
-    place = Path(vibench.sim.__file__).parent / "operating_system" / "_windows.py"
+    place = Path(vibench.sim.__file__).parent / "operating_system" / "windows.py"
     spec = importlib.util.spec_from_file_location("vibench.sim.operating_system.windows", place)
     module = importlib.util.module_from_spec(spec)
     here, sys.platform = sys.platform, "win32"

@@ -347,5 +347,5 @@ def test_rows_of_several_units_have_them_beside_their_values():
 
 def test_every_result_with_arrays_has_the_method():
     found = {*results(), *wholes()}
-    assert len(found) > 40
+    assert len(found) > 25
     assert sorted(each.__name__ for each in found if not issubclass(each, Labelled)) == []

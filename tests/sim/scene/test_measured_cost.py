@@ -17,7 +17,7 @@ SCENES = 12
 @pytest.fixture
 def ledger(tmp_path, monkeypatch):
     new = CostLedger(tmp_path / "costs.json")
-    for module in ("_plan", "_measured_cost"):
+    for module in ("plan", "measured_cost"):
         monkeypatch.setattr(f"vibench.sim.scene.{module}.cost_ledger", lambda: new)
     return new
 

@@ -7,16 +7,15 @@ import pytest
 from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.plan import BranchContinuation, Dwell, Measurement
 from vibench.acquisition.rig import load_rig
-from vibench.gui.pages import test as test_room
 from vibench.gui.pages.test import test_preview as preview
-from vibench.gui.pages.test.test_page import summary_text
+from vibench.gui.pages.test.test_page import TestPage, summary_text
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
 
 
 @pytest.fixture
 def page(context):
-    page = test_room.TestPage(context)
+    page = TestPage(context)
     yield page
     page.close()
 
