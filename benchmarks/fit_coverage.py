@@ -22,7 +22,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import ncx2
@@ -210,33 +209,36 @@ STEPS = 4
 """Of the integrator in a sample."""
 
 
-@numba.njit(cache=False)  # type: ignore[untyped-decorator]
-def _rubbing(base: Reals, masses: Reals, springs: Reals, dampers: Reals, force: float, soft: float) -> Reals:
-    """Velocity of m0 relative to a base of that acceleration, by Runge and Kutta's rule of fourth order."""
+def _rubbing(base: Reals, specimen: Specimen, force: float, soft: float) -> Reals:
+    """Velocities of m0 relative to bases of these accelerations, by Runge and Kutta's rule of fourth order.
+
+    ``base`` has shape (motions, samples), as has what is returned.
+    """
     step = 1.0 / (RATE_HZ * STEPS)
-    state, shown = np.zeros(6), np.zeros(base.size)
-    slopes, tried = np.zeros((4, 6)), np.zeros(6)
-    for sample in range(base.size - 1):
-        shown[sample] = state[3]
+    flow = np.zeros((6, 6))
+    flow[:3, 3:] = np.eye(3)
+    flow[3:, :3] = -np.linalg.solve(specimen.mass_matrix, specimen.stiffness_matrix)
+    flow[3:, 3:] = -np.linalg.solve(specimen.mass_matrix, specimen.damping_matrix)
+    brake = force / specimen.masses[0]
+
+    def slopes(state: Reals, pushed: Reals) -> Reals:
+        found = flow @ state
+        found[3:] -= pushed
+        found[3] -= brake * np.tanh(state[3] / soft)
+        return found
+
+    state, shown = np.zeros((6, len(base))), np.zeros(base.shape)
+    for sample in range(base.shape[1] - 1):
+        shown[:, sample] = state[3]
+        here, change = base[:, sample], (base[:, sample + 1] - base[:, sample]) / STEPS
         for part in range(STEPS):
-            for stage in range(4):
-                along = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-                for each in range(6):
-                    tried[each] = state[each] + (along * step * slopes[stage - 1, each] if stage else 0.0)
-                share = (part + along) / STEPS
-                pushed = base[sample] * (1 - share) + base[sample + 1] * share
-                up = springs[2] * (tried[2] - tried[0]) + dampers[2] * (tried[5] - tried[3])
-                across = springs[1] * (tried[1] - tried[2]) + dampers[1] * (tried[4] - tried[5])
-                ground = springs[0] * tried[0] + dampers[0] * tried[3] + force * np.tanh(tried[3] / soft)
-                slopes[stage, :3] = tried[3:]
-                slopes[stage, 3] = (up - ground) / masses[0] - pushed
-                slopes[stage, 4] = -across / masses[1] - pushed
-                slopes[stage, 5] = (across - up) / masses[2] - pushed
-            for each in range(6):
-                state[each] += (
-                    step / 6 * (slopes[0, each] + 2 * slopes[1, each] + 2 * slopes[2, each] + slopes[3, each])
-                )
-    shown[-1] = state[3]
+            before, middle, after = (here + (part + along) * change for along in (0.0, 0.5, 1.0))
+            first = slopes(state, before)
+            second = slopes(state + 0.5 * step * first, middle)
+            third = slopes(state + 0.5 * step * second, middle)
+            fourth = slopes(state + step * third, after)
+            state = state + step / 6.0 * (first + 2.0 * (second + third) + fourth)
+    shown[:, -1] = state[3]
     return shown
 
 
@@ -244,20 +246,21 @@ def rubbed(rig: Rig, rng: np.random.Generator) -> tuple[FrequencyResponse, bool 
     """Shake m0 that rubs on the base with a multisine, and estimate the transmission as of a recording."""
     count, whole = round(RATE_HZ * (SETTLE_S + 2 / REPETITION_HZ)), round(RATE_HZ * 2 / REPETITION_HZ)
     omega = 2 * np.pi * np.arange(round(50 / REPETITION_HZ), round(600 / REPETITION_HZ)) * REPETITION_HZ
-    parts = [np.asarray(each) for each in (rig.true.masses, rig.true.stiffnesses, rig.true.dampings)]
-    sums = PeriodicSums(RATE_HZ, REPETITION_HZ)
-    force, soft = 0.0, 1.0
+    motions = []
     for number in range(rig.realisations + 1):
         angle = np.outer(omega, np.arange(count) / RATE_HZ) + rng.uniform(0, 2 * np.pi, (omega.size, 1))
         base, moved = np.cos(angle).sum(axis=0), (np.sin(angle) / omega[:, None]).sum(axis=0)
-        relative = _rubbing(base, *parts, force, soft)
-        if number == 0:
-            # Without friction, to learn how fast it moves.
-            soft = 1e-3 * float(np.std(relative[-whole:]))
-            force = FRICTION_SHARE * rig.true.dampings[0] * 1e3 * soft
-            continue
+        motions.append((base, moved, rng.standard_normal(count if number > 0 else 0)))
+    bases = np.array([base for base, _, _ in motions])
+    # Without friction, to learn how fast it moves.
+    soft = 1e-3 * float(np.std(_rubbing(bases[:1], rig.true, 0.0, 1.0)[0, -whole:]))
+    force = FRICTION_SHARE * rig.true.dampings[0] * 1e3 * soft
+    sums = PeriodicSums(RATE_HZ, REPETITION_HZ)
+    for relative, (base, moved, noise) in zip(
+        _rubbing(bases[1:], rig.true, force, soft), motions[1:], strict=True
+    ):
         seen = relative + moved
-        seen = seen + float(np.median(rig.sd)) * np.std(seen) * rng.standard_normal(count)
+        seen = seen + float(np.median(rig.sd)) * np.std(seen) * noise
         sums.add(base[-whole:], base[-whole:], seen[-whole:])
     found = sums.frequency_response()
     response = converted_frequency_response(

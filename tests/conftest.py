@@ -79,6 +79,7 @@ LONG = (
     "tests/acquisition/campaign/test_unattended.py",
     "tests/analysis/frequency_response/test_noise_request.py",
     "tests/paper/test_paper_figures.py",
+    "tests/paper/test_textbook_methods.py",
     "tests/cli/test_watch.py",
     "tests/analysis/sine/test_jumps.py",
     "tests/cli/test_study.py",

@@ -6,7 +6,7 @@ runs a command of vibench so, and
 
     pytest -p tests.windows_here -o timeout_method=thread tests/acquisition/recording
 
-the tests of a room. Left of the true system are its libraries (numba, HDF5, Qt) and Python's own, and the
+the tests of a room. Left of the true system are its libraries (HDF5, Qt, ours) and Python's own, and the
 programs that a test starts: their locks are of another kind, and neither sees the other's (`sees_locks`).
 """
 

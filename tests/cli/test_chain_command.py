@@ -11,9 +11,6 @@ from vibench.cli.__main__ import app
 from vibench.sim import Harmonic, gong2025, steady_response
 from vibench.sim.chain import chain_of, chain_response, chain_transmissibility
 
-pytestmark = pytest.mark.timeout(300)
-"""The first run compiles the kernels of chains."""
-
 
 def run(*arguments):
     return CliRunner().invoke(app, ["chain", *(str(each) for each in arguments)])

@@ -27,7 +27,6 @@ ALT = Qt.KeyboardModifier.AltModifier
 STOPPED_S = 5.0
 """From the key to a finished recording; when the drive is silent is measured where the stops are."""
 PATIENCE_MS = 100_000
-"""The first bench that is opened may have to compile the simulation."""
 pytestmark = [pytest.mark.thorough, pytest.mark.timeout(300)]
 
 

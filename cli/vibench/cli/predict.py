@@ -184,7 +184,7 @@ class _Planned:
     frequency_hz: float
     plan: ScenePlan
     taken_s: float
-    """NaN where kernels were loaded in it."""
+    """NaN where it includes what a process pays once."""
 
 
 def explanation(results: StudyResults) -> str:
@@ -219,7 +219,7 @@ def _passage(points: Sequence[_Planned]) -> str:
 
 
 def _cost(points: Sequence[_Planned]) -> str:
-    """Say what points are estimated to take, and what those took whose kernels were there."""
+    """Say what points are estimated to take, and what those took that came after others of their kind."""
     known_s = [each.taken_s for each in points if math.isfinite(each.taken_s)]
     expected = points[0].plan.cost
     whole = replace(expected, time_s=sum(each.plan.cost_s for each in points))

@@ -3,7 +3,7 @@
 `measure_accuracy` runs free, periodic and chaotic motions (`MOTIONS`) at every level of accuracy and with
 general solvers of scipy, interleaved so that a busy machine slows all alike; it takes minutes. Cost is
 processor time over simulated time; errors are measured against a solution that shares nothing with the
-kernels: DOP853 on the paper's equations as a textbook writes them. The result for one machine is
+engine: DOP853 on the paper's equations as a textbook writes them. The result for one machine is
 docs/accuracy.md.
 
 >>> from vibench.sim.accuracy_benchmark.figures import MOTIONS

@@ -96,7 +96,7 @@ class CostLedger:
             return self._kinds.get(kind, _Kind()).runs
 
     def learn(self, kind: str, planned_s: float, taken_s: float) -> None:
-        """Note what a run took whose kernels were compiled and loaded before."""
+        """Note what a run took in a process that was prepared for its kind."""
         if not (planned_s > 0.0 and taken_s > 0.0):
             return
         with self._lock:

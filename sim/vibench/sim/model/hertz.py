@@ -25,7 +25,7 @@ class Hertz:
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the kernels."""
+        """Numbers of the law for the engine."""
         return Stops(contact_stiffness=float(self.stiffness))
 
 

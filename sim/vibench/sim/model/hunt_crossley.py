@@ -36,7 +36,7 @@ class HuntCrossley:
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the kernels."""
+        """Numbers of the law for the engine."""
         return Stops(contact_stiffness=float(self.stiffness), loss=float(self.loss))
 
 

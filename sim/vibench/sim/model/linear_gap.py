@@ -26,7 +26,7 @@ class LinearGap:
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the kernels."""
+        """Numbers of the law for the engine."""
         return Stops(linear_stiffness=float(self.stiffness))
 
 

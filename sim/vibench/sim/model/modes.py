@@ -246,8 +246,7 @@ def base_response(specimen: Specimen, frequency_hz: ArrayLike) -> BaseResponse:
 # them are inside a rigid body. What is left is linear with two displacements, x and z, and one condition:
 # the stop can only push. The native engine follows the motion and finds where that condition ends.
 #
-# The motion is one table (kernels copy every array they are handed): a term a row, modes first, the drive
-# last.
+# The motion is one table: a term a row, modes first, the drive last.
 
 RATE = 0
 """Column of l_j [1/s]."""

@@ -18,7 +18,7 @@ class NoContact:
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the kernels."""
+        """Numbers of the law for the engine."""
         return Stops()
 
 

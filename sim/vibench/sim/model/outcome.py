@@ -12,7 +12,7 @@ _TEXTS = (
 
 
 class Outcome(IntEnum):
-    """The codes that the kernels return."""
+    """The codes that the engine returns."""
 
     REACHED_END = 0
     TOO_MANY_IMPACTS = 1

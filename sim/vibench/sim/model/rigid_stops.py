@@ -25,7 +25,7 @@ class RigidStops:
 
     @property
     def stops(self) -> Stops:
-        """Numbers of the kernels."""
+        """Numbers of the law for the engine."""
         return Stops(restitution=float(self.restitution))
 
 

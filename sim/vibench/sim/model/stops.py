@@ -1,4 +1,4 @@
-"""What contact laws have in common: numbers for the kernels, and a word that stands for each. SI units."""
+"""What contact laws have in common: numbers for the engine, and a word that stands for each. SI units."""
 
 import math
 from collections.abc import Callable
@@ -17,7 +17,7 @@ PAPER_INDENTATION_M = 1e-6
 
 
 class Stops(NamedTuple):
-    """A law as kernels take it: F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at the indentation d."""
+    """A law for the engine: F = (linear d + contact d^(3/2)) (1 + loss dd/dt) at the indentation d."""
 
     linear_stiffness: float = 0.0
     """[N/m]."""

@@ -121,7 +121,7 @@ def test_exponents_are_drawn_with_their_intervals(page):
 
 
 @pytest.mark.thorough
-@pytest.mark.timeout(300)  # The first run compiles the kernels of chains.
+@pytest.mark.timeout(300)
 def test_a_chain_is_followed_and_drawn_over_frequency_place_and_time(page, waited):
     view = page.chain
     asked(view, ChainRequest(lengths=(3,), amplitude_m=30e-6, duration_s=0.2, settle_s=0.1))
