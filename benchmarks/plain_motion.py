@@ -4,7 +4,8 @@ The paper's equations as a textbook writes them, no modes, no other unknowns in 
 steps of DOP853 (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, section
 II.10). Where m1 touches or leaves a stop the instant is found by taking the step again, shorter, and the
 method begins anew beyond it. Responses are taken on the way: extremes where the speed passes zero, found
-likewise, and integrals of x and p against the drive as four more unknowns.
+likewise, and integrals of x and p against the drive as four more unknowns. It needs numba, which the extra
+`peers` brings.
 """
 
 import math
