@@ -130,7 +130,7 @@ def test_a_vibrometer_that_loses_its_light_is_no_change(live_world, kind, level_
     newest = running.twin.newest
     error = newest.p - running.p()[newest.first : newest.first + newest.p.size]
     assert np.sqrt(np.nanmean(error**2)) < 0.1e-6
-    assert np.mean(np.isnan(newest.p)) < 0.01
+    assert np.mean(np.isnan(newest.p)) < 0.02  # docs/hidden-motion.md: 98 to 99 % is followed
     found = {each.what: each for each in running.twin.found}
     assert found[Hidden.UPPER_GAP].low < 45e-6 < found[Hidden.UPPER_GAP].high
 

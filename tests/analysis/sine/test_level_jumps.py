@@ -19,7 +19,7 @@ RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.tom
 
 @pytest.fixture(scope="module")
 def analysis(tmp_path_factory):
-    """195 Hz from 0.2 to 0.8 Vpp and back."""
+    """195 Hz from 0.2 to 0.8 Vpp and back; at 0.2 Vpp collisions go on for up to a second, by chance."""
     rig = RIG.model_copy(
         update={
             "daq": RIG.daq.model_copy(update={"sample_rate_hz": 5120.0}),
@@ -27,7 +27,7 @@ def analysis(tmp_path_factory):
         }
     )
     plan = SteppedLevel(
-        frequency_hz=195, amplitude_vpp=0.8, lowest_vpp=0.2, step_vpp=0.1, settle_s=0.5, record_s=0.7
+        frequency_hz=195, amplitude_vpp=0.8, lowest_vpp=0.2, step_vpp=0.1, settle_s=1.5, record_s=0.7
     )
     path = tmp_path_factory.mktemp("level") / "level.h5"
     with open_bench(rig) as bench:

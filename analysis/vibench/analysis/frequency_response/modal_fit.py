@@ -349,11 +349,13 @@ def modal_fit(
         widened = max(1.0, chi_square, nearby) * (1 + float(np.mean(lines.ringing_share[about])))
         sd = np.sqrt(widened * np.diag(covariance)[2 * mode : 2 * mode + 2])
         ends_hz = lines.frequency_hz[[0, -1]]
-        fine_hz = np.clip(
-            np.linspace(natural_hz - 2 * half_hz, natural_hz + 2 * half_hz, _FINE_POINTS), *ends_hz
-        )
-        height = np.abs(curve(fine_hz, poles) @ found)
-        top_hz = fine_hz[[int(np.argmax(height))]]
+        top_hz = np.array([natural_hz])
+        for reach_hz in (
+            2 * half_hz,
+            4 * half_hz / _FINE_POINTS,
+        ):  # then between the neighbours of the highest
+            fine_hz = np.clip(np.linspace(top_hz[0] - reach_hz, top_hz[0] + reach_hz, _FINE_POINTS), *ends_hz)
+            top_hz = fine_hz[[int(np.argmax(np.abs(curve(fine_hz, poles) @ found)))]]
         value = curve(top_hz, poles) @ found
         changes = np.hstack((_moved(lambda moved: curve(top_hz, moved) @ found, poles), curve(top_hz, poles)))
         along = np.real(np.conj(value / np.abs(value))[:, None] * changes)[0]

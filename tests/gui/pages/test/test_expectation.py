@@ -8,14 +8,14 @@ from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.plan import BranchContinuation, Dwell, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.test import test_preview as preview
-from vibench.gui.pages.test.test_page import TestPage, summary_text
+from vibench.gui.pages.test.test_page import TestPage as Page, summary_text
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
 
 
 @pytest.fixture
 def page(context):
-    page = TestPage(context)
+    page = Page(context)
     yield page
     page.close()
 
