@@ -43,7 +43,7 @@ def sources_digest() -> str:
 
 def own_families() -> tuple[str, ...]:
     """Return the families that this processor runs, the fastest first."""
-    spec = importlib.util.spec_from_file_location("vibench_processor", ENGINE / "_processor.py")
+    spec = importlib.util.spec_from_file_location("vibench_processor", ENGINE / "processor.py")
     processor = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(processor)
     return processor.usable_families()
