@@ -10,6 +10,17 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
+LINES_AT_MOST = {
+    "acquisition": 30_110,
+    "analysis": 32_400,
+    "cli": 5_470,
+    "gui": 13_140,
+    "native": 6_600,
+    "sim": 21_490,
+    "studies": 3_220,
+    "virtual_rig": 8_900,
+}
+"""Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 
 
 @pytest.mark.timeout(300)  # mypy without a cache, beside another test, on two cores
@@ -43,3 +54,14 @@ def test_a_checkout_contains_nothing_that_a_program_generated():
     command = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert listed.stdout.splitlines() == []
+
+
+@pytest.mark.parametrize("folder", sorted(LINES_AT_MOST))
+def test_a_package_keeps_to_its_budget_of_lines(folder):
+    sources = [
+        path
+        for path in (ROOT / folder).rglob("*")
+        if path.suffix in {".py", ".pyi", ".j2", ".hpp", ".cpp"} and path.name != "test_engine.cpp"
+    ]
+    lines = sum(path.read_text(encoding="utf-8").count("\n") for path in sources)
+    assert 0 < lines <= LINES_AT_MOST[folder]
