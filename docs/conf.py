@@ -36,14 +36,17 @@ python_maximum_signature_line_length = 90
 napoleon_use_rtype = False
 
 HERE = Path(__file__).parent
-FACES = re.findall(
+PUBLIC_APIS = re.findall(
     r"^\| `(vibench[\w.]+)` \|",
-    (HERE / "architecture.md").read_text("utf-8").split("## Faces")[1].split("For our own programs")[0],
+    (HERE / "architecture.md")
+    .read_text("utf-8")
+    .split("## Public APIs")[1]
+    .split("Other packages of ours")[0],
     flags=re.MULTILINE,
 )
 # Every name is loaded now: autodoc would import with TYPE_CHECKING set, which runs what only checkers read.
 TARGETS = {}
-for face in reversed(FACES):
+for face in reversed(PUBLIC_APIS):
     module = importlib.import_module(face)
     TARGETS |= {name: f"{face}.{name}" for name in module.__all__ if getattr(module, name) is not None}
     page = f"{face}\n{'=' * len(face)}\n\n.. automodule:: {face}\n"
@@ -71,7 +74,7 @@ def _as_code_or_link(
         literal, name = match.groups()
         if literal:
             return str(literal)
-        target = name if name in FACES else TARGETS.get(name.rpartition(".")[2])
+        target = name if name in PUBLIC_APIS else TARGETS.get(name.rpartition(".")[2])
         return f":py:obj:`{name} <{target}>`" if target else f"``{name}``"
 
     for number, line in enumerate(lines):
