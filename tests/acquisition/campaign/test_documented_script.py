@@ -9,6 +9,7 @@ from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.campaign._journal import journal_path
 
 ROOT = Path(__file__).parents[3]
+# A specimen that leaves its collisions goes on with them for up to a second, by chance.
 CAMPAIGN = """
 name = "jump"
 [[sweeps]]
@@ -20,7 +21,7 @@ lead_s = 0.3
 [sweeps.measurement]
 ramp_s = 0.2
 ramp_step_s = 0.02
-excitation = { kind = "dwell", settle_s = 0.5, duration_s = 0.2 }
+excitation = { kind = "dwell", settle_s = 1.5, duration_s = 0.2 }
 """
 
 
