@@ -79,7 +79,7 @@ def cost(asked: argparse.Namespace) -> int:
     said = plan.model_dump(exclude={"specimen"})
     said["frequency_hz"]["points"], said["amplitude_m"]["points"] = asked.columns, asked.rows
     plan = Map(specimen=plan.specimen, **said)
-    # Kernels are compiled and loaded before the clock starts.
+    # Modules and tables are loaded before the clock starts.
     solver = settle_scene if asked.one_by_one else map_solver(plan)
     solver(plan.scene((0, 0, asked.columns // 2)))
     solver(plan.scene((asked.rows - 1, 0, asked.columns // 2)))

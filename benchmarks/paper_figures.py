@@ -2,7 +2,7 @@
 
 The figures: every hertz from 10 to 600 at four amplitudes, 30 s each with the last 5 s observed, standard
 accuracy; Figure 10 asks for exponents besides. The curve: 121 points at 20 um, with other starts where the
-start is forgotten, as `vibench predict` draws it. Kernels are compiled; as many threads as processors. Each
+start is forgotten, as `vibench predict` draws it. As many threads as processors. Each
 by lanes, as studies of this size are solved, and one motion after the other.
 """
 

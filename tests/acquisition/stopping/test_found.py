@@ -13,8 +13,7 @@ import pytest
 
 from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on_signal
 from vibench.acquisition.engine import StopDelivery, programs_to_stop, stop_engine
-from vibench.acquisition.engine._address import EngineAddress
-from vibench.acquisition.engine._announcement import announced
+from vibench.acquisition.engine._announcement import EngineAddress, announced
 from vibench.acquisition.stopping.kept_stops import engines_folder
 from vibench.acquisition.stopping.program import Program, announced_programs
 

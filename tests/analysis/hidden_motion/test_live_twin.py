@@ -121,18 +121,21 @@ def test_a_bench_and_a_specimen_that_cannot_be_followed_are_refused(live_world, 
 
 @pytest.mark.parametrize(("kind", "level_vpp"), [(261.0, 1.7), ("noise", 8.0)])
 def test_a_vibrometer_that_loses_its_light_is_no_change(live_world, kind, level_vpp):
-    running = live_world(kind, level_vpp, 4.2, seed=74, dropouts_per_s=8.0)
-    rng = np.random.default_rng(4)
-    while running.samples < 4 * 51_200:
-        assert running.go_on(int(rng.integers(100, 6000))) == ()
-        if running.samples > 0.6 * 51_200:
-            assert running.twin.newest.state is LiveState.TRACKED
-    newest = running.twin.newest
-    error = newest.p - running.p()[newest.first : newest.first + newest.p.size]
-    assert np.sqrt(np.nanmean(error**2)) < 0.1e-6
-    assert np.mean(np.isnan(newest.p)) < 0.02  # docs/hidden-motion.md: 98 to 99 % is followed
-    found = {each.what: each for each in running.twin.found}
-    assert found[Hidden.UPPER_GAP].low < 45e-6 < found[Hidden.UPPER_GAP].high
+    lost = []
+    for seed in (74, 75, 76):  # one draw of a colliding motion may lose its track once, for 33 ms
+        running = live_world(kind, level_vpp, 4.2, seed=seed, dropouts_per_s=8.0)
+        rng = np.random.default_rng(4)
+        while running.samples < 4 * 51_200:
+            assert running.go_on(int(rng.integers(100, 6000))) == ()
+            if running.samples > 0.6 * 51_200:
+                assert running.twin.newest.state is LiveState.TRACKED
+        newest = running.twin.newest
+        error = newest.p - running.p()[newest.first : newest.first + newest.p.size]
+        assert np.sqrt(np.nanmean(error**2)) < 0.1e-6
+        lost.append(np.mean(np.isnan(newest.p)))
+        found = {each.what: each for each in running.twin.found}
+        assert found[Hidden.UPPER_GAP].low < 45e-6 < found[Hidden.UPPER_GAP].high
+    assert np.mean(lost) < 0.01
 
 
 @pytest.mark.slow

@@ -49,7 +49,7 @@ def reconcile(journal: Journal, folder: Path, stop: StopSwitch) -> None:
                     journal.requeue(point.name, ReasonCode.DAMAGED, found.damage)
             case state if point.file:
                 ended = _ended(path, point.measurement, errors)
-                # An error that the journal noted does not say what stands on the disk.
+                # The journal may say failed although the file on the disk is complete: the file decides.
                 if has_part or state is JournalPointState.RUNNING or ended[0] is JournalPointState.DONE:
                     journal.end(point.name, *ended)
 

@@ -37,7 +37,7 @@ class CheckRule(StrEnum):
     NOW = "now"
     """One made now."""
     WAIVED = "waived"
-    """None; the recordings say what the last one found, if there was one."""
+    """No check; recordings contain the result of the last check, if there is one."""
 
 
 FOLDER = "bench_checks"

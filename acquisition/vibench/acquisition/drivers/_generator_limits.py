@@ -141,7 +141,7 @@ class ArbitraryCodes:
     codes: NDArray[np.uint16]
     """0 to ``top_code``, shape (points,)."""
     top_code: int
-    """The code of plus half of the amplitude on the panel; 0 is that of minus half."""
+    """Code of plus half of the peak-to-peak amplitude on the panel; code 0 is minus half of it."""
     panel_factor: float
     """Largest magnitude that is left: 1 for a waveform that is free of DC and reaches 1."""
 

@@ -8,6 +8,7 @@ from vibench.sim.operating_system.processes import Place
 from vibench.sim.operating_system.state_folder import state_folder
 from vibench.stop_files import SWITCH_OFF
 
+from ..host.toml_file import FrozenModel
 from ..stopping.program import (
     AnyProgram,
     Program,
@@ -18,8 +19,16 @@ from ..stopping.program import (
     withdraw,
 )
 from ..stopping.stop import StopLevel
-from ._address import EngineAddress
 from ._errors import EngineError, EngineGone
+
+
+class EngineAddress(FrozenModel):
+    """Where an engine can be asked, and the word that lets one in."""
+
+    host: str
+    port: int
+    token: str
+
 
 REFUSAL_S = 0.2
 """How long a refusal is waited for; one on this computer comes at once [s]."""

@@ -9,7 +9,7 @@ from math import inf
 from time import monotonic
 from typing import IO
 
-from ._address import EngineAddress
+from ._announcement import EngineAddress
 from ._client import Hello
 from ._status import ConnectionRole
 

@@ -16,7 +16,7 @@ from ..host.chosen import chosen
 from ..host.closed_on_leaving import ClosedOnLeaving
 from ..host.toml_file import FrozenModel
 from ..plan import Campaign
-from ._address import EngineAddress
+from ._announcement import EngineAddress
 from ._campaign_request import CampaignRequest
 from ._errors import EngineError, EngineGone, EngineSilent
 from ._status import ArmedPlan, ConnectionRole, EngineStatus, RowStatus

@@ -22,8 +22,7 @@ from pydantic import ValidationError
 
 from ..errors import AcquisitionError
 from ..stopping.program import Watchdog
-from ._address import EngineAddress
-from ._announcement import announced
+from ._announcement import EngineAddress, announced
 from ._client import Hello
 from ._errors import EngineError
 from ._request_handler import RequestHandler
@@ -31,11 +30,10 @@ from ._status import ConnectionRole
 from ._verbs import DONE, REQUEST, VERBS
 from ._wire import HELLO, REQUESTS, IncomingMessage, Message, WireError, receive, refused, send
 
-# Who is let in: connections that have not shown the token yet are few, brief and small.
-#
-# One thread reads them all, and holds at most `WAITING_MOST` x 1 kB of what they say. Where there are more,
-# or the process may open no more files, the one that has waited longest makes room: whoever has the token
-# shows it at once, and is let in among thousands that have not.
+# Admission: connections without the token are limited in number, time and size.
+# One thread reads them all and buffers at most `WAITING_MOST` x 1 kB. If there are more connections, or the
+# process cannot open more files, the connection that has waited longest is closed. A client with the token
+# sends it at once, so it gets in among thousands without one.
 
 WAITING_MOST = 64
 GREETING_S = 2.0
@@ -114,7 +112,7 @@ class Admission:
         except OSError as error:
             if error.errno in _NO_ROOM:
                 sleep(YOUNG_S)
-            return  # else: whoever came has gone again
+            return  # any other error: the client closed the connection
         with suppress(OSError):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setblocking(False)  # noqa: FBT003 - the socket's own parameter

@@ -8,8 +8,7 @@ from time import monotonic
 
 from ..host.chosen import chosen
 from ..host.closed_on_leaving import ClosedOnLeaving
-from ._address import EngineAddress
-from ._announcement import Announcement, announced_engines
+from ._announcement import Announcement, EngineAddress, announced_engines
 from ._client import EngineClient
 from ._errors import EngineGone
 from ._status import ConnectionRole, Supervision

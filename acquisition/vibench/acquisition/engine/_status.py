@@ -50,7 +50,7 @@ class ConnectionRole(StrEnum):
     """What a connection is for."""
 
     ATTENDING = "attending"
-    """Whoever answers for the run: it goes on only while this one asks."""
+    """The client in charge of the run, which stops when this client stops asking."""
     VISITING = "visiting"
     """A look from elsewhere: it keeps nothing running."""
 

@@ -1,8 +1,5 @@
-from ._disk import (
-    DiskTrouble as DiskTrouble,
-    sole_use as sole_use,
-    troubled_disks as troubled_disks,
-)
+from ._disk import sole_use as sole_use
+from ._disk_trouble import DiskTrouble as DiskTrouble, troubled_disks as troubled_disks
 from ._dropouts import (
     DROPOUTS_TOLD_AFTER_S as DROPOUTS_TOLD_AFTER_S,
     BridgedChannel as BridgedChannel,

@@ -336,7 +336,6 @@ def _sha256(raw: bytes) -> str:
 
 
 # Seals listed in the journals of campaigns: they reveal another recording under the same name.
-#
 # The check of a seal asks for them, so that every command identifies recordings by this one rule.
 
 JOURNAL_SUFFIX = ".campaign.sqlite"
@@ -411,10 +410,9 @@ def opened_to_look(path: Path) -> sqlite3.Connection:
 
 
 # Counts that are as they were when the seal was checked: each piece is hashed again as it is read.
-#
-# A check reads a recording from end to end, and an analysis reads it again. So that what is read is what
-# was checked, the state of each channel's checksum before every piece is kept, by the seal, for as long as
-# this process lives: whatever file carries that seal is held against it.
+# A check reads a recording from end to end, and an analysis reads it again. The process keeps the state of
+# each channel's checksum before every piece, by seal. Later reads of a file with this seal are compared with
+# these states, so that an analysis reads what was checked.
 
 _KNOWN: dict[str, ChannelStates] = {}
 """By seal. About 20 kB for a recording of a minute."""

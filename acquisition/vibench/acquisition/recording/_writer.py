@@ -25,7 +25,8 @@ from ..instruments import Block, Samples
 from . import _layout as layout
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer
 from ._counts import Counts, CountScale
-from ._disk import Disk, open_disk
+from ._disk import Disk
+from ._disk_trouble import open_disk
 from ._finalise import discard, finalise, whereabouts
 from ._header import RecordingHeader
 from ._journal import Journal, Number

@@ -18,7 +18,6 @@ TRUSTED_BAND = 0.4
 
 _KAISER_BETA = 19.9
 """Kaiser's formula for 64 taps and a transition from 0.4 to 0.6 of the sample rate: 189 dB."""
-_TAPS = 2 * REACH
 _PHASES = 512
 """Fractions of a sample with weights of their own; a cubic between four of them errs by 1e-10."""
 

@@ -1,4 +1,4 @@
-"""Which motion has the phase of a resonance: apart, as plans name it, which load no compiled code."""
+"""Which motion has the phase of a resonance: plans name it, and load no simulation for it."""
 
 from enum import StrEnum
 from typing import Literal

@@ -29,7 +29,7 @@ LEARNT_AS: dict[Solver, str] = {
 
 
 def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> None:
-    """Note the processor time that a scene took whose kernels were compiled and loaded before."""
+    """Note the processor time of a scene; modules and tables were loaded before."""
     plan = plan_scene(scene)
     cost_ledger().learn(_kind(plan, solver), plan.planned_s, taken_s)
 
@@ -65,7 +65,7 @@ def _kind(plan: ScenePlan, solver: Solver) -> str:
 def measure_cost(scene: Scene) -> None:
     """Run a few scenes like one that has been run, if what such scenes take on this machine is not known yet.
 
-    It takes less than a second, unless one such scene takes longer; the first of all loads its kernels.
+    It takes less than a second, unless one such scene takes longer.
     """
     kind, spent_s = plan_scene(scene).kind, 0.0
     for part in DETUNED:

@@ -141,7 +141,7 @@ OTHERS = (
     Column(FINAL_STATE, REAL, "m and m/s", "state at the end of the run", components=len(COORDINATES)),
     Column(PHASE, REAL, "rad", "phase of the drive when the run began"),
     Column(CONTINUES, WHOLE, "1", "number of the point, from 0, whose end is this one's start"),
-    Column(TAKEN, REAL, "s", "processor time; missing where kernels were compiled in it"),
+    Column(TAKEN, REAL, "s", "processor time; missing where modules and tables were loaded in it"),
     Column(SESSION, WHOLE, "1", "row of sessions in which it was computed"),
     Column(IDENTITY, f"S{IDENTITY_DIGITS}", "", "digest of everything that the scene says"),
     Column(MESSAGE, f"S{TEXT_BYTES}", "", "why the scene could not be computed"),

@@ -1,4 +1,4 @@
-"""Threads of this process as workers: the kernels run without the interpreter lock."""
+"""Threads of this process as workers: the native engine runs without the interpreter lock."""
 
 import os
 import queue
