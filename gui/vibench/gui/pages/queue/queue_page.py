@@ -73,7 +73,7 @@ class QueuePage(Page):
             wide=1,
         )
         # Else the column of excitations, which takes what is left, has room for a few letters only.
-        self.entries.setMinimumWidth(22 * self.fontMetrics().height())
+        self.entries.setMinimumWidth(25 * self.fontMetrics().height())
         self.rows = ReadTable(
             "Recordings of the campaign",
             ("", "recording", "level", "how it stands"),
