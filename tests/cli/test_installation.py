@@ -239,8 +239,8 @@ def installed_mb(name, seen):
     )
 
 
-def test_the_core_takes_less_than_half_a_gigabyte():
-    assert 300 < installed_mb("vibench", set()) < 500
+def test_the_core_takes_less_than_300_megabytes():
+    assert 200 < installed_mb("vibench", set()) < 300
 
 
 def test_the_page_lists_the_exit_codes_and_variables_that_there_are():
