@@ -236,9 +236,9 @@ def test_points_that_only_scatter_have_no_exponent():
     assert (found.kind, found.least_exponent_per_s) == (MotionKind.UNDECIDED, None)
 
 
-@pytest.mark.parametrize("number", range(4))
+@pytest.mark.parametrize("number", range(5))
 def test_noise_behind_a_static_nonlinearity_is_not_chaotic(number):
-    """Narrow-band noise through a cubic was chaotic in 6 of 6 cases."""
+    """Narrow-band noise through a cubic was chaotic in 6 of 6 cases, through x + x²/2 in 9 of 20."""
     _, points = noise_points(number, seed=2)
     found = motion_verdict(points, DRIVE_HZ)
     assert found.kind is MotionKind.UNDECIDED, found.why
