@@ -2,7 +2,7 @@
 
 Unmodified pyvisa finds an AFG1022, unmodified nidaqmx a converter behind a gRPC port; the samples it
 reads are what the generator's output does to amplifier, shaker, specimen, vibrometer and converter, in
-rig time. Faults happen on demand or by a script (docs/faults.md). It takes the configuration, errors and
+rig time. Faults happen on demand or by a script (docs/campaigns.md). It takes the configuration, errors and
 disk troubles from `vibench.acquisition`, physics from `vibench.sim`; it knows no driver, plan or run, and
 only a bench and ``vibench serve-rig`` switch it on. Levels and time: docs/decisions/0006-virtual-rig.md.
 

@@ -68,7 +68,7 @@ class VirtualConfig(FrozenModel):
     vibrometer_noise_m_per_s_per_rthz: NonNegativeFloat
     vibrometer_dropouts_per_s: NonNegativeFloat
     faults: str | None = None
-    """Path of a script of faults to play, from this file's folder on; see docs/faults.md."""
+    """Path of a script of faults to play, from this file's folder on; see docs/campaigns.md."""
     converter_noise_v: NonNegativeFloat
     """rms of each input at whatever rate it converts [V]."""
 

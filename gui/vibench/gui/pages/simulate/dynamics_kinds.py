@@ -59,7 +59,7 @@ SPECTRUM = DynamicsKind(
     curves=_no_curves,
     before=(
         "Each point follows six small changes for its whole duration; the sum of the exponents, which the "
-        "dampers fix, is its check (docs/spectrum.md)."
+        "dampers fix, is its check (docs/branches.md)."
     ),
 )
 CHAIN = DynamicsKind(
