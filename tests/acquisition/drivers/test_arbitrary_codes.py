@@ -7,47 +7,42 @@ from hypothesis.extra.numpy import arrays
 
 from vibench.acquisition import LimitExceeded
 from vibench.acquisition.drivers import AFG1022_MODEL
-from vibench.acquisition.drivers._generator_limits import arbitrary_codes as codes_for
 
 waveforms = arrays(np.float64, st.integers(2, 300), elements=st.floats(-1, 1, allow_subnormal=False)).filter(
     lambda values: np.ptp(values) > 1e-6
 )
 
 
-def arbitrary_codes(waveform):
-    return codes_for(waveform, AFG1022_MODEL)
-
-
 def achieved(made):
     """Values that the codes stand for, on the scale of the values as given."""
-    return made.panel_factor * (2 * made.codes / made.top_code - 1.0)
+    return made.panel_factor * (2 * made.codes / AFG1022_MODEL.top_code - 1.0)
 
 
 def half_a_step(made):
-    return made.panel_factor / made.top_code
+    return made.panel_factor / AFG1022_MODEL.top_code
 
 
 @given(waveforms)
 def test_what_the_codes_play_is_the_waveform_without_its_mean_within_half_a_step(values):
-    made = arbitrary_codes(values)
+    made = AFG1022_MODEL.codes(values)
     assert np.max(np.abs(achieved(made) - (values - values.mean()))) <= half_a_step(made) * (1 + 1e-9)
 
 
 @given(waveforms)
 def test_the_largest_magnitude_takes_an_outermost_code_and_none_is_beyond(values):
-    codes = arbitrary_codes(values).codes
+    codes = AFG1022_MODEL.codes(values).codes
     assert codes.min() == 0 or codes.max() == AFG1022_MODEL.top_code
     assert codes.max() <= AFG1022_MODEL.top_code
 
 
 @given(waveforms)
 def test_the_dc_that_is_left_is_less_than_half_a_step(values):
-    made = arbitrary_codes(values)
+    made = AFG1022_MODEL.codes(values)
     assert abs(achieved(made).mean()) <= half_a_step(made) * (1 + 1e-9)
 
 
 def test_a_sine_of_full_range_needs_no_other_amplitude_on_the_panel():
-    made = arbitrary_codes(np.sin(2 * np.pi * np.arange(4096) / 4096))
+    made = AFG1022_MODEL.codes(np.sin(2 * np.pi * np.arange(4096) / 4096))
     assert made.panel_factor == pytest.approx(1.0, abs=1e-12)
     assert (made.codes.min(), made.codes.max()) == (0, AFG1022_MODEL.top_code)
     assert abs(achieved(made).mean()) < 1e-7
@@ -55,7 +50,7 @@ def test_a_sine_of_full_range_needs_no_other_amplitude_on_the_panel():
 
 def test_an_uneven_waveform_tells_by_how_much_the_panel_must_be_higher():
     values = np.array([1.0, -0.2, -0.2, -0.2, -0.2])
-    made = arbitrary_codes(values)
+    made = AFG1022_MODEL.codes(values)
     assert made.panel_factor == pytest.approx(0.96)
 
 
@@ -73,4 +68,4 @@ def test_an_uneven_waveform_tells_by_how_much_the_panel_must_be_higher():
 )
 def test_what_the_memory_cannot_play_is_refused_before_anything_is_sent(values, complaint):
     with pytest.raises(LimitExceeded, match=complaint):
-        arbitrary_codes(values)
+        AFG1022_MODEL.codes(values)

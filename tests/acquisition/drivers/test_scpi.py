@@ -1,4 +1,4 @@
-"""The SCPI port: the dialogue, and everything that can go wrong in it."""
+"""The SCPI dialogue, and everything that can go wrong in it."""
 
 import errno
 from collections import deque
@@ -8,7 +8,7 @@ import pytest
 import pyvisa
 
 from vibench.acquisition import InstrumentError, InstrumentLost
-from vibench.acquisition.drivers._scpi import ScpiPort, number_in
+from vibench.acquisition.drivers._scpi import ScpiInstrument
 
 TIMEOUT = pyvisa.VisaIOError(pyvisa.constants.StatusCode.error_timeout)
 LOST = pyvisa.VisaIOError(pyvisa.constants.StatusCode.error_connection_lost)
@@ -58,7 +58,7 @@ class Instrument:
 
 
 def port(instrument, **options):
-    return ScpiPort(instrument, "the generator", **options)
+    return ScpiInstrument(lambda: instrument, "the generator", **options)
 
 
 def test_a_refused_command_names_itself_and_every_complaint():
@@ -93,9 +93,8 @@ def test_an_empty_first_answer_is_asked_for_again():
 def test_an_answer_outside_ascii_is_read_and_its_number_found():
     instrument = Instrument()
     instrument.answers["OUTP1:IMP?"] = [b"9.9E+37\xa6\xb8\n"]
-    reply = port(instrument).query("OUTP1:IMP?")
-    assert reply == "9.9E+37Ω"
-    assert number_in(reply, "OUTP1:IMP?") == 9.9e37
+    assert port(instrument).query("OUTP1:IMP?") == "9.9E+37Ω"
+    assert port(instrument).query_number("OUTP1:IMP?") == 9.9e37
 
 
 @pytest.mark.parametrize("reply", [b"\n", b"volts\n", b"\xff\xfe\n"])
@@ -103,7 +102,7 @@ def test_an_answer_that_is_no_number_is_an_error_naming_question_and_answer(repl
     instrument = Instrument()
     instrument.answers["FREQ?"] = [reply]
     with pytest.raises(InstrumentError, match=r"FREQ\?.*not a number"):
-        number_in(port(instrument).query("FREQ?"), "FREQ?")
+        port(instrument).query_number("FREQ?")
 
 
 def test_a_timeout_is_an_error_that_says_how_long_was_waited():

@@ -3,8 +3,8 @@
 import re
 import statistics
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import ClassVar, Self
 
 import numpy as np
@@ -12,9 +12,9 @@ import numpy as np
 from ..errors import AcquisitionError, InstrumentError, InstrumentLost, LimitExceeded, SettingRefused
 from ..instruments import Identity, Knob, Samples, Sweep
 from ..rig import HIGH_Z, GeneratorConfig
-from ._generator_limits import AFG1022_MODEL, ArbitraryCodes, GeneratorModel, Shape, arbitrary_codes
-from ._scpi import SWITCH, Number, ScpiPort, Verified, Word, end_if_known, number_in
-from ._visa_link import Link, open_link
+from ._generator_limits import AFG1022_MODEL, ArbitraryCodes, GeneratorModel, Shape
+from ._scpi import SWITCH, Number, ScpiInstrument, Word
+from ._visa_link import open_link
 
 OUTPUT = Word("OUTP{c}:STAT", SWITCH)
 _BURST_CHANNEL = 1
@@ -26,16 +26,7 @@ _INFINITE_OHM = 1e6
 _SAME_LOAD = 0.01
 
 
-@contextmanager
-def noted(error: BaseException) -> Iterator[None]:
-    """Clean up after ``error``: a further failure of an instrument is added to it as a note."""
-    try:
-        yield
-    except AcquisitionError as failure:
-        error.add_note(f"While cleaning up: {failure}")
-
-
-class AFG1022X(Verified):
+class AFG1022X(ScpiInstrument):
     """An AFG1022 as a `FunctionGenerator`, over pyvisa.
 
     Made by `open`, with the output off, 1 kHz sine at the smallest amplitude, no offset. Frequency
@@ -45,10 +36,9 @@ class AFG1022X(Verified):
     """
 
     model: ClassVar[GeneratorModel] = AFG1022_MODEL
-    wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
-    """Maker and model that ``*IDN?`` must answer, for people."""
     answers: ClassVar[re.Pattern[str]] = re.compile("TEKTRONIX,AFG1022", re.IGNORECASE)
-    """And as they are compared."""
+    """Maker and model that ``*IDN?`` must answer, and the same for people."""
+    wanted: ClassVar[str] = "TEKTRONIX,AFG1022"
     load_header: ClassVar[str] = "OUTP{c}:IMP"
 
     output = OUTPUT
@@ -64,19 +54,21 @@ class AFG1022X(Verified):
     burst_cycles = Number("SOUR{c}:BURS:NCYC", "{:.0f}")
     burst = Word("SOUR{c}:BURS:STAT", SWITCH)
 
-    def __init__(self, config: GeneratorConfig, connect: Callable[[], Link]) -> None:
+    identity: Identity
+    """Who answered ``*IDN?``; the reply is kept whole, since its last field varies."""
+    codes: ArbitraryCodes | None = None
+    """What the memory holds while it is selected."""
+    unconfirmed: tuple[Knob, ...] = ()
+    """Settings that could be neither made nor read remotely: the operator must confirm them."""
+    _is_known = False
+    _is_silent_and_closed = False
+
+    def __init__(self, config: GeneratorConfig) -> None:
         self._config = config
-        self._connect = connect
-        self._name = f"the generator at {config.resource}"
-        super().__init__(self._new_port(), config.channel)
-        self.codes: ArbitraryCodes | None = None
-        """What the memory holds while it is selected."""
-        self._is_known = False
-        self.identity: Identity
-        """Who answered ``*IDN?``; the reply is kept whole, since its last field varies."""
-        self.unconfirmed: tuple[Knob, ...] = ()
-        """Settings that could be neither made nor read remotely: the operator must confirm them."""
-        self._is_silent_and_closed = False
+        name = f"the generator at {config.resource}"
+        super().__init__(
+            lambda: open_link(config.resource, config.visa_library), name, config.channel, config.settle_s
+        )
 
     @classmethod
     def open(cls, config: GeneratorConfig) -> Self:
@@ -89,20 +81,19 @@ class AFG1022X(Verified):
             as far as the instrument could be reached.
 
         """
-        generator = cls(config, lambda: open_link(config.resource, config.visa_library))
+        generator = cls(config)
+        leave = generator.disconnect  # another instrument gets no further commands
         try:
             generator._identify()
-        except BaseException as error:
-            with noted(error):
-                generator.port.close()  # another instrument is not ours to command any further
-            raise
-        try:
+            leave = generator.close
             OUTPUT.insist(generator, "OFF")
             generator.unconfirmed = generator._agree_on_load()
             generator._to_quiet_sine()
         except BaseException as error:
-            with noted(error):
-                generator.close()
+            try:
+                leave()
+            except AcquisitionError as failure:
+                error.add_note(f"While cleaning up: {failure}")
             raise
         return generator
 
@@ -120,7 +111,7 @@ class AFG1022X(Verified):
     def load_sine(self, frequency_hz: float, amplitude_vpp: float) -> None:
         """Set up a sine. The output keeps its state."""
         self.model.check_frequency(Shape.SINE, frequency_hz)
-        self.model.check_amplitude(self._config, amplitude_vpp, 0.0)
+        self.model.check_amplitude(self._config, amplitude_vpp)
         with self._changing():
             self._ensure_known()
             if self.playing is not Shape.SINE:
@@ -135,7 +126,7 @@ class AFG1022X(Verified):
     def load_waveform(self, waveform: Samples, repetition_hz: float, amplitude_vpp: float) -> None:
         """Put one period in memory, compare the memory with it, and select it. The output keeps its state.
 
-        The mean is taken out, see `arbitrary_codes`. While the memory changes, the amplitude is at
+        The mean is taken out, see `GeneratorModel.codes`. While the memory changes, the amplitude is at
         its minimum.
 
         Raises
@@ -146,10 +137,10 @@ class AFG1022X(Verified):
             When points, repetition or amplitude are outside what instrument or bench allow.
 
         """
-        codes = arbitrary_codes(waveform, self.model)
+        codes = self.model.codes(waveform)
         panel_vpp = amplitude_vpp * codes.panel_factor
         self.model.check_frequency(Shape.EDIT_MEMORY, repetition_hz)
-        self.model.check_amplitude(self._config, panel_vpp, 0.0)
+        self.model.check_amplitude(self._config, panel_vpp)
         with self._changing():
             self._ensure_known()
             self._mute()
@@ -174,8 +165,9 @@ class AFG1022X(Verified):
 
     def set_amplitude(self, amplitude_vpp: float) -> None:
         """Change the peak-to-peak amplitude of what is playing."""
+        _ = self.playing  # with unknown settings nothing is sent
         panel_vpp = amplitude_vpp * self._panel_factor
-        self.model.check_amplitude(self._config, panel_vpp, self.offset_v)
+        self.model.check_amplitude(self._config, panel_vpp)
         with self._changing():
             self.panel_vpp = panel_vpp
 
@@ -183,14 +175,12 @@ class AFG1022X(Verified):
         """Play ``cycles`` periods at each `trigger`; LimitExceeded on channel 2, which has no bursts."""
         if self.channel != _BURST_CHANNEL:
             raise LimitExceeded(f"a burst was asked of channel {self.channel}; only channel 1 has bursts")
-        self.model.check_burst(cycles)
-        with self._changing():
-            self._set_burst(cycles)
+        self._arm_burst(cycles)
 
     def trigger(self) -> None:
         """Fire an armed burst."""
         with self._changing():
-            self.port.command("*TRG")
+            self.command("*TRG")
 
     def end_burst(self) -> None:
         """Play on without a trigger."""
@@ -199,7 +189,7 @@ class AFG1022X(Verified):
                 self.burst = "OFF"
 
     def start(self) -> None:
-        """Turn the output on, and see that it is."""
+        """Turn the output on, and read back that it is on."""
         with self._changing():
             _ = self.playing  # with unknown settings it stays off
             self.output = "ON"
@@ -215,20 +205,21 @@ class AFG1022X(Verified):
         """
         if self._is_silent_and_closed:
             return
-        failures: list[str] = []
+        last = ""
         for attempt in range(2 * _STOP_ATTEMPTS):
             try:
                 if attempt >= _STOP_ATTEMPTS:
-                    self._reconnect()
+                    self.reconnect()
+                    self._forget()
                 OUTPUT.insist(self, "OFF")
             except InstrumentError as failure:
-                failures.append(str(failure))
+                last = str(failure)
             else:
                 return
         raise InstrumentLost(
-            f"THE OUTPUT OF {self._name} MAY STILL BE ON: it could not be switched off in "
+            f"THE OUTPUT OF {self.name} MAY STILL BE ON: it could not be switched off in "
             f"{2 * _STOP_ATTEMPTS} attempts, the last two over a new connection. Turn the amplifier's gain "
-            f"down and switch it off now; then check cable and power of the generator ({failures[-1]})"
+            f"down and switch it off now; then check cable and power of the generator ({last})"
         )
 
     def close(self) -> None:
@@ -240,7 +231,7 @@ class AFG1022X(Verified):
             self._is_silent_and_closed = True
         finally:
             self._forget()
-            self.port.close()
+            self.disconnect()
 
     def measured_latency_s(self) -> float:
         """How long one verified change of amplitude takes: the floor of any emergency stop [s].
@@ -254,18 +245,18 @@ class AFG1022X(Verified):
             durations_s.append(time.perf_counter() - began_s)
         return statistics.median(durations_s)
 
-    # What another model of generator does otherwise
+    # Steps that differ between models of generators
 
     def _end_modes(self) -> None:
         """End sweep, burst, modulation and frequency lock."""
-        end_if_known(self, "SOUR{c}:FREQ:MODE", "CW", ("CW", "FIX", "FIXED"))
+        self.end_if_known("SOUR{c}:FREQ:MODE", "CW", ("CW", "FIX", "FIXED"))
         bursts = ("BURS",) if self.channel == _BURST_CHANNEL else ()
         for node in (*bursts, "AM", "FM", "PM", "FSK", "PWM", "ASK", "PSK"):
-            end_if_known(self, f"SOUR{{c}}:{node}:STAT", "OFF", SWITCH["OFF"])
-        end_if_known(self, "SOUR{c}:FREQ:CONC", "OFF", SWITCH["OFF"])
+            self.end_if_known(f"SOUR{{c}}:{node}:STAT", "OFF", SWITCH["OFF"])
+        self.end_if_known("SOUR{c}:FREQ:CONC", "OFF", SWITCH["OFF"])
 
     def _set_frequency(self, frequency_hz: float) -> None:
-        """Set the frequency of the sine, or how often a second the memory is played."""
+        """Set the frequency of the sine, or the repetition rate of the memory."""
         self.frequency_hz = frequency_hz
 
     def _select(self, codes: ArbitraryCodes | None) -> None:
@@ -276,14 +267,14 @@ class AFG1022X(Verified):
     def _upload(self, codes: ArbitraryCodes) -> None:
         """Fill the edit memory, and compare it point by point."""
         points = codes.codes.size
-        self.port.command(f"DATA:DEF EMEM,{points}")
-        self.port.command("DATA:DATA EMEM,", codes.codes)
-        held = self.port.query_codes("DATA:DATA? EMEM")
+        self.command(f"DATA:DEF EMEM,{points}")
+        self.command("DATA:DATA EMEM,", codes.codes)
+        held = self.query_codes("DATA:DATA? EMEM")
         if not np.array_equal(held, codes.codes):
             compared = min(points, held.size)
             same = int(np.count_nonzero(held[:compared] == codes.codes[:compared]))
             raise SettingRefused(
-                f"{self._name}: {points} points were put in its memory, and {held.size} read back, "
+                f"{self.name}: {points} points were put in its memory, and {held.size} read back, "
                 f"of which {same} agree. Upload again; if it fails again, check the USB cable"
             )
 
@@ -297,10 +288,12 @@ class AFG1022X(Verified):
     def _mute(self) -> None:
         self.panel_vpp = self.amplitude_range_vpp[0]
 
-    def _set_burst(self, cycles: int) -> None:
-        self.burst_mode = "TRIG"
-        self.burst_cycles = cycles
-        self.burst = "ON"
+    def _arm_burst(self, cycles: int) -> None:
+        self.model.check_burst(cycles)
+        with self._changing():
+            self.burst_mode = "TRIG"
+            self.burst_cycles = cycles
+            self.burst = "ON"
 
     def _ensure_known(self) -> None:
         if not self._is_known:
@@ -308,7 +301,7 @@ class AFG1022X(Verified):
             self._to_quiet_sine()
 
     def _to_quiet_sine(self) -> None:
-        """Whatever it was: no modes, no offset, the smallest amplitude, a sine."""
+        """From any state: no modes, no offset, the smallest amplitude, a sine."""
         # *RST is not used: what it does to the output of this model is not documented.
         self._end_modes()
         self.offset_v = 0.0  # first: it lowers the peak whatever the amplitude is
@@ -318,23 +311,14 @@ class AFG1022X(Verified):
         self._is_known = True
 
     def _forget(self) -> None:
-        """Hold nothing for known any more: a change was broken off."""
+        """Treat all settings as unknown: a change was broken off."""
         self.held.clear()
         self._is_known = False
 
-    def _new_port(self) -> ScpiPort:
-        return ScpiPort(self._connect(), self._name, self._config.settle_s)
-
-    def _reconnect(self) -> None:
-        with suppress(InstrumentError):  # the old session is what is broken: the new one is tried in any case
-            self.port.close()
-        self.port = self._new_port()
-        self._forget()
-
     def _identify(self) -> None:
-        self.port.send(f"OUTP{self.channel}:STAT OFF")
-        self.port.send("*CLS")
-        reply = self.port.query_patiently("*IDN?")
+        self.send(f"OUTP{self.channel}:STAT OFF")
+        self.send("*CLS")
+        reply = self.query_patiently("*IDN?")
         fields = [field.strip() for field in reply.split(",")]
         maker, model, serial, firmware = (*fields, "", "", "", "")[:4]
         if self.answers.match(f"{maker},{model}") is None:
@@ -352,30 +336,27 @@ class AFG1022X(Verified):
         the generator says that it expects another one, and does not let it be changed.
         """
         header, load = self.load_header.format(c=self.channel), self._config.load_ohm
-        refusal: InstrumentError | None = None
-        try:
-            self.port.command(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
-        except InstrumentError as error:
-            refusal = error
-        reply = self.port.query(f"{header}?")
-        self.port.complaints()  # an unknown query leaves one; the empty answer has already said so
+        complaints = self.send(f"{header} {'INF' if isinstance(load, str) else f'{load:g}'}")
+        reply = self.query(f"{header}?")
+        self.complaints()  # an unknown query leaves one; the empty answer has already said so
         wanted = load if isinstance(load, str) else f"{load:g} ohm"
         if not reply:
             return (Knob(instrument="generator", setting="output load", value=wanted),)
-        held_ohm = number_in(reply, f"{header}?")
+        held_ohm = self.query_number(f"{header}?")
         is_open = held_ohm > _INFINITE_OHM
         if is_open if isinstance(load, str) else abs(held_ohm - load) <= _SAME_LOAD * load:
             return ()
+        because = f" ({'; '.join(complaints)})" if complaints else ""
         raise SettingRefused(
             f"the generator expects a load of {HIGH_Z if is_open else f'{held_ohm:g} ohm'} where "
             f"generator.load_ohm says {load}: every amplitude would be wrong, by a factor of two between 50 "
             f"ohm and high-Z. The output is off; set the load to {wanted} on its panel, or correct the "
-            "configuration"
-        ) from refusal
+            f"configuration{because}"
+        )
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
-        """Switch off when a change fails: what the instrument then plays is nobody's intention."""
+        """Switch off when a change fails: the state of the instrument is then unknown."""
         try:
             yield
         except InstrumentError as error:

@@ -1,23 +1,19 @@
 """What a model of generator can do: ranges and waveforms, checked before anything is sent.
 
-Nothing here needs the library by which it is spoken to: plans are held against it without.
+Nothing here needs pyvisa: plans are checked without it.
 """
 
 from dataclasses import dataclass
 from enum import StrEnum
 from importlib import import_module
-from math import inf
-from typing import Literal, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import LimitExceeded
 from ..instruments import FunctionGenerator, GeneratorDescription, Samples, Sweep
-from ..rig import HIGH_Z, GeneratorConfig, GeneratorDriver
-
-Load = Literal["high-z"] | float
-SOURCE_OHM = 50.0
+from ..rig import GeneratorConfig, GeneratorDriver
 
 
 class Shape(StrEnum):
@@ -27,22 +23,25 @@ class Shape(StrEnum):
     EDIT_MEMORY = "EMEM"
 
 
-def shown_fraction(load: Load) -> float:
-    """Part of the open-circuit voltage that the panel shows for a load: its voltage divider."""
-    ohm = inf if load == HIGH_Z else float(load)
-    return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
+class ArbitraryCodes(NamedTuple):
+    """One period as the generator's memory holds it: free of DC, over the full range of codes.
+
+    Code 0 is minus, and the model's ``top_code`` plus, half of the panel's peak-to-peak amplitude.
+    """
+
+    codes: NDArray[np.uint16]
+    panel_factor: float
+    """Panel amplitude over requested amplitude: 1 when the waveform is free of DC and reaches 1."""
 
 
 @dataclass(frozen=True)
 class GeneratorModel:
-    """One model of generator: its figures, and the class of `vibench.acquisition.drivers` that opens it."""
+    """Limits of one model of generator, and the class of `vibench.acquisition.drivers` that opens it."""
 
     name: str
     driver: str
     open_range_vpp: tuple[float, float]
-    """Smallest and largest amplitude without load, peak to peak [V]."""
-    open_peak_v: float
-    """Largest abs(offset) + Vpp/2 without load [V]."""
+    """Smallest and largest amplitude without load and without offset, peak to peak [V]."""
     lowest_hz: float
     highest_hz: dict[Shape, float]
     memory_points: tuple[int, int]
@@ -51,48 +50,44 @@ class GeneratorModel:
     burst_cycles: tuple[int, int]
     usb_ids: tuple[tuple[int, int], ...] = ()
     longest_sweep_s: float = 0.0
-    """Of its own; 0 where its sweep time is no remote command."""
+    """Longest sweep that it makes by itself; 0 where its sweep time is no remote command."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Say what it can do into the load that it is told to expect."""
+        """Describe what it can do into the load that it is told to expect."""
+        lowest, highest = (limit * config.shown_fraction for limit in self.open_range_vpp)
+        sine_hz = self.highest_hz[Shape.SINE]
         return GeneratorDescription(
-            self.name,
-            self.range_vpp(config.load_ohm),
-            self.highest_hz[Shape.SINE],
-            self.memory_points,
-            self.usb_ids,
-            self.longest_sweep_s,
+            self.name, (lowest, highest), sine_hz, self.memory_points, self.usb_ids, self.longest_sweep_s
         )
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
-        """Open one; the library that speaks to it is loaded only now."""
+        """Open one; pyvisa is loaded only now."""
         driver = getattr(import_module("vibench.acquisition.drivers"), self.driver)
         return cast("GeneratorDriver", driver).open(config)
 
-    def range_vpp(self, load: Load) -> tuple[float, float]:
-        """Smallest and largest setting with a load, peak to peak [V]."""
-        fraction = shown_fraction(load)
-        return self.open_range_vpp[0] * fraction, self.open_range_vpp[1] * fraction
-
     def amplitude_range_vpp(self, config: GeneratorConfig) -> tuple[float, float]:
         """Smallest and largest amplitude setting of this bench, peak to peak [V]."""
-        lowest, highest = self.range_vpp(config.load_ohm)
+        lowest, highest = self.describe(config).amplitude_range_vpp
         return lowest, min(highest, config.amplitude_limit_vpp)
 
     def check_frequency(self, shape: Shape, frequency_hz: float) -> None:
-        """Raise LimitExceeded unless the generator can play ``shape`` so often a second."""
-        highest_hz = self.highest_hz[shape]
-        if not self.lowest_hz <= frequency_hz <= highest_hz:
-            raise LimitExceeded(
-                f"{frequency_hz:g} Hz was asked for; the {self.name} plays {shape.value} from "
-                f"{self.lowest_hz:g} to {highest_hz:g} Hz. Nothing was sent; choose a frequency in that range"
-            )
+        """Raise LimitExceeded unless the generator can play ``shape`` at this repetition rate."""
+        _require(frequency_hz, (self.lowest_hz, self.highest_hz[shape]), "Hz", f"{shape} of the {self.name}")
 
     def check_burst(self, cycles: int) -> None:
         """Raise LimitExceeded for a number of periods that the generator cannot count."""
-        fewest, most = self.burst_cycles
-        if not fewest <= cycles <= most:
-            raise LimitExceeded(f"a burst of {cycles} cycles was asked for; {fewest} to {most} are allowed")
+        _require(cycles, self.burst_cycles, "cycles", f"a burst of the {self.name}")
+
+    def check_amplitude(self, config: GeneratorConfig, amplitude_vpp: float) -> None:
+        """Raise LimitExceeded unless bench and generator allow this amplitude, without an offset."""
+        allowed = self.amplitude_range_vpp(config)
+        limit_vpp = config.amplitude_limit_vpp
+        reason = (
+            f"generator.amplitude_limit_vpp = {limit_vpp:g}"
+            if allowed[1] == limit_vpp
+            else f"the {self.name} with load_ohm = {config.load_ohm}"
+        )
+        _require(amplitude_vpp, allowed, "Vpp", reason)
 
     def check_sweep(self, sweep: Sweep) -> None:
         """Raise LimitExceeded unless the generator makes such a sweep by itself."""
@@ -105,93 +100,59 @@ class GeneratorModel:
                 f"itself {most}. Nothing was sent; use sine_sweep, which steps the frequency"
             )
 
-    def check_amplitude(self, config: GeneratorConfig, amplitude_vpp: float, offset_v: float) -> None:
-        """Raise LimitExceeded unless bench and generator allow this amplitude with this offset."""
-        lowest, highest = self.amplitude_range_vpp(config)
-        if not lowest <= amplitude_vpp <= highest:
-            reason = (
-                f"generator.amplitude_limit_vpp = {config.amplitude_limit_vpp:g}"
-                if highest == config.amplitude_limit_vpp
-                else f"the {self.name}'s range with load_ohm = {config.load_ohm}"
-            )
+    def codes(self, waveform: Samples) -> ArbitraryCodes:
+        """Turn one period of values into codes of the full range.
+
+        The mean is removed, since DC would push the shaker off its centre, and the rest is scaled so that
+        its largest magnitude takes an outermost code.
+
+        Raises
+        ------
+        LimitExceeded
+            When the waveform has too few or too many points, is not finite, leaves -1 to 1, or is constant.
+
+        """
+        values = np.asarray(waveform, dtype=np.float64)
+        fewest, most = self.memory_points
+        if values.ndim != 1 or not fewest <= values.size <= most:
             raise LimitExceeded(
-                f"{amplitude_vpp:g} Vpp was asked for; {lowest:g} to {highest:g} Vpp are allowed here "
-                f"({reason}). Nothing was sent; choose an amplitude in that range"
+                f"the waveform has the shape {values.shape}; the generator's memory takes one period of "
+                f"{fewest} to {most} points. Nothing was sent; resample it"
             )
-        largest_peak_v = min(
-            self.open_peak_v * shown_fraction(config.load_ohm), config.amplitude_limit_vpp / 2
-        )
-        peak_v = abs(offset_v) + amplitude_vpp / 2
-        if not peak_v <= largest_peak_v:
+        peak = float(np.max(np.abs(values)))
+        # Not "peak > 1": a NaN must not pass.
+        if not peak <= 1.0 + 1e-9:
             raise LimitExceeded(
-                f"{amplitude_vpp:g} Vpp around {offset_v:g} V peaks at {peak_v:g} V; {largest_peak_v:g} V is "
-                "allowed (abs(offset) + Vpp/2, of the generator and of generator.amplitude_limit_vpp). "
-                "Nothing was sent; lower one of them"
+                f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "
+                "(the amplitude is given separately). Nothing was sent; scale it"
             )
+        swing = values - values.mean()
+        factor = float(np.max(np.abs(swing)))
+        if factor <= np.finfo(np.float64).eps:
+            raise LimitExceeded(
+                "the waveform is constant: without its mean nothing is left to play. Nothing was sent; "
+                "give one period that moves"
+            )
+        middle = self.top_code / 2
+        codes = np.clip(np.rint(middle + swing / factor * middle), 0, self.top_code).astype(np.uint16)
+        return ArbitraryCodes(codes, factor)
 
 
-@dataclass(frozen=True)
-class ArbitraryCodes:
-    """One period as the generator's memory holds it: free of DC, over the full range of codes.
-
-    The terminal plays ``(2 * codes / top_code - 1)`` times half of what the panel is set to, which is
-    ``amplitude_vpp * panel_factor``.
-    """
-
-    codes: NDArray[np.uint16]
-    """0 to ``top_code``, shape (points,)."""
-    top_code: int
-    """Code of plus half of the peak-to-peak amplitude on the panel; code 0 is minus half of it."""
-    panel_factor: float
-    """Largest magnitude that is left: 1 for a waveform that is free of DC and reaches 1."""
-
-
-def arbitrary_codes(waveform: Samples, model: GeneratorModel) -> ArbitraryCodes:
-    """Turn one period of values into codes of the full range.
-
-    Code 0 stands for minus, and the highest one for plus, half of the amplitude on the panel. The mean is
-    removed, since DC would push the shaker off its centre, and what is left is scaled so that its largest
-    magnitude takes an outermost code.
-
-    Raises
-    ------
-    LimitExceeded
-        When the waveform has too few or too many points, is not finite, leaves -1 to 1, or is constant.
-
-    """
-    values = np.asarray(waveform, dtype=np.float64)
-    fewest, most = model.memory_points
-    if values.ndim != 1 or not fewest <= values.size <= most:
+def _require(value: float, allowed: tuple[float, float], unit: str, reason: str) -> None:
+    lowest, highest = allowed
+    if not lowest <= value <= highest:  # so that a NaN is refused
         raise LimitExceeded(
-            f"the waveform has the shape {values.shape}; the generator's memory takes one period of "
-            f"{fewest} to {most} points. Nothing was sent; resample it"
+            f"{value:g} {unit} was asked for; {lowest:g} to {highest:g} {unit} are allowed ({reason}). "
+            "Nothing was sent; choose a value in that range"
         )
-    peak = float(np.max(np.abs(values)))
-    # Not "peak > 1": a NaN must not pass.
-    if not peak <= 1.0 + 1e-9:
-        raise LimitExceeded(
-            f"the largest magnitude of the waveform is {peak:g}; values from -1 to 1 are allowed "
-            "(the amplitude is given apart). Nothing was sent; scale it"
-        )
-    swing = values - values.mean()
-    factor = float(np.max(np.abs(swing)))
-    if factor <= np.finfo(np.float64).eps:
-        raise LimitExceeded(
-            "the waveform is constant: without its mean nothing is left to play. Nothing was sent; "
-            "give one period that moves"
-        )
-    middle = model.top_code / 2
-    codes = np.clip(np.rint(middle + swing / factor * middle), 0, model.top_code).astype(np.uint16)
-    return ArbitraryCodes(codes, model.top_code, factor)
 
 
 AFG1022_MODEL = GeneratorModel(
     # Tektronix AFG1022 specification, as the IVI driver tkafg1k checks it. Drivers and measurements agree on
-    # a peak of 10 V; the IVI driver allows twice that. The stricter one holds.
+    # a peak of 10 V, thus 20 Vpp; the IVI driver allows twice that. The stricter one holds.
     name="AFG1022",
     driver="AFG1022X",
     open_range_vpp=(2e-3, 20.0),
-    open_peak_v=10.0,
     lowest_hz=1e-6,
     highest_hz={Shape.SINE: 25e6, Shape.EDIT_MEMORY: 10e6},
     memory_points=(2, 8192),
@@ -204,7 +165,6 @@ KEYSIGHT_33500B_MODEL = GeneratorModel(
     name="Keysight 33500B",
     driver="Keysight33500B",
     open_range_vpp=(2e-3, 20.0),
-    open_peak_v=10.0,
     lowest_hz=1e-6,
     highest_hz={Shape.SINE: 20e6, Shape.EDIT_MEMORY: 62.5e6 / 65_536},
     memory_points=(8, 65_536),

@@ -13,7 +13,7 @@ from ..errors import SettingRefused
 from ..instruments import Spacing, Sweep
 from ._afg1022x import AFG1022X
 from ._generator_limits import KEYSIGHT_33500B_MODEL, ArbitraryCodes, GeneratorModel
-from ._scpi import SWITCH, Number, Word, number_in
+from ._scpi import SWITCH, Number, Word
 
 _NAME = "VIBENCH"
 _MIDDLE = KEYSIGHT_33500B_MODEL.top_code // 2
@@ -72,10 +72,9 @@ class Keysight33500B(AFG1022X):
 
     def arm_burst(self, cycles: int) -> None:
         """Play ``cycles`` periods at each trigger of the bus."""
-        self.model.check_burst(cycles)
         with self._changing():
             self.trigger_source = "BUS"
-            self._set_burst(cycles)
+        self._arm_burst(cycles)
 
     def end_burst(self) -> None:
         """Play on without a trigger."""
@@ -104,18 +103,15 @@ class Keysight33500B(AFG1022X):
     def _upload(self, codes: ArbitraryCodes) -> None:
         """Fill the memory; it tells the number of points and their mean, not the points."""
         source = f"SOUR{self.channel}:DATA"
-        self.port.command(f"{source}:VOL:CLE")
+        self.command(f"{source}:VOL:CLE")
         self.byte_order = "NORM"
         signed = (codes.codes.astype(np.int32) - _MIDDLE).astype(np.int16)
-        self.port.command(f"{source}:ARB:DAC {_NAME},", signed.view(np.uint16))
-        points, mean = (
-            number_in(self.port.query(f"{source}:ATTR:{each}? {_NAME}"), f"{source}:ATTR:{each}?")
-            for each in ("POIN", "AVER")
-        )
+        self.command(f"{source}:ARB:DAC {_NAME},", signed.view(np.uint16))
+        points, mean = (self.query_number(f"{source}:ATTR:{each}? {_NAME}") for each in ("POIN", "AVER"))
         sent_mean = float(signed.mean()) / _MIDDLE
         if round(points) != signed.size or abs(mean - sent_mean) > _SAME_MEAN:
             raise SettingRefused(
-                f"{self.port.name}: {signed.size} points with a mean of {sent_mean:.4f} were put in its "
+                f"{self.name}: {signed.size} points with a mean of {sent_mean:.4f} were put in its "
                 f"memory, and it tells {points:g} with {mean:.4f}. Upload again; if it fails again, check "
                 "the USB cable"
             )

@@ -1,4 +1,4 @@
-"""One SCPI port for all drivers: no complaint is lost, no loss goes unnamed, every setting is read back."""
+"""SCPI instruments: no complaint is lost, every lost connection is named, every setting is read back."""
 
 import re
 import threading
@@ -29,8 +29,8 @@ _QUEUE_ENTRY = re.compile(r'([+-]?\d+)\s*,\s*"?([^"]*)"?')
 _LEADING_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)")
 
 
-class ScpiPort:
-    """Commands and queries over one VISA session.
+class ScpiInstrument:
+    """Commands, queries and verified settings over a VISA session.
 
     A command is followed by reading the error queue until it is empty, which also waits until the
     instrument has done the command. A dialogue that was broken off (Ctrl-C between question and
@@ -38,24 +38,35 @@ class ScpiPort:
 
     Parameters
     ----------
-    link
-        An open VISA session.
+    connect
+        Opens the VISA session; called again by `reconnect`.
     name
-        What to call the instrument in errors.
+        Name of the instrument in errors.
+    channel
+        Replaces ``{c}`` in the headers of settings.
     settle_s
-        Pause that the instrument needs after each command [s]; after a question its answer is the sign.
+        Pause that the instrument needs after each command [s]; it needs none after an answer.
 
     """
 
     def __init__(
-        self, link: Link, name: str, settle_s: float = 0.0, pause: Callable[[float], None] = time.sleep
+        self,
+        connect: Callable[[], Link],
+        name: str,
+        channel: int = 1,
+        settle_s: float = 0.0,
+        pause: Callable[[float], None] = time.sleep,
     ) -> None:
         self.name = name
-        self._link = link
+        self.channel = channel
+        self.held: dict[str, Any] = {}
+        """What was read back since the last failure, by header."""
+        self._connect = connect
         self._settle_s = settle_s
         self._pause = pause
-        self._reply_due = False
         self._lock = threading.RLock()
+        self._link = connect()
+        self._reply_due = False
 
     def command(self, message: str, codes: Codes | None = None) -> None:
         """Send a command; raises InstrumentError when the instrument queues any complaint about it."""
@@ -66,23 +77,19 @@ class ScpiPort:
             )
 
     def send(self, message: str, codes: Codes | None = None) -> tuple[str, ...]:
-        """Send a command, with 16-bit codes as a big-endian block behind it; return what is complained about.
+        """Send a command, with 16-bit codes as a big-endian block behind it; return the complaints.
 
         The complaints may be older than the command.
         """
-        with self._lock:
-            self._resynchronise()
-            with self._dialogue(message):
-                if codes is None:
-                    self._link.write(message)
-                else:
-                    payload = codes.astype(">u2").tobytes()
-                    length = str(len(payload))
-                    header = f"{message}#{len(length)}{length}".encode("ascii")
-                    self._link.write_raw(header + payload + b"\n")
-                # Some firmware drops messages that come too soon after a command, and has no flag for it.
-                if self._settle_s > 0:
-                    self._pause(self._settle_s)
+        with self._dialogue(message):
+            if codes is None:
+                self._link.write(message)
+            else:
+                block = pyvisa.util.to_ieee_block(codes, "H", is_big_endian=True)
+                self._link.write_raw(message.encode("ascii") + block + b"\n")
+            # Some firmware drops messages that come too soon after a command, and has no flag for it.
+            if self._settle_s > 0:
+                self._pause(self._settle_s)
             return self.complaints()
 
     def query(self, message: str) -> str:
@@ -94,9 +101,34 @@ class ScpiPort:
         """Ask, and once more when the answer is empty, as the first one after ``*CLS`` may be."""
         return self.query(message) or self.query(message)
 
+    def query_number(self, message: str) -> float:
+        """Ask for a number; what follows it in the answer is ignored."""
+        reply = self.query(message)
+        found = _LEADING_NUMBER.match(reply)
+        if found is None:
+            raise InstrumentError(
+                f"{self.name}: {message} was answered {reply!r}, which is not a number; try again"
+            )
+        return float(found.group(1))
+
     def query_codes(self, message: str) -> Codes:
         """Ask for a big-endian binary block of 16-bit codes."""
-        return _block_codes(self._ask(message), f"{self.name}: {message}")
+        reply = self._ask(message)
+        try:
+            first, length = pyvisa.util.parse_ieee_block_header(reply, len(reply))
+        except ValueError:
+            length = -1
+        if length < 0:
+            raise InstrumentError(
+                f"{self.name}: {message} was answered without a binary block ({reply[:20]!r}); try again"
+            )
+        payload = reply[first : first + length]
+        if len(payload) != length or length % 2:
+            raise InstrumentError(
+                f"{self.name}: {message} announced {length} bytes and sent {len(payload)}; "
+                "an even number, complete, is needed. Upload again"
+            )
+        return np.frombuffer(payload, dtype=">u2").astype(np.uint16)
 
     def complaints(self) -> tuple[str, ...]:
         """Empty the error queue and return what was in it."""
@@ -117,39 +149,69 @@ class ScpiPort:
             "switch it off and on, and open the bench again"
         )
 
-    def close(self) -> None:
-        """Give the session back. Legal at any time: a session that is gone is not missed."""
-        with self._lock, self._dialogue("closing the session"):
+    def known(self, header: str) -> Any:
+        """Return the setting read back last; raises InstrumentError when a change has failed since."""
+        if header not in self.held:
+            raise InstrumentError(
+                f"{self.name} has no known settings since a change failed; load a sine or a waveform first"
+            )
+        return self.held[header]
+
+    def end_if_known(self, header: str, word: str, answers: tuple[str, ...]) -> None:
+        """End a mode; a mode that the firmware does not know, and answers with nothing, cannot be on."""
+        header = header.format(c=self.channel)
+        self.send(f"{header} {word}")
+        reply = self.query(f"{header}?")
+        self.complaints()  # an unknown query leaves one behind its empty answer
+        if reply and reply.strip('"').upper() not in answers:
+            raise SettingRefused(
+                f"{self.name}: {header} was set to {word} and still reads {reply!r}; "
+                "the output is off. End that mode on its panel and open the bench again"
+            )
+
+    def disconnect(self) -> None:
+        """Close the session. Legal at any time, also when the connection is lost."""
+        with self._lock, self._naming_losses("closing the session"):
             self._link.close()
 
+    def reconnect(self) -> None:
+        """Open another session, whatever became of the one before."""
+        try:
+            self.disconnect()
+        except InstrumentError as error:
+            LOG.debug("%s: %s", self.name, error)
+        self._link = self._connect()
+        self._reply_due = False
+
     def _ask(self, message: str) -> bytes:
-        with self._lock:
-            self._resynchronise()
-            with self._dialogue(message):
-                self._reply_due = True
-                self._link.write(message)
-                reply = self._link.read_raw()
-                self._reply_due = False
+        with self._dialogue(message):
+            self._reply_due = True
+            self._link.write(message)
+            reply = self._link.read_raw()
+            self._reply_due = False
         LOG.debug("%s answers %r", self.name, reply)
         return reply
 
-    def _resynchronise(self) -> None:
-        """Read away the answer to a question that was broken off."""
-        if not self._reply_due:
-            return
-        self._reply_due = False
-        with self._dialogue("resuming the dialogue"):
-            usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
-            try:
-                self._link.read_raw()
-            except pyvisa.VisaIOError as error:
-                if error.error_code != _LATE:
-                    raise
-            finally:
-                self._link.timeout = usual_ms
+    @contextmanager
+    def _dialogue(self, message: str) -> Iterator[None]:
+        """Exchange messages, after reading away the answer to a question that was broken off."""
+        with self._lock:
+            if self._reply_due:
+                self._reply_due = False
+                with self._naming_losses("resuming the dialogue"):
+                    usual_ms, self._link.timeout = self._link.timeout, _STALE_REPLY_MS
+                    try:
+                        self._link.read_raw()
+                    except pyvisa.VisaIOError as error:
+                        if error.error_code != _LATE:
+                            raise
+                    finally:
+                        self._link.timeout = usual_ms
+            with self._naming_losses(message):
+                yield
 
     @contextmanager
-    def _dialogue(self, doing: str) -> Iterator[None]:
+    def _naming_losses(self, doing: str) -> Iterator[None]:
         LOG.debug("%s: %s", self.name, doing)
         try:
             yield
@@ -165,60 +227,9 @@ class ScpiPort:
             ) from error
 
 
-def number_in(reply: str, asked: str) -> float:
-    """Return the number at the start of a reply; raises InstrumentError when there is none."""
-    found = _LEADING_NUMBER.match(reply)
-    if found is None:
-        raise InstrumentError(f"{asked} was answered {reply!r}, which is not a number; try again")
-    return float(found.group(1))
-
-
-def _block_codes(reply: bytes, asked: str) -> Codes:
-    block = re.search(rb"#([1-9])", reply)
-    digits = int(block[1]) if block else 0
-    first = block.end() + digits if block else 0
-    length_text = reply[first - digits : first]
-    if block is None or not length_text.isdigit() or len(length_text) != digits:
-        raise InstrumentError(f"{asked} was answered without a binary block ({reply[:20]!r}); try again")
-    length, payload = int(length_text), reply[first : first + int(length_text)]
-    if len(payload) != length or length % 2:
-        raise InstrumentError(
-            f"{asked} announced {length} bytes and sent {len(payload)}; "
-            "an even number, complete, is needed. Upload again"
-        )
-    return np.frombuffer(payload, dtype=">u2").astype(np.uint16)
-
-
 # Settings as declarations: assigning one sends it, reads it back, and keeps what the instrument holds.
 # This family answers a value out of range with a silent default (Tektronix AFG1000 programmer manual,
 # general syntax), so that a command without a complaint proves nothing.
-
-
-class Verified:
-    """An instrument with verified settings."""
-
-    def __init__(self, port: ScpiPort, channel: int) -> None:
-        self.port = port
-        self.channel = channel
-        self.held: dict[str, Any] = {}
-        """What was read back since the last failure, by header."""
-
-    def refused(self, header: str, sent: str, got: str) -> SettingRefused:
-        """Return the error for a setting that reads back differently."""
-        return SettingRefused(
-            f"{self.port.name}: {header} was set to {sent} and reads back {got!r}: the instrument took "
-            "another value without a word. Stop, check the setting on its panel, and look whether its limits "
-            "allow it"
-        )
-
-    def known(self, header: str) -> Any:
-        """Return what the instrument holds; raises InstrumentError since a change has failed."""
-        if header not in self.held:
-            raise InstrumentError(
-                f"{self.port.name} has no known settings since a change failed; "
-                "load a sine or a waveform first"
-            )
-        return self.held[header]
 
 
 @dataclass(frozen=True)
@@ -231,16 +242,15 @@ class Number:
     absolute: float = 0.0
     relative: float = 0.0
 
-    def __get__(self, owner: Verified, _: type | None = None) -> float:
+    def __get__(self, owner: ScpiInstrument, _: type | None = None) -> float:
         return float(owner.known(self.header))
 
-    def __set__(self, owner: Verified, value: float) -> None:
+    def __set__(self, owner: ScpiInstrument, value: float) -> None:
         header, text = self.header.format(c=owner.channel), self.form.format(value)
-        owner.port.command(f"{header} {text}")
-        reply = owner.port.query(f"{header}?")
-        got = number_in(reply, f"{owner.port.name}: {header}?")
+        owner.command(f"{header} {text}")
+        got = owner.query_number(f"{header}?")
         if not abs(got - value) <= self.absolute + self.relative * abs(value):  # so that a NaN is refused
-            raise owner.refused(header, text, reply)
+            raise _refused(owner, header, text, f"{got:.10g}")
         owner.held[self.header] = got
 
 
@@ -251,39 +261,32 @@ class Word:
     header: str
     answers: Mapping[str, tuple[str, ...]]
 
-    def __get__(self, owner: Verified, _: type | None = None) -> str:
+    def __get__(self, owner: ScpiInstrument, _: type | None = None) -> str:
         return str(owner.known(self.header))
 
-    def __set__(self, owner: Verified, word: str) -> None:
-        owner.port.command(f"{self.header.format(c=owner.channel)} {word}")
-        self.expect(owner, word)
+    def __set__(self, owner: ScpiInstrument, word: str) -> None:
+        owner.command(f"{self.header.format(c=owner.channel)} {word}")
+        self._expect(owner, word)
 
-    def insist(self, owner: Verified, word: str) -> None:
-        """Set it whatever is complained about, old complaints above all: what it reads back decides."""
-        owner.port.send(f"{self.header.format(c=owner.channel)} {word}")
-        self.expect(owner, word)
+    def insist(self, owner: ScpiInstrument, word: str) -> None:
+        """Set it and ignore complaints, which may be old: the value read back decides."""
+        owner.send(f"{self.header.format(c=owner.channel)} {word}")
+        self._expect(owner, word)
 
-    def expect(self, owner: Verified, word: str) -> None:
-        """Raise SettingRefused unless the instrument holds a word."""
+    def _expect(self, owner: ScpiInstrument, word: str) -> None:
         header = self.header.format(c=owner.channel)
-        reply = owner.port.query(f"{header}?")
+        reply = owner.query(f"{header}?")
         if reply.strip('"').upper() not in self.answers[word]:
-            raise owner.refused(header, word, reply)
+            raise _refused(owner, header, word, reply)
         owner.held[self.header] = word
 
 
+def _refused(owner: ScpiInstrument, header: str, sent: str, got: str) -> SettingRefused:
+    return SettingRefused(
+        f"{owner.name}: {header} was set to {sent} and reads back {got!r}: the instrument took another value "
+        "without an error. Stop, check the setting on its panel, and check that its limits allow it"
+    )
+
+
 SWITCH = {"ON": ("1", "ON"), "OFF": ("0", "OFF")}
-"""The words of what is on or off."""
-
-
-def end_if_known(owner: Verified, header: str, word: str, answers: tuple[str, ...]) -> None:
-    """End a mode; what the firmware does not know, and answers with nothing, cannot be on."""
-    header = header.format(c=owner.channel)
-    owner.port.send(f"{header} {word}")
-    reply = owner.port.query(f"{header}?")
-    owner.port.complaints()  # an unknown query leaves one behind its empty answer
-    if reply and reply.strip('"').upper() not in answers:
-        raise SettingRefused(
-            f"{owner.port.name}: {header} was set to {word} and still reads {reply!r}; "
-            "the output is off. End that mode on its panel and open the bench again"
-        )
+"""Words of a setting that is on or off."""

@@ -145,6 +145,8 @@ class OutputConfig(FrozenModel):
 _LARGEST = 1e250
 """Of a shaker's numbers, in SI units: products of some are formed."""
 HIGH_Z: Literal["high-z"] = "high-z"
+SOURCE_OHM = 50.0
+"""Output impedance of a function generator."""
 
 
 Options = dict[str, str | int | float]
@@ -201,12 +203,15 @@ class GeneratorConfig(FrozenModel):
             )
         return self
 
+    @property
+    def shown_fraction(self) -> float:
+        """Part of the open-circuit voltage that the panel shows for the load that is declared."""
+        ohm = inf if self.load_ohm == HIGH_Z else self.load_ohm
+        return 1.0 if ohm == inf else ohm / (ohm + SOURCE_OHM)
+
     def terminal_factor(self) -> float:
         """Volts at the terminal per volt on the panel: 2 when 50 ohm are set and nothing loads it."""
-        source_ohm = 50.0
-        told = inf if self.load_ohm == HIGH_Z else self.load_ohm
-        shown = 1.0 if told == inf else told / (told + source_ohm)
-        return self.connected_ohm / (self.connected_ohm + source_ohm) / shown
+        return self.connected_ohm / (self.connected_ohm + SOURCE_OHM) / self.shown_fraction
 
 
 class AmplifierConfig(FrozenModel):
