@@ -12,7 +12,7 @@ from nidaqmx.errors import DaqError
 from vibench.acquisition import AcquisitionError, ConfigurationError, InstrumentError, InstrumentLost
 from vibench.acquisition.drivers import DaqmxDigitizer
 from vibench.acquisition.drivers._daqmx_errors import MEANINGS, from_code
-from vibench.acquisition.drivers._daqmx_inputs import InputScaling
+from vibench.acquisition.drivers._daqmx_inputs import linear_step_v
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig
@@ -125,6 +125,8 @@ class TestReading:
             counts = row / step_v
             assert np.max(np.abs(counts - np.rint(counts))) < 1e-6
             assert np.ptp(counts) > 1
+        assert block.counts.dtype == np.int32
+        assert np.array_equal(block.counts * np.array(digitizer.volts_per_count)[:, np.newaxis], block.volts)
 
     def test_two_blocks_share_no_memory(self, digitizer):
         digitizer.start()
@@ -292,16 +294,26 @@ class TestErrors:
 
 
 class TestScaling:
-    @given(step_v=st.floats(1e-8, 1e-3), shift=st.integers(-1000, 1000))
-    def test_a_straight_scaling_through_a_whole_count_has_a_step(self, step_v, shift):
-        assert InputScaling((shift * step_v, step_v)).volts_per_count(5.0) == step_v
+    @given(step_v=st.floats(1e-8, 1e-3))
+    def test_a_straight_scaling_through_zero_has_a_step(self, step_v):
+        assert linear_step_v((0.0, step_v), 5.0) == step_v
 
     @pytest.mark.parametrize(
         "coefficients",
-        [(), (0.0,), (0.0, 0.0), (0.0, -1e-6), (3.3e-7, 6e-7), (0.0, 6e-7, 1e-13), (0.0, 6e-7, 0.0, 1e-20)],
+        [
+            (),
+            (0.0,),
+            (0.0, 0.0),
+            (0.0, -1e-6),
+            (0.0, 2e-9),
+            (3.3e-7, 6e-7),
+            (6e-7, 6e-7),
+            (0.0, 6e-7, 1e-13),
+            (0.0, 6e-7, 0.0, 1e-20),
+        ],
     )
     def test_a_shifted_or_bent_scaling_has_none(self, coefficients):
-        assert InputScaling(coefficients).volts_per_count(5.0) is None
+        assert linear_step_v(coefficients, 5.0) is None
 
 
 def sine_fit(row, frequency_hz):

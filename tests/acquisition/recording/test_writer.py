@@ -1,4 +1,5 @@
 import os
+from dataclasses import replace
 from threading import Event
 
 import numpy as np
@@ -29,6 +30,26 @@ def test_every_24_bit_count_comes_back(tmp_path, make_header, make_block):
         np.testing.assert_allclose(
             recording.read("m0_velocity"), 0.125 * (truth[1] + 1.5) * step, rtol=1e-13, atol=1e-18
         )
+
+
+def test_a_converters_own_counts_are_recorded_as_they_are(tmp_path, make_header, make_block):
+    counts, block = make_block(0, BLOCK)
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        writer.append(replace(block, counts=counts))
+    with open_recording(tmp_path / "a.h5") as recording:
+        assert all(
+            np.array_equal(recording.read_counts(role), counts[row])
+            for row, role in enumerate(recording.roles)
+        )
+
+
+@pytest.mark.parametrize("spoil", [lambda counts: counts[:, 1:], lambda counts: counts.astype(float)])
+def test_counts_of_another_shape_or_type_are_refused(tmp_path, make_header, make_block, spoil):
+    counts, block = make_block(0, BLOCK)
+    with create_recording(tmp_path / "a.h5", make_header()) as writer:
+        with pytest.raises(RecordingError, match=r"they must be int32 and of the same shape"):
+            writer.append(replace(block, counts=spoil(counts)))
+        assert writer.samples == 0
 
 
 def test_only_the_finished_file_remains(tmp_path, make_header, make_block):

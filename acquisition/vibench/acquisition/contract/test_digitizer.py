@@ -56,8 +56,11 @@ def test_volts_are_whole_counts_where_it_tells_the_step(bench: Bench) -> None:
     steps_v = bench.digitizer.volts_per_count
     assert len(steps_v) == len(bench.digitizer.roles)
     bench.digitizer.start()
-    rows = bench.digitizer.read(4 * BLOCK).volts
-    for row, step_v in zip(rows, steps_v, strict=True):
+    block = bench.digitizer.read(4 * BLOCK)
+    if block.counts is not None:
+        assert block.counts.dtype == np.int32
+        np.testing.assert_array_equal(block.counts * np.array(steps_v)[:, np.newaxis], block.volts)
+    for row, step_v in zip(block.volts, steps_v, strict=True):
         if step_v is not None:
             counts = row / step_v
             assert np.max(np.abs(counts - np.rint(counts))) < 1e-3

@@ -1,18 +1,20 @@
 """A converter behind NI-DAQmx: continuous, hardware-timed, without a gap, and never left reserved."""
 
+from collections.abc import Callable
 from contextlib import ExitStack
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from nidaqmx import DaqError, Task
 from nidaqmx.constants import AcquisitionType, TaskMode
-from nidaqmx.stream_readers import AnalogMultiChannelReader
+from nidaqmx.stream_readers import AnalogMultiChannelReader, AnalogUnscaledReader
+from numpy.typing import NDArray
 
 from ..errors import ConfigurationError, InstrumentError, SettingRefused
-from ..instruments import Block, Identity, Overload, Samples
+from ..instruments import Block, Counts, Identity, Overload, Samples
 from ..rig import Channel, DaqConfig, Rig, channels_of
 from ._daqmx_errors import NOT_OFFERED, daqmx_call
-from ._daqmx_inputs import InputScaling, add_input
+from ._daqmx_inputs import add_input
 from ._daqmx_session import DaqmxSession, daqmx_session
 from ._overload import overload_ranges
 
@@ -48,8 +50,8 @@ class DaqmxDigitizer:
         self._channels = channels
         self._resources = ExitStack()
         self._task: Task | None = None
-        self._reader: AnalogMultiChannelReader | None = None
-        self._scalings: tuple[InputScaling | None, ...] = ()
+        self._reader: AnalogUnscaledReader | AnalogMultiChannelReader | None = None
+        self._volts_per_count: tuple[float | None, ...] = ()
         self._identity: Identity | None = None
         self._sample_rate_hz = 0.0
         self._next_sample = 0
@@ -94,10 +96,7 @@ class DaqmxDigitizer:
     @property
     def volts_per_count(self) -> tuple[float | None, ...]:
         """Step of the converter for each channel [V]; None where volts are no whole multiples of one step."""
-        return tuple(
-            None if scaling is None else scaling.volts_per_count(channel.range_v)
-            for scaling, channel in zip(self._scalings, self._channels, strict=True)
-        )
+        return self._volts_per_count
 
     @property
     def session(self) -> DaqmxSession:
@@ -138,17 +137,16 @@ class DaqmxDigitizer:
             raise InstrumentError(f"{self._config.device} is not sampling; start it before reading")
         if samples < 1:
             raise InstrumentError(f"{samples} samples were asked of {self._config.device}; ask for 1 or more")
-        volts = np.empty((len(self._channels), samples))
         first_sample = self._next_sample
         with daqmx_call(
             f"reading samples {first_sample} to {first_sample + samples - 1} of {self._config.device}"
         ):
             self._is_running = False  # until the block is whole
-            self._fill(volts)
+            volts, counts = self._next_samples(samples)
             told = self._overloaded_roles()
             self._is_running = True
         self._next_sample += samples
-        return Block(first_sample, volts, self._overloads(volts, first_sample, told))
+        return Block(first_sample, volts, self._overloads(volts, first_sample, told), counts)
 
     @property
     def waiting_samples(self) -> int:
@@ -181,7 +179,7 @@ class DaqmxDigitizer:
         self._identity = self._identify()
         self._task = task = self._resources.enter_context(Task(grpc_options=self._session.options))
         pairs = zip(self._config.channels, self._channels, strict=True)
-        self._scalings = tuple(add_input(task, config, channel) for config, channel in pairs)
+        self._volts_per_count = tuple(add_input(task, config, channel) for config, channel in pairs)
         rate_hz = self._config.sample_rate_hz
         task.timing.cfg_samp_clk_timing(
             rate_hz,
@@ -196,7 +194,11 @@ class DaqmxDigitizer:
                 "set daq.sample_rate_hz to a rate that it has"
             )
         task.control(TaskMode.TASK_RESERVE)
-        self._reader = AnalogMultiChannelReader(task.in_stream)
+        if None in self._volts_per_count:
+            self._reader = AnalogMultiChannelReader(task.in_stream)
+        else:
+            self._reader = AnalogUnscaledReader(task.in_stream)
+            self._steps_v = np.array(self._volts_per_count)[:, np.newaxis]
         # Every array is made here for the channels of this task; the check would be a call of its own.
         self._reader.verify_array_shape = False
 
@@ -214,17 +216,27 @@ class DaqmxDigitizer:
             raise InstrumentError(f"{self._config.device} is closed; open the bench again")
         return self._task
 
-    def _fill(self, volts: Samples) -> None:
+    def _next_samples(self, samples: int) -> tuple[Samples, Counts | None]:
+        """Read volts, and the counts that they are made of where the converter scales linearly."""
+        shape = len(self._channels), samples
+        if isinstance(self._reader, AnalogUnscaledReader):
+            counts = np.empty(shape, np.int32)
+            self._fill(counts, self._reader.read_int32)
+            return counts * self._steps_v, counts
         assert self._reader is not None, "a running task has a reader"
+        volts = np.empty(shape)
+        self._fill(volts, self._reader.read_many_sample)
+        return volts, None
+
+    def _fill(self, rows: NDArray[Any], read: Callable[[NDArray[Any], int, float], int]) -> None:
         piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self._sample_rate_hz))
-        for first in range(0, volts.shape[1], piece):
-            count = min(piece, volts.shape[1] - first)
+        for first in range(0, rows.shape[1], piece):
+            count = min(piece, rows.shape[1] - first)
             # The reader wants C order, which a slice of columns has not: only a long read is copied.
-            target = volts if count == volts.shape[1] else np.empty((volts.shape[0], count))
-            timeout_s = count / self._sample_rate_hz + _READ_MARGIN_S
-            self._reader.read_many_sample(target, count, timeout_s)
-            if target is not volts:
-                volts[:, first : first + count] = target
+            target = rows if count == rows.shape[1] else np.empty((rows.shape[0], count), rows.dtype)
+            read(target, count, count / self._sample_rate_hz + _READ_MARGIN_S)
+            if target is not rows:
+                rows[:, first : first + count] = target
 
     def _overloaded_roles(self) -> frozenset[str]:
         """Channels that the device itself flags: asked while it runs, and not all can tell."""

@@ -1,6 +1,6 @@
 """Setting up the inputs of a converter as the configuration says, and reading back that it is so."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 from nidaqmx import DaqError, Task
 from nidaqmx.constants import Coupling, ExcitationSource, ExcitationVoltageOrCurrent, TerminalConfiguration
@@ -18,34 +18,14 @@ _TERMINALS = {
 }
 _COUPLINGS = {"AC": Coupling.AC, "DC": Coupling.DC}
 _SAME = 1e-6
-# Beyond this, a scaling is bent or shifted by more than rounding, and counts cannot be had back from volts.
+# Beyond this, a scaling is bent or shifted by more than rounding: volts are no multiples of one step.
 _LINEAR = 1e-9
+# One count of an int32 marks lost samples in recordings: a 32-bit converter may use it for a voltage.
+_MOST_COUNTS = 2**29
 
 
-@dataclass(frozen=True)
-class InputScaling:
-    """How a converter's counts become volts: a polynomial, constant term first."""
-
-    coefficients: tuple[float, ...]
-
-    def volts_per_count(self, range_v: float) -> float | None:
-        """Step of the converter [V]; None when counts are not simply multiples of one step.
-
-        A calibrated device may scale with an offset or a curve; its volts are then recorded as they
-        come.
-        """
-        if len(self.coefficients) < 2 or self.coefficients[1] <= 0:
-            return None
-        offset, step, *bend = self.coefficients
-        most_counts = range_v / step
-        if any(abs(c) * most_counts**power > _LINEAR * range_v for power, c in enumerate(bend, start=2)):
-            return None
-        shift_counts = offset / step
-        return step if abs(shift_counts - round(shift_counts)) * step <= _LINEAR * range_v else None
-
-
-def add_input(task: Task, config: ChannelConfig, channel: Channel) -> InputScaling | None:
-    """Add one input to a task, named by its role; return its scaling where the device tells it.
+def add_input(task: Task, config: ChannelConfig, channel: Channel) -> float | None:
+    """Add one input to a task, named by its role; return its volts per count where these scale linearly.
 
     Raises
     ------
@@ -65,7 +45,7 @@ def add_input(task: Task, config: ChannelConfig, channel: Channel) -> InputScali
     made = task.ai_channels[channel.role.value]
     _excite(made, channel)
     _couple(made, channel)
-    return _scaling(made)
+    return _volts_per_count(made, channel.range_v)
 
 
 def _excite(made: AIChannel, channel: Channel) -> None:
@@ -99,13 +79,26 @@ def _couple(made: AIChannel, channel: Channel) -> None:
         raise _refused(channel, "coupling", wanted.name, held.name)
 
 
-def _scaling(made: AIChannel) -> InputScaling | None:
+def _volts_per_count(made: AIChannel, range_v: float) -> float | None:
     try:
-        return InputScaling(tuple(float(c) for c in made.ai_dev_scaling_coeff))
+        return linear_step_v([float(each) for each in made.ai_dev_scaling_coeff], range_v)
     except DaqError as error:
         if error.error_type in NOT_OFFERED:
             return None
         raise
+
+
+def linear_step_v(coefficients: Sequence[float], range_v: float) -> float | None:
+    """Step of a converter [V]; None when volts are not simply multiples of one step.
+
+    A calibrated device may scale with an offset or a curve; its volts are then recorded as they come.
+    ``coefficients`` are those of the polynomial from counts to volts, constant term first.
+    """
+    if len(coefficients) < 2 or not coefficients[1] * _MOST_COUNTS > range_v:
+        return None
+    step = coefficients[1]
+    rest_v = [abs(each) * (range_v / step) ** power for power, each in enumerate(coefficients) if power != 1]
+    return step if max(rest_v) <= _LINEAR * range_v else None
 
 
 def _refused(channel: Channel, what: str, sent: str, got: str) -> SettingRefused:

@@ -32,6 +32,7 @@ from ._reading import (
 )
 from ._values import (
     Block as Block,
+    Counts as Counts,
     FoundDevice as FoundDevice,
     Identity as Identity,
     Knob as Knob,

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Field
 from ..host.toml_file import FrozenModel
 
 Samples = NDArray[np.float64]
+Counts = NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,9 @@ class Block:
     volts: Samples
     """Shape (channels, samples) [V] at the converter's input."""
     overloads: tuple[Overload, ...] = ()
+    counts: Counts | None = None
+    """The converter's own numbers, where volts are these times `Digitizer.volts_per_count`: recorded as they
+    are. None where the converter gives volts only."""
 
 
 def _not_zero(units: float) -> float:

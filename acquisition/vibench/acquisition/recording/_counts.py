@@ -1,16 +1,13 @@
-"""Volts back to the counts that the converter produced, with proof that nothing is lost."""
+"""Counts of a block: the converter's own, or made of volts where it gives volts only."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..instruments import Samples
+from ..instruments import Counts, Samples
 from ._header import ChannelHeader
 from ._layout import COUNT_DTYPE, LARGEST_COUNT
-
-Counts = NDArray[np.int32]
 
 COUNT_TOLERANCE = 0.01
 """How far volts may lie from a whole count. Rounding of float64 is 1e-8 of a count at 24 bits;

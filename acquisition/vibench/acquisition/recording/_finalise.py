@@ -21,8 +21,8 @@ from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
 from ..host.log import LOG
+from ..instruments import Counts
 from . import _layout as layout, _tables as tables
-from ._counts import Counts
 from ._layout import (
     COUNT_DTYPE,
     DEFLATE_LEVEL,

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import h5py
 import numpy as np
 
+from ..instruments import Counts
 from . import _layout as layout
-from ._counts import Counts
 from ._layout import read_attributes, write_attributes
 
 BIN_SAMPLES = 128

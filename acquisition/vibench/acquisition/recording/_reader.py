@@ -14,10 +14,9 @@ import numpy as np
 from vibench.sim.hdf5_files import door
 
 from ..errors import RecordingError
-from ..instruments import Identity, Overload, Samples
+from ..instruments import Counts, Identity, Overload, Samples
 from . import _layout as layout, _tables as tables
 from ._contents import channel_header, configuration_facts, file_facts
-from ._counts import Counts
 from ._disk import is_being_recorded
 from ._header import ChannelHeader, require_different
 from ._layout import Origin, RecordingState, json_text, read_attributes

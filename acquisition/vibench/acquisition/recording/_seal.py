@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from vibench.sim.hdf5_files.door import walk
 
 from ..errors import RecordingError
+from ..instruments import Counts
 from . import _layout as layout
-from ._counts import Counts
 from ._layout import READ_KINDS, read_attributes, read_text_dataset, write_attributes, write_text_dataset
 
 if TYPE_CHECKING:

@@ -21,10 +21,10 @@ from vibench.sim.operating_system.this import Buffer
 
 from ..errors import RecordingError
 from ..host.log import LOG
-from ..instruments import Block, Samples
+from ..instruments import Block, Counts
 from . import _layout as layout
 from ._committer import COMMIT_INTERVAL_S, Batch, Committer
-from ._counts import Counts, CountScale
+from ._counts import CountScale
 from ._disk import Disk
 from ._disk_trouble import open_disk
 from ._finalise import discard, finalise, whereabouts
@@ -154,7 +154,11 @@ class RecordingWriter:
             or the disk has failed. What was committed is kept.
 
         """
-        counts = self._scale.counts(self._checked(block))
+        self._check(block)
+        # A converter's own counts are recorded as they are.
+        counts = (
+            self._scale.counts(block.volts) if block.counts is None else np.ascontiguousarray(block.counts)
+        )
         gap = block.first_sample - self._samples
         end = block.first_sample + counts.shape[1]
         self._require_capacity(end)
@@ -238,7 +242,7 @@ class RecordingWriter:
             # The first error is the cause; this one must not hide it.
             error.add_note(str(second))
 
-    def _checked(self, block: Block) -> Samples:
+    def _check(self, block: Block) -> None:
         if self._is_finished:
             raise RecordingError(
                 f"{self._path} is finished; the block was not recorded. Begin a new recording."
@@ -255,7 +259,12 @@ class RecordingWriter:
                 " recorded already and nothing is overwritten. The block was not recorded; hand over every"
                 " block once, in order."
             )
-        return block.volts
+        made = block.counts
+        if made is not None and (made.shape != block.volts.shape or made.dtype != layout.COUNT_DTYPE):
+            raise RecordingError(
+                f"Counts of shape {made.shape} and type {made.dtype} were given with volts of shape"
+                f" {block.volts.shape}; they must be int32 and of the same shape. The block was not recorded."
+            )
 
     def _require_capacity(self, end: int) -> None:
         if end > self._places.capacity:

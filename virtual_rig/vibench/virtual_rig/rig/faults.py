@@ -114,8 +114,12 @@ class RigFaults:
         return self._in_force(*(Fault(call, code) for call in _RESERVING))
 
     def fail_daq(self, call: str, code: int, from_s: float = 0.0) -> Heal:
-        """Let a call of the DAQmx driver fail with a code (``nidaqmx.error_codes``), from a rig time on."""
-        return self._in_force(Fault(call, code, from_s=from_s))
+        """Let a call of the DAQmx driver fail with a code (``nidaqmx.error_codes``), from a rig time on.
+
+        A fault of one call that reads samples is a fault of the other: which one a driver uses is its affair.
+        """
+        calls = _READS if call in _READS else (call,)
+        return self._in_force(*(Fault(each, code, from_s=from_s) for each in calls))
 
     def lose_daq_server(self, from_s: float = 0.0) -> Heal:
         """Let the DAQ server answer nobody any more, from a rig time on [s]."""
