@@ -20,7 +20,7 @@ from scipy.signal import hilbert
 from vibench.acquisition import AcquisitionError, open_bench, open_recording
 from vibench.acquisition.plan import Measurement, SineSweep
 from vibench.acquisition.rig import Rig, generator_driver, load_rig
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.run import run_measurement
 
 SETTLES_S = (0.0, 0.02, 0.05, 0.1, 0.2)
 STEPS_S = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0)

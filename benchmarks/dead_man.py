@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vibench.acquisition import open_bench, open_recording
 from vibench.acquisition.plan import Dwell, Measurement
 from vibench.acquisition.rig import load_rig
-from vibench.acquisition.run.run_measurement import run_measurement
+from vibench.acquisition.run.run import run_measurement
 
 RIG = Path(__file__).parent.parent / "hardware_configs" / "virtual_rig.toml"
 LENGTHS_S = (0.5, 1.0, 2.0, 5.0)

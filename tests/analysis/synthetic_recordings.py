@@ -15,7 +15,7 @@ from vibench.acquisition.recording import (
     RecordingState,
     create_recording,
 )
-from vibench.acquisition.recording._provenance import Provenance
+from vibench.acquisition.recording._header import Provenance
 from vibench.sim import Sampled, gong2025, integrate
 
 RATE = 6400.0

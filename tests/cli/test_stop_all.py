@@ -10,8 +10,12 @@ from pathlib import Path
 import pytest
 
 from tests.windows_here import sees_locks
-from vibench.acquisition.stopping.kept_stops import engines_folder
-from vibench.acquisition.stopping.program import Program, announced_programs, facts_of_this_process
+from vibench.acquisition.stopping.program import (
+    Program,
+    announced_programs,
+    engines_folder,
+    facts_of_this_process,
+)
 from vibench.sim.operating_system.this import OpenFile
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -25,14 +25,13 @@ from .errors import (
     MissingLibrary as MissingLibrary,
     RecordingError as RecordingError,
 )
-from .host.beside import Beside as Beside
+from .host.beside import Beside as Beside, follow_parent as follow_parent
 from .host.chosen import ChosenFrom as ChosenFrom
 from .host.extras import (
     naming_its_extra as naming_its_extra,
     need_extra as need_extra,
     need_space as need_space,
 )
-from .host.follow_parent import follow_parent as follow_parent
 from .host.printable import printable as printable, shortened as shortened
 from .host.schema import json_schema as json_schema, schema_line as schema_line
 from .host.shipped import (
@@ -60,6 +59,6 @@ from .plan import (
 from .recording import (
     open_recording as open_recording,
 )
-from .run.run_measurement import run_measurement as run_measurement
+from .run.run import run_measurement as run_measurement
 from .stopping.stop import StopLevel as StopLevel, StopSwitch as StopSwitch
 from .stopping.stop_on_signal import stop_on_signal as stop_on_signal

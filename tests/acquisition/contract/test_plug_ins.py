@@ -9,7 +9,7 @@ import pytest
 
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.instruments import PlugInKind, _plug_in, plug_in, plug_in_names
-from vibench.acquisition.instruments._plug_in import OURS
+from vibench.acquisition.instruments._guarded import OURS
 from vibench.acquisition.rig import load_rig
 
 ROOT = Path(__file__).resolve().parents[3]

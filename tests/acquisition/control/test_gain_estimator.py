@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vibench.acquisition.control.gain_estimator import GainEstimator
+from vibench.acquisition.control.sine_loop import GainEstimator
 
 STEP_S = 0.1
 

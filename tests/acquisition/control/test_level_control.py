@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control.level_control import LevelControl, MeasuredLevel, measured_level
+from vibench.acquisition.control.control_action import LevelControl, MeasuredLevel, measured_level
 from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.recording import Held
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.acquisition.control.level_control import MeasuredLevel
+from vibench.acquisition.control.control_action import MeasuredLevel
 from vibench.acquisition.control.phase_law import PhaseError, PhaseSearch
 from vibench.acquisition.control.resonance_controller import _phase_error
 from vibench.acquisition.control.settling_controller import SettledState

@@ -11,8 +11,8 @@ from nidaqmx.errors import DaqError
 
 from vibench.acquisition import AcquisitionError, ConfigurationError, InstrumentError, InstrumentLost
 from vibench.acquisition.drivers import DaqmxDigitizer
+from vibench.acquisition.drivers._daqmx import linear_step_v
 from vibench.acquisition.drivers._daqmx_errors import MEANINGS, from_code
-from vibench.acquisition.drivers._daqmx_inputs import linear_step_v
 from vibench.acquisition.errors import DataLost, InstrumentBusy
 from vibench.acquisition.rig import load_rig
 from vibench.virtual_rig import VirtualRig

@@ -34,10 +34,9 @@ from vibench.acquisition.engine import (
     start_engine,
 )
 from vibench.acquisition.engine._announcement import EngineAddress
-from vibench.acquisition.engine._errors import EngineError
 from vibench.acquisition.engine._status import ConnectionRole
 from vibench.acquisition.engine._verbs import VERBS
-from vibench.acquisition.engine._wire import send
+from vibench.acquisition.engine._wire import EngineError, send
 from vibench.acquisition.errors import InstrumentBusy
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.recording import RecordingState

@@ -21,7 +21,7 @@ from vibench.acquisition.engine import (
 from vibench.acquisition.engine._status import ChannelFacts
 from vibench.acquisition.plan import RunState
 from vibench.acquisition.run.ending import Progress
-from vibench.acquisition.stopping.driving import DRIVES_ON
+from vibench.acquisition.stopping.stop import DRIVES_ON
 
 from .conftest import campaign
 

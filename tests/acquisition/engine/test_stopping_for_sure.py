@@ -33,7 +33,7 @@ from vibench.acquisition.engine._server import GREETING_S, VIEWERS_MOST, WAITING
 from vibench.acquisition.engine._status import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
-from vibench.acquisition.stopping.kept_stops import engines_folder
+from vibench.acquisition.stopping.program import engines_folder
 from vibench.sim.operating_system.this import process_start
 from vibench.stop_files import put_down, stop_path
 

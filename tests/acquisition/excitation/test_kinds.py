@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from vibench.acquisition.excitation.base_level import HeldAcceleration, RelativeSetting, RmsSetting
 from vibench.acquisition.excitation.branch_continuation import BranchContinuation
-from vibench.acquisition.excitation.direction import Approach, Direction
 from vibench.acquisition.excitation.dwell import Dwell
 from vibench.acquisition.excitation.feedback import BaseLevel
 from vibench.acquisition.excitation.held_dwell import HeldDwell
@@ -23,6 +21,13 @@ from vibench.acquisition.excitation.settled_sine import SettledSine
 from vibench.acquisition.excitation.sine_sweep import SineSweep
 from vibench.acquisition.excitation.stepped_level import SteppedLevel
 from vibench.acquisition.excitation.stepped_sine import SteppedSine
+from vibench.acquisition.excitation.steps import (
+    Approach,
+    Direction,
+    HeldAcceleration,
+    RelativeSetting,
+    RmsSetting,
+)
 from vibench.acquisition.excitation.streamed_noise import StreamedNoise
 from vibench.acquisition.excitation.white_noise import WhiteNoise
 from vibench.acquisition.recording import SegmentLabel

@@ -4,7 +4,7 @@ from hypothesis import given, strategies as st
 
 from vibench.acquisition import RecordingError
 from vibench.acquisition.recording import ChannelHeader
-from vibench.acquisition.recording._counts import CountScale
+from vibench.acquisition.recording._writer import CountScale
 
 
 def scale(step, zero=0.0, range_v=5.0):

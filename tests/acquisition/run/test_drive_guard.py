@@ -24,11 +24,13 @@ from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.acquisition.run import silence_watch as drive_guard
 from vibench.acquisition.run.run import Run
 from vibench.acquisition.run.silence_watch import DriveGuard
-from vibench.acquisition.stopping.driving import DRIVES_ON
-from vibench.acquisition.stopping.kept_stops import engines_folder
-from vibench.acquisition.stopping.memory_reserve import MEMORY_RESERVE
-from vibench.acquisition.stopping.program import Program, facts_of_this_process, reached
-from vibench.acquisition.stopping.stop import Cause, StopRequest
+from vibench.acquisition.stopping.program import (
+    Program,
+    engines_folder,
+    facts_of_this_process,
+    reached,
+)
+from vibench.acquisition.stopping.stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopRequest
 from vibench.sim.operating_system.this import process_start
 from vibench.stop_files import Fate, fate_of, put_down, stop_path, taken_path
 

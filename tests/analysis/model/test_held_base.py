@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.acquisition import load_campaign
-from vibench.acquisition.excitation.base_level import HeldAcceleration
+from vibench.acquisition.excitation.steps import HeldAcceleration
 from vibench.acquisition.plan import Approach, base_motion
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import predict_measurement

@@ -9,8 +9,8 @@ from nidaqmx.error_codes import DAQmxErrors
 from nidaqmx.system import System
 
 from vibench.acquisition import ConfigurationError
+from vibench.virtual_rig.daqmx.channels import assigned_names, expand
 from vibench.virtual_rig.daqmx.devices import NI_9234, USB_6211, catalogue_with
-from vibench.virtual_rig.daqmx.names import assigned_names, expand
 
 
 @pytest.fixture

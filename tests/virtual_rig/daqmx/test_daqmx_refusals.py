@@ -11,7 +11,7 @@ from nidaqmx.errors import DaqReadError, RpcError
 from nidaqmx.system import System
 from session_pb2 import Session
 
-from vibench.virtual_rig.daqmx.faults import Fault, ServerGone
+from vibench.virtual_rig.daqmx.errors import Fault, ServerGone
 
 
 def code_of(action):

@@ -1,7 +1,6 @@
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.scpi_message import message_end, units
-from vibench.virtual_rig.generator.scpi_value import as_block, block
+from vibench.virtual_rig.generator.scpi_message import as_block, block, message_end, units
 
 
 def test_a_chain_becomes_one_unit_for_each_command():

@@ -1,8 +1,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.scpi_status import ErrorCode, ScpiError
-from vibench.virtual_rig.generator.scpi_value import (
+from vibench.virtual_rig.generator.scpi_message import (
     AMPLITUDE_UNITS,
     FREQUENCY_UNITS,
     as_number,
@@ -10,6 +9,7 @@ from vibench.virtual_rig.generator.scpi_value import (
     boolean,
     number,
 )
+from vibench.virtual_rig.generator.scpi_status import ErrorCode, ScpiError
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,8 @@ import pytest
 
 from vibench.acquisition import InstrumentLost
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.usb.device import Setup
 from vibench.virtual_rig.usb.remote import RemoteUsbDevice, usb_service
-from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
+from vibench.virtual_rig.usb.usbtmc import Setup, UsbTmcInstrument
 
 
 class Rig:

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.usb.device import Setup
-from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
+from vibench.virtual_rig.usb.usbtmc import Setup, UsbTmcInstrument
 
 TIMEOUT_MS = 2000
 CLASS_IN_INTERFACE, CLASS_IN_ENDPOINT = 0xA1, 0xA2

@@ -35,8 +35,7 @@ from ..rig import (
     load_rig,
     output_driver,
 )
-from .result import CheckResult
-from .simulated_rig import PlayedFault, SimulatedRig, simulated_rig
+from .result import CheckResult, PlayedFault, SimulatedRig, simulated_rig
 
 # One program at a bench: locks that vanish with the process that holds them, however that ends.
 #

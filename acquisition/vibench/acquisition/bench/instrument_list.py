@@ -6,7 +6,7 @@ from .. import drivers
 from ..errors import InstrumentError
 from ..instruments import FoundDevice
 from ..rig import Rig
-from .simulated_rig import simulated_rig
+from .result import simulated_rig
 
 
 @dataclass(frozen=True)

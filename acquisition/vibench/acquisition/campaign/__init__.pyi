@@ -2,14 +2,20 @@ from ._catalogue import (
     UNREADABLE as UNREADABLE,
     CatalogueEntry as CatalogueEntry,
     Refresh as Refresh,
+    VerifiedRecording as VerifiedRecording,
     list_recordings as list_recordings,
-)
-from ._estimate import (
-    CampaignEstimate as CampaignEstimate,
-    estimate_campaign as estimate_campaign,
+    verify_recordings as verify_recordings,
 )
 from ._journal import (
+    AfterFailure as AfterFailure,
+    CampaignProgress as CampaignProgress,
+    ChangedBench as ChangedBench,
+    ExistingRecordings as ExistingRecordings,
     JournalPointState as JournalPointState,
+    PointOutcome as PointOutcome,
+    PointResult as PointResult,
+    ReasonCode as ReasonCode,
+    ignore_result as ignore_result,
     read_journal as read_journal,
 )
 from ._log import (
@@ -29,23 +35,9 @@ from ._opening import (
     planned_recordings as planned_recordings,
     require_all_within_limits as require_all_within_limits,
 )
-from ._point_outcome import (
-    AfterFailure as AfterFailure,
-    CampaignProgress as CampaignProgress,
-    ChangedBench as ChangedBench,
-    ExistingRecordings as ExistingRecordings,
-    PointOutcome as PointOutcome,
-    PointResult as PointResult,
-    ReasonCode as ReasonCode,
-    ignore_result as ignore_result,
-)
-from ._reconnecting_bench import (
-    ReconnectingBench as ReconnectingBench,
-)
 from ._run_campaign import (
+    CampaignEstimate as CampaignEstimate,
+    ReconnectingBench as ReconnectingBench,
+    estimate_campaign as estimate_campaign,
     run_campaign as run_campaign,
-)
-from ._verify import (
-    VerifiedRecording as VerifiedRecording,
-    verify_recordings as verify_recordings,
 )

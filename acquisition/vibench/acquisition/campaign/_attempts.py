@@ -11,14 +11,13 @@ from ..plan import Point, Retryable, RetryPolicy, RunState
 from ..recording import open_recording
 from ..run.acquisition_loop import BLOCK_S
 from ..run.ending import Outcome, Progress
-from ..run.run_measurement import run_measurement
+from ..run.run import run_measurement
 from ..stopping.stop import StopSwitch
 from ._attempt_files import next_attempt
 from ._bench_identity import BenchIdentity
-from ._journal import Journal, JournalPointState
+from ._journal import Journal, JournalPointState, PointOutcome, PointResult, ReasonCode, reason_code_of
 from ._log import CampaignEvent, CampaignEventKind, CampaignListener
 from ._opening import require_same_bench
-from ._point_outcome import PointOutcome, PointResult, ReasonCode, reason_code_of
 
 
 class CoolingPause:

@@ -11,11 +11,9 @@ from pathlib import Path
 from time import monotonic
 
 from ..errors import RecordingError
-from ..host.beside import Beside
-from ..host.closed_on_leaving import ClosedOnLeaving
+from ..host.beside import Beside, ClosedOnLeaving
 from ..plan import measured_s
-from ._journal import JournalPoint, JournalPointState
-from ._point_outcome import CampaignProgress
+from ._journal import CampaignProgress, JournalPoint, JournalPointState
 
 
 class CampaignEventKind(StrEnum):

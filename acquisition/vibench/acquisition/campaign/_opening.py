@@ -17,9 +17,17 @@ from ..run.drive import drive_for
 from ..stopping.stop import StopSwitch
 from ._attempt_files import attempts_in, complete_attempt, next_attempt
 from ._bench_identity import BenchIdentity, differences
-from ._journal import Journal, JournalPointState, is_begun, journal_path, read_journal
+from ._journal import (
+    ChangedBench,
+    ExistingRecordings,
+    Journal,
+    JournalPointState,
+    ReasonCode,
+    is_begun,
+    journal_path,
+    read_journal,
+)
 from ._kept_recording import KeptRecording, looked_at
-from ._point_outcome import ChangedBench, ExistingRecordings, ReasonCode
 
 PROGRAM_ENDED = "its program ended in the middle of it"
 

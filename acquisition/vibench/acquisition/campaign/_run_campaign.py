@@ -1,20 +1,46 @@
 """A campaign from its first point to its last: one recording each, every step in a journal."""
 
+import shutil
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
+from typing import Self
 
-from ..bench.bench import RunBench
-from ..errors import AcquisitionError, InstrumentLost, RecordingError
+from ..bench.bench import Bench, RigPower, RunBench, open_bench
+from ..bench.result import CheckResult
+from ..control.fast_loop import require_holdable
+from ..errors import AcquisitionError, CheckFailed, InstrumentLost, RecordingError
+from ..excitation.plan import AbstractFeedback
 from ..host.chosen import chosen
-from ..plan import Campaign, Measurement, Point
+from ..instruments import Knob
+from ..plan import BYTES_PER_SAMPLE, Campaign, Measurement, Point, measured_s, require_played
 from ..recording import open_recording, sole_use
+from ..rig import Confirm, KnobSheet, Rig, channels_of, load_rig
 from ..run.ending import Progress
 from ..stopping.stop import StopSwitch
 from ..stopping.stop_on_signal import stop_on_signal
 from ._attempts import Attempts, CoolingPause, Reopen
-from ._journal import Journal, JournalPoint, JournalPointState
+from ._journal import (
+    After,
+    AfterFailure,
+    CampaignProgress,
+    ChangedBench,
+    DonePoint,
+    ExistingRecordings,
+    Finished,
+    Journal,
+    JournalPoint,
+    JournalPointState,
+    PointOutcome,
+    PointResult,
+    ReasonCode,
+    ignore_campaign_progress,
+    ignore_result,
+    reason_code_of,
+)
 from ._log import (
     LOG_SUFFIX,
     STATUS_SUFFIX,
@@ -26,22 +52,7 @@ from ._log import (
     ignore_event,
 )
 from ._notice import Messenger, Notifier
-from ._opening import make_folder, opened_journal, require_all_within_limits, require_new
-from ._point_outcome import (
-    After,
-    AfterFailure,
-    CampaignProgress,
-    ChangedBench,
-    DonePoint,
-    ExistingRecordings,
-    Finished,
-    PointOutcome,
-    PointResult,
-    ReasonCode,
-    ignore_campaign_progress,
-    ignore_result,
-    reason_code_of,
-)
+from ._opening import make_folder, opened_journal, planned_recordings, require_all_within_limits, require_new
 
 
 class CampaignRunner:
@@ -291,3 +302,169 @@ def _log_alone(folder: Path, campaign: Campaign) -> Iterator[CampaignLog]:
                 "Nothing was changed; let it end, or stop it"
             ) from error
         yield log
+
+
+LOOK_AGAIN_S = 1.0
+"""Rig time that passes on a virtual rig before its bench is opened again: cables are put back in it."""
+
+
+class ReconnectingBench:
+    """Opens a rig's bench, and opens it again without asking anybody anything. Use it in a ``with``."""
+
+    def __init__(self, config: Rig | Path, confirm: Confirm | None = None) -> None:
+        self._rig = config if isinstance(config, Rig) else load_rig(config)
+        self._confirm = confirm
+        self._power = RigPower(self._rig)
+        self._bench: Bench | None = None
+        self._last_check: CheckResult | None = None
+
+    @property
+    def bench(self) -> Bench:
+        """The open bench."""
+        if self._bench is None:
+            raise AcquisitionError("the bench is not open: enter it with 'with KeptBench(...) as kept'")
+        return self._bench
+
+    @property
+    def played_faults(self) -> tuple[str, ...]:
+        """What a script of faults has done to a virtual rig so far, in order."""
+        return tuple(each.fault for each in self._power.played_faults)
+
+    def reopen(self) -> Bench:
+        """Close the bench and open it again; knobs count as they were confirmed, for nobody has turned them.
+
+        Raises
+        ------
+        AcquisitionError
+            When an instrument is still not there. The bench is closed then; reopen again.
+
+        """
+        before, self._bench = self._bench, None
+        if before is not None:
+            self._last_check = before.last_check
+            sheet = before.confirmations
+            self._confirm = lambda knobs: _as_before(sheet, knobs)
+            with suppress(AcquisitionError):  # what is lost cannot be silenced; the others were
+                before.close()
+        self._power.let_pass(LOOK_AGAIN_S)
+        self._bench = open_bench(self._rig, self._confirm, power=self._power)
+        self._bench.last_check = self._last_check
+        return self._bench
+
+    def close(self) -> None:
+        """Silence and close everything. Legal at any time."""
+        bench, self._bench = self._bench, None
+        try:
+            if bench is not None:
+                bench.close()
+        finally:
+            self._power.__exit__(None, None, None)
+
+    def __enter__(self) -> Self:
+        self._power.__enter__()
+        try:
+            self._bench = open_bench(self._rig, self._confirm, power=self._power)
+        except BaseException as error:
+            self._power.__exit__(type(error), error, error.__traceback__)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        bench, self._bench = self._bench, None
+        try:
+            if bench is not None:
+                bench.__exit__(kind, error, trace)
+        finally:
+            self._power.__exit__(kind, error, trace)
+
+
+def _as_before(sheet: KnobSheet, knobs: tuple[Knob, ...]) -> KnobSheet:
+    missing = [f"{knob.instrument} {knob.setting}" for knob in knobs if knob not in sheet.knobs]
+    if missing:
+        raise CheckFailed(
+            f"the bench came back with settings that nobody has confirmed: {', '.join(missing)}. Nothing was "
+            "energised; look at them and resume the campaign"
+        )
+    return sheet
+
+
+WRITTEN_SHARE = 1 / 1.7
+"""A finished recording over its size while it is made: white noise at 24 bit; dwells need less."""
+
+
+@dataclass(frozen=True)
+class CampaignEstimate:
+    """How long and how large a campaign is; what is there already is not counted."""
+
+    recordings: int
+    """Still to be made."""
+    kept: int
+    """Complete already."""
+    duration_s: float
+    """On the rig, with bench checks, lead-ins and ramps."""
+    rest_s: float
+    """Of that, silence between recordings."""
+    lead_in_s: float
+    """Of that, on the way to points along their chains."""
+    largest_bytes: int
+    """Of one recording, while it is made."""
+    total_bytes: int
+    """Of all recordings, finished."""
+    free_bytes: int
+    """On the disk of the folder, now."""
+    searching: int = 0
+    """How many of the recordings end sooner where their feedback needs less than its longest searches."""
+
+    @property
+    def needed_bytes(self) -> int:
+        """Room that must be there for the campaign to come to its end."""
+        return self.total_bytes + self.largest_bytes
+
+    @property
+    def fits(self) -> bool:
+        """Whether the disk has that room."""
+        return self.needed_bytes <= self.free_bytes
+
+
+def estimate_campaign(
+    campaign: Campaign, rig: Rig, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
+) -> CampaignEstimate:
+    """Say what a campaign will take on a rig; opens no instrument and writes nothing.
+
+    Raises
+    ------
+    RecordingError
+        When the folder holds recordings of the campaign and ``existing`` refuses that.
+    ConfigurationError
+        When the rig lacks what a measurement is played with.
+    LimitExceeded
+        When its fast loop does not hold the motions that one asks for.
+
+    """
+    for each in campaign.measurements:
+        require_played(each, rig)
+    planned = planned_recordings(campaign, folder, existing)
+    missing = [each.measurement for each in planned if not each.is_complete]
+    for each in missing:
+        require_holdable(each, rig)
+    durations_s = [measured_s(each) for each in missing]
+    bytes_per_s = rig.daq.sample_rate_hz * len(channels_of(rig)) * BYTES_PER_SAMPLE
+    rest_s = campaign.rest_s * max(0, len(missing) - 1)
+    return CampaignEstimate(
+        recordings=len(missing),
+        kept=len(planned) - len(missing),
+        duration_s=sum(durations_s) + rest_s,
+        rest_s=rest_s,
+        lead_in_s=sum(each.excitation.lead_in_s for each in missing),
+        largest_bytes=round(max(durations_s, default=0.0) * bytes_per_s),
+        total_bytes=round(sum(durations_s) * bytes_per_s * WRITTEN_SHARE),
+        free_bytes=shutil.disk_usage(_existing_part(folder)).free,
+        searching=sum(isinstance(each.excitation, AbstractFeedback) for each in missing),
+    )
+
+
+def _existing_part(folder: Path) -> Path:
+    """Give the folder, or the nearest one above it that exists already."""
+    return next(each for each in (folder.resolve(), *folder.resolve().parents) if each.exists())

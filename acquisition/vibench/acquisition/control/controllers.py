@@ -12,9 +12,8 @@ from .dwell_controller import hold_dwell
 from .feedback_channels import feedback_channels_of
 from .noise_controller import equalise_noise
 from .resonance_controller import track_resonance
-from .response_controller import hold_response
 from .settled_controller import step_settled
-from .sine_loop import SineLoop
+from .sine_loop import SineLoop, hold_response
 from .sweep_controller import hold_sweep
 
 CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = MappingProxyType(

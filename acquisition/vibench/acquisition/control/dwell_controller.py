@@ -6,9 +6,8 @@ from ..excitation.held_dwell import HeldDwell
 from ..excitation.steps import Segment
 from ..plan import RunState
 from ..recording import DwellNote, Held, LevelNote, SegmentLabel, SegmentNote
-from .control_action import Controller
+from .control_action import Controller, LevelControl, measured_level
 from .feedback_channels import require_answer
-from .level_control import LevelControl, measured_level
 from .settling_controller import SettledState, SettlingController
 from .sine_loop import SineLoop, started
 

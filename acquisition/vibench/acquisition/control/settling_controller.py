@@ -6,10 +6,9 @@ from math import isfinite
 from ..excitation.feedback import BaseLevel, Settling
 from ..plan import LOOK_PERIODS, RunState, look_s
 from ..recording import Held, SettledNote, Steadiness
-from .control_action import Controller
+from .control_action import Controller, LevelControl, MeasuredLevel, measured_level
 from .feedback_channels import require_answer
 from .jump_search import SettledPoint
-from .level_control import LevelControl, MeasuredLevel, measured_level
 from .sine_loop import SineLoop
 from .steadiness import ORDERS, Judgement, Phasors, in_drives, judged
 

@@ -1,21 +1,96 @@
 """One sine at a time, played and measured: the actions that all feedback is made of."""
 
+from collections import deque
 from collections.abc import Generator
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, pi
 
 import numpy as np
 
+from vibench.sim import PhaseReference
+
 from ..excitation.feedback import BaseLevel
+from ..excitation.held_response import HeldResponse
 from ..excitation.settled_sine import GLIDE_TONE_S
 from ..excitation.steps import Segment, Tone
-from ..plan import HUSH_S, Measurement, Phase, RunState, lowest_setting_vpp, needed_vpp, ramp
-from ..recording import FeedbackNote
+from ..plan import HUSH_S, Measurement, Phase, RunState, look_s, lowest_setting_vpp, needed_vpp, ramp
+from ..recording import FeedbackNote, Held, HeldResponseNote
 from ..rig import OnTable, Rig
-from .control_action import ControlAction, Controller, PhaseSamples
+from .control_action import ControlAction, Controller, PhaseSamples, measured_level
 from .feedback_channels import BridgedRows, FeedbackChannels, require_answer
-from .gain_estimator import GainEstimator
-from .steadiness import Periods, Stroboscope
+from .steadiness import Periods, Phasors, Stroboscope
+
+_SURE = 4.0
+"""Standard uncertainties from which on a trend is followed instead of averaged away."""
+_FEWEST = 3
+"""Steps from which a trend and its scatter can be told."""
+
+
+@dataclass(frozen=True)
+class _Answer:
+    time_s: float
+    gain: complex
+    """Measured over what the rig's linear model says."""
+    level: complex
+    """Measured over what should be held."""
+
+
+class GainEstimator:
+    """What the base did over what the linear model of the rig says, for the last while.
+
+    In chaos the fundamental of a few periods is mostly chance: the mean of the track counts. Where the
+    answer changes steadily, as over a resonance, the track's line is drawn on to the next step.
+    """
+
+    def __init__(self, memory_s: float) -> None:
+        self._memory_s = memory_s
+        self._answers: deque[_Answer] = deque()
+
+    def add(self, time_s: float, base: Phasors, modelled: float, target: float) -> None:
+        """Take in the periods of a step, shape (periods,).
+
+        Parameters
+        ----------
+        modelled, target
+            Base acceleration of the linear model at this setting, and the one to be held [m/s2].
+
+        """
+        if not len(base):
+            return
+        mean = complex(np.mean(base))
+        self._answers.append(_Answer(time_s, mean / modelled, mean / target))
+        while self._answers[0].time_s < time_s - self._memory_s * (1 - 1e-9):
+            self._answers.popleft()
+
+    @property
+    def is_known(self) -> bool:
+        """Whether anything was measured yet."""
+        return bool(self._answers)
+
+    @property
+    def level(self) -> float:
+        """Give the mean amplitude over the track, as a share of what should be held."""
+        if not self._answers:
+            return 1.0
+        return float(abs(np.mean([each.level for each in self._answers])))
+
+    def gain_at(self, time_s: float) -> float:
+        """Foresee the magnitude of the gain; 1, the model, while nothing is known."""
+        if not self._answers:
+            return 1.0
+        gain = np.array([each.gain for each in self._answers])
+        mean = complex(gain.mean())
+        if len(gain) < _FEWEST:
+            return abs(mean)
+        since_s = np.array([each.time_s for each in self._answers])
+        away_s = since_s - since_s.mean()
+        spread = float(away_s @ away_s)
+        slope = complex(away_s @ gain) / spread
+        left = gain - mean - slope * away_s
+        slope_u = float(np.sqrt(np.sum(np.abs(left) ** 2) / (len(gain) - 2) / spread))
+        if abs(slope) <= _SURE * slope_u:
+            return abs(mean)
+        return abs(mean + slope * (time_s - float(since_s.mean())))
 
 
 @dataclass(frozen=True)
@@ -208,3 +283,74 @@ def _change(loop: SineLoop, frequency_hz: float, wanted_vpp: float, level: BaseL
         slow_vpp = min(max(wanted_vpp, now_vpp / level.most_change), now_vpp * level.most_change)
         wanted_vpp = loop.bounded_vpp(slow_vpp)
     loop.change(frequency_hz, wanted_vpp)
+
+
+_PROMPT = 0.8
+"""Part of the error, in decibels, that is corrected at once."""
+_IN_A_ROW = 2
+
+
+def hold_response(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
+    """Begin quietly, bring m0 to its amplitude at every frequency, record, ramp down."""
+    passes = tuple(plan.passes())
+    loop.change(passes[0][1][0], loop.bounded_vpp(plan.start_share * loop.most_vpp))
+    yield from loop.listen_to_silence()
+    yield from loop.ramp_up()
+    for direction, frequencies_hz in passes:
+        for frequency_hz in frequencies_hz:
+            if frequency_hz != loop.setting.frequency_hz:
+                yield from glided(loop, frequency_hz, None, plan.glide_step_hz)
+            yield from _brought(loop, plan)
+            yield from _recorded(loop, plan, frequency_hz, direction)
+    yield from loop.ramp_down()
+    yield from loop.say()
+
+
+def _brought(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
+    """Correct the setting until the response is as asked, or the wait is over."""
+    frequency_hz, waited_s, in_a_row = loop.setting.frequency_hz, 0.0, 0
+    stretch_s = look_s(frequency_hz)
+    while in_a_row < _IN_A_ROW and waited_s + stretch_s <= plan.longest_wait_s:
+        yield from loop.listen(RunState.SETTLING, stretch_s)
+        waited_s += stretch_s
+        response_m, _, base = response_of(loop, plan)
+        require_answer(loop.rig, frequency_hz, loop.setting.setting_vpp, base)
+        wanted = plan.response_m / max(response_m, 1e-15)
+        in_a_row = in_a_row + 1 if abs(wanted - 1) <= plan.tolerance else 0
+        change = min(max(wanted**_PROMPT, 1 / plan.most_change), plan.most_change)
+        # The newest look alone: what was before answers another setting.
+        if in_a_row == 0:
+            loop.change(frequency_hz, loop.bounded_vpp(change * loop.setting.setting_vpp))
+        else:
+            loop.forget()
+
+
+def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float]:
+    """Give the response [m], m0 over base, and the base's acceleration [m/s2]: amplitudes, newer half."""
+    periods, frequency_hz = loop.periods, loop.setting.frequency_hz
+    newer = slice(periods.count // 2, None)
+    base, response = periods.base[newer], periods.response[newer, 1]
+    acceleration = abs(complex(np.mean(base)))
+    ratio = loop.channels.transmissibility(base, response, frequency_hz)
+    against = 1.0 if plan.response_of is PhaseReference.RELATIVE else 0.0
+    response_m = abs(ratio - against) * acceleration / (2 * pi * frequency_hz) ** 2
+    return response_m, abs(ratio), acceleration
+
+
+def _recorded(loop: SineLoop, plan: HeldResponse, frequency_hz: float, direction: str) -> Controller[None]:
+    loop.forget()
+    yield from loop.listen(RunState.RECORDING, plan.record_s, plan.segment(frequency_hz, direction))
+    response_m, ratio, _ = response_of(loop, plan)
+    base = measured_level(loop.periods.base)
+    is_held = abs(response_m / plan.response_m - 1) <= 2 * plan.tolerance
+    loop.note(
+        HeldResponseNote(
+            frequency_hz=frequency_hz,
+            response_m=response_m,
+            response_ii=ratio,
+            base_m_per_s2=base.amplitude,
+            base_u=base.uncertainty,
+            setting_vpp=loop.setting.setting_vpp,
+            level=Held.WITHIN if is_held else Held.OUTSIDE,
+        )
+    )

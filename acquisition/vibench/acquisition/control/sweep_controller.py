@@ -4,9 +4,8 @@ from ..excitation.held_sweep import HeldSweep
 from ..plan import RunState
 from ..recording import ExcursionNote, Held, SegmentLabel, SweepNote
 from .control_action import Controller
-from .gain_estimator import GainEstimator
 from .settling_controller import SettlingController
-from .sine_loop import SineLoop, followed, started, tracked
+from .sine_loop import GainEstimator, SineLoop, followed, started, tracked
 
 
 def hold_sweep(loop: SineLoop, plan: HeldSweep) -> Controller[None]:

@@ -4,28 +4,26 @@ from ._afg1022x import (
 from ._daqmx import (
     DaqmxDigitizer as DaqmxDigitizer,
 )
-from ._daqmx_discovery import (
-    list_daqmx_devices as list_daqmx_devices,
-)
 from ._daqmx_output import (
     DaqmxOutput as DaqmxOutput,
+)
+from ._daqmx_session import (
+    list_daqmx_devices as list_daqmx_devices,
 )
 from ._file_player import (
     FilePlayer as FilePlayer,
 )
 from ._generator_limits import (
     AFG1022_MODEL as AFG1022_MODEL,
+    FILE_GENERATOR as FILE_GENERATOR,
     KEYSIGHT_33500B_MODEL as KEYSIGHT_33500B_MODEL,
+    NO_GENERATOR as NO_GENERATOR,
 )
 from ._keysight_33500b import (
     Keysight33500B as Keysight33500B,
 )
 from ._line_controller import (
     LineController as LineController,
-)
-from ._no_generator import (
-    FILE_GENERATOR as FILE_GENERATOR,
-    NO_GENERATOR as NO_GENERATOR,
 )
 from ._sound_card import (
     SoundCardDigitizer as SoundCardDigitizer,

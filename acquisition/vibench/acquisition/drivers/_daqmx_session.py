@@ -8,7 +8,9 @@ import grpc
 from nidaqmx import GrpcSessionOptions
 from nidaqmx.system import System
 
+from ..instruments import FoundDevice
 from ..rig import TOKEN_KEY, given_token
+from ._daqmx_errors import daqmx_call
 
 # Longer than any single read (`daqmx.LONGEST_READ_S` plus its margin): a server that is silent for
 # so long is gone, even if its connection still stands.
@@ -62,3 +64,31 @@ def daqmx_session(server: str | None) -> DaqmxSession:
     channel = grpc.insecure_channel(server, options=_CHANNEL_OPTIONS)
     options = GrpcSessionOptions(grpc.intercept_channel(channel, _Deadline()), "")
     return DaqmxSession(server, options, channel)
+
+
+def list_daqmx_devices(server: str | None) -> tuple[FoundDevice, ...]:
+    """List the devices of the driver on this computer, or of a device server at ``"host:port"``.
+
+    Raises
+    ------
+    InstrumentLost
+        When the server does not answer.
+    InstrumentError
+        When this computer has no driver.
+
+    """
+    session = daqmx_session(server)
+    try:
+        with daqmx_call(f"listing the devices of {session.place}"):
+            return tuple(
+                FoundDevice(
+                    name=device.name,
+                    product=device.product_type,
+                    serial=f"{device.serial_num:08X}",
+                    inputs=tuple(channel.name for channel in device.ai_physical_chans),
+                    outputs=tuple(channel.name for channel in device.ao_physical_chans),
+                )
+                for device in session.system().devices
+            )
+    finally:
+        session.close()

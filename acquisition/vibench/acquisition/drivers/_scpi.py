@@ -85,7 +85,7 @@ class ScpiInstrument:
             if codes is None:
                 self._link.write(message)
             else:
-                block = pyvisa.util.to_ieee_block(codes, "H", is_big_endian=True)
+                block = pyvisa.util.to_ieee_block(codes.tolist(), "H", is_big_endian=True)
                 self._link.write_raw(message.encode("ascii") + block + b"\n")
             # Some firmware drops messages that come too soon after a command, and has no flag for it.
             if self._settle_s > 0:

@@ -10,9 +10,6 @@ from ._announcement import (
 from ._attendant import (
     Attendant as Attendant,
 )
-from ._campaign_request import (
-    CampaignRequest as CampaignRequest,
-)
 from ._client import (
     EngineClient as EngineClient,
 )
@@ -20,19 +17,14 @@ from ._engine import (
     Engine as Engine,
     JobQueue as JobQueue,
 )
-from ._errors import (
-    EngineError as EngineError,
-    EngineGone as EngineGone,
-    EngineSilent as EngineSilent,
-)
 from ._live_twin import (
     TwinSwitch as TwinSwitch,
 )
+from ._published_state import (
+    SampleSlice as SampleSlice,
+)
 from ._request_handler import (
     RequestHandler as RequestHandler,
-)
-from ._sample_buffer import (
-    SampleSlice as SampleSlice,
 )
 from ._server import (
     serving as serving,
@@ -61,4 +53,12 @@ from ._status import (
 from ._stop_engine import (
     StopDelivery as StopDelivery,
     stop_engine as stop_engine,
+)
+from ._verbs import (
+    CampaignRequest as CampaignRequest,
+)
+from ._wire import (
+    EngineError as EngineError,
+    EngineGone as EngineGone,
+    EngineSilent as EngineSilent,
 )

@@ -19,7 +19,7 @@ from ..stopping.program import (
     withdraw,
 )
 from ..stopping.stop import StopLevel
-from ._errors import EngineError, EngineGone
+from ._wire import EngineError, EngineGone
 
 
 class EngineAddress(FrozenModel):

@@ -12,16 +12,14 @@ from vibench.stop_files import SWITCH_OFF
 from .. import errors
 from ..campaign import ExistingRecordings
 from ..errors import AcquisitionError
+from ..host.beside import ClosedOnLeaving
 from ..host.chosen import chosen
-from ..host.closed_on_leaving import ClosedOnLeaving
 from ..host.toml_file import FrozenModel
 from ..plan import Campaign
 from ._announcement import EngineAddress
-from ._campaign_request import CampaignRequest
-from ._errors import EngineError, EngineGone, EngineSilent
 from ._status import ArmedPlan, ConnectionRole, EngineStatus, RowStatus
-from ._verbs import EngineVerbs, Verb
-from ._wire import ANSWERS, Message, receive, send
+from ._verbs import CampaignRequest, EngineVerbs, Verb
+from ._wire import ANSWERS, EngineError, EngineGone, EngineSilent, Message, receive, send
 
 PATIENCE_S = 5.0
 """How long an answer may take; the engine answers from what it holds, in milliseconds [s]."""

@@ -27,13 +27,12 @@ from ..check.admission import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..plan import Campaign, OnChange
 from ..rig import Confirm, Rig
-from ..stopping.driving import DRIVES_ON
-from ..stopping.stop import Cause, StopSwitch
+from ..stopping.stop import DRIVES_ON, Cause, StopSwitch
 from ..stopping.stop_on_signal import stop_on_signal
-from ._campaign_request import CampaignRequest
 from ._live_twin import TwinProcess, TwinSwitch
 from ._published_state import PublishedState
 from ._status import BenchFacts, ChannelFacts, EngineState, Supervision, TwinStatus
+from ._verbs import CampaignRequest
 
 
 def bench_facts(bench: Bench) -> BenchFacts:

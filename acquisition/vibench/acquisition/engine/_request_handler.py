@@ -17,11 +17,9 @@ from ..rig import Confirm, KnobSheet, Rig
 from ..run.drive import drive_for
 from ..stopping.program import INTERVAL_S
 from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
-from ._campaign_request import CampaignRequest
 from ._engine import Engine, JobQueue
-from ._errors import EngineError
 from ._live_twin import TwinSwitch
-from ._sample_buffer import SampleSlice
+from ._published_state import SampleSlice
 from ._status import (
     DRIVING,
     SOUNDING,
@@ -34,7 +32,8 @@ from ._status import (
     hung_patience_s,
     patience_s,
 )
-from ._verbs import Verb
+from ._verbs import CampaignRequest, Verb
+from ._wire import EngineError
 
 Answer = TypeVar("Answer")
 

@@ -24,11 +24,10 @@ from ..errors import AcquisitionError
 from ..stopping.program import Watchdog
 from ._announcement import EngineAddress, announced
 from ._client import Hello
-from ._errors import EngineError
 from ._request_handler import RequestHandler
 from ._status import ConnectionRole
 from ._verbs import DONE, REQUEST, VERBS
-from ._wire import HELLO, REQUESTS, IncomingMessage, Message, WireError, receive, refused, send
+from ._wire import HELLO, REQUESTS, EngineError, IncomingMessage, Message, WireError, receive, refused, send
 
 # Admission: connections without the token are limited in number, time and size.
 # One thread reads them all and buffers at most `WAITING_MOST` x 1 kB. If there are more connections, or the

@@ -6,12 +6,12 @@ from contextlib import suppress
 from threading import Event
 from time import monotonic
 
+from ..host.beside import ClosedOnLeaving
 from ..host.chosen import chosen
-from ..host.closed_on_leaving import ClosedOnLeaving
 from ._announcement import Announcement, EngineAddress, announced_engines
 from ._client import EngineClient
-from ._errors import EngineGone
 from ._status import ConnectionRole, Supervision
+from ._wire import EngineGone
 
 LEAVING_S = 10.0
 """How long an engine may take to ramp down, finish its recording and end [s]."""

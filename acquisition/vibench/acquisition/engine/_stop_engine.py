@@ -10,13 +10,12 @@ from time import monotonic
 from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, put_down, stop_path
 
 from ..host.chosen import chosen
-from ..stopping.kept_stops import engines_folder
-from ..stopping.program import Program
+from ..stopping.program import Program, engines_folder
 from ..stopping.stop import StopLevel
 from ._announcement import Announcement
 from ._client import EngineClient
-from ._errors import EngineError, EngineGone, EngineSilent
 from ._status import SOUNDING, EngineState
+from ._wire import EngineError, EngineGone, EngineSilent
 
 PATIENCE_S = 1.0
 """How long an engine may take to answer; it takes milliseconds [s]."""

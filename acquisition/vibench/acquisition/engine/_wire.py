@@ -11,6 +11,8 @@ import struct
 from dataclasses import dataclass
 from time import monotonic
 
+from ..errors import AcquisitionError
+
 HEAD = struct.Struct("!4sII")
 MAGIC = b"VBE1"
 PIECE_BYTES = 1 << 18
@@ -112,3 +114,15 @@ def receive(connection: socket.socket, bounds: Bounds, within_s: float | None = 
     finally:
         connection.settimeout(patience_s)
     return incoming.message()
+
+
+class EngineError(AcquisitionError):
+    """The engine does not do what was asked; the text says what state it is in and what is allowed."""
+
+
+class EngineGone(EngineError, ConnectionError):
+    """The engine's process has ended, or cannot be reached."""
+
+
+class EngineSilent(EngineGone):
+    """The engine has not answered in time; its process may live."""

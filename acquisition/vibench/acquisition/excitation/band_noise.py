@@ -4,8 +4,8 @@ from typing import ClassVar, Self
 
 from pydantic import model_validator
 
-from .base_level import RmsSetting
 from .plan import AbstractExcitation, Family, FrequencyHz
+from .steps import RmsSetting
 
 
 class BandNoise(AbstractExcitation):

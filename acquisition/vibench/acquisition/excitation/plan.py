@@ -9,11 +9,9 @@ from pydantic import Field
 
 from ..host.toml_file import FrozenModel
 from ..recording import SegmentLabel
-from .base_level import HeldAcceleration, LevelAtBase, RelativeSetting
-from .direction import Approach, Direction
 from .feedback import BaseLevel
 from .preview import SignalPreview, signal_preview
-from .steps import Step, Tone
+from .steps import Approach, Direction, HeldAcceleration, LevelAtBase, RelativeSetting, Step, Tone
 
 AmplitudeVpp = Annotated[float, Field(gt=0, le=1000)]
 """What the generator takes, its description says; beyond the upper bound a unit was mistaken."""

@@ -9,10 +9,8 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..instruments import Spacing, Sweep
 from ..recording import SegmentLabel
-from .base_level import RelativeSetting
-from .direction import Approach, Direction
 from .plan import AbstractExcitation, Family, FrequencyHz
-from .steps import Segment, Step, Tone
+from .steps import Approach, Direction, RelativeSetting, Segment, Step, Tone
 
 
 class Hold(StrEnum):

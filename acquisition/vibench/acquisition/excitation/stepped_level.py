@@ -7,10 +7,9 @@ from typing import ClassVar, Literal, Self
 from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..recording import SegmentLabel
-from .direction import Direction
 from .plan import AmplitudeVpp, Family, FixedSine
 from .stepped_sine import MOST_STEPS
-from .steps import Segment, Step, Tone
+from .steps import Direction, Segment, Step, Tone
 
 
 class SteppedLevel(FixedSine):

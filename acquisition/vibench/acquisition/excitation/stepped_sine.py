@@ -9,9 +9,8 @@ from pydantic import NonNegativeFloat, PositiveFloat, model_validator
 
 from ..host.toml_file import FrozenModel
 from ..recording import SegmentLabel
-from .direction import Approach, Direction
 from .plan import AbstractExcitation, Family, FrequencyHz, around
-from .steps import Segment, Step, Tone
+from .steps import Approach, Direction, Segment, Step, Tone
 
 MOST_STEPS = 4000
 """What the table of segments of one recording holds, with room for the ramps and the check."""

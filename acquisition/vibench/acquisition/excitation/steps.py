@@ -1,8 +1,9 @@
 """What the generator does, step by step: the language between an excitation and the run that plays it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, TypeAlias
+from enum import StrEnum
+from typing import ClassVar, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,3 +95,63 @@ class Step:
     def duration_s(self) -> float:
         """Settling and recording together [s]."""
         return self.settle_s + self.record_s
+
+
+class Direction(StrEnum):
+    """Which way through the steps: an impacting specimen may answer differently on the way back."""
+
+    UP = "up"
+    DOWN = "down"
+    UP_THEN_DOWN = "up_then_down"
+    DOWN_THEN_UP = "down_then_up"
+
+    def ways(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
+        """Give each way through what rises: ``"up"`` or ``"down"``, and its values in the order played."""
+        up = (Direction.UP.value, rising)
+        down = (Direction.DOWN.value, rising[::-1])
+        match self:
+            case Direction.UP:
+                yield up
+            case Direction.DOWN:
+                yield down
+            case Direction.UP_THEN_DOWN:
+                yield from (up, down)
+            case Direction.DOWN_THEN_UP:
+                yield from (down, up)
+
+
+class Approach(StrEnum):
+    """Where the motion at each frequency begins; with several motions at one frequency it decides which."""
+
+    REST = "from rest"
+    UP = "led upwards"
+    """From the state and the phase in which the next lower frequency ended."""
+    DOWN = "led downwards"
+
+
+@dataclass(frozen=True)
+class HeldAcceleration:
+    """Feedback holds the base's fundamental, whatever setting that takes."""
+
+    amplitude_m_per_s2: float
+    """Peak."""
+    basis: ClassVar[str] = "the level that feedback holds"
+
+
+@dataclass(frozen=True)
+class RelativeSetting:
+    """A sine at a setting: the base does what the shaker makes of it."""
+
+    share: float
+    """Of the plan's ``amplitude_vpp``."""
+    basis: ClassVar[str] = "the rig's linear model"
+
+
+@dataclass(frozen=True)
+class RmsSetting:
+    """Noise at the plan's setting: no sine is played, so that one of the same rms stands for it."""
+
+    basis: ClassVar[str] = "a sine of the same rms base displacement"
+
+
+LevelAtBase: TypeAlias = HeldAcceleration | RelativeSetting | RmsSetting

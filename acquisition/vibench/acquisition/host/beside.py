@@ -1,11 +1,17 @@
 """A background thread for jobs that may hang, such as writing to a network folder."""
 
+import os
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing import parent_process
+from multiprocessing.connection import wait
 from threading import Condition, Thread
+from types import TracebackType
+from typing import Self
 
-from ..stopping.memory_reserve import MEMORY_RESERVE
+from ..stopping.stop import MEMORY_RESERVE
 
 
 class Beside:
@@ -61,3 +67,35 @@ class Beside:
             job = self._jobs.popleft()
         job()
         return True
+
+
+class ClosedOnLeaving(ABC):
+    """Something that must be closed, and is, at the end of a ``with``."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Let go of what is held. Legal at any time."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def follow_parent() -> None:
+    """End this process as soon as the one that spawned it is gone.
+
+    For the workers of a pool, which never notice: each of them holds both ends of the pipe that it
+    waits on. A worker has nothing to lose; what it was to give would reach nobody.
+    """
+    parent = parent_process()
+    if parent is not None:
+        Thread(target=_end_after, args=(parent.sentinel,), name="follow parent", daemon=True).start()
+
+
+def _end_after(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)

@@ -10,10 +10,8 @@ from ._fast_loop import (
     LoopState as LoopState,
 )
 from ._guarded import (
-    driver_of as driver_of,
-)
-from ._plug_in import (
     PlugInKind as PlugInKind,
+    driver_of as driver_of,
     plug_in as plug_in,
     plug_in_names as plug_in_names,
 )
@@ -26,8 +24,6 @@ from ._protocols import (
     RealTimeController as RealTimeController,
     Spacing as Spacing,
     Sweep as Sweep,
-)
-from ._reading import (
     read_block as read_block,
 )
 from ._values import (

@@ -14,7 +14,6 @@ docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 """
 
 from ..excitation.branch_continuation import BranchContinuation
-from ..excitation.direction import Approach, Direction
 from ..excitation.dwell import Dwell
 from ..excitation.held_dwell import HeldDwell
 from ..excitation.held_noise import HeldNoise, SpectrumPoint
@@ -36,27 +35,19 @@ from ..excitation.settled_sine import SettledSine
 from ..excitation.sine_sweep import Hold, SineSweep
 from ..excitation.stepped_level import SteppedLevel
 from ..excitation.stepped_sine import FrequencySteps, SteppedSine
-from ..excitation.steps import Segment, Step
+from ..excitation.steps import Approach, Direction, Segment, Step
 from ..excitation.streamed_noise import StreamedNoise
 from ..excitation.white_noise import WhiteNoise
 from ._campaign import BYTES_PER_SAMPLE, Campaign, Retryable, RetryPolicy, load_campaign, played_alike
-from ._check_level import (
+from ._limits import (
+    LimitCheck,
+    LimitSide,
     check_amplitude_vpp,
     check_phases,
     expected_under_check,
     nearest_expected,
-    run_check_vpp,
-)
-from ._drive_source import (
-    DriveSource,
-    drive_source_of,
-    lowest_setting_vpp,
-    require_played,
-)
-from ._limits import (
-    LimitCheck,
-    LimitSide,
     require_within_limits,
+    run_check_vpp,
     shortest_ramp_s,
 )
 from ._loads import BaseMotion, base_motion, needed_vpp, predicted_loads
@@ -76,15 +67,19 @@ from ._schedule import (
     CHECK_QUIET_S,
     CHECK_S,
     HUSH_S,
+    DriveSource,
     Phase,
     RunState,
+    drive_source_of,
     duration_s,
     half_cosine,
     known_phases,
     lead_in_s,
+    lowest_setting_vpp,
     measured_s,
     phases,
     ramp,
+    require_played,
     stairs,
 )
 from ._sweep import (

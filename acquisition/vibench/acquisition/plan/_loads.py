@@ -13,10 +13,18 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation.base_level import HeldAcceleration, RelativeSetting, RmsSetting
 from ..excitation.kinds import Excitation
 from ..excitation.multisine import held_lines
-from ..excitation.steps import Play, SampleSource, Stream, Tone, Waveform
+from ..excitation.steps import (
+    HeldAcceleration,
+    Play,
+    RelativeSetting,
+    RmsSetting,
+    SampleSource,
+    Stream,
+    Tone,
+    Waveform,
+)
 from ..rig import BaseQuantity, ComplexArray, OnTable, Rig, RigModel
 
 HELD_SPANS = 4

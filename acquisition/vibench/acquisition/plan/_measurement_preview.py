@@ -11,11 +11,10 @@ from ..excitation.preview import SignalPreview
 from ..excitation.steps import Samples
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
-from ._drive_source import DriveSource, drive_source_of
 from ._limits import LimitCheck, limit_checks
 from ._loop_time import loop_time_s
 from ._measurement import Measurement
-from ._schedule import duration_s
+from ._schedule import DriveSource, drive_source_of, duration_s
 
 MOST_SAMPLES = 1_000_000
 """Of the signal that is shown: a long sweep is sampled less often than it will be played."""

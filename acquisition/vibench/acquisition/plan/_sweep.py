@@ -9,10 +9,10 @@ from typing import Annotated, Any, Self, TypeAlias
 
 from pydantic import Field, PositiveFloat, PositiveInt, ValidationError, model_validator
 
-from ..excitation.direction import Direction
 from ..excitation.dwell import MOST_LEAD_INS
 from ..excitation.kinds import Excitation
 from ..excitation.plan import LeadIn
+from ..excitation.steps import Direction
 from ..host.toml_file import FrozenModel, complaints
 from ._measurement import Measurement, Name, Point
 

@@ -1,5 +1,4 @@
-from ._disk import sole_use as sole_use
-from ._disk_trouble import DiskTrouble as DiskTrouble, troubled_disks as troubled_disks
+from ._disk import DiskTrouble as DiskTrouble, sole_use as sole_use, troubled_disks as troubled_disks
 from ._dropouts import (
     DROPOUTS_TOLD_AFTER_S as DROPOUTS_TOLD_AFTER_S,
     BridgedChannel as BridgedChannel,
@@ -32,10 +31,14 @@ from ._feedback_note import (
     SweepNote as SweepNote,
     feedback_note as feedback_note,
 )
+from ._finalise import (
+    recover as recover,
+)
 from ._header import (
     ROLE_PATTERN as ROLE_PATTERN,
     ChannelHeader as ChannelHeader,
     RecordingHeader as RecordingHeader,
+    collect_provenance as collect_provenance,
     coupling_cut_hz as coupling_cut_hz,
 )
 from ._layout import (
@@ -56,18 +59,12 @@ from ._overview import (
 from ._preallocate import (
     HOLD_ROOM_S as HOLD_ROOM_S,
 )
-from ._provenance import (
-    collect_provenance as collect_provenance,
-)
 from ._reader import (
     RecordedBlock as RecordedBlock,
     Recording as Recording,
     RecordingDescription as RecordingDescription,
     name_now as name_now,
     open_recording as open_recording,
-)
-from ._recover import (
-    recover as recover,
 )
 from ._results import (
     ResultArray as ResultArray,

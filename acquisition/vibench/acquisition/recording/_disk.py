@@ -2,8 +2,10 @@
 
 import errno
 import os
-from collections.abc import Iterator
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from math import inf
 from pathlib import Path
 from typing import Protocol
 
@@ -68,3 +70,111 @@ def is_being_recorded(path: Path) -> bool:
         return not is_locked_alone(descriptor)
     finally:
         os.close(descriptor)
+
+
+Heal = Callable[[], None]
+
+
+class DiskTrouble:
+    """What is wrong with the disk at the moment; any thread may change it.
+
+    The first refusal comes at once, so that the recording hears of it before anything else happens. From the
+    second one on, ``on_refusal`` is called before the refusal is raised.
+    """
+
+    def __init__(self, on_refusal: Callable[[], None] = lambda: None) -> None:
+        self._on_refusal = on_refusal
+        self._changed = threading.Condition()
+        self._refusals = 0.0
+        self._has_refused = False
+        self._delay_s = 0.0
+
+    def fill(self, refusals: float = inf) -> Heal:
+        """Refuse everything as a full disk does, until healed or as often as ``refusals`` says."""
+        with self._changed:
+            self._refusals, self._has_refused = refusals, False
+        return self._make_room
+
+    def slow_down(self, delay_s: float) -> Heal:
+        """Let every write and every sync take that much longer, on the wall's clock [s]."""
+        with self._changed:
+            self._delay_s = delay_s
+        return self._speed_up
+
+    def meet(self) -> None:
+        """Be as slow, and fail, as the disk does now; raises OSError (ENOSPC) when it is full."""
+        with self._changed:
+            # A slow disk takes time; one that is well again lets go at once.
+            self._changed.wait_for(lambda: self._delay_s == 0.0, timeout=self._delay_s)
+            is_refused = self._refusals > 0
+            self._refusals -= is_refused
+            is_asked_again = is_refused and self._has_refused
+            self._has_refused |= is_refused
+        if is_asked_again:
+            self._on_refusal()
+        if is_refused:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def _make_room(self) -> None:
+        with self._changed:
+            self._refusals = 0.0
+
+    def _speed_up(self) -> None:
+        with self._changed:
+            self._delay_s = 0.0
+            self._changed.notify_all()
+
+
+class TroubledDisk:
+    """A disk that meets the trouble before every operation."""
+
+    def __init__(self, disk: Disk, trouble: DiskTrouble) -> None:
+        self._disk = disk
+        self._trouble = trouble
+
+    def write(self, offset: int, data: Buffer) -> None:
+        """Put ``data`` at ``offset``."""
+        self._trouble.meet()
+        self._disk.write(offset, data)
+
+    def sync(self) -> None:
+        """Return when everything written so far would survive a power cut."""
+        self._trouble.meet()
+        self._disk.sync()
+
+    def reserve(self, offset: int, size: int) -> None:
+        """Claim room."""
+        self._trouble.meet()
+        self._disk.reserve(offset, size)
+
+    def close(self) -> None:
+        """Release the file."""
+        self._disk.close()
+
+
+_installed: list[DiskTrouble] = []
+"""Troubles of the virtual rigs that are on in this process; all recordings of a process share one disk."""
+
+
+@contextmanager
+def troubled_disks(trouble: DiskTrouble) -> Iterator[None]:
+    """Let every recording of this process that is opened inside meet ``trouble``."""
+    _installed.append(trouble)
+    try:
+        yield
+    finally:
+        _installed.remove(trouble)
+
+
+def open_disk(path: Path) -> Disk:
+    """Open an existing file to record to."""
+    disk: Disk = PositionedFile(path)
+    for trouble in _installed:
+        disk = TroubledDisk(disk, trouble)
+    return disk
+
+
+def meet_trouble() -> None:
+    """Fail as a full disk does where room is claimed for a whole file; nothing happens on a sound one."""
+    for trouble in tuple(_installed):
+        trouble.meet()

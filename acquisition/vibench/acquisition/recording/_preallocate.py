@@ -20,8 +20,7 @@ from vibench.sim.operating_system.this import allocate, open_to_write, rename, s
 
 from ..errors import RecordingError
 from . import _layout as layout
-from ._disk import PositionedFile
-from ._disk_trouble import meet_trouble
+from ._disk import PositionedFile, meet_trouble
 from ._header import RecordingHeader
 from ._layout import Table, read_text_dataset, write_attributes, write_text_dataset
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from . import _layout as layout
 from ._contents import json_object
+from ._header import collect_provenance
 from ._layout import json_text, read_attributes, read_text_dataset, write_attributes, write_text_dataset
-from ._provenance import collect_provenance
 from ._seal import SealKey, SealState, check_result, seal_result
 
 REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..instruments import Overload
 from . import _layout as layout
+from ._committer import Number
 from ._contents import json_object
-from ._journal import Number
 from ._layout import Column, RecordingState, Table, decoded
 
 Columns = dict[str, NDArray[Any]]

@@ -19,17 +19,24 @@ from ._configuration import (
     fastest_sample_rate_hz as fastest_sample_rate_hz,
     given_token as given_token,
     highest_carried_hz as highest_carried_hz,
+    volts_per_unit as volts_per_unit,
 )
 from ._knobs import (
     CalibrationRule as CalibrationRule,
+    Channel as Channel,
     Confirm as Confirm,
     KnobSheet as KnobSheet,
+    accelerometer as accelerometer,
     calibrations as calibrations,
+    channels_of as channels_of,
     check_calibrations as check_calibrations,
     confirm_at_terminal as confirm_at_terminal,
     confirm_by_sheet as confirm_by_sheet,
     confirm_simulated as confirm_simulated,
     save_knob_sheet as save_knob_sheet,
+    sensor_name as sensor_name,
+    vibrometer as vibrometer,
+    wire as wire,
 )
 from ._load_rig import (
     ControllerDriver as ControllerDriver,
@@ -50,15 +57,4 @@ from ._model import (
     shaker_of as shaker_of,
     specimen_of as specimen_of,
     suspended_mass_kg as suspended_mass_kg,
-)
-from ._sensitivity import (
-    volts_per_unit as volts_per_unit,
-)
-from ._sensors import (
-    Channel as Channel,
-    accelerometer as accelerometer,
-    channels_of as channels_of,
-    sensor_name as sensor_name,
-    vibrometer as vibrometer,
-    wire as wire,
 )

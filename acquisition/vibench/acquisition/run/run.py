@@ -13,7 +13,8 @@ from ..control.controllers import CONTROLLERS, feedback_controller
 from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded, RunStalled
 from ..excitation.plan import AbstractFeedback
 from ..excitation.steps import Tone
-from ..host.closed_on_leaving import ClosedOnLeaving
+from ..host.beside import ClosedOnLeaving
+from ..host.chosen import chosen
 from ..instruments import Block, FunctionGenerator
 from ..plan import (
     CHECK_S,
@@ -32,8 +33,8 @@ from ..plan import (
 )
 from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, create_recording
 from ..rig import Channel, KnobSheet
-from ..stopping.memory_reserve import MEMORY_RESERVE
-from ..stopping.stop import LEVELS, Cause, StopLevel, StopRequest, StopSwitch
+from ..stopping.stop import LEVELS, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
+from ..stopping.stop_on_signal import stop_on_signal
 from .acquisition_loop import AcquisitionLoop, SampleSink
 from .drive import Drive, drive_for
 from .ending import Ending, Outcome, Progress
@@ -379,3 +380,36 @@ def _controlled(runner: PhaseRunner, controller: Controller[None]) -> Iterator[P
             action = controller.send(replace(phase_samples(blocks), coefficients=runner.coefficients))
     except StopIteration:
         pass
+
+
+def ignore_progress(progress: Progress) -> None:
+    """Watch nothing."""
+
+
+def run_measurement(
+    bench: RunBench,
+    measurement: Measurement,
+    path: Path,
+    bench_check: LowLevelCheck | str = LowLevelCheck.AT_LOW_LEVEL,
+    on_progress: Callable[[Progress], None] = ignore_progress,
+    create: CreateRecording = create_recording,
+    switch: StopSwitch | None = None,
+) -> Outcome:
+    """Carry out ``measurement`` on an open bench and record it at ``path`` (``NAME.h5``).
+
+    ``on_progress`` is called after every block; ``switch`` lets others hold or end the run. Ctrl-C
+    ramps down and returns an outcome whose state is ``stopped``; a second one raises KeyboardInterrupt.
+
+    Raises
+    ------
+    AcquisitionError
+        As `run.Run` says; the generator is silent then, and the recording, if it had begun, is
+        finished as failed.
+
+    """
+    run = Run(bench, measurement, path, chosen(LowLevelCheck, bench_check), create, switch)
+    # The signals stay caught until the run has been left: impatience must not interrupt the silencing.
+    with stop_on_signal(run.switch, path.stem), run:
+        for progress in run:
+            on_progress(progress)
+    return run.outcome

@@ -11,13 +11,11 @@ from time import monotonic
 import numpy as np
 
 from ..errors import InstrumentError
-from ..host.closed_on_leaving import ClosedOnLeaving
+from ..host.beside import ClosedOnLeaving
 from ..instruments import Block, Samples
 from ..rig import Channel, Role
-from ..stopping.driving import DRIVES_ON
-from ..stopping.memory_reserve import MEMORY_RESERVE
 from ..stopping.program import Watchdog
-from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
+from ..stopping.stop import DRIVES_ON, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
 from .acquisition_loop import BLOCK_S
 from .drive import Drive
 from .low_level_check import STILL_SHARE

@@ -1,9 +1,14 @@
 """How a run is told to end: what may cause it, how hard each cause stops, and the switch in between."""
 
+import mmap
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
+from threading import Lock
+
+from ..errors import AcquisitionError
 
 
 class StopLevel(StrEnum):
@@ -144,3 +149,80 @@ class StopSwitch:
         """Give a request that is harder than ``level``, if there is one."""
         request = self.request
         return request if request is not None and request.level.is_harder_than(level) else None
+
+
+class DrivesOn:
+    """Drives that have started and are not yet confirmed as off."""
+
+    def __init__(self) -> None:
+        self._drives: set[object] = set()
+        self._has_advanced = False
+
+    def __bool__(self) -> bool:
+        """Whether any drive may be on."""
+        return bool(self._drives)
+
+    def begin(self, drive: object) -> None:
+        """Note that a drive may be on. The output was read back as off before, whatever was unconfirmed."""
+        self._drives = {drive}
+
+    def confirm_silence(self, drive: object) -> None:
+        """Note that its output was read back as off. Legal at any time."""
+        self._drives.discard(drive)
+
+    def note_advance(self) -> None:
+        """Note that the run of a drive goes on, or ramps down."""
+        self._has_advanced = True
+
+    def take_advance(self) -> bool:
+        """Return whether a run has gone on since the last call."""
+        advanced, self._has_advanced = self._has_advanced, False
+        return advanced
+
+
+DRIVES_ON = DrivesOn()
+"""Of this process."""
+
+
+RESERVE_BYTES = 16_000_000
+"""Commands of a generator take some kB; the rest is what other threads may take meanwhile."""
+
+
+class MemoryReserve:
+    """Reserved address space."""
+
+    def __init__(self) -> None:
+        self._held: mmap.mmap | None = None
+        self._changing = Lock()
+
+    def hold(self) -> None:
+        """Reserve it before anything drives. Raises AcquisitionError when memory is too short."""
+        with self._changing:
+            if self._held is None:
+                try:
+                    self._held = mmap.mmap(-1, RESERVE_BYTES)
+                except (OSError, MemoryError) as error:
+                    raise AcquisitionError(
+                        f"this process can get no more memory ({error}), and needs {RESERVE_BYTES / 1e6:g} "
+                        "MB to be sure of silencing the drive. Nothing was played; close other programs, or "
+                        "raise its limit (ulimit -v)"
+                    ) from error
+
+    def release(self) -> None:
+        """Release the reserve. Legal at any time."""
+        held, self._held = self._held, None
+        if held is not None:
+            held.close()
+
+    @contextmanager
+    def released_when_short(self) -> Iterator[None]:
+        """Release the reserve at a MemoryError inside, and re-raise it."""
+        try:
+            yield
+        except MemoryError:
+            self.release()
+            raise
+
+
+MEMORY_RESERVE = MemoryReserve()
+"""Of this process."""

@@ -25,9 +25,9 @@ from nidaqmx.error_codes import DAQmxErrors
 from ..analogue import Coupling
 from .acquisition import Acquisition
 from .channels import OutputChannel
+from .data_calls import asked_available, default_samples, newest
 from .devices import AnalogInputs, AnalogOutputs, Device, Idle, Overloads
 from .errors import DaqmxRefusal, member, unsupported_value
-from .reading import asked_available, default_samples, newest
 from .system import DaqmxSystem
 from .tasks import Task, TaskState
 from .timing import check_memory

@@ -21,9 +21,8 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from .channels import InputChannel, OutputChannel
+from .channels import InputChannel, OutputChannel, assigned_names
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
-from .names import assigned_names
 from .system import DaqmxSystem
 from .tasks import Task
 from .timing import LogSettings, ReferenceTrigger

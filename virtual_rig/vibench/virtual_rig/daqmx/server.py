@@ -1,5 +1,7 @@
 """The simulated DAQmx system on a port: any nidaqmx program can connect to it."""
 
+import hmac
+import secrets
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -12,18 +14,47 @@ from nidaqmx._stubs import nidaqmx_pb2
 from nidaqmx.error_codes import DAQmxErrors
 
 from vibench.acquisition import ConfigurationError
+from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
 
 from ..analogue import AnalogueWorld
 from .attributes import SERVICE, attribute_calls
 from .calls import CALLS, Fields
 from .data_calls import DATA_CALLS
 from .devices import Catalogue
-from .errors import DaqmxRefusal
+from .errors import DaqmxRefusal, Faults, Unavailable
 from .events import EVENTS, Listener
-from .faults import Faults, Unavailable
 from .rig import OnDemandPace, Pace, Rig
 from .system import DaqmxSystem
-from .token import TokenRequired
+
+LOOPBACK_HOSTS = frozenset({"127.0.0.1", "localhost", "[::1]"})
+
+
+def token_for(address: str) -> str | None:
+    """Make a token for a server at ``"host:port"``; None on loopback, which is this computer only."""
+    host = address.rpartition(":")[0]
+    return None if host in LOOPBACK_HOSTS else secrets.token_urlsafe(24)
+
+
+class TokenRequired(grpc.ServerInterceptor):  # type: ignore[misc] # grpc ships without types
+    """Turns away every call without the token."""
+
+    def __init__(self, token: str) -> None:
+        self._token = token
+
+    def intercept_service(self, continuation: Callable[[Any], Any], details: Any) -> Any:
+        """Let a call pass, or answer it with a refusal."""
+        given = dict(details.invocation_metadata).get(TOKEN_KEY, "")
+        if hmac.compare_digest(str(given).encode(), self._token.encode()):
+            return continuation(details)
+        return grpc.unary_unary_rpc_method_handler(_refuse)
+
+
+def _refuse(request: Any, context: grpc.ServicerContext) -> None:  # noqa: ARG001 - the request does not matter
+    context.abort(
+        grpc.StatusCode.UNAUTHENTICATED,
+        f"this rig is served with a token: put what 'vibench serve-rig' printed into {TOKEN_VARIABLE}",
+    )
+
 
 LOOPBACK = "127.0.0.1:0"
 """This computer only, on a free port: the server knows no passwords."""

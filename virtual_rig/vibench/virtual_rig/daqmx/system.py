@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable
 
 from nidaqmx.error_codes import DAQmxErrors
 
+from .channels import expand
 from .devices import Device
 from .errors import DaqmxRefusal
-from .names import expand
 from .rig import Rig
 from .tasks import Task
 

@@ -2,22 +2,73 @@
 
 import math
 import time
+from collections.abc import Callable
 from enum import IntEnum
+from importlib.util import find_spec
 
+import numpy as np
 from nidaqmx.constants import AcquisitionType, SampleTimingType, TaskMode
 from nidaqmx.error_codes import DAQmxErrors
+from numpy.typing import NDArray
 
-from vibench.acquisition import AcquisitionError
+from vibench.acquisition import AcquisitionError, ConfigurationError
 
 from .acquisition import Acquisition
-from .channels import Channel, InputChannel, OutputChannel
+from .channels import Channel, InputChannel, OutputChannel, expand
 from .devices import AnalogInputs, AnalogOutputs, Conversion, Device, Untimed
 from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation, OutputBuffer
-from .names import expand
 from .rig import Rig
-from .tdms_log import TdmsLog
-from .timing import InputSettings, OutputSettings, Timing, check_memory
+from .timing import InputSettings, LogSettings, OutputSettings, Timing, check_memory
+
+
+class TdmsLog:
+    """The file of one run of a task; needs npTDMS."""
+
+    def __init__(
+        self,
+        settings: LogSettings,
+        inputs: list[InputChannel],
+        rate_hz: float,
+        wall_s: Callable[[float], float],
+    ) -> None:
+        """Make the file, in the place of one that is there."""
+        if find_spec("nptdms") is None:
+            raise ConfigurationError(
+                "Logging needs npTDMS where the virtual rig runs: pip install 'vibench[exchange]'"
+            )
+        self._settings = settings
+        self._inputs = inputs
+        self._interval_s = 1 / rate_hz
+        self._wall_s = wall_s
+        self._began: np.datetime64 | None = None
+        try:
+            settings.path.write_bytes(b"")
+        except OSError as error:
+            raise DaqmxRefusal(DAQmxErrors.GENERIC_FILE_IO, f"File: {settings.path}\n{error}") from error
+
+    def write(self, volts: NDArray[np.float64], began_s: float) -> None:
+        """Append samples, shape (channels, samples) [V]; the first of them at rig time ``began_s``."""
+        from nptdms import ChannelObject, TdmsWriter  # noqa: PLC0415 - an extra; few programs log
+
+        self._began = self._began or np.datetime64(round(self._wall_s(began_s) * 1e6), "us")
+        with TdmsWriter(self._settings.path, mode="a") as file:
+            file.write_segment(
+                [
+                    ChannelObject(
+                        self._settings.group,
+                        channel.name,
+                        row,
+                        {
+                            "wf_start_time": self._began,
+                            "wf_increment": self._interval_s,
+                            "unit_string": "Volts",
+                        },
+                    )
+                    for channel, row in zip(self._inputs, volts, strict=True)
+                ]
+            )
+
 
 _BREATH_S = 1e-4
 _OWN_CLOCKS = ("", "onboardclock")

@@ -40,8 +40,7 @@ from .scpi_command import (
     switch,
 )
 from .scpi_instrument import Quirks, ScpiInstrument
-from .scpi_status import ErrorCode, ScpiError
-from .scpi_value import (
+from .scpi_message import (
     AMPLITUDE_UNITS,
     FREQUENCY_UNITS,
     NO_UNITS,
@@ -56,6 +55,7 @@ from .scpi_value import (
     number_and_unit,
     text,
 )
+from .scpi_status import ErrorCode, ScpiError
 from .terminal_voltage import Relay, Terminal
 
 DEFAULT_SERIAL = "C010101"

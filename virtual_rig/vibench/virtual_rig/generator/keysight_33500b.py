@@ -16,8 +16,8 @@ from .arbitrary_memory import EDIT_MEMORY, ArbitraryMemory, Codes
 from .phase_course import Spacing
 from .scpi_command import Command, Parameters, choice, none, only, switch
 from .scpi_instrument import Quirks
+from .scpi_message import NO_UNITS, as_number, block, integer, number, text
 from .scpi_status import ErrorCode, ScpiError
-from .scpi_value import NO_UNITS, as_number, block, integer, number, text
 
 TOP_CODE = 65_534
 """Codes -32767 to 32767, counted from zero."""

@@ -8,8 +8,8 @@ from typing import Any
 
 from .afg1022_settings import ChannelSettings
 from .scpi_header import HeaderPattern, mnemonic_matches, short_form
+from .scpi_message import INFINITE, as_number, boolean, number as value_of, text
 from .scpi_status import ErrorCode, ScpiError
-from .scpi_value import INFINITE, as_number, boolean, number as value_of, text
 
 CHANNELS = 2
 _RANGE_ROUNDING = 1e-9

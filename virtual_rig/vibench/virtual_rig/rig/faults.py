@@ -6,7 +6,7 @@ from nidaqmx.error_codes import DAQmxErrors
 
 from vibench.acquisition.recording import DiskTrouble
 
-from ..daqmx.faults import Fault, ServerGone
+from ..daqmx.errors import Fault, ServerGone
 from ..daqmx.server import DaqServer
 from ..generator.afg1022 import AFG1022
 from ..usb.usbtmc import UsbTmcInstrument

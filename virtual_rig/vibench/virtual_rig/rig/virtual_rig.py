@@ -14,8 +14,7 @@ from vibench.acquisition.rig import Rig, VirtualConfig
 from ..controller.virtual_controller import controller_of
 from ..daqmx.devices import catalogue_with
 from ..daqmx.rig import OnDemandPace, Pace, WallPace
-from ..daqmx.server import LOOPBACK, DaqServer
-from ..daqmx.token import token_for
+from ..daqmx.server import LOOPBACK, DaqServer, token_for
 from ..generator.afg1022 import AFG1022
 from ..generator.channel_output import Panel
 from ..generator.keysight_33500b import Keysight33500B

@@ -14,7 +14,7 @@ import grpc
 from vibench.acquisition import InstrumentLost
 from vibench.acquisition.rig import TOKEN_KEY, given_token
 
-from .device import Identification, Setup, UsbDevice
+from .usbtmc import Identification, Setup, UsbDevice
 
 SERVICE = "vibench.virtual.UsbDevice"
 CONNECT_TIMEOUT_S = 5.0

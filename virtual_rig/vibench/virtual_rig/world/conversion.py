@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .decimation import Decimator, decimator
+from .disturbance import NoiseStream
 from .input_stage import InputStage
-from .noise import NoiseStream
 from .wiring import Cable
 
 FloatArray = NDArray[np.float64]

@@ -4,9 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analogue import Coupling, Input
-from .recursive_filter import RecursiveFilter
 from .sensors import IEPE_BIAS_V
-from .time_grid import USUAL_GRID, TimeGrid
+from .time_grid import USUAL_GRID, RecursiveFilter, TimeGrid
 from .wiring import Behind, Cable
 
 FloatArray = NDArray[np.float64]

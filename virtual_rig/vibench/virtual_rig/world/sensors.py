@@ -11,10 +11,8 @@ from vibench.acquisition.rig import AccelerometerConfig, VibrometerConfig
 from vibench.sim.engine.run import native_engine
 from vibench.sim.engine.structures import Structure
 
-from .disturbance import Disturbance, RandomDropouts, overwrite
-from .noise import NoiseStream
-from .recursive_filter import RecursiveFilter
-from .time_grid import USUAL_GRID, TimeGrid
+from .disturbance import Disturbance, NoiseStream, RandomDropouts, overwrite
+from .time_grid import USUAL_GRID, RecursiveFilter, TimeGrid
 
 _FIT_BAND = 0.2
 """The fit covers zero to this part of the grid's rate: what a converter at half the rate can pass."""

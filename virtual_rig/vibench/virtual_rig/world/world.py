@@ -28,13 +28,11 @@ from ..controller.virtual_controller import VirtualController
 from .analogue_output import AnalogueOutput
 from .conversion import Conversion, converter_input
 from .decimation import history_steps
-from .disturbance import Disturbance, RandomDropouts
+from .disturbance import Disturbance, NoiseStream, RandomDropouts
 from .input_stage import InputStage
-from .loop_cables import LoopCables, PlantParts
-from .noise import NoiseStream
 from .sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
 from .time_grid import PPM, USUAL_GRID, TimeGrid
-from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
+from .wiring import OPEN_INPUT, Cable, LoopCables, PlantParts, Signal, amplifier_input, cables_of
 
 
 class EventSchedule:
