@@ -17,7 +17,7 @@ from pathlib import Path
 
 from vibench.virtual_rig.generator.afg1022 import AFG1022
 from vibench.virtual_rig.generator.scpi_instrument import Reply
-from vibench.virtual_rig.generator.scpi_status import ErrorCode, Status
+from vibench.virtual_rig.generator.scpi_message import ErrorCode, Status
 from vibench.virtual_rig.usb.bus import plug_in
 from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 

@@ -59,7 +59,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import KnobSheet, Rig, save_knob_sheet
-from vibench.acquisition.stopping.stop_on_signal import heeded_signals, signal_name
+from vibench.acquisition.stopping.program import heeded_signals, signal_name
 from vibench.virtual_rig import VirtualRig
 
 VIBENCH = str(Path(sys.executable).with_name("vibench"))

@@ -9,7 +9,7 @@ from typing import Any
 
 from vibench.acquisition import load_campaign
 from vibench.acquisition.engine import EngineClient
-from vibench.acquisition.engine._announcement import EngineAddress
+from vibench.acquisition.engine._client import EngineAddress
 from vibench.acquisition.engine._wire import HEAD, MAGIC
 from vibench.acquisition.rig import load_rig
 

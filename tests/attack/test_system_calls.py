@@ -43,7 +43,7 @@ rename(folder / "file.coming", folder / "file")
 """
 RESULT = """
 import h5py
-from vibench.acquisition.recording._replacing import replace_with_change
+from vibench.acquisition.recording._preallocate import replace_with_change
 arm()
 replace_with_change(folder / "dwell.h5", 1000, lambda file: file.attrs.__setitem__("note", "all of it"))
 """

@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 from vibench.acquisition import CheckStopped, StopSwitch, stop_on_signal
 from vibench.acquisition.bench.instrument_list import InstrumentList
 from vibench.acquisition.errors import ConfigurationError
-from vibench.acquisition.first_day.configured import configured, value_in, with_answer
-from vibench.acquisition.first_day.questions import QUESTIONS
+from vibench.acquisition.first_day.configured import QUESTIONS, configured, value_in, with_answer
 from vibench.acquisition.instruments import FoundDevice
 from vibench.acquisition.rig import confirm_at_terminal, load_rig
 from vibench.cli.__main__ import app

@@ -22,7 +22,7 @@ from vibench.acquisition.engine import (
     start_engine,
     stop_engine,
 )
-from vibench.acquisition.engine._announcement import EngineAddress, announced
+from vibench.acquisition.engine._client import EngineAddress, announced
 from vibench.acquisition.plan import Campaign
 from vibench.acquisition.rig import load_rig
 from vibench.acquisition.stopping.program import Program, announced_programs

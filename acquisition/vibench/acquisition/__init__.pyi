@@ -60,5 +60,5 @@ from .recording import (
     open_recording as open_recording,
 )
 from .run.run import run_measurement as run_measurement
+from .stopping.program import stop_on_signal as stop_on_signal
 from .stopping.stop import StopLevel as StopLevel, StopSwitch as StopSwitch
-from .stopping.stop_on_signal import stop_on_signal as stop_on_signal

@@ -5,7 +5,7 @@ import pytest
 
 from vibench.acquisition import CheckFailed
 from vibench.acquisition.rig import BaseQuantity, RigModel, Role, channels_of
-from vibench.acquisition.run.low_level_check import judged
+from vibench.acquisition.run.silence_watch import judged
 
 RATE_HZ = 51_200.0
 AMPLITUDE_VPP = 0.02

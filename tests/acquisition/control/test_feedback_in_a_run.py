@@ -18,8 +18,8 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import OutputUse, Role
-from vibench.acquisition.run.low_level_check import LowLevelCheck
 from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 SETTLING = Settling(longest_wait_s=2, tolerance=0.02)

@@ -3,7 +3,13 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.acquisition.control.jump_search import LocatedJump, SettledPoint, is_on_branch, located, side
+from vibench.acquisition.control.settling_controller import (
+    LocatedJump,
+    SettledPoint,
+    is_on_branch,
+    located,
+    side,
+)
 from vibench.acquisition.recording import JumpSide
 
 

@@ -15,7 +15,7 @@ from vibench.acquisition.plan import (
     RunState,
     SettledSine,
 )
-from vibench.acquisition.run.low_level_check import sine_amplitude
+from vibench.acquisition.run.silence_watch import sine_amplitude
 from vibench.sim import Harmonic, PhaseReference, gong2025, integrate, phase_resonance_branch
 
 SAMPLE_RATE_HZ = 10240.0

@@ -11,7 +11,7 @@ from vibench.virtual_rig.generator.afg1022 import AFG1022
 from vibench.virtual_rig.generator.afg1022_settings import ChannelSettings
 from vibench.virtual_rig.generator.channel_output import Panel
 from vibench.virtual_rig.generator.scpi_instrument import Quirks, Reply
-from vibench.virtual_rig.generator.scpi_status import ErrorCode
+from vibench.virtual_rig.generator.scpi_message import ErrorCode
 from vibench.virtual_rig.usb.bus import plug_in, unplug
 from vibench.virtual_rig.usb.usbtmc import UsbTmcInstrument
 

@@ -33,7 +33,7 @@ from vibench.acquisition.engine import (
     Supervision,
     start_engine,
 )
-from vibench.acquisition.engine._announcement import EngineAddress
+from vibench.acquisition.engine._client import EngineAddress
 from vibench.acquisition.engine._status import ConnectionRole
 from vibench.acquisition.engine._verbs import VERBS
 from vibench.acquisition.engine._wire import EngineError, send

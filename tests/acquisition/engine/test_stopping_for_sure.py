@@ -28,7 +28,7 @@ from vibench.acquisition.engine import (
     stop_engine,
     the_engine,
 )
-from vibench.acquisition.engine._announcement import Announcement
+from vibench.acquisition.engine._client import Announcement
 from vibench.acquisition.engine._server import GREETING_S, VIEWERS_MOST, WAITING_MOST
 from vibench.acquisition.engine._status import ConnectionRole
 from vibench.acquisition.engine._wire import HEAD, MAGIC

@@ -8,8 +8,8 @@ import pytest
 from vibench.acquisition.errors import ConfigurationError, DriveLate
 from vibench.acquisition.plan import Dwell, Measurement, SineSweep, SteppedSine
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run.low_level_check import LowLevelCheck
 from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.silence_watch import LowLevelCheck
 
 RATE = 5120.0
 DRIVE = 0

@@ -31,10 +31,9 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run.low_level_check import LowLevelCheck, sine_amplitude
 from vibench.acquisition.run.phase_runner import HOLD_LONGEST_S
 from vibench.acquisition.run.run import Run
-from vibench.acquisition.run.silence_watch import LISTEN_S
+from vibench.acquisition.run.silence_watch import LISTEN_S, LowLevelCheck, sine_amplitude
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 RATE = 5120.0

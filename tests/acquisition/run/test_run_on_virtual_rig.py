@@ -27,8 +27,8 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import BaseQuantity, load_rig
-from vibench.acquisition.run.low_level_check import sine_amplitude
 from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.silence_watch import sine_amplitude
 
 ROOT = Path(__file__).parent.parent.parent.parent
 VIRTUAL = ROOT / "hardware_configs" / "virtual_rig.toml"

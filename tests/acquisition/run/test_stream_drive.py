@@ -15,8 +15,8 @@ from vibench.acquisition.plan import (
     shortest_ramp_s,
 )
 from vibench.acquisition.recording import RecordingState
-from vibench.acquisition.run.low_level_check import LowLevelCheck
 from vibench.acquisition.run.run import Run
+from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 
 RATE = 5120.0

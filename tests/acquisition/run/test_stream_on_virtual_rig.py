@@ -12,8 +12,8 @@ from vibench.acquisition.excitation.sine_sweep import Hold
 from vibench.acquisition.plan import Measurement, RunState, SineSweep, StreamedNoise
 from vibench.acquisition.recording import RecordingState
 from vibench.acquisition.rig import OutputUse, load_rig
-from vibench.acquisition.run.low_level_check import LowLevelCheck
-from vibench.virtual_rig.world.decimation import GROUP_DELAY_SAMPLES
+from vibench.acquisition.run.silence_watch import LowLevelCheck
+from vibench.virtual_rig.world.conversion import GROUP_DELAY_SAMPLES
 
 STREAMING = Path(__file__).parents[3] / "hardware_configs" / "virtual_rig_streaming.toml"
 RIG = load_rig(STREAMING)

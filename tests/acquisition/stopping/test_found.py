@@ -13,7 +13,7 @@ import pytest
 
 from vibench.acquisition import AcquisitionError, StopLevel, StopSwitch, stop_on_signal
 from vibench.acquisition.engine import StopDelivery, programs_to_stop, stop_engine
-from vibench.acquisition.engine._announcement import EngineAddress, announced
+from vibench.acquisition.engine._client import EngineAddress, announced
 from vibench.acquisition.stopping.program import Program, announced_programs, engines_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="pipes and modes as POSIX has them")

@@ -7,8 +7,8 @@ import sys
 import pytest
 
 from vibench.acquisition import StopSwitch, stop_on_signal
+from vibench.acquisition.stopping.program import LEFT_TO_THE_DEAD_MAN, heeded_signals, signal_name
 from vibench.acquisition.stopping.stop import Cause
-from vibench.acquisition.stopping.stop_on_signal import LEFT_TO_THE_DEAD_MAN, heeded_signals, signal_name
 
 VALID = sorted(getattr(signal, "valid_signals", set)())
 UNHEEDED = """

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.acquisition import open_bench, open_recording, run_measurement
 from vibench.acquisition.plan import Measurement, StreamedNoise
-from vibench.acquisition.run.low_level_check import LowLevelCheck
+from vibench.acquisition.run.silence_watch import LowLevelCheck
 from vibench.analysis import NotEnoughData
 from vibench.analysis.frequency_response.noise_response import streamed_response
 from vibench.analysis.recordings.channels import RecordedChannels

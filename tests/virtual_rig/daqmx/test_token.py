@@ -9,7 +9,7 @@ from vibench.acquisition import InstrumentLost, open_bench
 from vibench.acquisition.rig import TOKEN_VARIABLE, CalibrationRule, confirm_simulated, load_rig
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.daqmx.server import token_for
-from vibench.virtual_rig.usb.remote import RemoteUsbDevice
+from vibench.virtual_rig.usb.bus import RemoteUsbDevice
 
 
 @pytest.fixture

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.arbitrary_memory import TOP_CODE
-from vibench.virtual_rig.generator.periodic_shape import Rectangle, Sine, Table, Triangle
+from vibench.virtual_rig.generator.scpi_message import TOP_CODE
+from vibench.virtual_rig.generator.terminal_voltage import Rectangle, Sine, Table, Triangle
 
 TABLE = Table(np.random.default_rng(5).integers(0, TOP_CODE + 1, 37).astype(np.uint16))
 SHAPES = {

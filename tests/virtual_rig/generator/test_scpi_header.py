@@ -1,7 +1,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.generator.scpi_header import HeaderPath, HeaderPattern, mnemonic_matches
+from vibench.virtual_rig.generator.scpi_message import HeaderPath, HeaderPattern, mnemonic_matches
 
 AMPLITUDE = HeaderPattern("[SOURce#:]VOLTage[:LEVel][:IMMediate][:AMPLitude]")
 

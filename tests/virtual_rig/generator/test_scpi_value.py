@@ -4,12 +4,13 @@ from hypothesis import given, strategies as st
 from vibench.virtual_rig.generator.scpi_message import (
     AMPLITUDE_UNITS,
     FREQUENCY_UNITS,
+    ErrorCode,
+    ScpiError,
     as_number,
     block,
     boolean,
     number,
 )
-from vibench.virtual_rig.generator.scpi_status import ErrorCode, ScpiError
 
 
 @pytest.mark.parametrize(

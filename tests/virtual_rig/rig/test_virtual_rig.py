@@ -18,7 +18,7 @@ from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig
 from vibench.virtual_rig import VirtualRig
 from vibench.virtual_rig.generator.channel_output import Panel
 from vibench.virtual_rig.generator.scpi_instrument import Quirks
-from vibench.virtual_rig.usb.remote import RemoteUsbDevice
+from vibench.virtual_rig.usb.bus import RemoteUsbDevice
 
 SHIPPED = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")
 RIG = SHIPPED.model_copy(

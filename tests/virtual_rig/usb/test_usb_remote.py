@@ -12,7 +12,7 @@ import pytest
 
 from vibench.acquisition import InstrumentLost
 from vibench.virtual_rig.generator.afg1022 import AFG1022
-from vibench.virtual_rig.usb.remote import RemoteUsbDevice, usb_service
+from vibench.virtual_rig.usb.bus import RemoteUsbDevice, usb_service
 from vibench.virtual_rig.usb.usbtmc import Setup, UsbTmcInstrument
 
 

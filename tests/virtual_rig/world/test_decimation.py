@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from vibench.virtual_rig.world.decimation import (
+from vibench.virtual_rig.world.conversion import (
     EARLIEST_STEPS,
     GROUP_DELAY_SAMPLES,
     decimator,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.world.input_stage import AC_CUT_HZ, OVER_RANGE, InputStage, clip_v
+from vibench.virtual_rig.world.conversion import AC_CUT_HZ, OVER_RANGE, InputStage, clip_v
 from vibench.virtual_rig.world.sensors import IEPE_BIAS_V
 from vibench.virtual_rig.world.time_grid import USUAL_GRID
 from vibench.virtual_rig.world.wiring import OPEN_INPUT, Behind, Cable, Signal

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.virtual_rig.world.disturbance import PAGE, NoiseStream
+from vibench.virtual_rig.world.sensors import PAGE, NoiseStream
 
 
 @given(st.lists(st.integers(1, 3000), min_size=1, max_size=12), st.integers(0, 3 * PAGE))

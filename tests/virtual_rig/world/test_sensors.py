@@ -7,8 +7,16 @@ import pytest
 
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import load_rig
-from vibench.virtual_rig.world.disturbance import PAGE, Disturbance, NoiseStream, RandomDropouts
-from vibench.virtual_rig.world.sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
+from vibench.virtual_rig.world.sensors import (
+    LONGEST_DELAY_S,
+    PAGE,
+    Accelerometer,
+    Disturbance,
+    NoiseStream,
+    RandomDropouts,
+    Vibrometer,
+    shown,
+)
 from vibench.virtual_rig.world.time_grid import FULL_BAND_HZ, USUAL_GRID
 
 RIG = load_rig(Path(__file__).parents[3] / "hardware_configs" / "virtual_rig.toml")

@@ -12,8 +12,7 @@ from vibench.acquisition.rig import BaseQuantity, RigModel, load_rig, specimen_o
 from vibench.sim import base_transmissibility
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS
 from vibench.virtual_rig.analogue import Coupling, Input
-from vibench.virtual_rig.world.conversion import volts_per_count
-from vibench.virtual_rig.world.decimation import GROUP_DELAY_SAMPLES
+from vibench.virtual_rig.world.conversion import GROUP_DELAY_SAMPLES, volts_per_count
 from vibench.virtual_rig.world.time_grid import USUAL_GRID, relative_clock_ppm
 from vibench.virtual_rig.world.world import World
 

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, closing
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from threading import Event as Alarm
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 from vibench.sim.operating_system.state_folder import shared_folder, state_folder
 from vibench.sim.operating_system.this import is_locked_alone, open_for_all, read_at, write_at
@@ -357,46 +357,3 @@ def _leave(closing: ExitStack, error: BaseException | None) -> None:
         while earlier is not None and earlier is not error:
             error.add_note(f"While leaving the bench: {earlier}")
             earlier = earlier.__context__
-
-
-class RunBench(Protocol):
-    """The open instruments of a rig, as `vibench.acquisition.open_bench` gives them."""
-
-    @property
-    def rig(self) -> Rig:
-        """The configuration that the bench was opened from."""
-
-    @property
-    def generator(self) -> FunctionGenerator:
-        """What plays sines and waveforms."""
-
-    @property
-    def output(self) -> AnalogOutput | None:
-        """What plays signals that never repeat; None where the rig has no analogue output."""
-
-    @property
-    def controller(self) -> RealTimeController | None:
-        """What closes a fast loop; None where the rig has no such controller."""
-
-    @property
-    def digitizer(self) -> Digitizer:
-        """What samples."""
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """What is recorded, in the order of the rows of a block."""
-
-    @property
-    def identities(self) -> Mapping[str, Identity]:
-        """Who answered, by the instrument's part in the bench."""
-
-    @property
-    def confirmations(self) -> KnobSheet:
-        """What the operator confirmed by hand."""
-
-    def idle(self, duration_s: float) -> None:
-        """Wait while nothing is sampled [s], in the rig's own time."""
-
-    @property
-    def last_check(self) -> CheckResult | None:
-        """The check that the bench was admitted on; None when it was waived and there was none."""

@@ -22,13 +22,11 @@ from ._log import (
     CampaignEvent as CampaignEvent,
     CampaignEventKind as CampaignEventKind,
     CampaignListener as CampaignListener,
-    ignore_event as ignore_event,
-)
-from ._notice import (
     CommandMessenger as CommandMessenger,
     MailMessenger as MailMessenger,
     MailSettings as MailSettings,
     Messenger as Messenger,
+    ignore_event as ignore_event,
 )
 from ._opening import (
     make_folder as make_folder,

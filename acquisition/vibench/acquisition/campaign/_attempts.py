@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from time import monotonic
 
-from ..bench.bench import RunBench
+from ..bench.bench import Bench
 from ..errors import AcquisitionError, InstrumentError, RecordingError
 from ..plan import Point, Retryable, RetryPolicy, RunState
 from ..recording import open_recording
@@ -37,7 +37,7 @@ class CoolingPause:
         """Have the next recording wait: something has been played."""
         self._is_due = True
 
-    def wait(self, bench: RunBench, name: str) -> None:
+    def wait(self, bench: Bench, name: str) -> None:
         """Rest before the recording of a point, if it is due; the generator is off between recordings."""
         if not self._is_due or not self._rest_s:
             return
@@ -51,7 +51,7 @@ class CoolingPause:
             left_s -= piece_s
 
 
-Reopen = Callable[[], RunBench]
+Reopen = Callable[[], Bench]
 """Closes a bench that has lost an instrument, and opens it again; raises AcquisitionError."""
 
 LOOK_EVERY_S = 1.0
@@ -63,7 +63,7 @@ class Attempts:
 
     def __init__(
         self,
-        bench: RunBench,
+        bench: Bench,
         journal: Journal,
         policy: RetryPolicy,
         switch: StopSwitch,
@@ -187,7 +187,7 @@ class Attempts:
         if self._switch.request is not None:
             raise failed
 
-    def _reopened(self, reopen: Reopen, lost: AcquisitionError) -> RunBench:
+    def _reopened(self, reopen: Reopen, lost: AcquisitionError) -> Bench:
         began, idled_s = monotonic(), 0.0
         while True:
             try:

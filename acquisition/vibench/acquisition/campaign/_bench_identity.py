@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, Self
 
-from ..bench.bench import RunBench
+from ..bench.bench import Bench
 from ..host.toml_file import FrozenModel
 from ..rig import Rig
 
@@ -26,7 +26,7 @@ class BenchIdentity(FrozenModel):
     """What is set by hand, as it was confirmed; not when, nor by whom."""
 
     @classmethod
-    def of(cls, bench: RunBench) -> Self:
+    def of(cls, bench: Bench) -> Self:
         """Take it from an open bench."""
         instruments = {
             part: Instrument(maker=each.maker, model=each.model, serial=each.serial, firmware=each.firmware)

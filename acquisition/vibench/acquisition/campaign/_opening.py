@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import assert_never
 
-from ..bench.bench import RunBench
+from ..bench.bench import Bench
 from ..errors import CheckFailed, LimitExceeded, RecordingError
 from ..plan import Campaign, Measurement, Point, played_alike, require_within_limits
 from ..recording import RecordingState, SealDepth, part_of, recover, tmp_of
 from ..run.drive import drive_for
 from ..stopping.stop import StopSwitch
-from ._attempt_files import attempts_in, complete_attempt, next_attempt
+from ._attempt_files import KeptRecording, attempts_in, complete_attempt, looked_at, next_attempt
 from ._bench_identity import BenchIdentity, differences
 from ._journal import (
     ChangedBench,
@@ -27,7 +27,6 @@ from ._journal import (
     journal_path,
     read_journal,
 )
-from ._kept_recording import KeptRecording, looked_at
 
 PROGRAM_ENDED = "its program ended in the middle of it"
 
@@ -143,7 +142,7 @@ class PlannedRecording:
     """It exists already, made by the same plan."""
 
 
-def require_all_within_limits(points: tuple[Point, ...], bench: RunBench) -> None:
+def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
     """Refuse a campaign of which any point passes a limit, or cannot be played; raises LimitExceeded."""
     complaints: dict[str, None] = {}
     for point in played_alike(points):
@@ -182,7 +181,7 @@ def planned_recordings(
 
 
 def opened_journal(
-    bench: RunBench,
+    bench: Bench,
     campaign: Campaign,
     folder: Path,
     existing: ExistingRecordings,

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from ..bench.bench import Bench, RigPower, RunBench, open_bench
+from ..bench.bench import Bench, RigPower, open_bench
 from ..bench.result import CheckResult
 from ..control.fast_loop import require_holdable
 from ..errors import AcquisitionError, CheckFailed, InstrumentLost, RecordingError
@@ -20,8 +20,8 @@ from ..plan import BYTES_PER_SAMPLE, Campaign, Measurement, Point, measured_s, r
 from ..recording import open_recording, sole_use
 from ..rig import Confirm, KnobSheet, Rig, channels_of, load_rig
 from ..run.ending import Progress
+from ..stopping.program import stop_on_signal
 from ..stopping.stop import StopSwitch
-from ..stopping.stop_on_signal import stop_on_signal
 from ._attempts import Attempts, CoolingPause, Reopen
 from ._journal import (
     After,
@@ -48,10 +48,11 @@ from ._log import (
     CampaignEventKind,
     CampaignListener,
     CampaignLog,
+    Messenger,
+    Notifier,
     StatusLine,
     ignore_event,
 )
-from ._notice import Messenger, Notifier
 from ._opening import make_folder, opened_journal, planned_recordings, require_all_within_limits, require_new
 
 
@@ -198,7 +199,7 @@ def _names(measurement: Measurement) -> tuple[str, ...]:
 
 
 def run_campaign(
-    bench: RunBench,
+    bench: Bench,
     campaign: Campaign,
     folder: Path,
     existing: ExistingRecordings | str = ExistingRecordings.REFUSE,

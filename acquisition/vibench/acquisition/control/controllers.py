@@ -8,13 +8,12 @@ from ..plan import Measurement
 from ..rig import Channel, Rig
 from .continuation_controller import follow_branch
 from .control_action import Controller
-from .dwell_controller import hold_dwell
+from .dwell_controller import hold_dwell, hold_sweep
 from .feedback_channels import feedback_channels_of
+from .jump_controller import step_settled
 from .noise_controller import equalise_noise
 from .resonance_controller import track_resonance
-from .settled_controller import step_settled
 from .sine_loop import SineLoop, hold_response
-from .sweep_controller import hold_sweep
 
 CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = MappingProxyType(
     {

@@ -1,5 +1,7 @@
-from ._announcement import (
+from ._client import (
     Announcement as Announcement,
+    Attendant as Attendant,
+    EngineClient as EngineClient,
     announced_engines as announced_engines,
     out_of_reach as out_of_reach,
     programs_to_stop as programs_to_stop,
@@ -7,18 +9,9 @@ from ._announcement import (
     require_ended as require_ended,
     the_engine as the_engine,
 )
-from ._attendant import (
-    Attendant as Attendant,
-)
-from ._client import (
-    EngineClient as EngineClient,
-)
 from ._engine import (
     Engine as Engine,
     JobQueue as JobQueue,
-)
-from ._live_twin import (
-    TwinSwitch as TwinSwitch,
 )
 from ._published_state import (
     SampleSlice as SampleSlice,
@@ -49,6 +42,7 @@ from ._status import (
     RunStatus as RunStatus,
     Supervision as Supervision,
     TwinStatus as TwinStatus,
+    TwinSwitch as TwinSwitch,
 )
 from ._stop_engine import (
     StopDelivery as StopDelivery,

@@ -7,8 +7,8 @@ import sys
 from threading import Event, Thread
 from types import FrameType
 
+from ..stopping.program import heeded_signals, signal_name
 from ..stopping.stop import Cause
-from ..stopping.stop_on_signal import heeded_signals, signal_name
 from ._engine import Engine, JobQueue
 from ._request_handler import RequestHandler
 from ._server import LOOPBACK, serving, spoken

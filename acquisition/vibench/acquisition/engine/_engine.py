@@ -27,11 +27,10 @@ from ..check.admission import check_bench, require_fresh
 from ..errors import AcquisitionError, CheckStopped, InstrumentLost
 from ..plan import Campaign, OnChange
 from ..rig import Confirm, Rig
+from ..stopping.program import stop_on_signal
 from ..stopping.stop import DRIVES_ON, Cause, StopSwitch
-from ..stopping.stop_on_signal import stop_on_signal
-from ._live_twin import TwinProcess, TwinSwitch
 from ._published_state import PublishedState
-from ._status import BenchFacts, ChannelFacts, EngineState, Supervision, TwinStatus
+from ._status import BenchFacts, ChannelFacts, EngineState, Supervision, TwinProcess, TwinStatus, TwinSwitch
 from ._verbs import CampaignRequest
 
 

@@ -18,7 +18,6 @@ from ..run.drive import drive_for
 from ..stopping.program import INTERVAL_S
 from ..stopping.stop import Cause, StopLevel, StopRequest, StopSwitch
 from ._engine import Engine, JobQueue
-from ._live_twin import TwinSwitch
 from ._published_state import SampleSlice
 from ._status import (
     DRIVING,
@@ -29,6 +28,7 @@ from ._status import (
     EngineStatus,
     Supervision,
     TwinStatus,
+    TwinSwitch,
     hung_patience_s,
     patience_s,
 )

@@ -22,8 +22,7 @@ from pydantic import ValidationError
 
 from ..errors import AcquisitionError
 from ..stopping.program import Watchdog
-from ._announcement import EngineAddress, announced
-from ._client import Hello
+from ._client import EngineAddress, Hello, announced
 from ._request_handler import RequestHandler
 from ._status import ConnectionRole
 from ._verbs import DONE, REQUEST, VERBS

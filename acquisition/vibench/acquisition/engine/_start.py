@@ -8,8 +8,7 @@ from time import monotonic
 
 from ..host.beside import ClosedOnLeaving
 from ..host.chosen import chosen
-from ._announcement import Announcement, EngineAddress, announced_engines
-from ._client import EngineClient
+from ._client import Announcement, EngineAddress, EngineClient, announced_engines
 from ._status import ConnectionRole, Supervision
 from ._wire import EngineGone
 

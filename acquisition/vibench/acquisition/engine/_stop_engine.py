@@ -12,8 +12,7 @@ from vibench.stop_files import HEEDED_S, SWITCH_OFF, Fate, fate_of, put_down, st
 from ..host.chosen import chosen
 from ..stopping.program import Program, engines_folder
 from ..stopping.stop import StopLevel
-from ._announcement import Announcement
-from ._client import EngineClient
+from ._client import Announcement, EngineClient
 from ._status import SOUNDING, EngineState
 from ._wire import EngineError, EngineGone, EngineSilent
 

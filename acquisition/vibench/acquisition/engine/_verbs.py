@@ -34,7 +34,6 @@ from ..host.toml_file import FrozenModel, validated
 from ..plan import Campaign
 from ..rig import KnobSheet, Rig
 from ..stopping.stop import StopLevel
-from ._live_twin import TwinSwitch
 from ._published_state import SampleSlice
 from ._status import (
     DRIVING,
@@ -45,6 +44,7 @@ from ._status import (
     EngineStatus,
     Supervision,
     TwinStatus,
+    TwinSwitch,
 )
 from ._wire import Message
 

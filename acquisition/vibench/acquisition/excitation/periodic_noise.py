@@ -8,7 +8,6 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from ..recording import SegmentLabel
-from .band_noise import BandNoise
 from .multisine import (
     FEWEST_POINTS,
     MOST_POINTS,
@@ -19,7 +18,38 @@ from .multisine import (
     require_far_image,
     require_lines,
 )
-from .steps import Segment, Step, Waveform
+from .plan import AbstractExcitation, Family, FrequencyHz
+from .steps import RmsSetting, Segment, Step, Waveform
+
+
+class BandNoise(AbstractExcitation):
+    """Noise between two frequencies."""
+
+    family: ClassVar[Family] = Family.NOISE
+    band_start_hz: FrequencyHz
+    """Lower edge of the band [Hz]."""
+    band_stop_hz: FrequencyHz
+    """Upper edge of the band [Hz]."""
+
+    @model_validator(mode="after")
+    def _band_rises(self) -> Self:
+        if self.band_stop_hz <= self.band_start_hz:
+            raise ValueError(
+                f"band_stop_hz = {self.band_stop_hz:g} is not above band_start_hz = {self.band_start_hz:g}; "
+                "give the band from low to high"
+            )
+        return self
+
+    def level_at(self, frequency_hz: float) -> RmsSetting:
+        """Give the setting of the whole band."""
+        del frequency_hz
+        return RmsSetting()
+
+    @property
+    def band_hz(self) -> tuple[float, float]:
+        """The edges of the band [Hz]."""
+        return self.band_start_hz, self.band_stop_hz
+
 
 MOST_REALISATIONS = 1000
 """Of one measurement: all their waveforms, of 8 bytes a point, are of one level and made together."""

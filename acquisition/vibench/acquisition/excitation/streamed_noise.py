@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from ..recording import SegmentLabel
-from .band_noise import BandNoise
+from .periodic_noise import BandNoise
 from .steps import Samples, Segment, Step, Stream
 
 CREST_FACTOR = 4.5

@@ -28,8 +28,7 @@ from ..excitation.kinds import (
     rows_by_kind,
 )
 from ..excitation.odd_multisine import OddMultisine
-from ..excitation.plan import AbstractExcitation, Family, LeadIn
-from ..excitation.preview import SignalPreview
+from ..excitation.plan import AbstractExcitation, Family, LeadIn, SignalPreview
 from ..excitation.resonance_tracking import ResonanceTracking
 from ..excitation.settled_sine import SettledSine
 from ..excitation.sine_sweep import Hold, SineSweep
@@ -57,7 +56,6 @@ from ._loop_time import (
     look_s,
     loop_time_s,
 )
-from ._measurement import FEWEST_STAIRS, InRunLimits, Measurement, OnChange, OnOverload, Point
 from ._measurement_preview import (
     MeasurementPreview,
     preview_measurement,
@@ -66,9 +64,15 @@ from ._schedule import (
     CHECK_FREQUENCY_HZ,
     CHECK_QUIET_S,
     CHECK_S,
+    FEWEST_STAIRS,
     HUSH_S,
     DriveSource,
+    InRunLimits,
+    Measurement,
+    OnChange,
+    OnOverload,
     Phase,
+    Point,
     RunState,
     drive_source_of,
     duration_s,

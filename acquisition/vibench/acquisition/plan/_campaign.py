@@ -14,8 +14,7 @@ from pydantic import Field, NonNegativeFloat, PositiveInt, model_validator
 from ..excitation.kinds import EXCITATION_KINDS, present_word
 from ..host.shipped import named
 from ..host.toml_file import FrozenModel, load_toml
-from ._measurement import Measurement, Name, Point
-from ._schedule import measured_s
+from ._schedule import Measurement, Name, Point, measured_s
 from ._sweep import Sweep
 
 

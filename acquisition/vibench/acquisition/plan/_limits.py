@@ -28,7 +28,6 @@ from ..rig import (
     suspended_mass_kg,
 )
 from ._loads import Loads, needed_vpp, predicted_loads
-from ._measurement import Measurement, OnOverload
 from ._schedule import (
     CHECK_FRACTION,
     CHECK_FREQUENCY_HZ,
@@ -37,6 +36,8 @@ from ._schedule import (
     CHECK_QUIET_S,
     CHECK_SETTLE_S,
     DriveSource,
+    Measurement,
+    OnOverload,
     Phase,
     RunState,
     drive_source_of,

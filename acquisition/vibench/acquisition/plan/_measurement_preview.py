@@ -7,14 +7,13 @@ import numpy as np
 from vibench.sim.branches import least_growth_time_s
 
 from ..excitation.kinds import EXCITATION_KINDS
-from ..excitation.preview import SignalPreview
+from ..excitation.plan import SignalPreview
 from ..excitation.steps import Samples
 from ..rig import Rig
 from ._campaign import BYTES_PER_SAMPLE
 from ._limits import LimitCheck, limit_checks
 from ._loop_time import loop_time_s
-from ._measurement import Measurement
-from ._schedule import DriveSource, drive_source_of, duration_s
+from ._schedule import DriveSource, Measurement, drive_source_of, duration_s
 
 MOST_SAMPLES = 1_000_000
 """Of the signal that is shown: a long sweep is sampled less often than it will be played."""

@@ -14,7 +14,7 @@ from ..excitation.kinds import Excitation
 from ..excitation.plan import LeadIn
 from ..excitation.steps import Direction
 from ..host.toml_file import FrozenModel, complaints
-from ._measurement import Measurement, Name, Point
+from ._schedule import Measurement, Name, Point
 
 MOST_VALUES = 10_000
 """On one axis."""

@@ -21,7 +21,7 @@ from ._disk import is_being_recorded
 from ._header import ChannelHeader, require_different
 from ._layout import Origin, RecordingState, json_text, read_attributes
 from ._overview import CountOverview, read_overview
-from ._replacing import replace_with_change
+from ._preallocate import replace_with_change
 from ._results import ResultArray, SavedResult, Setting, read_results, result_groups, write_result
 from ._seal import (
     ChannelStates,

@@ -3,41 +3,20 @@
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
-from pathlib import Path
-from typing import Protocol
 
 from ..errors import LimitExceeded
 from ..excitation.steps import Segment
 from ..instruments import Block, Digitizer, read_block
-from ..recording import EventKind, RecordingState
+from ..recording import EventKind, RecordingWriter
 
 BLOCK_S = 0.1
 """Longest time between two checks of the limits and of the switch [s]; ten reads a second suit NI-DAQmx."""
 
 
-class SampleSink(Protocol):
-    """Where a run puts its samples; `recording.writer.RecordingWriter` is one."""
-
-    def append(self, block: Block) -> None:
-        """Hand over the next samples."""
-
-    def log(self, kind: str, text: str, sample: int | None = None) -> None:
-        """Note an event."""
-
-    def begin_segment(self, label: str, **numbers: int | float | str) -> None:
-        """Begin a named range at the next sample."""
-
-    def end_segment(self) -> None:
-        """End the open segment with the last sample handed over."""
-
-    def finish(self, state: RecordingState, reason: str = "") -> Path:
-        """End the recording, and return the finished file."""
-
-
 class AcquisitionLoop:
     """The recording as it runs. Its clock is the number of samples read: to wait is to read."""
 
-    def __init__(self, digitizer: Digitizer, sink: SampleSink, advance: Callable[[], None]) -> None:
+    def __init__(self, digitizer: Digitizer, sink: RecordingWriter, advance: Callable[[], None]) -> None:
         """``advance`` is called after every block."""
         self._advance = advance
         self._digitizer = digitizer

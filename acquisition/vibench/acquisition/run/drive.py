@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Protocol
 
-from ..bench.bench import RunBench
+from ..bench.bench import Bench
 from ..errors import ConfigurationError, LimitExceeded
 from ..excitation.steps import LoopTone, Play, Tone
 from ..instruments import LoopBlock, LoopProgram, LoopState, RealTimeController
@@ -171,7 +171,7 @@ class Drive(Protocol):
         """Be silent as soon as it goes without a step, and at once when that fails. Legal at any time."""
 
 
-def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
+def drive_for(bench: Bench, measurement: Measurement) -> Drive:
     """Choose what plays a measurement.
 
     Raises ConfigurationError when the bench has none.
@@ -188,7 +188,7 @@ def drive_for(bench: RunBench, measurement: Measurement) -> Drive:
             return GeneratorDrive(bench.generator, measurement, _dead_man(bench, measurement))
 
 
-def _dead_man(bench: RunBench, measurement: Measurement) -> DeadMan | None:
+def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
     """Give the dead man that the configuration asks for; raises ConfigurationError where it cannot be."""
     longest_s = bench.rig.generator.dead_man_s
     if longest_s is None:

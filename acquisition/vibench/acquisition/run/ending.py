@@ -8,9 +8,8 @@ from ..errors import AcquisitionError, DataLost, DriveLate, InstrumentError, Lim
 from ..excitation.steps import Segment
 from ..instruments import Block, Digitizer
 from ..plan import RunState
-from ..recording import RecordingState
+from ..recording import RecordingState, RecordingWriter
 from ..stopping.stop import Cause
-from .acquisition_loop import SampleSink
 from .silence_watch import DriveGuard
 
 
@@ -73,7 +72,7 @@ class Ending:
         """Tell how it ended."""
         return Outcome(self.state, self.reason, path, self._cause)
 
-    def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: SampleSink) -> None:
+    def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: RecordingWriter) -> None:
         """Silence, end sampling, finish the recording: each of them, whatever the others do."""
         with ExitStack() as leaving:
             leaving.callback(self._finish, sink)
@@ -96,7 +95,7 @@ class Ending:
             if not has_failed_already:  # else the first failure is the cause, and must stay in front
                 raise
 
-    def _finish(self, sink: SampleSink) -> None:
+    def _finish(self, sink: RecordingWriter) -> None:
         try:
             sink.finish(_RECORDED_AS[self.state], self.reason)
         except AcquisitionError as failure:

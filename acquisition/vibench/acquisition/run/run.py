@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
-from ..bench.bench import RunBench
+from ..bench.bench import Bench
 from ..control.control_action import Controller, phase_samples
 from ..control.controllers import CONTROLLERS, feedback_controller
 from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded, RunStalled
@@ -31,17 +31,16 @@ from ..plan import (
     run_check_vpp,
     shortest_ramp_s,
 )
-from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, create_recording
+from ..recording import ChannelHeader, EventKind, Origin, RecordingHeader, RecordingWriter, create_recording
 from ..rig import Channel, KnobSheet
+from ..stopping.program import stop_on_signal
 from ..stopping.stop import LEVELS, MEMORY_RESERVE, Cause, StopLevel, StopRequest, StopSwitch
-from ..stopping.stop_on_signal import stop_on_signal
-from .acquisition_loop import AcquisitionLoop, SampleSink
+from .acquisition_loop import AcquisitionLoop
 from .drive import Drive, drive_for
 from .ending import Ending, Outcome, Progress
 from .limit_monitor import LimitMonitor
-from .low_level_check import LowLevelCheck, judged, require_checkable
 from .phase_runner import GlideWatch, PhaseRunner, Stopped
-from .silence_watch import DriveGuard, SilenceWatch
+from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, judged, require_checkable
 
 ROOM = 1.25
 """A step of a glide must be longer than a setting takes by this factor: not all take the same time."""
@@ -84,7 +83,7 @@ def _rounded_up(step_s: float) -> float:
     return -(-step_s // 0.01) * 0.01
 
 
-def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None] | None:
+def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] | None:
     """Give the feedback controller of a measurement; None for one whose course is known.
 
     Raises ConfigurationError when the bench cannot do it: before anything plays.
@@ -99,7 +98,7 @@ def controller_for(bench: RunBench, measurement: Measurement) -> Controller[None
     return feedback_controller(measurement, bench.rig, bench.channels, bench.digitizer.sample_rate_hz)
 
 
-def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> RecordingHeader:
+def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> RecordingHeader:
     """Describe the recording of ``planned_s`` that a run of ``measurement`` on ``bench`` is going to make."""
     rig = bench.rig
     steps = bench.digitizer.volts_per_count
@@ -118,7 +117,7 @@ def run_header(bench: RunBench, measurement: Measurement, planned_s: float) -> R
     )
 
 
-def _origin(bench: RunBench) -> Origin:
+def _origin(bench: Bench) -> Origin:
     """Say where samples come from: simulated where the rig is, or an instrument knows that its own are."""
     told = {identity.origin for identity in bench.identities.values()}
     simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in told
@@ -151,7 +150,7 @@ def _confirmations(sheet: KnobSheet) -> dict[str, str]:
     return {"operator": sheet.operator, "confirmed": sheet.confirmed.isoformat(), **knobs}
 
 
-CreateRecording = Callable[[Path, RecordingHeader], SampleSink]
+CreateRecording = Callable[[Path, RecordingHeader], RecordingWriter]
 
 
 class Run(ClosedOnLeaving):
@@ -174,7 +173,7 @@ class Run(ClosedOnLeaving):
 
     def __init__(
         self,
-        bench: RunBench,
+        bench: Bench,
         measurement: Measurement,
         path: Path,
         bench_check: LowLevelCheck = LowLevelCheck.AT_LOW_LEVEL,
@@ -281,7 +280,7 @@ class Run(ClosedOnLeaving):
             deque(self._ramped_down_early(runner, LEVELS[Cause.PROGRAM]), maxlen=0)
             raise
 
-    def _admitted(self) -> SampleSink:
+    def _admitted(self) -> RecordingWriter:
         """Refuse what can be refused before anything moves; then begin the recording."""
         self._state = RunState.CHECKING
         try:
@@ -387,7 +386,7 @@ def ignore_progress(progress: Progress) -> None:
 
 
 def run_measurement(
-    bench: RunBench,
+    bench: Bench,
     measurement: Measurement,
     path: Path,
     bench_check: LowLevelCheck | str = LowLevelCheck.AT_LOW_LEVEL,

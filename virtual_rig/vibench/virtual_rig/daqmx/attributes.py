@@ -23,14 +23,13 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 
 from ..analogue import Coupling
-from .acquisition import Acquisition
+from .acquisition import Acquisition, check_memory
+from .calls import DaqmxSystem
 from .channels import OutputChannel
 from .data_calls import asked_available, default_samples, newest
 from .devices import AnalogInputs, AnalogOutputs, Device, Idle, Overloads
 from .errors import DaqmxRefusal, member, unsupported_value
-from .system import DaqmxSystem
 from .tasks import Task, TaskState
-from .timing import check_memory
 
 DRIVER_VERSION = (24, 8, 0)
 """Major, minor, update. From 24.5 on the client asks the driver how many samples "all" are."""

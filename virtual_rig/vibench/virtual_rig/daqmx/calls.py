@@ -4,13 +4,16 @@ Their names are those of NI's protocol file (`nidaqmx.proto`); the function of t
 it stands in the NI-DAQmx C reference.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import grpc
+from nidaqmx._stubs import nidaqmx_pb2
 from nidaqmx.constants import (
     AcquisitionType,
     Edge,
+    EveryNSamplesEventType,
     LoggingMode,
     LoggingOperation,
     SampleTimingType,
@@ -21,11 +24,108 @@ from nidaqmx.constants import (
 from nidaqmx.error_codes import DAQmxErrors
 from session_pb2 import Session, SessionInitializationBehavior
 
-from .channels import InputChannel, OutputChannel, assigned_names
+from .acquisition import Acquisition, LogSettings, Overflow, ReferenceTrigger
+from .channels import InputChannel, OutputChannel, assigned_names, expand
+from .devices import Device
 from .errors import DaqmxRefusal, member, sentence, unsupported_value
-from .system import DaqmxSystem
+from .generation import Generation
+from .rig import Rig
 from .tasks import Task
-from .timing import LogSettings, ReferenceTrigger
+
+
+class DaqmxSystem:
+    """Everything one driver knows; used with the rig's lock held."""
+
+    def __init__(self, rig: Rig) -> None:
+        """Begin without tasks."""
+        self.rig = rig
+        self.catalogue = rig.catalogue
+        self.tasks: dict[str, Task] = {}
+        self._unnamed = 0
+
+    # --- tasks ---------------------------------------------------------------------------
+
+    def create_task(self, name: str) -> Task:
+        """Create a task; an empty name is replaced by a free one (-200089 for a name in use)."""
+        if not name:
+            name = f"_unnamedTask<{self._unnamed}>"
+            self._unnamed += 1
+        if name in self.tasks:
+            raise DaqmxRefusal(DAQmxErrors.DUPLICATE_TASK, f"Task Name: {name}")
+        task = Task(name, self.rig)
+        self.tasks[name] = task
+        return task
+
+    def task(self, name: str) -> Task:
+        """Find a task by name (-200088 if there is none)."""
+        if name not in self.tasks:
+            raise DaqmxRefusal(DAQmxErrors.INVALID_TASK, f"Task Name: {name}")
+        return self.tasks[name]
+
+    def clear_task(self, name: str) -> None:
+        """End a task and forget it."""
+        self.task(name).abort()
+        del self.tasks[name]
+        self.rig.changed.notify_all()
+
+    def reset(self) -> None:
+        """Clear every task, also those whose client is gone."""
+        for name in tuple(self.tasks):
+            self.clear_task(name)
+
+    # --- devices -------------------------------------------------------------------------
+
+    def device(self, name: str) -> Device:
+        """Find a device by its name, or by that of anything on it (-200220 if there is none)."""
+        device = self.catalogue.find(name.strip("/").partition("/")[0])
+        if device is None:
+            known = ", ".join(known.name for known in self.catalogue.devices)
+            raise DaqmxRefusal(DAQmxErrors.INVALID_DEVICE_ID, f"Device Specified: {name}\nDevices: {known}")
+        return device
+
+    def reset_device(self, name: str) -> None:
+        """Abort every task on a device, and on the modules in it."""
+        device = self.device(name)
+        touched = {device.name, *device.modules}
+        for task in self.tasks.values():
+            if any(used.name in touched for used in task.devices):
+                task.abort()
+
+    def inputs(self, names: str) -> tuple[str, ...]:
+        """Return the physical inputs in a list of names and ranges."""
+        return self._of_side(names, lambda device: device.input_names)
+
+    def outputs(self, names: str) -> tuple[str, ...]:
+        """Return the physical outputs in a list of names and ranges."""
+        return self._of_side(names, lambda device: device.output_names)
+
+    def _of_side(self, names: str, side: Callable[[Device], tuple[str, ...]]) -> tuple[str, ...]:
+        """Spell channels as their devices do (-200220, -200170, -200096 for those that do not exist)."""
+        found = []
+        for name in _with_devices(expand(names)):
+            device = self.device(name)
+            known = {each.lower(): each for each in (*device.input_names, *device.output_names)}
+            if name.lower() not in known:
+                detail = f"Physical Channel: {name}\nPhysical Channels: {', '.join(known.values()) or 'none'}"
+                raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, detail)
+            if known[name.lower()] not in side(device):
+                raise DaqmxRefusal(DAQmxErrors.INVALID_PHYS_CHAN_TYPE, f"Physical Channel: {name}")
+            found.append(known[name.lower()])
+        if not found:
+            raise DaqmxRefusal(DAQmxErrors.PHYSICAL_CHAN_DOES_NOT_EXIST, "No physical channel was given.")
+        return tuple(found)
+
+
+def _with_devices(names: Iterable[str]) -> Iterable[str]:
+    """In ``"Dev1/ai0, ai2"`` the second channel lies on the first one's device."""
+    device = ""
+    for name in names:
+        if "/" in name.strip("/"):
+            device = name.rpartition("/")[0]
+            yield name
+        else:
+            yield f"{device}/{name}" if device else name
+
 
 Fields = Mapping[str, object]
 """The fields of a response; status 0 is left out."""
@@ -184,3 +284,93 @@ CALLS: Mapping[str, Call] = {
 }
 """The calls by their names in the protocol; those that move samples stand in `_data_calls`."""
 # fmt: on
+
+
+Listener = Iterator[Any]
+Stream = Acquisition | Generation
+_FOR_EVER = -1.0
+_BY_OTHERS = float("inf")
+"""Rig time of something that other calls must bring about."""
+
+
+def every_n_samples(system: DaqmxSystem, request: Any, context: grpc.ServicerContext) -> Listener:
+    """Answer again and again, every ``n_samples`` of a task, until the client or the task ends it.
+
+    A listener waits for rig time like a reader does: on demand, it is the listener who lets time pass,
+    and it goes on when the samples announced have been read.
+    """
+    kind = member(
+        EveryNSamplesEventType, pick(request, "every_n_samples_event_type"), "every N samples event"
+    )
+    task = task_of(system, request)
+    if request.n_samples < 1:
+        raise DaqmxRefusal(DAQmxErrors.EVERY_N_SAMPS_EVENT_INTERVAL_ZERO_NOT_SUPPORTED)
+    is_input = kind is EveryNSamplesEventType.ACQUIRED_INTO_BUFFER
+    if is_input and task.outputs:
+        raise DaqmxRefusal(DAQmxErrors.EVERY_N_SAMPS_ACQ_INTO_BUFFER_NOT_FOR_OUTPUT)
+    if not is_input and task.inputs:
+        raise DaqmxRefusal(DAQmxErrors.EVERY_N_SAMPS_TRANSFERRED_FROM_BUFFER_NOT_FOR_INPUT)
+    response = nidaqmx_pb2.RegisterEveryNSamplesEventResponse(
+        every_n_samples_event_type_raw=kind.value, n_samples=request.n_samples
+    )
+    return _repeat(system, task, response, context)
+
+
+def _repeat(system: DaqmxSystem, task: Task, response: Any, context: grpc.ServicerContext) -> Listener:
+    """Run on a thread of its own, and take the rig's lock only while looking."""
+    subscription = _Subscription(system, task, context)
+    while stream := subscription.await_run():
+        count = response.n_samples
+        while subscription.await_count(stream, count, count - response.n_samples):
+            yield response
+            count += response.n_samples
+
+
+class _Subscription:
+    """One listener's view of one task: which run it has followed, and whether its client is still there."""
+
+    def __init__(self, system: DaqmxSystem, task: Task, context: grpc.ServicerContext) -> None:
+        self._system = system
+        self._rig = system.rig
+        self._task = task
+        self._context = context
+        self._followed: Stream | None = None
+        context.add_callback(self._wake)
+
+    def _wake(self) -> None:
+        with self._rig.changed:
+            self._rig.changed.notify_all()
+
+    @property
+    def _has_gone(self) -> bool:
+        return not self._context.is_active() or self._system.tasks.get(self._task.name) is not self._task
+
+    def _wait(self, until_s: float, is_there: Callable[[], bool]) -> None:
+        self._rig.pace.ask(self._rig, until_s, lambda: is_there() or self._has_gone, _FOR_EVER)
+
+    def await_run(self) -> Stream | None:
+        """Wait for a run not followed yet; None when there is nobody to tell any more."""
+        with self._rig.changed:
+            self._wait(_BY_OTHERS, lambda: self._task.stream not in (None, self._followed))
+            self._followed = None if self._has_gone else self._task.stream
+            return self._followed
+
+    def await_count(self, stream: Stream, count: int, announced: int) -> bool:
+        """Wait until ``count`` samples have passed; False when this run will not get there.
+
+        Where nothing is lost nobody is hurried either: the next samples come when those announced are read.
+        """
+        with self._rig.changed:
+            if self._rig.pace.overflow is Overflow.GROW:
+                self._wait(_BY_OTHERS, lambda: stream.used >= announced or self._is_over(stream))
+            self._wait(
+                stream.listened_until_s(count), lambda: stream.passed >= count or self._is_over(stream)
+            )
+            return stream.passed >= count and not self._has_gone
+
+    def _is_over(self, stream: Stream) -> bool:
+        return stream.is_done or self._task.stream is not stream
+
+
+EVENTS = {"RegisterEveryNSamplesEvent": every_n_samples}
+"""The calls that answer with a stream, by their names in the protocol."""

@@ -12,13 +12,11 @@ from nidaqmx.constants import AcquisitionType, FillMode, SampleTimingType, Wavef
 from nidaqmx.error_codes import DAQmxErrors
 from numpy.typing import NDArray
 
-from .acquisition import Acquisition
-from .calls import Call, Fields, pick, task_of
+from .acquisition import Acquisition, StartsItself, check_memory
+from .calls import Call, DaqmxSystem, Fields, pick, task_of
 from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation
-from .system import DaqmxSystem
 from .tasks import Task
-from .timing import StartsItself, check_memory
 
 READ_ALL = -1
 

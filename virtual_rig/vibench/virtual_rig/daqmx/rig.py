@@ -10,11 +10,10 @@ from nidaqmx.error_codes import DAQmxErrors
 from vibench.acquisition import AcquisitionError
 
 from ..analogue import AnalogueWorld
-from .acquisition import Acquisition
+from .acquisition import Acquisition, Overflow
 from .devices import Catalogue
 from .errors import DaqmxRefusal
 from .generation import Generation
-from .timing import Overflow
 
 QUESTION_S = 0.1
 """Rig time that a question about progress takes when nothing else lets time pass [s].

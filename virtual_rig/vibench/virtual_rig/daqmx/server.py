@@ -18,13 +18,11 @@ from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
 
 from ..analogue import AnalogueWorld
 from .attributes import SERVICE, attribute_calls
-from .calls import CALLS, Fields
+from .calls import CALLS, EVENTS, DaqmxSystem, Fields, Listener
 from .data_calls import DATA_CALLS
 from .devices import Catalogue
 from .errors import DaqmxRefusal, Faults, Unavailable
-from .events import EVENTS, Listener
 from .rig import OnDemandPace, Pace, Rig
-from .system import DaqmxSystem
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "localhost", "[::1]"})
 

@@ -13,13 +13,12 @@ from numpy.typing import NDArray
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 
-from .acquisition import Acquisition
+from .acquisition import Acquisition, InputSettings, LogSettings, OutputSettings, Timing, check_memory
 from .channels import Channel, InputChannel, OutputChannel, expand
 from .devices import AnalogInputs, AnalogOutputs, Conversion, Device, Untimed
 from .errors import DaqmxRefusal, unsupported_value
 from .generation import Generation, OutputBuffer
 from .rig import Rig
-from .timing import InputSettings, LogSettings, OutputSettings, Timing, check_memory
 
 
 class TdmsLog:

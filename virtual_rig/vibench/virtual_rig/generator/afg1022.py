@@ -24,12 +24,13 @@ from .afg1022_settings import (
     highest_frequency_hz,
     standard_shape,
 )
-from .arbitrary_memory import EDIT_MEMORY, ArbitraryMemory, big_endian, memory_name
 from .channel_output import ChannelOutput, Panel, shape_of
-from .scpi_command import (
+from .scpi_instrument import (
     CHANNELS,
     Command,
     Parameters,
+    Quirks,
+    ScpiInstrument,
     action,
     choice,
     exactly,
@@ -39,23 +40,27 @@ from .scpi_command import (
     report,
     switch,
 )
-from .scpi_instrument import Quirks, ScpiInstrument
 from .scpi_message import (
     AMPLITUDE_UNITS,
+    EDIT_MEMORY,
     FREQUENCY_UNITS,
     NO_UNITS,
     PERCENT_UNITS,
     RESISTANCE_UNITS,
     VOLTAGE_UNITS,
+    ArbitraryMemory,
+    ErrorCode,
+    ScpiError,
     as_block,
     as_number,
+    big_endian,
     block,
     boolean,
     integer,
+    memory_name,
     number_and_unit,
     text,
 )
-from .scpi_status import ErrorCode, ScpiError
 from .terminal_voltage import Relay, Terminal
 
 DEFAULT_SERIAL = "C010101"

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum
 
 from .phase_course import Spacing
-from .scpi_header import mnemonic_matches, short_form
-from .scpi_status import ErrorCode, ScpiError
+from .scpi_message import ErrorCode, ScpiError, mnemonic_matches, short_form
 from .terminal_voltage import OUTPUT_RESISTANCE_OHM, Relay
 
 LOWEST_FREQUENCY_HZ = 1e-6

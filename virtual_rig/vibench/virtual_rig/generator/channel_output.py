@@ -19,10 +19,21 @@ from .afg1022_settings import (
     RunMode,
     SweepTrigger,
 )
-from .arbitrary_memory import ArbitraryMemory
-from .periodic_shape import Flat, PeriodicShape, Rectangle, Sine, Table, Triangle
 from .phase_course import UHZ_PER_HZ, PhaseCourse, Spacing, SteadyPhase, SweptPhase, TriggeredSweepPhase
-from .terminal_voltage import Burst, Relay, Signal, Terminal, Timeline
+from .scpi_message import ArbitraryMemory
+from .terminal_voltage import (
+    Burst,
+    Flat,
+    PeriodicShape,
+    Rectangle,
+    Relay,
+    Signal,
+    Sine,
+    Table,
+    Terminal,
+    Timeline,
+    Triangle,
+)
 
 _DEGREES = 360.0
 _PERCENT = 100.0

@@ -12,12 +12,21 @@ from numpy.typing import NDArray
 
 from .afg1022 import AFG1022, SHARED_COMMANDS, burst_cycles, load_command, modulation_switch, with_mode
 from .afg1022_settings import SINE, BurstMode, ChannelSettings, OwnSweep, RunMode, SweepTrigger
-from .arbitrary_memory import EDIT_MEMORY, ArbitraryMemory, Codes
 from .phase_course import Spacing
-from .scpi_command import Command, Parameters, choice, none, only, switch
-from .scpi_instrument import Quirks
-from .scpi_message import NO_UNITS, as_number, block, integer, number, text
-from .scpi_status import ErrorCode, ScpiError
+from .scpi_instrument import Command, Parameters, Quirks, choice, none, only, switch
+from .scpi_message import (
+    EDIT_MEMORY,
+    NO_UNITS,
+    ArbitraryMemory,
+    Codes,
+    ErrorCode,
+    ScpiError,
+    as_number,
+    block,
+    integer,
+    number,
+    text,
+)
 
 TOP_CODE = 65_534
 """Codes -32767 to 32767, counted from zero."""

@@ -2,12 +2,174 @@
 
 import math
 import re
+from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
+from enum import IntEnum, IntFlag
 
-from .scpi_header import mnemonic_matches
-from .scpi_status import ErrorCode, ScpiError
+import numpy as np
+from numpy.typing import NDArray
+
+QUEUE_LENGTH = 20
+"""Errors kept before the last one becomes "Queue overflow" (the depth is assumed, SCPI asks for >= 2)."""
+
+
+class ErrorCode(IntEnum):
+    """SCPI-1999 error numbers (volume 2, chapter 21.8) that the instrument uses."""
+
+    NO_ERROR = 0
+    SYNTAX_ERROR = -102
+    DATA_TYPE_ERROR = -104
+    PARAMETER_NOT_ALLOWED = -108
+    MISSING_PARAMETER = -109
+    UNDEFINED_HEADER = -113
+    HEADER_SUFFIX_OUT_OF_RANGE = -114
+    EXPONENT_TOO_LARGE = -123
+    INVALID_SUFFIX = -131
+    INVALID_BLOCK_DATA = -161
+    SETTINGS_CONFLICT = -221
+    DATA_OUT_OF_RANGE = -222
+    ILLEGAL_PARAMETER_VALUE = -224
+    OUT_OF_MEMORY = -225
+    HARDWARE_MISSING = -241
+    QUEUE_OVERFLOW = -350
+    QUERY_INTERRUPTED = -410
+    QUERY_UNTERMINATED = -420
+    QUERY_DEADLOCKED = -430
+
+    @property
+    def text(self) -> str:
+        """The words that SYST:ERR? sends with the number."""
+        words = self.name.replace("_", " ").capitalize()
+        kind, _, problem = words.partition(" ")
+        return f"{kind} {problem.upper()}" if kind == "Query" else words
+
+
+class ScpiError(Exception):
+    """A command was refused; carries the number that goes into the error queue."""
+
+    def __init__(self, code: ErrorCode) -> None:
+        super().__init__(f'{int(code)},"{code.text}"')
+        self.code = code
+
+
+class Event(IntFlag):
+    """Bits of the standard event status register (IEEE 488.2-1992, 11.5.1)."""
+
+    NONE = 0
+    OPERATION_COMPLETE = 1
+    QUERY_ERROR = 4
+    DEVICE_ERROR = 8
+    EXECUTION_ERROR = 16
+    COMMAND_ERROR = 32
+    POWER_ON = 128
+
+
+_EVENT_OF_HUNDRED = {
+    1: Event.COMMAND_ERROR,
+    2: Event.EXECUTION_ERROR,
+    3: Event.DEVICE_ERROR,
+    4: Event.QUERY_ERROR,
+}
+BYTE = 255
+
+
+class Status:
+    """Error queue and registers of one instrument."""
+
+    def __init__(self) -> None:
+        self._errors: deque[ErrorCode] = deque()
+        self._events = Event.POWER_ON
+
+    def report(self, code: ErrorCode) -> None:
+        """Queue an error and set its bit in the event register."""
+        self._events |= _EVENT_OF_HUNDRED[-int(code) // 100]
+        if len(self._errors) < QUEUE_LENGTH:
+            self._errors.append(code)
+        else:
+            self._errors[-1] = ErrorCode.QUEUE_OVERFLOW
+
+    def next_error(self) -> ErrorCode:
+        """Take the oldest error from the queue; NO_ERROR when it is empty."""
+        return self._errors.popleft() if self._errors else ErrorCode.NO_ERROR
+
+    def take_events(self) -> Event:
+        """Read the event register, which clears it."""
+        events, self._events = self._events, Event.NONE
+        return events
+
+    def operation_complete(self) -> None:
+        """Note that everything asked for is done (``*OPC``)."""
+        self._events |= Event.OPERATION_COMPLETE
+
+    def clear(self) -> None:
+        """Empty queue and event register (``*CLS``)."""
+        self._errors.clear()
+        self._events = Event.NONE
+
+
+_NODE = re.compile(r"(?P<short>\*?[A-Z]+)(?P<rest>[a-z]*)(?P<suffix>#?)")
+
+
+@dataclass(frozen=True)
+class HeaderPattern:
+    """A header as manuals print it: capitals are the short form, brackets are optional, # is a number.
+
+    ``[SOURce#:]FREQuency[:FIXed]`` matches ``FREQ``, ``source2:frequency:fix`` and so on. A missing
+    number means 1 (SCPI-1999, volume 1, 6.2.5.2).
+    """
+
+    text: str
+    _expression: re.Pattern[str] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_expression", re.compile(_expression(self.text), re.IGNORECASE))
+
+    def match(self, header: str) -> int | None:
+        """Return the numeric suffix (1 when absent) if the header is this command, else None."""
+        found = self._expression.fullmatch(header)
+        if found is None:
+            return None
+        return int(found.groupdict().get("suffix") or 1)
+
+
+def _expression(pattern: str) -> str:
+    """Translate the manual's notation into a regular expression."""
+    expression = pattern.replace("[", "(?:").replace("]", ")?").replace("*", r"\*")
+    return _NODE.sub(_node_expression, expression)
+
+
+def _node_expression(node: re.Match[str]) -> str:
+    rest = f"(?:{node['rest']})?" if node["rest"] else ""
+    suffix = r"(?P<suffix>\d{1,3})?" if node["suffix"] else ""
+    return f"{node['short']}{rest}{suffix}"
+
+
+@dataclass(frozen=True)
+class HeaderPath:
+    """Where in the command tree the next header of a message counts from (SCPI-1999, volume 1, 6.2.4)."""
+
+    prefix: str = ""
+
+    def resolve(self, header: str) -> tuple[str, "HeaderPath"]:
+        """Return the full header and the path for the unit after it."""
+        if header.startswith("*"):
+            return header, self
+        full = header[1:] if header.startswith(":") else self.prefix + header
+        return full, HeaderPath(full[: full.rfind(":") + 1])
+
+
+def mnemonic_matches(word: str, mnemonic: str) -> bool:
+    """Say whether a word is the long or the short form of a mnemonic such as ``SINusoid``, in any case."""
+    short = "".join(letter for letter in mnemonic if not letter.islower())
+    return word.upper() in (short.upper(), mnemonic.upper())
+
+
+def short_form(mnemonic: str) -> str:
+    """Return the capitals of a mnemonic: what the instrument answers."""
+    return "".join(letter for letter in mnemonic if not letter.islower())
+
 
 SEPARATOR = ord(";")
 COMMA = ord(",")
@@ -246,3 +408,94 @@ def as_number(value: float) -> bytes:
     mantissa = "".join(map(str, digits))
     power = exponent + len(mantissa) - 1
     return f"{'-' if sign else ''}{mantissa[0]}.{mantissa[1:] or '0'}E{power:+03d}".encode("ascii")
+
+
+Codes = NDArray[np.uint16]
+
+FEWEST_POINTS = 2
+MOST_POINTS = 8192
+TOP_CODE = 16383
+"""14 bits (Tektronix AFG1000 IVI driver tkafg1k; confirmed by read-back in public drivers)."""
+USER_MEMORIES = 256
+EDIT_MEMORY = "EMEM"
+_MIDDLE_CODE = 8191
+_POWER_ON_POINTS = 1000
+"""Length of the edit memory after power-on (assumed, as in the AFG3000 series)."""
+
+
+class ArbitraryMemory:
+    """Edit memory and user memories; every stored waveform is immutable."""
+
+    def __init__(self, most_points: int = MOST_POINTS, top_code: int = TOP_CODE) -> None:
+        self.top_code = top_code
+        self._most_points = most_points
+        self._waveforms: dict[str, Codes] = {EDIT_MEMORY: _blank(_POWER_ON_POINTS)}
+
+    def codes(self, name: str) -> Codes:
+        """Return the codes of a memory; an empty user memory is refused with -224."""
+        try:
+            return self._waveforms[name]
+        except KeyError:
+            raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE) from None
+
+    def define(self, points: int) -> None:
+        """Make the edit memory ``points`` long and flat."""
+        self._store(EDIT_MEMORY, _blank(self._checked_length(points)))
+
+    def load(self, name: str, data: bytes) -> None:
+        """Fill a memory from big-endian 16-bit codes."""
+        if len(data) % 2:
+            raise ScpiError(ErrorCode.INVALID_BLOCK_DATA)
+        self._checked_length(len(data) // 2)
+        codes = np.frombuffer(data, dtype=">u2").astype(np.uint16)
+        if codes.max() > self.top_code:
+            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+        self._store(name, codes)
+
+    def copy(self, source: str, target: str) -> None:
+        """Copy one memory onto another."""
+        self._waveforms[target] = self.codes(source)
+
+    @property
+    def catalogue(self) -> tuple[str, ...]:
+        """Names of all memories that hold a waveform, the edit memory first."""
+        users = [name for name in self._waveforms if name != EDIT_MEMORY]
+        return (EDIT_MEMORY, *sorted(users, key=lambda name: int(name.removeprefix("USER"))))
+
+    def hold(self, codes: Codes) -> None:
+        """Let the edit memory hold codes of any generator."""
+        self._checked_length(len(codes))
+        self._store(EDIT_MEMORY, codes)
+
+    def _checked_length(self, points: int) -> int:
+        if not FEWEST_POINTS <= points <= self._most_points:
+            raise ScpiError(ErrorCode.DATA_OUT_OF_RANGE)
+        return points
+
+    def _store(self, name: str, codes: Codes) -> None:
+        codes.flags.writeable = False
+        self._waveforms[name] = codes
+
+
+def memory_name(word: str) -> str | None:
+    """Return the canonical name of the memory that a word means, or None if it means none."""
+    upper = word.upper()
+    if upper in ("EMEM", "EMEMORY"):
+        return EDIT_MEMORY
+    number = upper.removeprefix("USER")
+    if upper == "USER":
+        return "USER0"
+    if number != upper and number.isdigit() and int(number) < USER_MEMORIES:
+        return f"USER{int(number)}"
+    return None
+
+
+def big_endian(codes: Codes) -> bytes:
+    """Codes as they travel on the wire."""
+    return codes.astype(">u2").tobytes()
+
+
+def _blank(points: int) -> Codes:
+    codes = np.full(points, _MIDDLE_CODE, dtype=np.uint16)
+    codes.flags.writeable = False
+    return codes

@@ -21,13 +21,11 @@ from ..generator.keysight_33500b import Keysight33500B
 from ..generator.scpi_instrument import Quirks
 from ..generator.scpi_socket import ScpiSocket
 from ..generator.terminal_voltage import Terminal
-from ..usb.bus import plug_in, unplug
-from ..usb.remote import usb_service
+from ..usb.bus import plug_in, unplug, usb_service
 from ..usb.usbtmc import UsbTmcInstrument
 from ..world.time_grid import FULL_BAND_HZ, relative_clock_ppm
 from ..world.world import World, virtual_section
-from .fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, load_fault_script
-from .faults import RigFaults
+from .fault_script import DISK_FAULTS, FaultPlay, FaultScript, PlayedFault, RigFaults, load_fault_script
 
 _USB_RESOURCE_FIELDS = 5
 REFUSED_S = 1.0

@@ -15,8 +15,7 @@ from enum import IntEnum, IntFlag
 from typing import NoReturn, Protocol
 
 from ..generator.scpi_instrument import Reply
-from ..generator.scpi_message import LONGEST_MESSAGE
-from ..generator.scpi_status import BYTE, ErrorCode
+from ..generator.scpi_message import BYTE, LONGEST_MESSAGE, ErrorCode
 
 # What a USB device is to the bus: descriptors, and transfers that succeed or fail like the real ones.
 #

@@ -1,11 +1,8 @@
 """What an analogue output of the converter plays: queued samples, each held until the next one."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from .time_grid import USUAL_GRID, TimeGrid
-
-FloatArray = NDArray[np.float64]
+from .time_grid import USUAL_GRID, FloatArray, TimeGrid
 
 
 class AnalogueOutput:

@@ -5,7 +5,6 @@ from enum import Enum, IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibench.acquisition.rig import Rig, Role
 from vibench.sim.engine.run import native_engine
@@ -13,6 +12,7 @@ from vibench.sim.shaker.loaded_shaker import LoadedShaker, ShakenMotion
 
 from ..controller.virtual_controller import VirtualController
 from .sensors import SensorParts
+from .time_grid import FloatArray
 
 SECOND_DEVICE = "Dev1"
 """The second converter of the virtual system: the same cables end at it, by way of T-pieces."""
@@ -80,9 +80,6 @@ def cables_of(rig: Rig, vibrometer_delay_steps: float) -> dict[str, Cable]:
 
 def _accelerometer(rig: Rig) -> Behind:
     return Behind.IEPE_SENSOR if rig.accelerometer.iepe == "yes" else Behind.VOLTAGE_SOURCE
-
-
-FloatArray = NDArray[np.float64]
 
 
 class _LoopEnd(IntEnum):

@@ -9,7 +9,6 @@ from itertools import count
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
 from vibench.acquisition.rig import (
@@ -26,12 +25,17 @@ from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker, Motio
 from ..analogue import Input
 from ..controller.virtual_controller import VirtualController
 from .analogue_output import AnalogueOutput
-from .conversion import Conversion, converter_input
-from .decimation import history_steps
-from .disturbance import Disturbance, NoiseStream, RandomDropouts
-from .input_stage import InputStage
-from .sensors import LONGEST_DELAY_S, Accelerometer, Vibrometer, shown
-from .time_grid import PPM, USUAL_GRID, TimeGrid
+from .conversion import Conversion, InputStage, converter_input, history_steps
+from .sensors import (
+    LONGEST_DELAY_S,
+    Accelerometer,
+    Disturbance,
+    NoiseStream,
+    RandomDropouts,
+    Vibrometer,
+    shown,
+)
+from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
 from .wiring import OPEN_INPUT, Cable, LoopCables, PlantParts, Signal, amplifier_input, cables_of
 
 
@@ -56,8 +60,6 @@ class EventSchedule:
         """Tell how far the world may be computed towards ``step`` without missing one."""
         return min(step, self._due[0][0]) if self._due else step
 
-
-FloatArray = NDArray[np.float64]
 
 LOWEST_RATE_HZ = 500.0
 """Slowest conversion: its filter looks back a tenth of a second."""
