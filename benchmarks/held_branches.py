@@ -34,9 +34,7 @@ from vibench.acquisition import (
     open_recording,
     run_measurement,
 )
-from vibench.acquisition.control import continuation_controller as _continuation_controller
 from vibench.acquisition.excitation.feedback import BaseLevel
-from vibench.acquisition.plan import BranchContinuation
 from vibench.acquisition.recording import (
     BranchEndNote,
     BranchPointNote,
@@ -54,9 +52,6 @@ from vibench.acquisition.rig import (
 )
 from vibench.analysis.figures.style import MEASURED, SIMULATED, legend_above, new_figure, styled
 from vibench.sim import Specimen
-from vibench.sim.feedback.branch import Begin, branch_multipliers, impact_branch
-from vibench.sim.feedback.law import designed_law
-from vibench.sim.feedback.plant import LoopTiming, SampledPlant
 from vibench.sim.periodic.balance_branch import balance_branch_within
 from vibench.sim.periodic.balance_solver import balance
 from vibench.sim.periodic.branch import Branch
@@ -64,6 +59,11 @@ from vibench.sim.periodic.branch_following import FrequencyPath
 from vibench.sim.periodic.condensation import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
+from vibench_fast_loop import continuation_controller as _continuation_controller
+from vibench_fast_loop.branch_continuation import BranchContinuation
+from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
+from vibench_fast_loop.law import designed_law
+from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 NOISES = (
     "generator_noise_v",
@@ -186,7 +186,7 @@ def compare_stops(points: list[BranchPointNote], specimen: Specimen) -> None:
     """Print how far motions with impacts lie from the model's, and how unstable those are."""
     level_m = STOPS.base_level.displacement_m
     range_hz = STOPS.low_hz - 0.4, STOPS.high_hz
-    branch = impact_branch(specimen, level_m, STOPS.start_hz, range_hz, Begin.ABOVE)
+    branch = impact_branch(specimen, level_m, STOPS.start_hz, range_hz, "above")
     fold = next(each for each in branch.events if each.kind.value == "fold")
     hertz = np.array([each.frequency_hz for each in points])
     turn = int(np.argmax(hertz))

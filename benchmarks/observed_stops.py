@@ -18,11 +18,11 @@ from scipy.linalg import solve_discrete_are
 
 from vibench.acquisition.rig import amplifier_of, load_rig, shaker_of, specimen_of
 from vibench.sim import Harmonic
-from vibench.sim.feedback.branch import Begin, branch_multipliers, impact_branch
-from vibench.sim.feedback.law import LawWeights, designed_law
-from vibench.sim.feedback.plant import LoopTiming, SampledPlant
 from vibench.sim.periodic.period_map import PeriodMap
 from vibench.sim.periodic.restoring_force import spring_of
+from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
+from vibench_fast_loop.law import LawWeights, designed_law
+from vibench_fast_loop.plant import LoopTiming, SampledPlant
 
 SUBSTEPS = 40
 """Of a sample: contacts are shorter."""
@@ -117,7 +117,7 @@ def main() -> None:
     rig = rig.model_copy(update={"specimen": load_rig(Path("virtual_rig")).specimen})
     specimen = specimen_of(rig)
     spring = spring_of(specimen)
-    branch = impact_branch(specimen, LEVEL_M, START_HZ, RANGE_HZ, Begin.ABOVE)
+    branch = impact_branch(specimen, LEVEL_M, START_HZ, RANGE_HZ, "above")
     fold = next(each.index for each in branch.events if each.kind.value == "fold")
     sizes = np.abs(branch.multipliers[:, 0])
     for size in OPEN:

@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from importlib.util import find_spec
 
 import hypothesis
 import pytest
@@ -32,16 +33,22 @@ except ImportError as error:
     QT_MISSING = str(error)
     collect_ignore_glob = ["gui/*"]
 else:
+    collect_ignore_glob = []
     pytest_plugins = ["pytestqt.plugin"]
+HAS_EXTENSIONS = find_spec("vibench_fast_loop") is not None
+if not HAS_EXTENSIONS:
+    collect_ignore_glob.append("extensions/*")
 
 
 def pytest_report_header() -> str:
-    """Say aloud when the window is not tested: a green run must not hide it."""
+    """Say aloud when the window or an extension is not tested: a green run must not hide it."""
+    window = "the window is tested offscreen"
     if QT_MISSING:
-        return (
+        window = (
             f"the window's tests were NOT RUN: Qt cannot be loaded ({QT_MISSING}); docs/gui.md names packages"
         )
-    return "the window is tested offscreen"
+    missing = "; those of extensions were NOT RUN: pip install -e extensions/fast_loop"
+    return window if HAS_EXTENSIONS else window + missing
 
 
 LONG = (
@@ -74,7 +81,7 @@ LONG = (
     "tests/gui/test_job.py",
     "tests/acquisition/control/test_on_virtual_rig.py",
     "tests/acquisition/control/test_feedback_controllers.py",
-    "tests/acquisition/control/test_continuation.py",
+    "tests/extensions/fast_loop/test_continuation.py",
     "tests/acquisition/campaign/test_damaged_recordings.py",
     "tests/acquisition/campaign/test_unattended.py",
     "tests/analysis/frequency_response/test_noise_request.py",

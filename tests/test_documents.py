@@ -20,10 +20,10 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 FOLDERS = (
     "sim|acquisition|virtual_rig|analysis|gui|cli|"
-    "tests|docs|examples|benchmarks|campaigns|studies|hardware_configs"
+    "tests|docs|examples|benchmarks|campaigns|studies|hardware_configs|extensions"
 )
 
-NAME = re.compile(r"(?<![\w./-])vibench(?:\.[A-Za-z_]\w*)+")
+NAME = re.compile(r"(?<![\w./-])vibench(?:_fast_loop)?(?:\.[A-Za-z_]\w*)+")
 PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w.*/-]*\w")
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 CODE = re.compile(r"^```python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
@@ -64,10 +64,10 @@ def text_of(document):
 
 def resolves(dotted):
     """Say whether a dotted name is a module, or something that stands on one, or a group of entry points."""
-    if dotted in {each.value for each in PlugInKind}:
+    name, *rest = dotted.split(".")
+    if dotted in {each.value for each in PlugInKind} or importlib.util.find_spec(name) is None:
         return True
-    module, *rest = None, *dotted.split(".")[1:]
-    name = "vibench"
+    module = None
     while rest:
         try:
             module = importlib.import_module(f"{name}.{rest[0]}")

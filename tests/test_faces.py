@@ -36,7 +36,6 @@ FOR_OUR_PROGRAMS = (
     "vibench.acquisition.control",
     "vibench.acquisition.first_day",
     "vibench.sim.engine",
-    "vibench.sim.feedback",
     "vibench.sim.shaker",
     "vibench.sim.hdf5_files",
     "vibench.sim.operating_system",

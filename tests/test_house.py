@@ -11,14 +11,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 30_110,
-    "analysis": 32_400,
+    "acquisition": 28_650,
+    "analysis": 32_190,
     "cli": 5_470,
+    "extensions": 2_750,
     "gui": 13_140,
     "native": 6_600,
-    "sim": 21_490,
+    "sim": 20_670,
     "studies": 3_220,
-    "virtual_rig": 8_900,
+    "virtual_rig": 8_640,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 

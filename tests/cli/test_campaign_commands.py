@@ -104,6 +104,7 @@ def test_a_command_that_cannot_be_read_is_refused_before_anything_plays(vibench_
 def test_an_estimate_refuses_a_branch_that_the_fast_loop_does_not_hold_with_the_number(
     vibench_here, tmp_path
 ):
+    pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     usual = (HARDWARE_CONFIGS / "virtual_rig_controller.toml").read_text(encoding="utf-8")
     bench = tmp_path / "late.toml"
     bench.write_text(usual.replace("latency_s = 3e-4", "latency_s = 2e-3"), encoding="utf-8")
@@ -114,6 +115,7 @@ def test_an_estimate_refuses_a_branch_that_the_fast_loop_does_not_hold_with_the_
 
 
 def test_an_estimate_says_that_a_bench_lacks_what_a_plan_is_played_with(vibench_here, tmp_path):
+    pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     result = vibench_here(
         "measure", "branch", "--bench", "virtual_rig", "--out", "out", "--estimate", cwd=tmp_path
     )

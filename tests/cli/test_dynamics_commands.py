@@ -55,6 +55,7 @@ def test_what_a_bench_can_hold_is_told_beside_branches():
 
 
 def test_a_bench_with_a_real_time_controller_holds_what_that_one_is_quick_enough_for():
+    pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     result = run(
         "branches", "--frequency", "60:62", "--amplitude", "5e-6", "--places", 2, "--starts", 0,
         "--holdable", shipped("hardware_configs/virtual_rig_controller.toml"), "--json",

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from vibench.acquisition.plan import fast_loop_time_s, loop_time_s
+from vibench.acquisition.plan import loop_time_s
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import (
     Curve,
@@ -130,7 +130,7 @@ def branches(
         if asked.resonance_band_hz is not None:
             lowest_hz = asked.resonance_band_hz[0]
         rig = load_rig(holdable)
-        loop_s = loop_time_s(rig, lowest_hz) if rig.controller is None else fast_loop_time_s(rig.controller)
+        loop_s = loop_time_s(rig, lowest_hz) if rig.controller is None else rig.controller.loop_time_s
         asked = asked.model_copy(update={"loop_time_s": loop_s})
     from vibench.analysis.report import branches_figure
 

@@ -27,16 +27,9 @@ from helic_link import HelicLink, Packet
 from helic_signals import READ, Coefficients, Glide, Played, pd_gains
 
 from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentLost
-from vibench.acquisition.instruments import (
-    Identity,
-    LoopBlock,
-    LoopFacts,
-    LoopInput,
-    LoopProgram,
-    LoopReport,
-    LoopState,
-)
-from vibench.acquisition.rig import ControllerConfig
+from vibench.acquisition.instruments import Identity
+from vibench.acquisition.rig import ControllerConfig, LoopInput
+from vibench_fast_loop.protocol import LoopBlock, LoopFacts, LoopProgram, LoopReport, LoopState
 
 GAINS = ("ctrl_kp", "ctrl_kd", "ctrl_tau_d")
 GATE_OPEN, GATE_TRIPPED = 1, 2

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vibench.acquisition import InstrumentError
-from vibench.acquisition.instruments import LoopBlock, LoopFeedback, LoopProgram
+from vibench_fast_loop.protocol import LoopBlock, LoopFeedback, LoopProgram
 
 Volts = NDArray[np.complex128]
 READ = ("phase", "cmd_epoch", "out", "base", "m0")

@@ -2,7 +2,10 @@
 
 from vibench.acquisition.control.controllers import CONTROLLERS
 from vibench.acquisition.excitation.kinds import EXCITATION_KINDS
+from vibench.acquisition.instruments import PlugInKind, plug_in_names
 
 
 def test_the_kinds_with_feedback_are_those_with_a_controller():
-    assert set(CONTROLLERS) == {word for word, kind in EXCITATION_KINDS.items() if kind.is_feedback}
+    of_packages = plug_in_names(PlugInKind.FEEDBACK)
+    with_feedback = {word for word, kind in EXCITATION_KINDS.items() if kind.is_feedback}
+    assert {*CONTROLLERS, *of_packages} == with_feedback

@@ -70,6 +70,7 @@ def test_what_feedback_can_hold_follows_from_the_rig_s_loop_and_nothing_is_said_
 
 
 def test_of_a_branch_that_a_fast_loop_follows_no_growth_time_is_told_for_it_decides_nothing():
+    pytest.importorskip("vibench_fast_loop", reason="pip install -e extensions/fast_loop brings it")
     fast = load_rig(ROOT / "hardware_configs" / "virtual_rig_controller.toml")
     (branch,) = load_campaign(ROOT / "campaigns" / "branch.toml").measurements
     assert preview_measurement(branch, fast).least_growth_time_s is None

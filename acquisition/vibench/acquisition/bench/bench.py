@@ -3,22 +3,31 @@
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
+from contextlib import AbstractContextManager, ExitStack, closing
 from datetime import UTC, datetime
 from enum import StrEnum
 from getpass import getuser
 from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from threading import Event as Alarm
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from vibench.sim.operating_system.state_folder import shared_folder, state_folder
 from vibench.sim.operating_system.this import is_locked_alone, open_for_all, read_at, write_at
 
 from ..errors import AcquisitionError, InstrumentBusy
 from ..host.chosen import chosen
-from ..instruments import AnalogOutput, Digitizer, FunctionGenerator, Identity, RealTimeController
+from ..instruments import (
+    AnalogOutput,
+    Digitizer,
+    FunctionGenerator,
+    Identity,
+    PlugInKind,
+    RealTimeController,
+    plug_in,
+)
 from ..rig import (
     CalibrationRule,
     Channel,
@@ -29,13 +38,12 @@ from ..rig import (
     check_calibrations,
     confirm_at_terminal,
     confirm_simulated,
-    controller_driver,
     digitizer_driver,
     generator_driver,
     load_rig,
     output_driver,
 )
-from .result import CheckResult, PlayedFault, SimulatedRig, simulated_rig
+from .result import CheckResult
 
 # One program at a bench: locks that vanish with the process that holds them, however that ends.
 #
@@ -129,6 +137,12 @@ def _holder(descriptor: int) -> str:
     return found[0].decode() if found else "unknown"
 
 
+def simulated_rig(rig: Rig) -> AbstractContextManager[Any]:
+    """Load the virtual rig by name: a real bench must not load the simulation, nor depend on it."""
+    made: AbstractContextManager[Any] = import_module("vibench.virtual_rig").VirtualRig(rig)
+    return made
+
+
 class RigPower:
     """Holds the instruments of a rig, in a ``with``: a virtual one is switched on and off, a real one locked.
 
@@ -138,7 +152,7 @@ class RigPower:
 
     def __init__(self, rig: Rig) -> None:
         self.rig = rig
-        self._virtual: SimulatedRig | None = None
+        self._virtual: Any = None
         self._closing = ExitStack()
 
     @property
@@ -159,7 +173,7 @@ class RigPower:
         )
 
     @property
-    def played_faults(self) -> Sequence[PlayedFault]:
+    def played_faults(self) -> Sequence[Any]:
         """What a script has done to the rig so far."""
         return () if self._virtual is None else self._virtual.played_faults
 
@@ -334,7 +348,7 @@ def _output(rig: Rig, digitizer: Digitizer, closing: ExitStack) -> AnalogOutput 
 def _controller(rig: Rig, closing: ExitStack) -> RealTimeController | None:
     if rig.controller is None:
         return None
-    controller = controller_driver(rig.controller).open(rig.controller)
+    controller: RealTimeController = plug_in(PlugInKind.DRIVE, "controller").open(rig.controller)
     closing.callback(controller.close)  # silences it
     return controller
 

@@ -6,7 +6,7 @@ from .. import drivers
 from ..errors import InstrumentError
 from ..instruments import FoundDevice
 from ..rig import Rig
-from .result import simulated_rig
+from .bench import simulated_rig
 
 
 @dataclass(frozen=True)

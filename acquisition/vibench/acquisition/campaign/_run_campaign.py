@@ -11,7 +11,6 @@ from typing import Self
 
 from ..bench.bench import Bench, RigPower, open_bench
 from ..bench.result import CheckResult
-from ..control.fast_loop import require_holdable
 from ..errors import AcquisitionError, CheckFailed, InstrumentLost, RecordingError
 from ..excitation.plan import AbstractFeedback
 from ..host.chosen import chosen
@@ -441,7 +440,7 @@ def estimate_campaign(
     ConfigurationError
         When the rig lacks what a measurement is played with.
     LimitExceeded
-        When its fast loop does not hold the motions that one asks for.
+        When feedback on it does not hold the motions that one asks for.
 
     """
     for each in campaign.measurements:
@@ -449,7 +448,7 @@ def estimate_campaign(
     planned = planned_recordings(campaign, folder, existing)
     missing = [each.measurement for each in planned if not each.is_complete]
     for each in missing:
-        require_holdable(each, rig)
+        each.excitation.require_holdable(rig)
     durations_s = [measured_s(each) for each in missing]
     bytes_per_s = rig.daq.sample_rate_hz * len(channels_of(rig)) * BYTES_PER_SAMPLE
     rest_s = campaign.rest_s * max(0, len(missing) - 1)

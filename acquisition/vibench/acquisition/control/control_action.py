@@ -3,12 +3,12 @@
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from math import sqrt
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 
 from ..excitation.feedback import BaseLevel
-from ..instruments import Block, LoopBlock, Samples
+from ..instruments import Block, Samples
 from ..plan import Phase
 from ..recording import FeedbackNote, Held
 from .steadiness import Phasors
@@ -30,7 +30,7 @@ class PhaseSamples:
     first_sample: int
     volts: Samples
     """Shape (channels, samples) [V]."""
-    coefficients: tuple[LoopBlock, ...] = ()
+    coefficients: tuple[Any, ...] = ()
     """What a real-time controller measured meanwhile."""
 
 

@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
+from ..instruments import PlugInKind, plug_in
 from ..plan import Measurement
 from ..rig import Channel, Rig
-from .continuation_controller import follow_branch
 from .control_action import Controller
 from .dwell_controller import hold_dwell, hold_sweep
 from .feedback_channels import feedback_channels_of
@@ -22,11 +22,10 @@ CONTROLLERS: Mapping[str, Callable[[SineLoop, Any], Controller[None]]] = Mapping
         "held_sweep": hold_sweep,
         "resonance_tracking": track_resonance,
         "held_noise": equalise_noise,
-        "branch_continuation": follow_branch,
         "held_response": hold_response,
     }
 )
-"""Controller of each kind with feedback: of the loop, and of a plan of its kind."""
+"""Controller of each of our kinds with feedback: of the loop, and of a plan of its kind."""
 
 
 def feedback_controller(
@@ -53,8 +52,12 @@ def feedback_controller(
     Raises
     ------
     ConfigurationError
-        When the rig lacks a channel that feedback listens to; before anything is yielded.
+        When the rig lacks a channel that feedback listens to, or no package offers the controller; before
+        anything is yielded.
 
     """
     loop = SineLoop(feedback_channels_of(channels, sample_rate_hz), rig, measurement)
-    return CONTROLLERS[measurement.excitation.kind](loop, measurement.excitation)
+    kind = measurement.excitation.kind
+    control = CONTROLLERS.get(kind) or plug_in(PlugInKind.FEEDBACK, kind)
+    controller: Controller[None] = control(loop, measurement.excitation)
+    return controller

@@ -22,13 +22,12 @@ from ._generator_limits import (
 from ._keysight_33500b import (
     Keysight33500B as Keysight33500B,
 )
-from ._line_controller import (
-    LineController as LineController,
-)
 from ._sound_card import (
     SoundCardDigitizer as SoundCardDigitizer,
     SoundCardOutput as SoundCardOutput,
 )
 from ._visa_link import (
+    Link as Link,
     list_visa_resources as list_visa_resources,
+    open_link as open_link,
 )

@@ -1,14 +1,15 @@
 """All kinds of excitation, told apart by the word ``kind`` in a file."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from inspect import getdoc
 from types import MappingProxyType
-from typing import Annotated, TypeAlias, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, TypeVar, Union, get_args
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
-from .branch_continuation import BranchContinuation
+from ..errors import ConfigurationError
+from ..instruments import PlugInKind, missing_package, plug_in, plug_in_names
 from .dwell import Dwell
 from .held_dwell import HeldDwell
 from .held_noise import HeldNoise
@@ -24,7 +25,7 @@ from .stepped_sine import SteppedSine
 from .streamed_noise import StreamedNoise
 from .white_noise import WhiteNoise
 
-Excitation: TypeAlias = Annotated[
+_Ours: TypeAlias = (
     WhiteNoise
     | StreamedNoise
     | SineSweep
@@ -37,10 +38,54 @@ Excitation: TypeAlias = Annotated[
     | HeldDwell
     | ResonanceTracking
     | HeldNoise
-    | BranchContinuation
-    | HeldResponse,
-    Field(discriminator="kind"),
-]
+    | HeldResponse
+)
+_LACKING: dict[str, str] = {}
+"""Kinds of installed packages that cannot be used, and why."""
+
+
+def _of_packages() -> Iterator[type[AbstractExcitation]]:
+    """Load the kinds that installed packages add; one that cannot be used does not stop the others."""
+    taken = {word for plan in get_args(_Ours) for word in _words(plan)}
+    for name in plug_in_names(PlugInKind.EXCITATION):
+        try:
+            plan = plug_in(PlugInKind.EXCITATION, name)
+        except ConfigurationError as error:
+            _LACKING[name] = str(error)
+            continue
+        is_plan = isinstance(plan, type) and issubclass(plan, AbstractExcitation)
+        if is_plan and name in _words(plan) and taken.isdisjoint(_words(plan)):
+            taken.update(_words(plan))
+            yield plan
+        else:
+            _LACKING[name] = f"{name!r} of vibench.excitations is {plan!r:.80}: no plan with that kind alone"
+
+
+def _words(plan: type[AbstractExcitation]) -> tuple[str, ...]:
+    """Give what a file may give as ``kind``, earlier words too."""
+    kind = plan.model_fields.get("kind")
+    words = () if kind is None else get_args(kind.annotation)
+    return words if kind is not None and kind.default in words else ()
+
+
+def _require_installed(given: Any) -> Any:
+    """Refuse a kind of a package that is missing, or cannot be used, with a sentence that names it."""
+    word = given.get("kind") if isinstance(given, dict) else None
+    if isinstance(word, str) and word not in EXCITATION_KINDS:
+        reason = _LACKING.get(word) or missing_package(word)
+        if reason is not None:
+            raise ValueError(reason)
+    return given
+
+
+if TYPE_CHECKING:
+    Excitation: TypeAlias = _Ours
+else:
+    Excitation = Annotated[
+        Union[(_Ours, *_of_packages())],
+        Field(discriminator="kind"),
+        BeforeValidator(_require_installed),
+    ]
 Row = TypeVar("Row")
 _GROUPS = {Family.STEPPED: "steps"}
 
@@ -85,12 +130,8 @@ class ExcitationKind:
 EXCITATION_KINDS: Mapping[str, ExcitationKind] = MappingProxyType(
     {kind.word: kind for kind in map(ExcitationKind, get_args(get_args(Excitation)[0]))}
 )
-"""A row for each plan of the union, which is written out for whoever checks types."""
-_PRESENT_WORDS = {
-    word: kind.word
-    for kind in EXCITATION_KINDS.values()
-    for word in get_args(kind.plan.model_fields["kind"].annotation)
-}
+"""A row for each plan of the union; ours are written out for whoever checks types."""
+_PRESENT_WORDS = {word: kind.word for kind in EXCITATION_KINDS.values() for word in _words(kind.plan)}
 
 
 def present_word(word: str) -> str:
@@ -105,7 +146,9 @@ def present_word(word: str) -> str:
     return _PRESENT_WORDS.get(word, word)
 
 
-def rows_by_kind(of_family: Mapping[Family, Row], of_kind: Mapping[str, Row]) -> Mapping[str, Row]:
+def rows_by_kind(
+    of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
+) -> Mapping[str, Row]:
     """Give every kind the row of its family, or its own where it has one.
 
     Parameters
@@ -114,6 +157,8 @@ def rows_by_kind(of_family: Mapping[Family, Row], of_kind: Mapping[str, Row]) ->
         Row of each family of excitations.
     of_kind
         Rows of single kinds, by their words.
+    of_packages
+        Entry points by which installed packages give rows of the kinds that they add.
 
     Raises
     ------
@@ -124,7 +169,24 @@ def rows_by_kind(of_family: Mapping[Family, Row], of_kind: Mapping[str, Row]) ->
     rows = {word: of_family[kind.plan.family] for word, kind in EXCITATION_KINDS.items()}
     for word, row in of_kind.items():
         rows[EXCITATION_KINDS[word].word] = row
-    return MappingProxyType(rows)
+    return MappingProxyType(rows) if of_packages is None else _RowsOfPackages(rows, of_packages)
+
+
+class _RowsOfPackages(Mapping[str, Row]):
+    """Rows by kind; those of packages are loaded when they are asked for, and may import what is above."""
+
+    def __init__(self, rows: Mapping[str, Row], group: PlugInKind) -> None:
+        self._rows, self._group = rows, group
+
+    def __getitem__(self, word: str) -> Row:
+        row = self._rows[word]
+        return plug_in(self._group, word) if word in plug_in_names(self._group) else row
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._rows)
+
+    def __len__(self) -> int:
+        return len(self._rows)
 
 
 def excitation_text(excitation: Excitation) -> str:

@@ -13,6 +13,7 @@ from ..errors import ConfigurationError
 from ..host.toml_file import FrozenModel
 from ..instruments import Sweep
 from ..recording import SegmentLabel
+from ..rig import Rig
 from .feedback import BaseLevel
 from .steps import (
     Approach,
@@ -200,6 +201,12 @@ class AbstractExcitation(FrozenModel, ABC):
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
         """List frequencies [Hz] and amplitudes of the base's acceleration [m/s2] that feedback will hold."""
         return iter(())
+
+    def require_holdable(self, rig: Rig) -> None:
+        """Refuse motions that feedback on a rig would not hold; what is played without has nothing to hold.
+
+        Raises ConfigurationError or LimitExceeded. Nothing was played.
+        """
 
     @property
     @abstractmethod

@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instruments import LoopProgram, Sweep
+from ..instruments import Sweep
 from ..recording import SegmentLabel
 
 Samples = NDArray[np.float64]
@@ -25,10 +25,7 @@ class Tone:
 
 @dataclass(frozen=True)
 class LoopTone(Tone):
-    """A sine in front of a fast loop: a real-time controller plays it, with all that holds the motion."""
-
-    program: LoopProgram | None = None
-    """What the controller is told; None for a sine that is only planned."""
+    """A sine that a real-time controller plays, with all that holds the motion."""
 
 
 @dataclass(frozen=True, eq=False)

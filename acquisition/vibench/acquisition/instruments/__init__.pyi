@@ -1,17 +1,7 @@
-from ._fast_loop import (
-    LOOP_PROTOCOL as LOOP_PROTOCOL,
-    LoopBlock as LoopBlock,
-    LoopFacts as LoopFacts,
-    LoopFeedback as LoopFeedback,
-    LoopInput as LoopInput,
-    LoopProgram as LoopProgram,
-    LoopReport as LoopReport,
-    LoopRequest as LoopRequest,
-    LoopState as LoopState,
-)
 from ._guarded import (
     PlugInKind as PlugInKind,
     driver_of as driver_of,
+    missing_package as missing_package,
     plug_in as plug_in,
     plug_in_names as plug_in_names,
 )

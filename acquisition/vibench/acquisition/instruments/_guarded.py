@@ -5,11 +5,12 @@ is what mends it.
 """
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import is_dataclass, replace
 from enum import StrEnum
 from functools import cache, lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from types import MappingProxyType
 from typing import Any, cast, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
@@ -26,6 +27,16 @@ class PlugInKind(StrEnum):
     OUTPUT = "vibench.outputs"
     CONTROLLER = "vibench.controllers"
     SENSOR = "vibench.sensors"
+    EXCITATION = "vibench.excitations"
+    """The plan of a kind of measurement; its name here and below is the word in a plan."""
+    FEEDBACK = "vibench.feedback"
+    """The controller of a kind of measurement with feedback."""
+    ANALYSIS = "vibench.analyses"
+    DRAWING = "vibench.drawings"
+    DRIVE = "vibench.drives"
+    """What plays in the generator's place, by the table of the hardware configuration."""
+    VIRTUAL_INSTRUMENT = "vibench.virtual_instruments"
+    """The simulation of such a drive, by the same table."""
 
 
 _DRIVERS = "vibench.acquisition.drivers"
@@ -44,12 +55,29 @@ OURS = tuple(
         (PlugInKind.OUTPUT, "daqmx", f"{_DRIVERS}:DaqmxOutput"),
         (PlugInKind.DIGITIZER, "soundcard", f"{_DRIVERS}:SoundCardDigitizer"),
         (PlugInKind.OUTPUT, "soundcard", f"{_DRIVERS}:SoundCardOutput"),
-        (PlugInKind.CONTROLLER, "lines", f"{_DRIVERS}:LineController"),
         (PlugInKind.SENSOR, "wire", f"{_SENSORS}:wire"),
         (PlugInKind.SENSOR, "accelerometer", f"{_SENSORS}:accelerometer"),
         (PlugInKind.SENSOR, "vibrometer", f"{_SENSORS}:vibrometer"),
     )
 )
+
+
+FOUND_IN: Mapping[str, str] = MappingProxyType(
+    dict.fromkeys(("branch_continuation", "controller", "lines"), "fast_loop")
+)
+"""Names of what our own extensions offer: each with its folder in ``extensions``."""
+
+
+def missing_package(name: str) -> str | None:
+    """Say which package of ours offers a name that is not installed; None where none of them does."""
+    folder = FOUND_IN.get(name)
+    if folder is None:
+        return None
+    package = f"vibench-{folder.replace('_', '-')}"
+    return (
+        f"{name!r} needs {package}, which is not installed: run 'pip install extensions/{folder}' in the "
+        "folder of vibench's sources"
+    )
 
 
 def plug_in_names(kind: PlugInKind) -> tuple[str, ...]:
@@ -83,7 +111,8 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
     found = {row.value: row for row in _rows(kind) if row.name == name}
     if not found:
         raise ConfigurationError(
-            f"{name!r} is no instrument of {kind.value}: {', '.join(plug_in_names(kind))} are installed. "
+            missing_package(name)
+            or f"{name!r} is no instrument of {kind.value}: {', '.join(plug_in_names(kind))} are installed. "
             "Correct the driver in the hardware configuration, or install the package that offers it"
         )
     if len(found) > 1:
@@ -101,13 +130,14 @@ def plug_in(kind: PlugInKind, name: str) -> Any:
 
 
 def _rows(kind: PlugInKind) -> tuple[EntryPoint, ...]:
-    return (*(row for row in OURS if row.group == kind), *_installed(kind, tuple(sys.path)))
+    return (*(row for row in OURS if row.group == kind), *_installed(tuple(sys.path))[kind])
 
 
-@lru_cache(maxsize=len(PlugInKind))
-def _installed(kind: PlugInKind, _path: tuple[str, ...]) -> tuple[EntryPoint, ...]:
+@lru_cache(maxsize=1)
+def _installed(_path: tuple[str, ...]) -> Mapping[PlugInKind, tuple[EntryPoint, ...]]:
     """Read what installed packages offer, once for a path: each channel asks, and a look takes 6 ms."""
-    return tuple(entry_points(group=kind.value))
+    offered = entry_points()
+    return {kind: tuple(offered.select(group=kind.value)) for kind in PlugInKind}
 
 
 def driver_of(kind: PlugInKind, name: str, promise: type) -> Any:

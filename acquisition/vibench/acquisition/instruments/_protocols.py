@@ -8,7 +8,6 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from ..errors import InstrumentError
-from ._fast_loop import LoopFacts, LoopProgram, LoopReport
 from ._values import Block, Identity, Knob, Samples
 
 Time = TypeVar("Time", float, Samples)
@@ -217,31 +216,11 @@ class AnalogOutput(Protocol):
 
 
 class RealTimeController(Protocol):
-    """A loop of its own from two sensors to the amplifier, which a host tells what to play."""
+    """An instrument that plays in the generator's place and closes a loop of its own."""
 
     @property
     def identity(self) -> Identity:
         """Who answered."""
-
-    @property
-    def facts(self) -> LoopFacts:
-        """Rate, latency, limit and watchdog."""
-
-    def play(self, program: LoopProgram) -> LoopReport:
-        """Go over to a program, along its glide."""
-
-    def report(self) -> LoopReport:
-        """Hand over what has been measured since the last report; its watchdog hears it.
-
-        Raises
-        ------
-        InstrumentLost
-            When nobody answers.
-
-        """
-
-    def silence(self, ramp_s: float) -> LoopReport:
-        """Ramp down and be silent. Legal at any time."""
 
     def close(self) -> None:
         """Silence, connection closed. Legal at any time."""

@@ -13,7 +13,6 @@ docs/decisions/0014-chains-of-points.md. Feedback: docs/feedback.md.
 11.0
 """
 
-from ..excitation.branch_continuation import BranchContinuation
 from ..excitation.dwell import Dwell
 from ..excitation.held_dwell import HeldDwell
 from ..excitation.held_noise import HeldNoise, SpectrumPoint
@@ -52,7 +51,6 @@ from ._limits import (
 from ._loads import BaseMotion, base_motion, needed_vpp, predicted_loads
 from ._loop_time import (
     LOOK_PERIODS,
-    fast_loop_time_s,
     look_s,
     loop_time_s,
 )
@@ -104,7 +102,6 @@ __all__ = [
     "AbstractExcitation",
     "Approach",
     "BaseMotion",
-    "BranchContinuation",
     "Campaign",
     "Direction",
     "DriveSource",
@@ -153,7 +150,6 @@ __all__ = [
     "duration_s",
     "excitation_text",
     "expected_under_check",
-    "fast_loop_time_s",
     "half_cosine",
     "known_phases",
     "lead_in_s",

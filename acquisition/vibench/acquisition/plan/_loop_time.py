@@ -1,6 +1,6 @@
 """How fast a bench's feedback acts: what tells which unstable motions it can hold."""
 
-from ..rig import ControllerConfig, Rig
+from ..rig import Rig
 
 LOOK_S = 0.2
 """Time between two looks of the feedback at the motion [s]; ten periods at least."""
@@ -12,15 +12,6 @@ _COMMANDS = 2
 def look_s(frequency_hz: float) -> float:
     """Give the time over which the feedback looks at a motion before it acts [s]."""
     return max(LOOK_S, LOOK_PERIODS / frequency_hz)
-
-
-_SAMPLES_LATE = 1.5
-"""How late a mean over a sample is, and a volt that is held over one, in samples."""
-
-
-def fast_loop_time_s(controller: ControllerConfig) -> float:
-    """Give the time from a motion to the drive of a real-time controller that answers it [s]."""
-    return controller.latency_s + _SAMPLES_LATE / controller.rate_hz
 
 
 def loop_time_s(rig: Rig, frequency_hz: float) -> float:

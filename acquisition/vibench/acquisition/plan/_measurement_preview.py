@@ -84,7 +84,7 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
     if not EXCITATION_KINDS[excitation.kind].is_feedback:
         return None
     if drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
-        # What a fast loop holds follows from its gains and the plant, see `control.require_holdable`.
+        # What a fast loop holds follows from its gains and the plant, see `require_holdable`.
         return None
     return least_growth_time_s(loop_time_s(rig, excitation.band_hz[0]))
 

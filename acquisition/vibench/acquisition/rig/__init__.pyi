@@ -9,6 +9,7 @@ from ._configuration import (
     ControllerConfig as ControllerConfig,
     DaqConfig as DaqConfig,
     GeneratorConfig as GeneratorConfig,
+    LoopInput as LoopInput,
     OutputConfig as OutputConfig,
     OutputUse as OutputUse,
     Rig as Rig,
@@ -39,9 +40,7 @@ from ._knobs import (
     wire as wire,
 )
 from ._load_rig import (
-    ControllerDriver as ControllerDriver,
     GeneratorDriver as GeneratorDriver,
-    controller_driver as controller_driver,
     digitizer_driver as digitizer_driver,
     generator_driver as generator_driver,
     load_rig as load_rig,

@@ -21,7 +21,7 @@ from pydantic import (
 from vibench.sim import SpecimenTable
 
 from ..host.toml_file import FrozenModel
-from ..instruments import Knob, LoopInput
+from ..instruments import Knob
 
 _VOLTS = {"V": 1.0, "mV": 1e-3, "uV": 1e-6}
 _STANDARD_GRAVITY, _POUND_KG = 9.80665, 0.45359237
@@ -475,6 +475,13 @@ class SpecimenConfig(SpecimenTable):
     """Largest displacement of a mass that the springs bear."""
 
 
+class LoopInput(StrEnum):
+    """What a controller samples, in the order of its inputs."""
+
+    BASE = "base_acceleration"
+    M0 = "m0_velocity"
+
+
 class ControllerConfig(FrozenModel):
     """A real-time controller: sensors of base and m0 at its inputs, its output at the amplifier's input.
 
@@ -501,6 +508,12 @@ class ControllerConfig(FrozenModel):
     """The input of which alone it takes a law, proportional and derivative; absent: any linear law."""
     source: str = Field(min_length=1)
     """Where rate, latency and limit come from."""
+
+    @property
+    def loop_time_s(self) -> float:
+        """Time from a motion to the drive that answers it [s]."""
+        # A mean over a sample, and a volt that is held over one, are late by one and a half.
+        return self.latency_s + 1.5 / self.rate_hz
 
 
 class Rig(FrozenModel):

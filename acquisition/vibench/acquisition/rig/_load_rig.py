@@ -12,11 +12,11 @@ from ..instruments import (
     FunctionGenerator,
     GeneratorDescription,
     PlugInKind,
-    RealTimeController,
     driver_of,
+    missing_package,
     plug_in_names,
 )
-from ._configuration import ControllerConfig, GeneratorConfig, OutputConfig, Rig
+from ._configuration import GeneratorConfig, OutputConfig, Rig
 
 
 def load_rig(path: Path | str) -> Rig:
@@ -54,8 +54,12 @@ def _require_plug_ins(rig: Rig, path: Path) -> None:
     for key, kind, name in asked:
         if name not in (names := plug_in_names(kind)):
             raise ConfigurationError(
-                f"{path}: {key} = {name!r} is not installed: {', '.join(names)} may be given, or the name "
-                f"of an entry point {kind.value} of a package that you install (docs/instruments.md)"
+                f"{path}: {key} = "
+                + (
+                    missing_package(name)
+                    or f"{name!r} is not installed: {', '.join(names)} may be given, or the name of an entry "
+                    f"point {kind.value} of a package that you install (docs/instruments.md)"
+                )
             )
 
 
@@ -116,18 +120,6 @@ class OutputDriver(Protocol):
             What the digitizer's driver of the same name has opened; both start together.
 
         """
-
-
-class ControllerDriver(Protocol):
-    """What an entry point of ``vibench.controllers`` is."""
-
-    def open(self, config: ControllerConfig) -> RealTimeController:
-        """Connect to a controller, silent; raises InstrumentError where none answers, or another one."""
-
-
-def controller_driver(config: ControllerConfig) -> ControllerDriver:
-    """Find the driver of a real-time controller; raises ConfigurationError where none is installed."""
-    return cast("ControllerDriver", driver_of(PlugInKind.CONTROLLER, config.driver, ControllerDriver))
 
 
 def generator_driver(config: GeneratorConfig) -> GeneratorDriver:

@@ -1,120 +1,15 @@
 """What makes the sound of a run: a function generator, or an analogue output for what never repeats."""
 
 from collections.abc import Iterable, Iterator
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..bench.bench import Bench
-from ..errors import ConfigurationError, LimitExceeded
-from ..excitation.steps import LoopTone, Play, Tone
-from ..instruments import LoopBlock, LoopProgram, LoopState, RealTimeController
-from ..plan import DriveSource, Measurement, Phase, RunState, known_phases, require_played
+from ..errors import ConfigurationError
+from ..excitation.steps import Tone
+from ..instruments import PlugInKind, plug_in
+from ..plan import DriveSource, Measurement, Phase, known_phases, require_played
 from .generator_drive import DeadMan, GeneratorDrive
 from .stream_drive import StreamDrive
-
-TALK = 0.25
-"""It is talked to after this part of its watchdog's time at the latest."""
-QUICK_S = 0.1
-"""Ramp of the ways out on which no samples can be counted [s]."""
-_ROUNDING_S = 1e-9
-
-
-class LoopDrive:
-    """A `Drive` that ramps, glides and falls silent by itself."""
-
-    drive_source = DriveSource.CONTROLLER
-    is_commanded = False
-    pause_s = 0.0
-    can_hold = False
-    """What it plays must be talked to."""
-
-    def __init__(self, controller: RealTimeController, measurement: Measurement) -> None:
-        self._controller = controller
-        self._amplitude_vpp = measurement.excitation.amplitude_vpp
-        self._program: LoopProgram | None = None
-        self._blocks: list[LoopBlock] = []
-
-    @property
-    def setting_vpp(self) -> float:
-        """Twice the fundamental that it is told [V]; 0 in silence."""
-        return 0.0 if self._program is None else 2 * abs(complex(*self._program.reference_v[0]))
-
-    @property
-    def is_playing(self) -> bool:
-        """Whether there is anything to ramp down."""
-        return self._program is not None
-
-    @property
-    def coefficients(self) -> tuple[LoopBlock, ...]:
-        """What was measured since the phase began."""
-        return tuple(self._blocks)
-
-    def arm(self, coming: Iterable[Phase]) -> None:
-        """Nothing to get ready: it is silent."""
-
-    def announce(self, coming: Iterable[Phase]) -> None:
-        """Nothing to prepare."""
-
-    def perform(self, phase: Phase) -> Iterator[float]:
-        """Tell it what to play, and talk to it while it does; yields how long to read between [s]."""
-        self._blocks = []
-        if phase.state is RunState.RAMPING_DOWN:
-            self._silence(phase.duration_s)
-        elif phase.play is None:
-            self._silence(QUICK_S)
-        else:
-            self._play(phase.play, phase.duration_s if phase.state is RunState.RAMPING_UP else None)
-        yield from self._talking(phase.duration_s)
-
-    def ramp_down(self, ramp_s: float) -> Iterator[float]:
-        """Let it ramp down from what it plays."""
-        self._silence(ramp_s)
-        yield from self._talking(ramp_s)
-
-    def cut(self) -> None:
-        """Silence it, with a step."""
-        self._silence(0.0)
-
-    def silence(self) -> None:
-        """Silence it, whatever happens."""
-        self._silence(QUICK_S)
-
-    def _play(self, play: Play, ramp_s: float | None) -> None:
-        match play:
-            case LoopTone(program=LoopProgram() as program):
-                told = program
-            case Tone(frequency_hz, level):
-                told = LoopProgram(
-                    frequency_hz=frequency_hz, reference_v=((0.5 * self._amplitude_vpp * level, 0.0),)
-                )
-            case _:
-                raise LimitExceeded(
-                    "a real-time controller plays sines, and was given something else; it stayed silent"
-                )
-        if ramp_s is not None:
-            told = told.model_copy(update={"glide_s": ramp_s})
-        if told != self._program:
-            # Before the command: should it fail half-way, it counts as playing.
-            self._program = told
-            self._controller.play(told)  # what it measured of the program before is dropped
-
-    def _talking(self, duration_s: float) -> Iterator[float]:
-        longest_s = TALK * self._controller.facts.watchdog_s
-        while duration_s > _ROUNDING_S:
-            piece_s = min(duration_s, longest_s)
-            yield piece_s
-            duration_s -= piece_s
-            report = self._controller.report()
-            self._blocks.extend(report.blocks)
-            if self._program is not None and report.state is not LoopState.PLAYING:
-                self._program = None
-                raise LimitExceeded(
-                    f"the real-time controller ended by itself: {report.reason or 'it was told to'}. It is "
-                    "silent, and its recording kept; lower the level, or go in shorter steps"
-                )
-
-    def _silence(self, ramp_s: float) -> None:
-        self._controller.silence(ramp_s)
-        self._program = None
 
 
 class Drive(Protocol):
@@ -133,7 +28,7 @@ class Drive(Protocol):
         """Silence between saying what comes after all that was told, and hearing it [s]."""
 
     @property
-    def coefficients(self) -> tuple[LoopBlock, ...]:
+    def coefficients(self) -> tuple[Any, ...]:
         """What a real-time controller has measured since the phase began; nothing of other drives."""
 
     @property
@@ -181,7 +76,8 @@ def drive_for(bench: Bench, measurement: Measurement) -> Drive:
         raise _without_dead_man(f"{measurement.name} is played by the {source.value}")
     match source, bench.output, bench.controller:
         case DriveSource.CONTROLLER, _, controller if controller is not None:
-            return LoopDrive(controller, measurement)
+            drive: Drive = plug_in(PlugInKind.DRIVE, "controller")(controller, measurement)
+            return drive
         case DriveSource.OUTPUT, output, _ if output is not None:
             return StreamDrive(output, measurement, bench.rig.generator.terminal_factor())
         case _:

@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from enum import Enum, auto
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from ..errors import DriveLate, RunStalled
 from ..excitation.steps import Play, Tone
-from ..instruments import Block, LoopBlock, Samples, Sweep
+from ..instruments import Block, Samples, Sweep
 from ..plan import Phase, RunState
 from ..recording import HOLD_ROOM_S, EventKind
 from ..rig import Channel, Role
@@ -206,7 +206,7 @@ class PhaseRunner:
         self._glided_hz = self._planned_hz = 0.0
 
     @property
-    def coefficients(self) -> tuple[LoopBlock, ...]:
+    def coefficients(self) -> tuple[Any, ...]:
         """What a real-time controller has measured since the last phase began."""
         return self._drive.coefficients
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..bench.bench import Bench
 from ..control.control_action import Controller, phase_samples
-from ..control.controllers import CONTROLLERS, feedback_controller
+from ..control.controllers import feedback_controller
 from ..errors import AcquisitionError, ConfigurationError, DriveLate, LimitExceeded, RunStalled
 from ..excitation.plan import AbstractFeedback
 from ..excitation.steps import Tone
@@ -88,7 +88,7 @@ def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] |
 
     Raises ConfigurationError when the bench cannot do it: before anything plays.
     """
-    if measurement.excitation.kind not in CONTROLLERS:
+    if not isinstance(measurement.excitation, AbstractFeedback):
         return None
     if drive_source_of(measurement, bench.rig) is DriveSource.OUTPUT:
         raise ConfigurationError(

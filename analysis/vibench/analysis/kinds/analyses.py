@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
+from vibench.acquisition.instruments import PlugInKind
 from vibench.acquisition.plan import Family, rows_by_kind
 
 from .analysis_kind import AnalysisKind
 from .dwell import DWELL
 from .noise import REPEATED_NOISE, STREAMED_NOISE
-from .stepped import BRANCH_CONTINUATION, RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE
+from .stepped import RESONANCE_TRACKING, SETTLED_SINE, STEPPED_LEVEL, STEPPED_SINE
 from .sweep import SWEEP
 
 ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
@@ -23,8 +24,8 @@ ANALYSES: Mapping[str, AnalysisKind[Any, Any, Any]] = rows_by_kind(
         "settled_sine": SETTLED_SINE,
         "stepped_level": STEPPED_LEVEL,
         "resonance_tracking": RESONANCE_TRACKING,
-        "branch_continuation": BRANCH_CONTINUATION,
         "held_response": SETTLED_SINE,
     },
+    PlugInKind.ANALYSIS,
 )
 """By the word in a plan; families in the order in which a report shows them."""

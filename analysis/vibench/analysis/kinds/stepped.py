@@ -1,7 +1,6 @@
 """Stepped sines: responses frequency by frequency or level by level, and what JSON says of them."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import nan
 
 import numpy as np
@@ -9,7 +8,6 @@ import numpy as np
 from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison.recording_curves import stepped_traces
-from ..errors import UnusableData
 from ..frequency_response.request import FrequencyResponseRequest
 from ..model.draws import Draw
 from ..model.ensemble import Quantity
@@ -55,11 +53,13 @@ def _compared(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
     return stepped_quantities(analysis.response)
 
 
-def _stepped(
+def stepped(
     setting_vpp: Setting,
     label: SegmentLabel = SegmentLabel.STEP,
     measured: Callable[[SteppedSineAnalysis], Json] = _measured,
 ) -> AnalysisKind[Steps, SteppedSineAnalysis, SteppedSineOverlay]:
+    """Return the analysis of a kind that records step after step, under a label of its own."""
+
     def analyse(
         facts: RecordingFacts, channels: Channels, plan: Steps, _: FrequencyResponseRequest
     ) -> SteppedSineAnalysis:
@@ -88,23 +88,8 @@ def _stepped(
     )
 
 
-STEPPED_SINE = _stepped(lambda plan, _: plan.amplitude_vpp)
-STEPPED_LEVEL = _stepped(
-    lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), measured=_measured_levels
-)
+STEPPED_SINE = stepped(lambda plan, _: plan.amplitude_vpp)
+STEPPED_LEVEL = stepped(lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), measured=_measured_levels)
 # With feedback the setting is not the plan's, and is known of no step.
-SETTLED_SINE = _stepped(lambda *_: nan)
-RESONANCE_TRACKING = _stepped(lambda *_: nan, SegmentLabel.RESONANCE)
-
-
-def _undrawn(_: SteppedSineAnalysis, __: SimulatedChannels) -> Draw[SteppedResponse]:
-    raise UnusableData(
-        "the motions of a branch were held by a fast loop, and under the recorded voltage alone the model "
-        "leaves them; nothing was simulated, compare them with the model's branch"
-    )
-
-
-# A branch folds: it is no curve over frequency.
-BRANCH_CONTINUATION = replace(
-    _stepped(lambda *_: nan, SegmentLabel.BRANCH), draw=_undrawn, curves=lambda *_: iter(())
-)
+SETTLED_SINE = stepped(lambda *_: nan)
+RESONANCE_TRACKING = stepped(lambda *_: nan, SegmentLabel.RESONANCE)

@@ -20,7 +20,7 @@ from vibench.acquisition.recording import (
     SealState,
     feedback_note,
 )
-from vibench.sim import Specimen, SpecimenTable
+from vibench.sim import Specimen, SpecimenTable, fault_in_words
 
 from ..errors import UnusableData
 from ..tables import named
@@ -163,6 +163,8 @@ def plan_of(recording: Recording) -> Measurement:
         return Measurement.model_validate(recording.plan)
     except ValidationError as error:
         first = error.errors()[0]
+        if first["loc"] == ("excitation",) and first["type"] == "value_error":  # its package is missing
+            raise UnusableData(f"{recording.path.name}: {fault_in_words(first)}") from error
         place = ".".join(str(part) for part in first["loc"])
         raise UnusableData(
             f"the plan in {recording.path.name} is not one this version of vibench can read "
@@ -244,6 +246,8 @@ def _require_bench(recording: Recording) -> None:
         described_specimen(recording.bench)
     except ValidationError as error:
         first = error.errors()[0]
+        if first["loc"] == ("excitation",) and first["type"] == "value_error":  # its package is missing
+            raise UnusableData(f"{recording.path.name}: {fault_in_words(first)}") from error
         place = ".".join(str(part) for part in first["loc"])
         raise UnusableData(
             f"what {recording.path.name} says of its bench cannot be read ({place}: {first['msg']}); "

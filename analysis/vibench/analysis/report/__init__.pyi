@@ -13,6 +13,7 @@ from ._comparison_export import (
 )
 from ._drawings import (
     DRAWINGS as DRAWINGS,
+    STEPPED as STEPPED,
     Drawing as Drawing,
     findings as findings,
     recording_figures as recording_figures,

@@ -7,6 +7,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
+from vibench.acquisition.instruments import PlugInKind
 from vibench.acquisition.plan import Family, excitation_text, rows_by_kind
 
 from ..figures.backbone import backbone_figure
@@ -14,7 +15,6 @@ from ..figures.bench_levels import bench_levels_figure
 from ..figures.distortion import distortion_figure
 from ..figures.dwells import dwells_figure
 from ..figures.excitation import excitation_figure
-from ..figures.held_branch import held_branch_figure
 from ..figures.hysteresis import hysteresis_figure
 from ..figures.portraits import portraits_figure
 from ..figures.stepped_sine import (
@@ -44,7 +44,6 @@ from ..results.summary import budgets_of
 from ..sine.tracked_resonance import tracked_resonances
 from ..tables import plus_minus
 from ._findings import (
-    branch_findings,
     dwell_findings,
     level_findings,
     noise_findings,
@@ -166,6 +165,10 @@ def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
         yield f"base amplitude A0, at {found.frequency_hz[top]:.4g} Hz", f"{amplitude} µm"
 
 
+STEPPED: Drawing[Any, Any] = Drawing(
+    _stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers
+)
+"""Of what is recorded step after step: a kind of another package may replace parts of it."""
 DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
     {
         Family.NOISE: Drawing(
@@ -181,15 +184,13 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
             (dwell_table, line_table),
             _dwell_levels,
         ),
-        Family.STEPPED: Drawing(_stepped_figures(STEPPED_FREQUENCIES), stepped_findings, _stepped_numbers),
+        Family.STEPPED: STEPPED,
     },
     {
         "stepped_level": Drawing(_stepped_figures(STEPPED_LEVELS), level_findings, _stepped_numbers),
         "resonance_tracking": Drawing(_tracked_figures, tracked_findings, _stepped_numbers),
-        "branch_continuation": Drawing(
-            lambda branch: iter((held_branch_figure(branch.analysis),)), branch_findings, _stepped_numbers
-        ),
     },
+    PlugInKind.DRAWING,
 )
 """By the word in a plan."""
 

@@ -13,7 +13,6 @@ from ..kinds.analysis_kind import DwellResult, NoiseResult, SteppedSineResult, S
 from ..model.draws import CLOCK_TOLERANCE
 from ..model.prediction import PREDICTION_S, WINDOW_S
 from ..results.campaign_results import CampaignResults
-from ..sine.held_branch import branch_sentences
 from ..sine.tracked_resonance import feedback_sentences
 
 
@@ -58,11 +57,6 @@ def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
 def level_findings(result: SteppedSineResult) -> Iterator[str]:
     """Say between which levels the motion jumps."""
     yield stepped_level_caption(result.analysis.response)
-
-
-def branch_findings(result: SteppedSineResult) -> Iterator[str]:
-    """Say how far a branch was followed, and where it turned."""
-    yield from branch_sentences(result.analysis.facts.feedback)
 
 
 def tracked_findings(result: SteppedSineResult) -> Iterator[str]:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from vibench.acquisition.plan import (
-    BranchContinuation,
     HeldResponse,
     ResonanceTracking,
     SettledSine,
@@ -23,7 +22,7 @@ from ..tables import Labelled
 from .background import silence_before
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response
 
-Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | BranchContinuation | HeldResponse
+Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
 """What is recorded frequency by frequency, or level by level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end."""

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from vibench.acquisition.excitation.feedback import BaseLevel
-from vibench.acquisition.plan import BranchContinuation, Dwell, Measurement
+from vibench.acquisition.plan import Dwell, Measurement
 from vibench.acquisition.rig import load_rig
 from vibench.gui.pages.test import test_preview as preview
 from vibench.gui.pages.test.test_page import TestPage as Page, summary_text
@@ -30,8 +30,11 @@ def test_the_expected_uncertainty_stands_under_the_prediction(page):
 
 
 def test_a_branch_that_the_fast_loop_does_not_hold_is_no_complete_test_and_the_page_says_why(page):
+    fast_loop = pytest.importorskip(
+        "vibench_fast_loop.branch_continuation", reason="pip install -e extensions/fast_loop"
+    )
     rig = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig_controller.toml")
-    plan = BranchContinuation(
+    plan = fast_loop.BranchContinuation(
         amplitude_vpp=4, base_level=BaseLevel(displacement_m=1e-6), start_hz=95, low_hz=94.5, high_hz=96
     )
     asked = preview.TestPreview(

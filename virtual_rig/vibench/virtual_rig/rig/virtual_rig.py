@@ -1,17 +1,18 @@
 """The whole virtual rig, switched on: a generator on the USB bus, a DAQ server, and the world between."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass
 from enum import Enum, auto
 from pathlib import Path
 from types import MappingProxyType, TracebackType
-from typing import Self
+from typing import Any, Self
 
 from vibench.acquisition import AcquisitionError, ConfigurationError
+from vibench.acquisition.instruments import PlugInKind, plug_in as load_plug_in
 from vibench.acquisition.recording import DiskTrouble, troubled_disks
 from vibench.acquisition.rig import Rig, VirtualConfig
 
-from ..controller.virtual_controller import controller_of
 from ..daqmx.devices import catalogue_with
 from ..daqmx.rig import OnDemandPace, Pace, WallPace
 from ..daqmx.server import LOOPBACK, DaqServer, token_for
@@ -97,9 +98,9 @@ class VirtualRig:
             terminal=_terminal(rig, virtual),
         )
         """What is behind the USB cable."""
-        self.controller = controller_of(rig, lambda: self.world.time_s)
+        self.controller = _controller(rig, lambda: self.world.time_s)
         """What closes a fast loop; None where the rig has none."""
-        self.world = World(rig, self.generator, loop=self.controller)
+        self.world = World(rig, self.generator, loop=self.controller.cables if self.controller else None)
         """What is behind the terminals."""
         self._usb = UsbTmcInstrument(self.generator, usb_ids=usb_ids)
         self._running: _Running | None = None
@@ -193,22 +194,23 @@ class VirtualRig:
         return self._running
 
 
+@dataclass(frozen=True)
 class _Running:
     """What exists only while the rig is switched on."""
 
-    def __init__(
-        self,
-        daq: DaqServer,
-        socket: ScpiSocket,
-        controller: ScpiSocket | None,
-        play: FaultPlay,
-        closing: ExitStack,
-    ) -> None:
-        self.daq = daq
-        self.socket = socket
-        self.controller = controller
-        self.play = play
-        self.closing = closing
+    daq: DaqServer
+    socket: ScpiSocket
+    controller: ScpiSocket | None
+    play: FaultPlay
+    closing: ExitStack
+
+
+def _controller(rig: Rig, clock: Callable[[], float]) -> Any:
+    """Give what simulates a real-time controller: a `ScpiDevice` whose ``cables`` are a `ClosedLoop`."""
+    if rig.controller is None:
+        return None
+    simulated = load_plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")
+    return simulated(rig.controller, virtual_section(rig).grid_rate_hz, clock)
 
 
 def _pace(virtual: VirtualConfig) -> Pace:

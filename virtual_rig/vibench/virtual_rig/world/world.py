@@ -23,7 +23,6 @@ from vibench.sim import Specimen
 from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed, ShakenMotion
 
 from ..analogue import Input
-from ..controller.virtual_controller import VirtualController
 from .analogue_output import AnalogueOutput
 from .conversion import Conversion, InputStage, converter_input, history_steps
 from .sensors import (
@@ -32,11 +31,12 @@ from .sensors import (
     Disturbance,
     NoiseStream,
     RandomDropouts,
+    SensorParts,
     Vibrometer,
     shown,
 )
 from .time_grid import PPM, USUAL_GRID, FloatArray, TimeGrid
-from .wiring import OPEN_INPUT, Cable, LoopCables, PlantParts, Signal, amplifier_input, cables_of
+from .wiring import OPEN_INPUT, Cable, Signal, amplifier_input, cables_of
 
 
 class EventSchedule:
@@ -77,6 +77,30 @@ class TerminalVoltage(Protocol):
         """Mean terminal voltage over each of ``count`` intervals [V]; calls follow each other in time."""
 
 
+class ClosedLoop(Protocol):
+    """A simulated instrument that answers what it samples with the volts at the amplifier."""
+
+    @property
+    def is_on(self) -> bool:
+        """Whether it plays, or volts are still on their way; the world does not stop for it else."""
+
+    def move(
+        self,
+        first: int,
+        step_s: float,
+        shaker: LoadedShaker,
+        noise: FloatArray,
+        sensors: tuple[SensorParts, SensorParts],
+        motion: ShakenMotion,
+        signals: FloatArray,
+    ) -> int:
+        """Move the shaker from a step of the world on, the loop closed; gives the steps done.
+
+        ``noise`` is the amplifier's [V], ``sensors`` those of base and m0; ``signals`` holds at first what
+        else drives the amplifier, and at last all that there was.
+        """
+
+
 class World:
     """The simulated rig in rig time, advancing only when asked to.
 
@@ -90,7 +114,7 @@ class World:
         rig: Rig,
         terminal: TerminalVoltage,
         specimen: Specimen | None = None,
-        loop: VirtualController | None = None,
+        loop: ClosedLoop | None = None,
     ) -> None:
         """``specimen`` defaults to the one the rig describes; ``loop``: a controller beside the generator."""
         virtual = virtual_section(rig)
@@ -119,7 +143,7 @@ class World:
         self._cables = dict(self._plan)
         self._amplifier_input = amplifier_input(rig)
         self._outputs: dict[str, AnalogueOutput] = {}
-        self._loop = None if loop is None else LoopCables(loop)
+        self._loop = loop
         self._conversions: list[Conversion] = []
         self._history = np.zeros((len(Signal), _history_steps(grid)))
         self._schedule = EventSchedule(grid)
@@ -292,9 +316,8 @@ class World:
         motion = ShakenMotion.of(steps, steps if self._truth is not None else 0)
         try:
             if self._loop is not None and self._loop.is_on:
-                base, m0 = self._accelerometer.parts(first, steps), self.vibrometer.parts(first, steps)
-                plant = PlantParts(self.plant, noise, base, m0)
-                good = self._loop.move(first, self._grid.step_s, plant, motion, signals)
+                sensors = self._accelerometer.parts(first, steps), self.vibrometer.parts(first, steps)
+                good = self._loop.move(first, self._grid.step_s, self.plant, noise, sensors, motion, signals)
                 self.plant.account(good, steps)
             else:
                 self.plant.move_into(motion, signals[Signal.DRIVE], noise)

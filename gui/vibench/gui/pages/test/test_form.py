@@ -1,8 +1,10 @@
 """The form of one test, judged by the plan at every change."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from PySide6.QtWidgets import QGroupBox
 
@@ -80,8 +82,8 @@ class NamedTest:
 
 
 def shipped_tests() -> tuple[NamedTest, ...]:
-    """Every measurement of the campaigns that come with vibench."""
-    campaigns = [load_campaign(path) for path in all_shipped("campaigns")]
+    """Every measurement of the campaigns that come with vibench and need no package that is missing."""
+    campaigns = [campaign for _, campaign in _readable(all_shipped("campaigns"), load_campaign)]
     return tuple(
         NamedTest(f"{campaign.name} / {each.name}", each)
         for campaign in sorted(campaigns, key=lambda each: (each.name != FIRST, each.name))
@@ -91,13 +93,14 @@ def shipped_tests() -> tuple[NamedTest, ...]:
 
 def own_tests(folder: Path) -> tuple[NamedTest, ...]:
     """Every test that was saved in a folder; a file that cannot be read is left out."""
-    found: list[NamedTest] = []
-    for path in sorted(folder.glob("*.toml")):
-        try:
-            found.append(NamedTest(f"own / {path.stem}", load_test(path)))
-        except ConfigurationError:
-            continue
-    return tuple(found)
+    found = _readable(sorted(folder.glob("*.toml")), load_test)
+    return tuple(NamedTest(f"own / {path.stem}", test) for path, test in found)
+
+
+def _readable(paths: Iterable[Path], load: Callable[[Path], Any]) -> Iterator[tuple[Path, Any]]:
+    for path in paths:
+        with suppress(ConfigurationError):
+            yield path, load(path)
 
 
 def load_test(path: Path) -> Measurement:

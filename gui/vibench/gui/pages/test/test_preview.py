@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 import vibench.analysis
 from vibench.acquisition import AcquisitionError
-from vibench.acquisition.control.fast_loop import require_holdable
 from vibench.acquisition.plan import Measurement, MeasurementPreview, preview_measurement
 from vibench.acquisition.rig import Rig
 
@@ -33,14 +32,14 @@ class TestPrediction:
     motion: "MeasurementPrediction"
     expected: tuple["Expected", ...]
     refusal: str
-    """Why the rig's fast loop would not hold it; empty where nothing speaks against it."""
+    """Why feedback on the rig would not hold it; empty where nothing speaks against it."""
 
 
 def predict_test(test: TestPreview) -> TestPrediction:
     """Simulate what the specimen will do."""
     refusal = ""
     try:
-        require_holdable(test.measurement, test.rig)
+        test.measurement.excitation.require_holdable(test.rig)
     except AcquisitionError as error:
         refusal = f"{error}"
     return TestPrediction(

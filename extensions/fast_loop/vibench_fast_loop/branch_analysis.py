@@ -1,0 +1,24 @@
+"""The analysis of a branch that a fast loop held: that of stepped sines, without a simulation."""
+
+from dataclasses import replace
+from math import nan
+
+from vibench.acquisition.recording import SegmentLabel
+from vibench.analysis.errors import UnusableData
+from vibench.analysis.kinds.stepped import stepped
+from vibench.analysis.model.draws import Draw
+from vibench.analysis.model.simulated_channels import SimulatedChannels
+from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineAnalysis
+
+
+def _undrawn(_: SteppedSineAnalysis, __: SimulatedChannels) -> Draw[SteppedResponse]:
+    raise UnusableData(
+        "the motions of a branch were held by a fast loop, and under the recorded voltage alone the model "
+        "leaves them; nothing was simulated, compare them with the model's branch"
+    )
+
+
+# A branch folds: it is no curve over frequency.
+BRANCH_CONTINUATION = replace(
+    stepped(lambda *_: nan, SegmentLabel.BRANCH), draw=_undrawn, curves=lambda *_: iter(())
+)

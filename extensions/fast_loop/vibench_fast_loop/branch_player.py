@@ -1,0 +1,152 @@
+"""Playing one setting of a fast loop, and looking at base and m0 until both are known well enough."""
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vibench.acquisition.control.control_action import ControlAction, PhaseSamples
+from vibench.acquisition.control.feedback_channels import require_answer
+from vibench.acquisition.control.sine_loop import SineLoop
+from vibench.acquisition.excitation.steps import Segment
+from vibench.acquisition.plan import Phase, RunState
+
+from .branch_continuation import BranchContinuation
+from .branch_solver import LoopSetting
+from .fast_loop import Coefficients, FastLoop
+from .protocol import LoopBlock, LoopProgram, ProgramTone
+
+Vector = NDArray[np.float64]
+_BLOCK_PERIODS = 10
+_GLIDE_S = 0.1
+_HIGHEST = 9
+"""Harmonic that is looked at."""
+_MOST_LOOKS = 20
+_KNOWN, _KNOWN_HARMONIC, _KNOWN_RATIO = 0.1, 0.2, 0.02
+"""A look may end when the standard errors of the base's fundamental and harmonics are these parts of the
+tolerance, and that of m0 this part of itself;"""
+_ROUGHLY = 0.15
+"""far from the level this part of the way there will do for the base."""
+_DRIFT = 3.0
+"""A first half that differs from the second by so many standard errors had not settled."""
+_REMEMBERED = 0.8
+"""What the scatter in a look weighs in the next one: the few blocks of one look may agree by chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopLook:
+    """What base and m0 did under a setting: means over blocks of periods, from the first harmonic on."""
+
+    base_m: Coefficients
+    m0_m: Coefficients
+    base_u: Vector
+    """Standard error of each coefficient's parts [m]."""
+    m0_u: Vector
+
+    @property
+    def ratio(self) -> complex:
+        """Fundamental of m0 over that of the base."""
+        return complex(self.m0_m[0] / self.base_m[0])
+
+    @property
+    def ratio_u(self) -> float:
+        """Standard error of each of its parts."""
+        shares = self.m0_u[0] / abs(self.m0_m[0]), self.base_u[0] / abs(self.base_m[0])
+        return float(abs(self.ratio) * np.hypot(*shares))
+
+
+class BranchPlayer:
+    """Plays settings, and looks at what they make of base and m0."""
+
+    def __init__(self, loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> None:
+        self.plan = plan
+        self.fast = fast
+        self.run = loop.run_phase
+        self._most_vpp = loop.most_vpp
+        self._feedback = fast.feedback
+        self._blocks: list[LoopBlock] = []
+        """Of the setting that is played, since it has settled."""
+        self._squares, self._degrees = np.zeros(1), 0.0
+        """Of deviations of blocks from their means in earlier looks, and how many there were."""
+
+    def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
+        """Give what the controller is told."""
+        program = LoopProgram(
+            frequency_hz=setting.frequency_hz,
+            reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),
+            feedback=self._feedback,
+            glide_s=glide_s,
+            block_periods=_BLOCK_PERIODS,
+            harmonics=max(_HIGHEST, self.plan.harmonics),
+        )
+        level = 2 * abs(setting.reference_v[0]) / self._most_vpp
+        return ProgramTone(setting.frequency_hz, min(float(level), 1.0), program)
+
+    def looked(
+        self, setting: LoopSetting, level_m: float
+    ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
+        """Play a setting, and average for as long as its noise asks for."""
+        tone, frequency_hz = self.tone(setting), setting.frequency_hz
+        look_s = self.plan.look_periods / frequency_hz
+        samples = yield from self.run(Phase(RunState.SETTLING, tone, self.plan.settle_s + look_s))
+        self._blocks = list(samples.coefficients)[-max(2, self.plan.look_periods // _BLOCK_PERIODS) :]
+        look, squares, degrees = self._averaged(frequency_hz)
+        for _ in range(_MOST_LOOKS - 1):
+            if _is_known(look, level_m, self.plan):
+                break
+            samples = yield from self.run(Phase(RunState.SETTLING, tone, look_s))
+            self._blocks += samples.coefficients
+            look, squares, degrees = self._averaged(frequency_hz)
+        self._squares = _REMEMBERED * (self._squares + squares)
+        self._degrees = _REMEMBERED * (self._degrees + degrees)
+        acceleration = abs(look.base_m[0]) * (2 * pi * frequency_hz) ** 2
+        require_answer(self.fast.rig, frequency_hz, 2 * abs(setting.reference_v[0]) * 0.1, acceleration)
+        return look
+
+    def recorded(
+        self, setting: LoopSetting, segment: Segment
+    ) -> Generator[ControlAction, PhaseSamples, LoopLook]:
+        """Record a setting that is played, and average over what was looked at before as well."""
+        tone = self.tone(setting)
+        samples = yield from self.run(Phase(RunState.RECORDING, tone, self.plan.record_s, segment))
+        self._blocks += samples.coefficients
+        return self._averaged(setting.frequency_hz)[0]
+
+    def _averaged(self, frequency_hz: float) -> tuple[LoopLook, Vector, int]:
+        base, m0 = self.fast.motions(self._blocks, frequency_hz)
+        seen = _settled(np.hstack([base, m0]))
+        mean, degrees = seen.mean(axis=0), len(seen) - 1
+        squares = 0.5 * np.sum(np.abs(seen - mean) ** 2, axis=0)
+        known = max(self._degrees + degrees, 1.0)
+        error = np.sqrt((self._squares + squares) / known / len(seen))
+        orders = base.shape[1]
+        look = LoopLook(mean[:orders], mean[orders:], error[:orders], error[orders:])
+        return look, squares, degrees
+
+
+def _settled(seen: Coefficients) -> Coefficients:
+    """Leave out the first half of the blocks for as long as it differs from the second."""
+    while len(seen) > 3:
+        first, second = seen[: len(seen) // 2], seen[len(seen) // 2 :]
+        # Between neighbours: a drift makes little of it.
+        scatter = np.sqrt(0.5 * np.mean(np.abs(np.diff(seen, axis=0)) ** 2, axis=0))
+        moved = np.abs(first.mean(axis=0) - second.mean(axis=0))
+        error = scatter * np.sqrt(1 / len(first) + 1 / len(second))
+        fundamentals = [0, seen.shape[1] // 2]
+        if np.all((moved <= _DRIFT * error)[fundamentals]):
+            break
+        seen = second
+    return seen
+
+
+def _is_known(look: LoopLook, level_m: float, plan: BranchContinuation) -> bool:
+    """Whether the errors of a look are small beside what they are to tell."""
+    share = look.base_u[: plan.harmonics] / level_m
+    wrong = abs(abs(look.base_m[0]) / level_m - 1)
+    return bool(
+        share[0] <= max(_KNOWN * plan.tolerance, _ROUGHLY * wrong)
+        and share[1:].max() <= max(_KNOWN_HARMONIC * plan.tolerance, _ROUGHLY * wrong)
+        and look.m0_u[0] <= _KNOWN_RATIO * abs(look.m0_m[0])
+    )

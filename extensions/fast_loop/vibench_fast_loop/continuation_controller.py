@@ -1,0 +1,324 @@
+"""Following a branch with a fast loop: predicted along the arc, corrected until the base is a sine.
+
+Small changes of what holds a motion tell whether it would be stable without its feedback.
+"""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import degrees, isfinite, nan
+
+import numpy as np
+
+from vibench.acquisition.control.control_action import Controller, PhaseSamples
+from vibench.acquisition.control.feedback_channels import FeedbackChannels
+from vibench.acquisition.control.sine_loop import SineLoop
+from vibench.acquisition.excitation.steps import Segment
+from vibench.acquisition.instruments import Samples
+from vibench.acquisition.plan import HUSH_S, Phase, RunState, ramp
+from vibench.acquisition.recording import (
+    BranchEnd,
+    BranchEndNote,
+    BranchPointNote,
+    BranchStabilityNote,
+    Stability,
+)
+
+from .branch_continuation import BranchContinuation
+from .branch_player import BranchPlayer, LoopLook
+from .branch_solver import (
+    BranchSolver,
+    Coefficients,
+    Foreseen,
+    LoopSetting,
+    Seen,
+    Vector,
+    is_new,
+    noise_of,
+    residual_of,
+)
+from .fast_loop import FastLoop, fast_loop, level_at, require_held
+from .open_loop_multiplier import (
+    OpenLoopMultiplier,
+    PerturbedMotion,
+    envelope_deviation,
+    open_loop_multiplier,
+)
+
+_MOST_TRIES = 8
+_FIRST_TRIES = 30
+"""Of the first point, which the model without stops may be far from."""
+_NEAR = 0.3
+"""Part of the level by which the first motion may be wrong when its unknowns are probed each alone."""
+_SHORTEST_STEP = 1 / 64
+"""Of the plan's step."""
+_GROWTH, _EASY = 1.5, 3
+"""A step grows by this factor where a point took so many tries or fewer."""
+_PROBE, _PROBE_HARMONIC = -0.05, 0.02
+"""Changes by which unknowns are probed: two in steps, harmonics over the level."""
+_BELOW = 5.0
+"""Steps of the first coefficient below the model's from which it is raised."""
+_ABOVE = 8.0
+"""Those above it from which it is lowered: a factor of three."""
+_LOWERED, _CALM = 0.3, 0.03
+"""Steps by which it is lowered at most, and harmonics of the base, over its level, above which it is not:
+a motion with impacts is soon lost."""
+_SLOPES = 0.05, 1.0
+"""Least and largest change of the base's level in a step of the first coefficient, while it is raised."""
+_TOLD = 0.01
+"""Shortest change of it that tells the slope, in steps."""
+_CLOSER, _CLOSE = 0.3, 0.7
+"""Parts of the tolerance that a point must keep when it is found: a fold moves with the level."""
+_BEND_HZ = 0.05
+
+
+def follow_branch(loop: SineLoop, plan: BranchContinuation) -> Controller[None]:
+    """Begin from rest, follow the branch until it ends or leaves its range, ramp down.
+
+    Raises LimitExceeded at once where the loop would not hold the branch: before anything is yielded.
+    """
+    fast = fast_loop(loop.rig)
+    require_held(fast, plan)
+    return _branch(loop, plan, fast)
+
+
+def _branch(loop: SineLoop, plan: BranchContinuation, fast: FastLoop) -> Controller[None]:
+    player = BranchPlayer(loop, plan, fast)
+    start_m = level_at(plan, plan.start_hz)
+    gains = fast.gains(plan.start_hz, plan.harmonics)
+    beside = abs(fast.gains(plan.start_hz + _BEND_HZ, 1)[0])
+    first = np.zeros(plan.harmonics, dtype=np.complex128)
+    first[0] = start_m / abs(gains[0])
+    start = LoopSetting(plan.start_hz, first)
+    bend = float(np.log(beside / abs(gains[0]))) / _BEND_HZ
+    solver = BranchSolver(start, gains, bend, start_m, plan.step_hz)
+    yield from player.run(Phase(RunState.ARMED, None, HUSH_S))
+    tone = player.tone(start)
+    yield from player.run(ramp(RunState.RAMPING_UP, tone, loop.measurement))
+    points, end = yield from _followed(loop, player, solver)
+    loop.note(BranchEndNote(points=points, end=end))
+    yield from player.run(ramp(RunState.RAMPING_DOWN, tone, loop.measurement))
+    yield from loop.say()
+
+
+def _followed(
+    loop: SineLoop, player: BranchPlayer, solver: BranchSolver
+) -> Controller[tuple[int, BranchEnd]]:
+    plan = player.plan
+    way = 1.0 if plan.begin == "up" else -1.0
+    points: list[Seen] = []
+    length, failed = 1.0, 0
+    found = yield from _begun(player, solver)
+    while True:
+        if found is None:
+            length *= 0.5
+            if length < _SHORTEST_STEP or not points:
+                return len(points), BranchEnd.LOST
+            failed += 1
+            yield from _probed(player, solver, points[-1], 2 if failed == 1 else len(points[-1].unknowns))
+        else:
+            seen, tries = found
+            setting = solver.setting(seen.unknowns)
+            if points and not plan.low_hz <= setting.frequency_hz <= plan.high_hz:
+                return len(points), BranchEnd.RANGE
+            yield from _recorded(loop, player, setting, len(points), tries)
+            points.append(seen)
+            failed = 0
+            if len(points) == plan.most_points:
+                return len(points), BranchEnd.POINTS
+            if tries <= _EASY:
+                length = min(length * _GROWTH, 1.0)
+        found = yield from _corrected(player, solver, solver.next(points, length, way))
+
+
+def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen, int] | None]:
+    """Raise what is played until the base has its level: the first motion that is met from rest."""
+    foreseen = solver.first()
+    unknowns = foreseen.unknowns.copy()
+    above = player.plan.begin_from == "above"
+    unknowns[1] += _ABOVE if above else -_BELOW
+    slope, before, most = _SLOPES[0], None, _LOWERED if above else 1.0
+    for tries in range(1, _FIRST_TRIES + 1):
+        seen: Seen = yield from _seen(player, solver, unknowns)
+        wrong = float(seen.residual[0])
+        if _is_sine(seen.residual, player.plan.tolerance):
+            return seen, tries
+        if before is not None and abs(moved := seen.unknowns[1] - before.unknowns[1]) > _TOLD:
+            slope = min(max((wrong - before.residual[0]) / moved, _SLOPES[0]), _SLOPES[1])
+        harmonics = replace(seen, residual=np.concatenate([[0.0], seen.residual[1:]]))
+        before, unknowns = seen, solver.corrected(harmonics, foreseen)
+        # A secant of its own: harmonics that are not yet zero move the level too, and no bracket lasts.
+        unknowns[1] = seen.unknowns[1]
+        if not above or np.abs(seen.residual[1:]).max() <= _CALM:
+            unknowns[1] -= min(max(wrong / slope, -most), most)
+    if abs(wrong) > _NEAR:
+        return None
+    # Level and harmonics that move each other settle slowly by what changes of all of them have told.
+    yield from _probed(player, solver, seen, len(seen.unknowns))
+    return (yield from _corrected(player, solver, replace(foreseen, unknowns=seen.unknowns)))
+
+
+def _probed(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
+    """Go back to the last point, and learn anew what the first of the unknowns do, each alone.
+
+    Frequency and first coefficient are what usually changed. What is believed of the harmonics was learnt
+    on the way, from changes of all at once, and can leave equations that near a fold have no solution.
+    """
+    here = yield from _seen(player, solver, last.unknowns)
+    for column in range(columns):
+        unknowns = last.unknowns.copy()
+        unknowns[column] += _PROBE if column < 2 else _PROBE_HARMONIC
+        beside = yield from _seen(player, solver, unknowns)
+        solver.probe(column, here, beside)
+
+
+def _corrected(
+    player: BranchPlayer, solver: BranchSolver, foreseen: Foreseen
+) -> Controller[tuple[Seen, int] | None]:
+    """Find the point of the branch beside a foreseen one; gives it and how many settings were tried."""
+    unknowns = foreseen.unknowns
+    for tries in range(1, _MOST_TRIES + 1):
+        seen = yield from _seen(player, solver, unknowns)
+        if _is_sine(seen.residual, player.plan.tolerance) and is_new(seen, foreseen):
+            return seen, tries
+        unknowns = solver.corrected(seen, foreseen)
+    return None
+
+
+def _seen(player: BranchPlayer, solver: BranchSolver, unknowns: Vector) -> Controller[Seen]:
+    plan, setting = player.plan, solver.setting(unknowns)
+    level_m = level_at(plan, setting.frequency_hz)
+    look = yield from player.looked(setting, level_m)
+    residual = residual_of(look.base_m[: plan.harmonics], level_m)
+    seen = Seen(
+        unknowns, residual, look.ratio, noise_of(look.base_u[: plan.harmonics] / level_m, look.ratio_u)
+    )
+    solver.learn(seen)
+    return seen
+
+
+def _recorded(
+    loop: SineLoop, player: BranchPlayer, setting: LoopSetting, number: int, tries: int
+) -> Controller[None]:
+    look = yield from player.recorded(setting, player.plan.segment(number, setting.frequency_hz))
+    orders = np.arange(2, len(look.base_m) + 1)
+    share = np.abs(look.base_m[1:] / look.base_m[0])
+    loop.note(
+        BranchPointNote(
+            point=number,
+            frequency_hz=setting.frequency_hz,
+            base_m=float(abs(look.base_m[0])),
+            base_u_m=float(look.base_u[0]),
+            m0_m=float(abs(look.m0_m[0])),
+            m0_u_m=float(look.m0_u[0]),
+            phase_deg=degrees(float(np.angle(look.ratio))),
+            residue=float(np.linalg.norm(share)),
+            residue_acceleration=float(np.linalg.norm(share * orders**2)),
+            reference_v=float(abs(setting.reference_v[0])),
+            tries=tries,
+        )
+    )
+    if player.plan.perturbation:
+        loop.note((yield from perturbed_stability(player, loop.channels, setting, number, look)))
+
+
+def _is_sine(residual: Vector, tolerance: float) -> bool:
+    """Whether the base moves as it should: its fundamental, and each harmonic."""
+    harmonics = np.hypot(residual[1::2], residual[2::2])
+    return bool(abs(residual[0]) <= _CLOSER * tolerance and np.all(harmonics <= _CLOSE * tolerance))
+
+
+_EACH = 5
+"""Periods of a change: short beside growth, long beside what the upper modes need to follow."""
+_LEAD, _TRIAL = 3, 8
+"""Changes before those that count, and changes by which their size is found."""
+_CHANGED = (0, 2)
+"""Coefficients that are changed: the first, and the third, at which the specimen pushes the table."""
+_FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
+"""Of the first coefficient: the change of the trial, and the largest."""
+_SAME, _ERRORS = 0.01, 3.0
+"""A motion that differs by this part, and so many standard errors, from what it was is another one."""
+_NEVER = 1e-9
+
+
+def perturbed_stability(
+    player: BranchPlayer, channels: FeedbackChannels, setting: LoopSetting, number: int, before: LoopLook
+) -> Controller[BranchStabilityNote]:
+    """Go through small changes of what is played twice, the second time with the other sign, and back.
+
+    Their size, by a trial, is such that base and m0 change by as much as the plan says at most; the held
+    motion is looked at afterwards.
+    """
+    plan, frequency_hz = player.plan, setting.frequency_hz
+    period = channels.sample_rate_hz / frequency_hz
+    count = plan.perturbed_periods // (2 * _EACH)
+    changes = _changes(count, number)
+    first_v = _FIRST_SIZE * abs(setting.reference_v[0])
+    told = yield from _changed(player, setting, first_v * changes[:_TRIAL], None)
+    seen = max(envelope_deviation(each, period) for each in _joined(told, channels))
+    size_v = first_v * min(plan.perturbation / max(seen, _NEVER), _MOST_SIZE / _FIRST_SIZE)
+    segment = plan.perturbed(number, frequency_hz, size_v)
+    course = np.concatenate([-changes[-_LEAD:], changes, -changes, np.zeros((1, len(_CHANGED)))])
+    told = yield from _changed(player, setting, size_v * course, segment)
+    after = yield from player.looked(setting, abs(before.base_m[0]))
+    return stability_note(_fitted(told, channels, period, count), number, plan.perturbation, before, after)
+
+
+def _changes(count: int, seed: int) -> Coefficients:
+    """Give corners of a square at random, shape (count, coefficients)."""
+    corners = np.random.default_rng(seed).integers(0, 4, (count, len(_CHANGED)))
+    return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
+
+
+def _changed(
+    player: BranchPlayer, setting: LoopSetting, course: Coefficients, segment: Segment | None
+) -> Controller[list[PhaseSamples]]:
+    """Go from change to change along half cosines, without a step."""
+    told = []
+    state = RunState.SETTLING if segment is None else RunState.RECORDING
+    length_s = _EACH / setting.frequency_hz
+    for change in course:
+        volts = setting.reference_v.copy()
+        volts[list(_CHANGED)] += change
+        tone = player.tone(LoopSetting(setting.frequency_hz, volts), length_s)
+        told.append((yield from player.run(Phase(state, tone, length_s, segment))))
+    return told
+
+
+def _joined(told: list[PhaseSamples], channels: FeedbackChannels) -> tuple[Samples, Samples]:
+    """Join base and m0 of all phases."""
+    rows = [channels.rows(each) for each in told]
+    return np.concatenate([base for _, base, _ in rows]), np.concatenate([m0 for _, _, m0 in rows])
+
+
+def _fitted(
+    told: list[PhaseSamples], channels: FeedbackChannels, period: float, count: int
+) -> OpenLoopMultiplier:
+    """Fit what was recorded; nothing is known where samples are missing between phases (a run was held)."""
+    if any(one.first_sample + one.volts.shape[1] != two.first_sample for one, two in pairwise(told)):
+        return OpenLoopMultiplier(nan, nan)
+    base, m0 = _joined(told, channels)
+    return open_loop_multiplier(
+        PerturbedMotion(base, m0, period, round(_LEAD * _EACH * period), count * _EACH)
+    )
+
+
+def stability_note(
+    found: OpenLoopMultiplier, number: int, asked: float, before: LoopLook, after: LoopLook
+) -> BranchStabilityNote:
+    """Judge a fit; a motion that is another one afterwards was not the one that it is about."""
+    error = float(np.hypot(before.m0_u[0], after.m0_u[0]) / abs(before.m0_m[0]))
+    moved = float(abs(abs(after.m0_m[0] / before.m0_m[0]) - 1))
+    low, high = found.bounds
+    stability = Stability.OPEN
+    if moved <= max(_SAME, _ERRORS * error):
+        # Comparisons with what is not a number are false: not determined.
+        stability = Stability.STABLE if high < 1 else Stability.UNSTABLE if low > 1 else Stability.OPEN
+    known = isfinite(found.size) and isfinite(found.error)
+    return BranchStabilityNote(
+        point=number,
+        stability=stability,
+        multiplier=found.size if known else None,
+        multiplier_u=found.error if known else None,
+        perturbation=asked,
+        moved=moved,
+    )

@@ -1,0 +1,148 @@
+"""What every real-time controller must do: play what it is told, say what it saw, end by itself."""
+
+from collections.abc import Sequence
+from typing import cast
+
+import numpy as np
+import pytest
+
+from vibench.acquisition.bench.bench import Bench
+from vibench.acquisition.contract.conftest import LEVEL, heard_v, line_v, refused
+from vibench.acquisition.instruments import PlugInKind, Samples
+from vibench.acquisition.rig import LoopInput, Role
+
+from ..protocol import LoopBlock, LoopController, LoopFeedback, LoopProgram, LoopState
+
+KIND = PlugInKind.CONTROLLER
+TONE_HZ = 160.0
+TALK_S = 0.1
+"""Between two reports: shorter than any watchdog."""
+LAW = 0.05
+"""Of what is played: what the law adds to it."""
+
+
+def controller_of(bench: Bench) -> LoopController:
+    assert bench.controller is not None
+    return cast("LoopController", bench.controller)
+
+
+def level_v(bench: Bench) -> float:
+    return LEVEL * controller_of(bench).facts.limit_v
+
+
+def series(bench: Bench, feedback: LoopFeedback | None = None) -> LoopProgram:
+    level = level_v(bench)
+    return LoopProgram(
+        frequency_hz=TONE_HZ, reference_v=((level, 0.0), (0.1 * level, -0.2 * level)), feedback=feedback
+    )
+
+
+def listened(bench: Bench, duration_s: float) -> tuple[Samples, list[LoopBlock]]:
+    """Read so long, and talk to the controller meanwhile."""
+    stretch = int(TALK_S * bench.digitizer.sample_rate_hz)
+    parts, blocks = [], list[LoopBlock]()
+    for _ in range(round(duration_s / TALK_S)):
+        parts.append(bench.digitizer.read(stretch).volts)
+        blocks += controller_of(bench).report().blocks
+    return np.concatenate(parts, axis=1), blocks
+
+
+def complex_of(row: Sequence[tuple[float, float]]) -> list[complex]:
+    return [complex(*pair) for pair in row]
+
+
+def answered(block: LoopBlock, of_base: bool) -> complex:  # noqa: FBT001 - which of two inputs
+    return complex_of(block.base if of_base else block.m0)[1]
+
+
+def test_it_says_who_it_is_and_what_its_configuration_says_of_it(bench: Bench) -> None:
+    facts, told = controller_of(bench).facts, bench.rig.controller
+    assert controller_of(bench).identity.reply
+    assert controller_of(bench).identity == controller_of(bench).identity
+    assert told is not None
+    assert facts.rate_hz == pytest.approx(told.rate_hz, rel=0.01)
+    assert facts.latency_s == pytest.approx(told.latency_s, abs=1 / facts.rate_hz)
+    assert facts.limit_v <= 1.01 * told.limit_v
+    assert facts.watchdog_s <= 1.01 * told.watchdog_s
+    assert facts.pd_of == told.pd_of
+    assert controller_of(bench).report().state is LoopState.SILENT
+
+
+def test_a_series_is_heard_at_the_terminal_as_it_was_told(bench: Bench) -> None:
+    bench.digitizer.start()
+    controller_of(bench).play(series(bench))
+    volts, blocks = listened(bench, 0.8)
+    row = bench.digitizer.roles.index(Role.DRIVE_VOLTAGE.value)
+    heard = (volts[row] * bench.channels[row].units_per_volt)[volts.shape[1] // 2 :]
+    level, rate_hz = level_v(bench), bench.digitizer.sample_rate_hz
+    assert line_v(heard, TONE_HZ, rate_hz) == pytest.approx(level, rel=0.03)
+    assert line_v(heard, 2 * TONE_HZ, rate_hz) == pytest.approx(np.hypot(0.1, 0.2) * level, rel=0.05)
+    assert [each.end_s for each in blocks] == sorted(each.end_s for each in blocks)
+
+
+def test_the_coefficients_are_those_of_what_is_played_and_of_what_its_sensors_show(bench: Bench) -> None:
+    bench.digitizer.start()
+    controller_of(bench).play(series(bench))
+    volts, blocks = listened(bench, 1.2)
+    block = [each for each in blocks if each.steady][-1]
+    output, level = complex_of(block.output), level_v(bench)
+    assert abs(output[1] - level) < 0.01 * level
+    assert abs(output[2] - complex(0.1, -0.2) * level) < 0.01 * level
+    for role, told in ((Role.BASE_ACCELERATION, block.base), (Role.M0_VELOCITY, block.m0)):
+        row = volts[bench.digitizer.roles.index(role.value)]
+        shown = line_v(row[len(row) // 2 :], TONE_HZ, bench.digitizer.sample_rate_hz)
+        assert abs(complex_of(told)[1]) == pytest.approx(shown, rel=0.05)
+
+
+def test_a_law_answers_what_is_sampled_beside_the_series(bench: Bench) -> None:
+    bench.digitizer.start()
+    controller_of(bench).play(series(bench))
+    _, blocks = listened(bench, 0.8)
+    of_base = controller_of(bench).facts.pd_of in (None, LoopInput.BASE)
+    gain = LAW * level_v(bench) / abs(answered(blocks[-1], of_base))
+    # The memory is the sample before, and the law the mean of both: of proportional and derivative form.
+    into = (1.0, 0.0) if of_base else (0.0, 1.0)
+    direct = (0.5 * gain * into[0], 0.5 * gain * into[1])
+    law = LoopFeedback(step=((0.0,),), inlet=(into,), output=(0.5 * gain,), direct=direct)
+    controller_of(bench).play(series(bench, law))
+    _, blocks = listened(bench, 0.8)
+    block = [each for each in blocks if each.steady][-1]
+    late = np.exp(-2j * np.pi * TONE_HZ / controller_of(bench).facts.rate_hz)
+    wanted = level_v(bench) + 0.5 * gain * (1 + late) * answered(block, of_base)
+    assert abs(complex_of(block.output)[1] - wanted) < 0.1 * LAW * level_v(bench)
+
+
+def test_it_falls_silent_when_nobody_talks_to_it_and_says_why(bench: Bench) -> None:
+    controller = controller_of(bench)
+    bench.digitizer.start()
+    controller.play(series(bench))
+    bench.digitizer.read(int((controller.facts.watchdog_s + 0.5) * bench.digitizer.sample_rate_hz))
+    assert line_v(heard_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
+    told = controller.report()
+    assert told.state is LoopState.SILENT
+    assert told.reason
+    controller.play(series(bench))
+    assert controller.report().state is LoopState.PLAYING, "it may be told to play again"
+
+
+def test_silence_is_legal_at_any_time_and_is_heard(bench: Bench) -> None:
+    controller_of(bench).silence(0.0)
+    bench.digitizer.start()
+    controller_of(bench).play(series(bench))
+    listened(bench, 0.3)
+    controller_of(bench).silence(0.05)
+    controller_of(bench).silence(0.0)
+    assert line_v(heard_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
+    assert controller_of(bench).report().state is LoopState.SILENT
+
+
+def test_close_may_be_repeated_and_is_silence(bench: Bench) -> None:
+    controller = controller_of(bench)
+    bench.digitizer.start()
+    controller.play(series(bench))
+    listened(bench, 0.3)
+    controller.close()
+    controller.close()
+    assert line_v(heard_v(bench, 0.2), TONE_HZ, bench.digitizer.sample_rate_hz) < 0.05 * level_v(bench)
+    with refused():
+        controller.play(series(bench))

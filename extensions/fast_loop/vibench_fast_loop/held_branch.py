@@ -1,0 +1,203 @@
+"""A branch that a fast loop held: its points in the order held, and their figure over the model's branch."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from math import nan
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from vibench.acquisition.recording import (
+    BranchEndNote,
+    BranchPointNote,
+    BranchStabilityNote,
+    FeedbackNote,
+    Stability,
+)
+from vibench.analysis.figures.style import (
+    MEASURED,
+    SIMULATED,
+    DrawnFigure,
+    legend_above,
+    new_figure,
+    prefixed,
+    styled,
+)
+from vibench.analysis.recordings.facts import specimen_of
+from vibench.analysis.report import STEPPED
+from vibench.analysis.signals.arrays import Reals
+from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
+from vibench.analysis.tables import Labelled, named, table
+from vibench.sim import (
+    Branch,
+    FrequencyPath,
+    Harmonic,
+    ShootingEnd,
+    Specimen,
+    periodic_branch_within,
+    periodic_orbit,
+)
+
+_LEAST = 3
+"""Points that a turn needs."""
+
+
+@dataclass(frozen=True)
+class HeldBranch(Labelled):
+    """Motions of one branch; arrays of shape (points,), in the order in which they were held."""
+
+    frequency_hz: Reals
+    base_m: Reals
+    """Amplitude of the base's fundamental."""
+    m0_m: Reals
+    """That of m0."""
+    phase_deg: Reals
+    """Of m0 over the base, as displacements."""
+    residue: Reals
+    """Harmonics of the base from the second on, rms, over its fundamental: displacement."""
+    residue_acceleration: Reals
+    stability: tuple[str, ...]
+    """Without feedback, under a base that moves as it should: a word of `Stability`; empty where unasked."""
+    multiplier: Reals
+    """Largest over a period, as small changes told it; NaN where they told nothing."""
+    multiplier_u: Reals
+    """Its standard uncertainty."""
+
+    @property
+    def folds(self) -> tuple[int, ...]:
+        """Points at which the frequency turned: motions between two of them lie on the way back."""
+        if self.frequency_hz.size < _LEAST:
+            return ()
+        ways = np.sign(np.diff(self.frequency_hz))
+        return tuple(int(each) + 1 for each in np.flatnonzero(ways[1:] != ways[:-1]))
+
+
+def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
+    """Collect what a fast loop noted; empty where it held nothing."""
+    points = [each for each in notes if isinstance(each, BranchPointNote)]
+    told = {each.point: each for each in notes if isinstance(each, BranchStabilityNote)}
+    asked = [told.get(each.point) for each in points]
+    sizes = [(nan, nan) if each is None else (each.multiplier, each.multiplier_u) for each in asked]
+    multiplier, multiplier_u = np.array(sizes, dtype=np.float64).reshape(-1, 2).T
+    return HeldBranch(
+        frequency_hz=np.array([each.frequency_hz for each in points]),
+        base_m=np.array([each.base_m for each in points]),
+        m0_m=np.array([each.m0_m for each in points]),
+        phase_deg=np.array([each.phase_deg for each in points]),
+        residue=np.array([each.residue for each in points]),
+        residue_acceleration=np.array([each.residue_acceleration for each in points]),
+        stability=tuple("" if each is None else each.stability.value for each in asked),
+        multiplier=multiplier,
+        multiplier_u=multiplier_u,
+    )
+
+
+def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
+    """Say how far a branch was followed, and what it turned at."""
+    found, ends = held_branch(notes), [each for each in notes if isinstance(each, BranchEndNote)]
+    if not found.frequency_hz.size:
+        return ("No motion of the branch was held.",)
+    size_um = 1e6 * found.base_m
+    held = (
+        f"{found.frequency_hz.size} motions held, base {size_um.min():.4g} to {size_um.max():.4g} µm, its "
+        f"harmonics at most {found.residue.max():.2g} of that as displacement and "
+        f"{found.residue_acceleration.max():.2g} as acceleration."
+    )
+    told = [held]
+    if found.folds:
+        turns = ", ".join(f"{found.frequency_hz[each]:.5g}" for each in found.folds)
+        told.append(f"The branch turned at {turns} Hz.")
+    if any(found.stability):
+        counts = ", ".join(f"{found.stability.count(each.value)} {each.value}" for each in Stability)
+        told.append(f"Without feedback they would be: {counts}, by small changes of what was played.")
+    told.extend(f"It was left because {each.end.value}." for each in ends)
+    return tuple(told)
+
+
+_HEIGHT_IN = 4.4
+_ROOM_HZ = 1.0
+"""Of the model's branch beyond the points held."""
+
+
+def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
+    """Draw amplitude and phase of m0 over frequency, in the order held, on the model's branch."""
+    found = held_branch(analysis.facts.feedback)
+    scale, unit = prefixed(float(np.max(found.m0_m, initial=1e-9)), "m")
+    with styled():
+        figure = new_figure(_HEIGHT_IN)
+        axes: Axes = figure.subplots(1, 1)
+        model = model_branch(found, specimen_of(analysis.facts.bench))
+        if model is not None:
+            _model(axes, model, scale)
+        for label, chosen, marks in _groups(found):
+            if chosen.any():
+                axes.plot(
+                    found.frequency_hz[chosen], scale * found.m0_m[chosen], color=MEASURED,
+                    markersize=4, linestyle="none", label=label, **marks,
+                )  # fmt: skip
+        axes.set_xlabel("drive frequency [Hz]")
+        axes.set_ylabel(f"amplitude of m0 [{unit}]")
+        legend_above(figure, [axes], columns=2)
+    name = f"branch_{analysis.facts.name}"
+    return DrawnFigure(
+        name=name,
+        title=f"Branch held by a fast loop, {analysis.excitation.level_text}",
+        caption=" ".join(branch_sentences(analysis.facts.feedback)),
+        figure=figure,
+        tables=(table(name, **named(found, *(each.name for each in fields(found)))),),
+    )
+
+
+def _groups(found: HeldBranch) -> tuple[tuple[str, NDArray[np.bool_], dict[str, Any]], ...]:
+    """Sort points, with their marks: by their stability where it was asked for, else by the turns."""
+    filled: dict[str, Any] = {"marker": "o"}
+    empty = filled | {"markerfacecolor": "white"}
+    if any(found.stability):
+        told = np.array(found.stability)
+        return (
+            ("held, stable without feedback", told == Stability.STABLE.value, filled),
+            ("held, unstable without feedback", told == Stability.UNSTABLE.value, empty),
+            ("held, stability not determined", told == Stability.OPEN.value, {"marker": "x"}),
+            ("held", told == "", {"marker": "."}),
+        )
+    back = np.zeros(found.frequency_hz.size, dtype=bool)
+    for first, last in zip(found.folds[::2], found.folds[1::2], strict=False):
+        back[first + 1 : last] = True
+    return ("held", ~back, filled), ("held, on the way back", back, empty)
+
+
+def model_branch(found: HeldBranch, specimen: Specimen) -> Branch | None:
+    """Follow the model's branch through the range of the points held; None where it has no start there."""
+    if not found.frequency_hz.size:
+        return None
+    amplitude_m = float(np.median(found.base_m))
+    first_hz = float(found.frequency_hz[0])
+    low, high = float(found.frequency_hz.min()) - _ROOM_HZ, float(found.frequency_hz.max()) + _ROOM_HZ
+    orbit = periodic_orbit(specimen, Harmonic(first_hz, amplitude_m))
+    if orbit.outcome is not ShootingEnd.CONVERGED:
+        return None
+    return periodic_branch_within(orbit, FrequencyPath((amplitude_m,)), low, high)
+
+
+def _model(axes: Axes, model: Branch, scale: float) -> None:
+    m0 = scale * model.response_ii[:, 0] * model.amplitudes_m
+    for chosen, style, label in (
+        (model.is_stable, "-", "model, stable"),
+        (~model.is_stable, "--", "model, unstable"),
+    ):
+        if chosen.any():
+            near = chosen | np.roll(chosen, 1)
+            axes.plot(
+                model.frequencies_hz, np.where(near, m0, np.nan),
+                color=SIMULATED, linestyle=style, linewidth=1.0, label=label,
+            )  # fmt: skip
+
+
+HELD_BRANCH = replace(
+    STEPPED,
+    figures=lambda branch: iter((held_branch_figure(branch.analysis),)),
+    findings=lambda branch: iter(branch_sentences(branch.analysis.facts.feedback)),
+)
+"""What a report shows of a branch."""

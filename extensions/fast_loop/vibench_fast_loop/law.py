@@ -1,0 +1,227 @@
+"""The linear law of a controller: a Kalman filter of the sampled plant, and the feedback of its estimate.
+
+For a controller that takes no such law there is one of two gains. Multipliers of plant and law together tell
+whether a motion is stable under it.
+"""
+
+from dataclasses import dataclass
+from functools import reduce
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
+from scipy.optimize import fmin
+
+from vibench.sim.model.arrays import Table, Vector
+
+from .plant import SampledPlant
+
+
+@dataclass(frozen=True)
+class LawWeights:
+    """What a law shall weigh; sizes of motion that go with a volt."""
+
+    relative_m: float = 3e-5
+    """Motion of p that is worth a tenth of a volt of control."""
+    push_n: float = 3e-3
+    """Force between m1 and m2 that the filter expects without knowing it, rms over a step [N]."""
+    volt: float = 1e-2
+    """Unknown voltage, likewise [V]."""
+    acceleration: float = 0.2
+    """Noise of a sample of the base's acceleration [m/s2]."""
+    velocity: float = 1e-4
+    """Noise of a sample of m0's velocity [m/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearLaw:
+    """Volts u of samples s: u = output @ memory + direct @ s, then memory = step @ memory + inlet @ s."""
+
+    step: Table
+    """Shape (n, n)."""
+    inlet: Table
+    """Shape (n, 2), per m/s2 of the base and per m/s of m0."""
+    output: Table
+    """Shape (1, n) [V]."""
+    direct: Table
+    """Shape (1, 2)."""
+
+
+def designed_law(plant: SampledPlant, weights: LawWeights = LawWeights()) -> LinearLaw:
+    """Design the law that takes motion out of the spring between m1 and m2.
+
+    Linear-quadratic Gaussian (Franklin, Powell and Workman, Digital Control of Dynamic Systems, ch. 9), the
+    estimate being that of the moment of the sample.
+
+    Parameters
+    ----------
+    plant
+        As far as it is known; the law is made for its latency.
+    weights
+        What is weighed.
+
+    """
+    step, volt, shown, cost, unknown, noise = _weighed(plant, weights)
+    gain = _gain(step, volt[:, None], cost, np.eye(1))
+    covariance = solve_discrete_are(step.T, shown.T, unknown + 1e-12 * np.eye(plant.size), noise)
+    filtered = np.linalg.solve(shown @ covariance @ shown.T + noise, shown @ covariance).T
+    kept = np.eye(plant.size) - filtered @ shown
+    closed = step - volt[:, None] @ gain
+    return LinearLaw(closed @ kept, closed @ filtered, -gain @ kept, -gain @ filtered)
+
+
+def pd_law(plant: SampledPlant, sample: int, weights: LawWeights = LawWeights()) -> LinearLaw:
+    """Design a law of two gains, by the measure of `designed_law`: for a controller that takes no other.
+
+    ``u = -(kp s + kd d)`` of one sample s, its rate of change behind a low-pass ``d += a ((s - before) / step
+    - d)``, ``a = step / (tau + step)``. Both gains and tau are those of the least expected cost (W. S. Levine
+    and M. Athans, IEEE Trans. Autom. Control 15 (1970) 44).
+
+    Parameters
+    ----------
+    plant
+        As far as it is known; the law is made for its latency.
+    sample
+        Which is answered: 0 the base's acceleration, 1 m0's velocity.
+    weights
+        What is weighed.
+
+    """
+    problem, step_s = _weighed(plant, weights), plant.timing.step_s
+    omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
+    size = 0.1 / weights.relative_m / omega ** (2 - sample)
+
+    def law(unknowns: Vector) -> LinearLaw:
+        share = step_s / (abs(unknowns[2]) / omega + step_s)
+        kp, kd = size * unknowns[0], size * unknowns[1] / omega
+        inlet, direct = np.zeros((2, 2)), np.zeros((1, 2))
+        inlet[:, sample], direct[0, sample] = (share / step_s, 1.0), -kp - kd * share / step_s
+        rate = np.array([[1.0 - share, -share / step_s]])
+        return LinearLaw(np.vstack([rate, np.zeros((1, 2))]), inlet, -kd * rate, direct)
+
+    start = np.array([[0.0, 0.0, 1.0], [-0.1, 0.0, 1.0], [0.0, -0.1, 1.0], [0.0, 0.0, 2.0]])
+
+    def cost(unknowns: Vector) -> float:
+        return _expected_cost(problem, law(unknowns))
+
+    return law(np.asarray(fmin(cost, start[0], xtol=1e-3, ftol=1e-12, initial_simplex=start, disp=False)))
+
+
+class _Weighed(NamedTuple):
+    """A plant in the sizes of its motions, and what is weighed in it."""
+
+    step: Table
+    volt: Vector
+    shown: Table
+    cost: Table
+    unknown: Table
+    noise: Table
+
+
+def _weighed(plant: SampledPlant, weights: LawWeights) -> _Weighed:
+    scale = plant.scales
+    step, volt = plant.step
+    step = step * scale / scale[:, None]
+    volt = volt / scale
+    into, relative = (each * factor for each, factor in zip(plant.spring, (1 / scale, scale), strict=True))
+    fast = np.zeros(plant.size)
+    omega = 2 * np.pi * plant.specimen.natural_frequencies_hz[0]
+    fast[7], fast[8] = scale[7] / omega, -scale[8] / omega
+    cost = (np.outer(relative, relative) + np.outer(fast, fast)) * (0.1 / weights.relative_m) ** 2
+    pushed = step @ into * plant.timing.step_s
+    unknown = np.outer(pushed, pushed) * weights.push_n**2 + np.outer(volt, volt) * weights.volt**2
+    noise = np.diag([weights.acceleration**2, weights.velocity**2])
+    return _Weighed(step, volt, plant.shown * scale, cost, unknown, noise)
+
+
+def _expected_cost(problem: _Weighed, law: LinearLaw) -> float:
+    """Give what motion and volts cost a sample in the mean, under noise; infinite where they grow."""
+    answer = np.hstack([law.direct @ problem.shown, law.output])[0]
+    own = len(problem.step)
+    closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.shown, law.step])])
+    closed[:own, :own] = problem.step
+    closed[:own] += np.outer(problem.volt, answer)
+    if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
+        return float("inf")
+    heard = np.vstack([np.outer(problem.volt, law.direct), law.inlet])
+    noise = heard @ problem.noise @ heard.T
+    noise[:own, :own] += problem.unknown
+    covariance = solve_discrete_lyapunov(closed, noise)
+    direct = (law.direct @ problem.noise @ law.direct.T).item()
+    return float(np.trace(covariance[:own, :own] @ problem.cost) + answer @ covariance @ answer + direct)
+
+
+def _gain(step: Table, volt: Table, cost: Table, price: Table) -> Table:
+    value = solve_discrete_are(step, volt, cost, price)
+    return np.asarray(np.linalg.solve(price + volt.T @ value @ volt, volt.T @ value @ step))
+
+
+def loop_multiplier(
+    plant: SampledPlant,
+    law: LinearLaw,
+    stiffness: ArrayLike,
+    damping: ArrayLike = 0.0,
+    periods: int = 1,
+    parts: int = 1,
+) -> float:
+    """Give the largest multiplier over a period of a motion, with the law acting: below 1 it is held.
+
+    Parameters
+    ----------
+    plant
+        What is driven; not the one of the design where that was not exact.
+    law
+        Designed for the same latency, or another.
+    stiffness, damping
+        Slopes dF/dp [N/m] and dF/d(dp/dt) [N s/m] of the stops' force along the motion, in the middle of each
+        part of each sample, shape (samples * parts,).
+    periods
+        Over how many periods the slopes go; as many as take a whole number of samples, or nearly so.
+    parts
+        Of a sample: contacts are shorter.
+
+    """
+    stretches = _joined(plant, law, parts)
+    into, relative = (np.pad(each, (0, len(stretches[0]) - plant.size)) for each in plant.spring)
+    rate, part_s = np.roll(relative, 3), plant.timing.step_s / parts
+    springs, dampers = np.broadcast_arrays(np.asarray(stiffness) - plant.stiffness, damping)
+    free = reduce(lambda before, stretch: stretch @ before, stretches)
+    moved = np.eye(len(free))
+    for spring, damper in zip(springs.reshape(-1, parts), dampers.reshape(-1, parts), strict=True):
+        if not spring.any():
+            moved = free @ moved
+            continue
+        pulls = part_s * (np.outer(spring, relative) + np.outer(damper, rate))
+        for stretch, pull in zip(stretches, pulls, strict=False):
+            moved = stretch @ moved
+            moved += np.outer(into, pull @ moved)
+        moved = stretches[-1] @ moved
+    return float(np.abs(np.linalg.eigvals(moved)).max() ** (1.0 / periods))
+
+
+def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> complex:
+    """Give the base's displacement per volt of what is played beside the law's answer [m/V].
+
+    The phases are those at the moments of the samples; the motion is that without stops.
+    """
+    before, after = _joined(plant, law, 1)
+    played = np.concatenate([plant.stretches()[0][1], np.zeros(len(law.step)), [1.0]])
+    turn = np.exp(2j * np.pi * frequency_hz * plant.timing.step_s)
+    return complex(np.linalg.solve(turn * np.eye(len(before)) - after @ before, after @ played)[0])
+
+
+def _joined(plant: SampledPlant, law: LinearLaw, parts: int) -> list[Table]:
+    """Stretches of a step of plant, memory of the law, and the volt it gives, which all of them need."""
+    own, memory = plant.size, len(law.step)
+    answer = np.hstack([law.direct @ plant.shown, law.output])
+    (first, of_first), *others = plant.stretches(parts)
+    begin = np.zeros((own + memory + 1, own + memory + 1))
+    begin[:own, :own], begin[own:-1, :own], begin[own:-1, own:-1] = first, law.inlet @ plant.shown, law.step
+    begin[:own, :-1] += np.outer(of_first, answer)
+    begin[-1, :-1] = answer[0]
+    joined = [begin]
+    for stretch, of_volt in others:
+        joined.append(np.eye(own + memory + 1))
+        joined[-1][:own, :own], joined[-1][:own, -1] = stretch, of_volt
+    return joined

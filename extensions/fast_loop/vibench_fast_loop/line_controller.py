@@ -1,0 +1,116 @@
+"""A real-time controller that speaks lines of JSON over a socket (`vibench_fast_loop.protocol`)."""
+
+import json
+from typing import Self, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pyvisa import VisaIOError
+
+from vibench.acquisition.drivers import Link, open_link
+from vibench.acquisition.errors import ConfigurationError, InstrumentError, InstrumentLost
+from vibench.acquisition.instruments import Identity
+from vibench.acquisition.rig import ControllerConfig
+
+from .protocol import LoopFacts, LoopProgram, LoopReport, LoopRequest
+
+_PART = 0.01
+"""How far a rate may be from what the configuration says."""
+_LEAVING_S = 0.1
+Answer = TypeVar("Answer", bound=BaseModel)
+
+
+class LineController:
+    """The host's end of a connection to a real-time controller."""
+
+    def __init__(self, link: Link, config: ControllerConfig) -> None:
+        self._link = link
+        self._config = config
+        self._is_open = True
+        self._facts = self._asked(LoopRequest(ask="hello"), LoopFacts)
+
+    @classmethod
+    def open(cls, config: ControllerConfig) -> Self:
+        """Connect, silence whatever plays, and compare the controller with its configuration."""
+        if not config.resource:
+            raise ConfigurationError(
+                "controller.resource is empty, and only a virtual rig knows where its controller is; give "
+                "TCPIP0::<host>::<port>::SOCKET in the hardware configuration"
+            )
+        controller = cls(open_link(config.resource, config.visa_library), config)
+        controller.silence(_LEAVING_S)
+        facts = controller.facts
+        different = abs(facts.rate_hz / config.rate_hz - 1) > _PART or facts.limit_v > config.limit_v * (
+            1 + _PART
+        )
+        different = different or facts.pd_of != config.pd_of
+        if different or facts.watchdog_s > config.watchdog_s * (1 + _PART):
+            controller.close()
+            raise ConfigurationError(
+                f"{facts.name} at {config.resource} takes {facts.rate_hz:g} samples a second, gives up to "
+                f"{facts.limit_v:g} V, waits {facts.watchdog_s:g} s for its host and takes {_laws(facts)}; "
+                f"the configuration says {config.rate_hz:g}, {config.limit_v:g} V, {config.watchdog_s:g} s "
+                f"and {_laws(config)}. It is silent; make them agree"
+            )
+        return controller
+
+    @property
+    def identity(self) -> Identity:
+        """Who answered."""
+        facts = self._facts
+        return Identity("", facts.name, facts.serial, f"loop {facts.vibench_loop}", facts.model_dump_json())
+
+    @property
+    def facts(self) -> LoopFacts:
+        """Rate, latency, limit and watchdog."""
+        return self._facts
+
+    def play(self, program: LoopProgram) -> LoopReport:
+        """Go over to a program."""
+        return self._asked(LoopRequest(ask="play", program=program), LoopReport)
+
+    def report(self) -> LoopReport:
+        """Hand over what has been measured since the last report."""
+        return self._asked(LoopRequest(ask="report"), LoopReport)
+
+    def silence(self, ramp_s: float) -> LoopReport:
+        """Ramp down and be silent."""
+        return self._asked(LoopRequest(ask="silence", ramp_s=ramp_s), LoopReport)
+
+    def close(self) -> None:
+        """Silence, and end the connection; where it is gone already, its watchdog silences it."""
+        if self._is_open:
+            try:
+                self.silence(_LEAVING_S)
+            finally:
+                self._is_open = False
+                self._link.close()
+
+    def _asked(self, request: LoopRequest, kind: type[Answer]) -> Answer:
+        where = self._config.resource
+        if not self._is_open:
+            raise InstrumentError(
+                f"the connection to the real-time controller at {where} was closed, and it was told to "
+                f"{request.ask}. It is silent; open the bench again"
+            )
+        try:
+            self._link.write(request.model_dump_json(exclude_defaults=False))
+            line = self._link.read_raw()
+        except (VisaIOError, OSError) as error:
+            raise InstrumentLost(
+                f"the real-time controller at {where} does not answer ({error}). It falls silent by itself "
+                f"after {self._config.watchdog_s:g} s; look at its power and its network"
+            ) from error
+        try:
+            told = json.loads(line)
+            if isinstance(told, dict) and "refused" in told:
+                raise InstrumentError(f"the real-time controller at {where} refused: {told['refused']}")
+            return kind.model_validate_json(line)
+        except (ValueError, ValidationError) as error:
+            raise InstrumentError(
+                f"what answers at {where} is no controller of loop protocol {request.vibench_loop} "
+                f"({error}); correct controller.resource, or give the name of its driver"
+            ) from error
+
+
+def _laws(told: LoopFacts | ControllerConfig) -> str:
+    return "any linear law" if told.pd_of is None else f"proportional and derivative laws of {told.pd_of}"

@@ -1,0 +1,167 @@
+"""What passes between a host and a real-time controller: programs go down, Fourier coefficients come back.
+
+Version 1 of the protocol. Each message is one line of JSON, answered by one line; the host always begins.
+``{"vibench_loop": 1, "ask": "hello" | "play" | "report" | "silence", ...}``; docs/feedback.md has the rest.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, Final, Literal, Protocol, Self
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, model_validator
+
+from vibench.acquisition.excitation.steps import LoopTone
+from vibench.acquisition.instruments import RealTimeController
+from vibench.acquisition.rig import ControllerConfig, LoopInput
+from vibench.sim import FrozenModel
+
+LOOP_PROTOCOL: Final = 1
+MOST_HARMONICS = 20
+MOST_MEMORY = 64
+"""Numbers that a feedback may remember."""
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Row = tuple[Finite, ...]
+Pair = tuple[Finite, Finite]
+"""Real and imaginary part."""
+
+
+class LoopFeedback(FrozenModel):
+    """A linear law: u = output m + direct s, then m = step m + inlet s; s the input volts, m the memory."""
+
+    step: tuple[Row, ...] = Field(max_length=MOST_MEMORY)
+    """Shape (n, n)."""
+    inlet: tuple[Row, ...]
+    """Shape (n, 2) [per V]."""
+    output: Row
+    """Shape (n,) [V]."""
+    direct: Row
+    """Shape (2,) [V/V]."""
+
+    @model_validator(mode="after")
+    def _shapes_agree(self) -> Self:
+        memory, inputs = len(self.output), len(LoopInput)
+        widths = [*(len(row) == memory for row in self.step), *(len(row) == inputs for row in self.inlet)]
+        if not (all(widths) and len(self.step) == len(self.inlet) == memory and len(self.direct) == inputs):
+            raise ValueError(
+                f"a feedback of {memory} outputs needs step of {memory} x {memory}, inlet of {memory} x "
+                f"{inputs} and direct of {inputs}; make the shapes agree"
+            )
+        return self
+
+
+class LoopProgram(FrozenModel):
+    """What a controller plays: a Fourier series, and the answer of a law to what it samples.
+
+    ``v(t) = sum Re(reference_k exp(i k theta)) + u``, theta the controller's own phase, which goes
+    on without a jump from program to program.
+    """
+
+    frequency_hz: PositiveFloat
+    reference_v: tuple[Pair, ...] = Field(min_length=1, max_length=MOST_HARMONICS)
+    """Coefficients from the first harmonic on, as pairs [V]."""
+    feedback: LoopFeedback | None = None
+    """None for none; a law that is the same as before keeps its memory."""
+    glide_s: NonNegativeFloat = 0.1
+    """Time in which frequency and coefficients go over to those of now, along a half cosine [s]."""
+    block_periods: int = Field(default=10, ge=2, le=1000)
+    """Periods over which the coefficients that come back are taken, under a Hann window."""
+    harmonics: int = Field(default=9, ge=1, le=MOST_HARMONICS)
+    """Highest harmonic that comes back."""
+
+
+class LoopState(StrEnum):
+    """What a controller does."""
+
+    SILENT = "silent"
+    PLAYING = "playing"
+    ENDING = "ending"
+    """It ramps down by itself."""
+
+
+class LoopBlock(FrozenModel):
+    """Fourier coefficients over one block of periods, from the mean on, as pairs in volts."""
+
+    end_s: float
+    """By the controller's clock [s]."""
+    steady: bool
+    """Whether nothing was changed while it lasted."""
+    output: tuple[Pair, ...]
+    """Of what is played."""
+    base: tuple[Pair, ...]
+    m0: tuple[Pair, ...]
+
+
+class LoopReport(FrozenModel):
+    """What a controller says of itself; blocks are handed over once."""
+
+    vibench_loop: Literal[1] = LOOP_PROTOCOL
+    state: LoopState
+    reason: str = ""
+    """Why it is ending, or silent, if it was not told to."""
+    time_s: float
+    blocks: tuple[LoopBlock, ...] = ()
+
+
+class LoopFacts(FrozenModel):
+    """Who a controller is, and what it can do."""
+
+    vibench_loop: Literal[1] = LOOP_PROTOCOL
+    name: str
+    serial: str
+    rate_hz: PositiveFloat
+    latency_s: NonNegativeFloat
+    limit_v: PositiveFloat
+    """Largest output, peak [V]."""
+    watchdog_s: PositiveFloat
+    """Nothing asked for so long, and it ramps down [s]."""
+    pd_of: LoopInput | None = None
+    """Of which input alone it takes a law, proportional and derivative; None: any linear law."""
+
+
+class LoopRequest(FrozenModel):
+    """One question or command of the host."""
+
+    vibench_loop: Literal[1] = LOOP_PROTOCOL
+    ask: Literal["hello", "play", "report", "silence"]
+    program: LoopProgram | None = None
+    """Of "play"."""
+    ramp_s: NonNegativeFloat = 0.1
+    """Of "silence" [s]."""
+
+
+@dataclass(frozen=True)
+class ProgramTone(LoopTone):
+    """A sine with the program by which a controller plays it."""
+
+    program: LoopProgram | None = None
+
+
+class LoopController(RealTimeController, Protocol):
+    """A loop of its own from two sensors to the amplifier, which a host tells what to play."""
+
+    @property
+    def facts(self) -> LoopFacts:
+        """Rate, latency, limit and watchdog."""
+
+    def play(self, program: LoopProgram) -> LoopReport:
+        """Go over to a program, along its glide."""
+
+    def report(self) -> LoopReport:
+        """Hand over what has been measured since the last report; its watchdog hears it.
+
+        Raises
+        ------
+        InstrumentLost
+            When nobody answers.
+
+        """
+
+    def silence(self, ramp_s: float) -> LoopReport:
+        """Ramp down and be silent. Legal at any time."""
+
+
+class ControllerDriver(Protocol):
+    """What an entry point of ``vibench.controllers`` is."""
+
+    def open(self, config: ControllerConfig) -> LoopController:
+        """Connect to a controller, silent; raises InstrumentError where none answers, or another one."""

@@ -1,0 +1,254 @@
+"""The simulated real-time controller: a law and a Fourier series, sample by sample, and lines of JSON.
+
+It speaks version 1 of the protocol of `vibench_fast_loop.protocol`. Its watchdog counts its own samples:
+when no host has said anything for so long it ramps down, and needs nobody for that. Between the world and
+the controller: its samples are means over its step, its volts come late.
+"""
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from vibench.acquisition.rig import ControllerConfig
+from vibench.sim.engine.run import native_engine
+from vibench.sim.engine.structures import Structure
+from vibench.sim.shaker.loaded_shaker import LoadedShaker, ShakenMotion
+from vibench.virtual_rig.generator.scpi_instrument import Reply
+from vibench.virtual_rig.world.sensors import SensorParts
+from vibench.virtual_rig.world.wiring import Signal
+
+from .protocol import (
+    LOOP_PROTOCOL,
+    LoopBlock,
+    LoopFacts,
+    LoopFeedback,
+    LoopProgram,
+    LoopReport,
+    LoopRequest,
+    LoopState,
+)
+
+FloatArray = NDArray[np.float64]
+RAMP_S = 0.05
+"""How fast it ramps down by itself [s]."""
+LONGEST_AT_LIMIT_S = 0.05
+"""An output that stays at its limit for so long is a law that does not hold: it ramps down [s]."""
+MOST_BLOCKS = 2000
+"""Blocks kept for a host that does not ask for them."""
+
+
+class VirtualController:
+    """A real-time controller between two sensors and the amplifier; any thread may call it.
+
+    Parameters
+    ----------
+    facts
+        Who it is, and what it can do.
+    clock
+        Rig time [s].
+    grid_rate_hz
+        Steps a second of the world that it samples; a whole number of them from sample to sample.
+
+    """
+
+    def __init__(self, facts: LoopFacts, clock: Callable[[], float], grid_rate_hz: float) -> None:
+        self.facts = facts
+        self.steps_per_sample = round(grid_rate_hz / facts.rate_hz)
+        self.latency_steps = round(facts.latency_s * grid_rate_hz)
+        self._clock = clock
+        self._turn = threading.RLock()
+        self._state = LoopState.SILENT
+        self._reason = ""
+        self._blocks: list[LoopBlock] = []
+        self._program: LoopProgram | None = None
+        self._now = self._new()
+        self.cables = LoopCables(self)
+        """Between it and the world."""
+
+    @property
+    def is_on(self) -> bool:
+        """Whether anything is played."""
+        return self._state is not LoopState.SILENT
+
+    @contextmanager
+    def answering(self) -> Iterator[Structure]:
+        """Hand out what samples are answered with; nothing is changed by its host meanwhile.
+
+        A `Controller` of native/structures.hpp.
+        """
+        with self._turn:
+            yield self._now
+
+    def attend(self, time_s: float) -> None:
+        """Keep a block, end, or be silent, as the samples up to a rig time ask for."""
+        with self._turn:
+            if self._now["done"]:
+                self._keep_block(time_s)
+            self._watch()
+
+    def execute(self, message: bytes) -> Reply:
+        """Carry out one line of the protocol, and give the line that answers it."""
+        try:
+            request = LoopRequest.model_validate_json(message)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            answer = _refusal(f"{place}: {first['msg']}; what it plays goes on")
+        else:
+            with self._turn:
+                self._now["unheard"] = 0.0
+                answer = self._answered(request)
+        return Reply(answer.encode() + b"\n")
+
+    def _answered(self, request: LoopRequest) -> str:
+        match request:
+            case LoopRequest(ask="hello"):
+                return self.facts.model_dump_json()
+            case LoopRequest(ask="play", program=LoopProgram() as program):
+                self._play(program)
+            case LoopRequest(ask="play"):
+                return _refusal("play: no program was given; what it plays goes on")
+            case LoopRequest(ask="silence", ramp_s=ramp_s):
+                self._end("", ramp_s)
+        blocks, self._blocks = tuple(self._blocks), []
+        report = LoopReport(state=self._state, reason=self._reason, time_s=self._clock(), blocks=blocks)
+        return report.model_dump_json()
+
+    def _play(self, program: LoopProgram) -> None:
+        before = self._program
+        began = not self.is_on or before is None
+        omega = 2 * np.pi * program.frequency_hz / self.facts.rate_hz
+        if began:
+            self._now = self._new()
+            self._now["omega"] = omega
+        now = self._now
+        before_v, after_v = now["reference"].copy()
+        share = 0.5 - 0.5 * np.cos(np.pi * now["glide"])
+        now["reference"][0] = 0.0 if began else before_v + share * (after_v - before_v)
+        now["reference"][1] = 0.0
+        now["reference"][1, : len(program.reference_v)] = [complex(*each) for each in program.reference_v]
+        now["harmonics"] = max(now["harmonics"], len(program.reference_v), program.harmonics)
+        now["omega_from"], now["omega_to"] = now["omega"], omega
+        now["glide"], now["glide_step"] = 0.0, 1.0 / max(program.glide_s * self.facts.rate_hz, 1.0)
+        now["fade"], now["fade_step"] = 1.0, 0.0
+        now["block"] = program.block_periods
+        now["turns"] = now["weight"] = now["is_steady"] = now["sums"] = 0
+        if began or before is None or program.feedback != before.feedback:
+            _fill_law(now, program.feedback)
+        self._program, self._state, self._reason = program, LoopState.PLAYING, ""
+        now["is_on"] = 1
+
+    def _new(self) -> Structure:
+        rate_hz = self.facts.rate_hz
+        return native_engine().new(
+            "Controller",
+            limit=self.facts.limit_v,
+            most_unheard=self.facts.watchdog_s * rate_hz,
+            most_at_limit=LONGEST_AT_LIMIT_S * rate_hz,
+        )
+
+    def _end(self, reason: str, ramp_s: float) -> None:
+        if self.is_on and self._state is not LoopState.ENDING:
+            self._state, self._reason = LoopState.ENDING, reason
+            self._now["fade_step"] = 1.0 / max(ramp_s * self.facts.rate_hz, 1.0)
+
+    def _watch(self) -> None:
+        now = self._now
+        if now["unheard"] > now["most_unheard"]:
+            self._end(f"its host said nothing for {self.facts.watchdog_s:g} s", RAMP_S)
+        elif now["at_limit"] > now["most_at_limit"]:
+            self._end(f"its output stayed at its limit of {self.facts.limit_v:g} V", RAMP_S)
+        if self._state is LoopState.ENDING and now["fade"] <= 0.0:
+            self._state = LoopState.SILENT
+            now["is_on"] = now["unheard"] = now["at_limit"] = 0
+
+    def _keep_block(self, end_s: float) -> None:
+        count = 0 if self._program is None else self._program.harmonics + 1
+        found = self._now["coefficients"][:, :count]
+        output, base, m0 = (tuple((float(c.real), float(c.imag)) for c in row) for row in found)
+        steady = bool(self._now["done"] > 1)
+        self._now["done"] = 0
+        if len(self._blocks) < MOST_BLOCKS:
+            self._blocks.append(LoopBlock(end_s=end_s, steady=steady, output=output, base=base, m0=m0))
+
+
+class _LoopEnd(IntEnum):
+    """How the engine ends a call; `LoopEnd` in native/world.hpp."""
+
+    COMPLETE = 0
+    NEEDS_ATTENTION = 1
+    MOTION_LOST = 2
+
+
+class LoopCables:
+    """Hands a controller its samples, on a grid since the world began, and plays its volts.
+
+    While it is silent the world does not stop for it.
+    """
+
+    def __init__(self, loop: VirtualController) -> None:
+        self._loop = loop
+        engine, steps = native_engine(), loop.steps_per_sample
+        self._late = np.zeros(loop.latency_steps + steps)
+        self._cables = engine.new("LoopCables", late=self._late, steps_per_sample=steps)
+
+    @property
+    def is_on(self) -> bool:
+        """Whether the controller plays, or volts are still on their way."""
+        return self._loop.is_on or bool(self._late.any())
+
+    def move(
+        self,
+        first: int,
+        step_s: float,
+        shaker: LoadedShaker,
+        noise: FloatArray,
+        sensors: tuple[SensorParts, SensorParts],
+        motion: ShakenMotion,
+        signals: FloatArray,
+    ) -> int:
+        """Move the shaker as `ClosedLoop` says."""
+        cables, drive = self._cables, signals[Signal.DRIVE]
+        cables["first"], cables["begin"] = first, 0
+        base = sensors[0].showing(motion.base_acceleration, signals[Signal.BASE_ACCELERATION])
+        m0 = sensors[1].showing(motion.m0_velocity, signals[Signal.M0_VELOCITY])
+        shaker.prepare(motion, drive, noise)
+        native_engine().fill(cables, shaker=shaker.structure.ctypes.data, drive=drive, base=base, m0=m0)
+        done, end = 0, _LoopEnd.COMPLETE
+        while end is not _LoopEnd.MOTION_LOST and done < drive.size:
+            with self._loop.answering() as loop:
+                cables["controller"] = loop.ctypes.data
+                end = _LoopEnd(native_engine().call("close_loop", cables))
+                done = int(cables["begin"])
+                self._loop.attend((first + done) * step_s)
+        signals[Signal.AMPLIFIER, :done] = motion.amplifier_voltage[:done]
+        return done
+
+
+def controller_of(
+    config: ControllerConfig, grid_rate_hz: float, clock: Callable[[], float]
+) -> VirtualController:
+    """Make the controller that a hardware configuration describes."""
+    told = {name: getattr(config, name) for name in LoopFacts.model_fields if hasattr(config, name)}
+    facts = LoopFacts(name="simulated controller", serial="virtual", **told)
+    return VirtualController(facts, clock, grid_rate_hz)
+
+
+def _fill_law(now: Structure, feedback: LoopFeedback | None) -> None:
+    now["remembered"] = now["memory"] = now["direct"] = 0
+    if feedback is not None:
+        size = len(feedback.output)
+        now["remembered"] = size
+        now["step"][:size, :size] = np.reshape(feedback.step, (size, size))
+        now["inlet"][:size] = np.reshape(feedback.inlet, (size, 2))
+        now["output"][:size], now["direct"] = feedback.output, feedback.direct
+
+
+def _refusal(sentence: str) -> str:
+    return json.dumps({"vibench_loop": LOOP_PROTOCOL, "refused": sentence})

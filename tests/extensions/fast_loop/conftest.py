@@ -1,0 +1,5 @@
+"""The rig of the tests of acquisition."""
+
+from tests.acquisition.conftest import rig
+
+__all__ = ["rig"]

@@ -1,0 +1,185 @@
+"""The sampled plant against the compiled one, multipliers against those of the branch, the law's purpose."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from vibench.sim import gong2025
+from vibench.sim.model.power_law import PowerLaw
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.branch_following import FrequencyPath
+from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.restoring_force import spring_of
+from vibench.sim.shaker.loaded_shaker import LoadedShaker
+from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench_fast_loop.fast_loop import branch_hold, branch_multipliers, impact_branch, motion_slopes
+from vibench_fast_loop.law import LawWeights, LinearLaw, designed_law, loop_multiplier, loop_transfer, pd_law
+from vibench_fast_loop.plant import LoopTiming, SampledPlant
+
+RATE_HZ = 10_240.0
+K1 = 2.1e-3 * (2 * np.pi * 100) ** 2
+HARDENING = replace(gong2025(), contact=PowerLaw(1e-4, ((3, 0.1 * K1 * 1e-4),)))
+LINEAR = gong2025(contact="linear")
+NO_LAW = LinearLaw(np.zeros((1, 1)), np.zeros((1, 2)), np.zeros((1, 1)), np.zeros((1, 2)))
+
+
+def shaker(mass_kg=0.127):
+    return Shaker(
+        moving_mass_kg=mass_kg,
+        suspension_stiffness_n_per_m=9932.0,
+        suspension_damping_ns_per_m=21.51,
+        force_constant_n_per_a=6.78,
+        coil_resistance_ohm=2.6,
+        coil_inductance_h=1e-4,
+    )
+
+
+def plant(latency_s=3e-4, specimen=HARDENING, mass_kg=0.127, gain=3.16):
+    return SampledPlant(Amplifier(gain=gain), shaker(mass_kg), specimen, LoopTiming(RATE_HZ, latency_s))
+
+
+@cache
+def branch():
+    structure, spring = structure_of(HARDENING), spring_of(HARDENING)
+    start = balance(structure, spring, 90.0, 3e-6)
+    return balance_branch_within(structure, spring, start, FrequencyPath((3e-6,)), 89.0, 120.0)
+
+
+@pytest.mark.parametrize("latency_s", [0.0, 0.7 / RATE_HZ, 3.1 / RATE_HZ, 10 / RATE_HZ])
+def test_the_sampled_plant_moves_as_the_compiled_one(latency_s):
+    model = plant(latency_s, LINEAR)
+    fine = 40
+    volts = np.random.default_rng(3).normal(0, 0.05, 300)
+    late = round(latency_s * RATE_HZ * fine)
+    held = np.concatenate([np.zeros(late), np.repeat(volts, fine)])[: volts.size * fine]
+    compiled = LoadedShaker(model.amplifier, model.shaker, LINEAR, 1 / (RATE_HZ * fine))
+    motion = compiled.move(held)
+    seen = np.stack([motion.base_acceleration, motion.m0_velocity]).reshape(2, -1, fine).mean(axis=2)
+    step, volt = model.step
+    state, shown = np.zeros(model.size), []
+    for each in volts:
+        shown.append(model.shown @ state)
+        state = step @ state + volt * each
+    for row, expected in zip(np.transpose(shown)[:, 1:], seen[:, :-1], strict=True):
+        assert np.abs(row - expected).max() < 4e-3 * np.abs(expected).max()
+
+
+def test_under_a_table_too_heavy_to_move_the_multipliers_are_those_of_the_branch():
+    found = branch()
+    points = np.random.default_rng(7).integers(0, len(found.frequencies_hz), 30)
+    # The table's own multiplier is one: it stays where it is.
+    exact = np.maximum(np.abs(found.multipliers[points, 0]), 1.0)
+    assert exact.max() > 1.15
+    seen = branch_multipliers(plant(mass_kg=1e7), NO_LAW, found, points)
+    assert seen == pytest.approx(exact, rel=0.01)
+
+
+@pytest.mark.thorough
+def test_so_they_are_among_stops_whose_contacts_are_shorter_than_a_sample():
+    stops = gong2025()
+    found = impact_branch(stops, 1e-6, 97.5, (97.2, 98.7), "above")
+    points = np.argsort(np.abs(found.multipliers[:, 0]))[[-1, -10]]
+    exact = np.abs(found.multipliers[points, 0])
+    assert exact.min() > 1.2
+    seen = branch_multipliers(plant(mass_kg=1e7, specimen=stops), NO_LAW, found, points)
+    assert seen == pytest.approx(exact, rel=0.02)
+
+
+def test_the_law_holds_every_motion_of_a_branch_through_both_folds_also_where_the_model_is_wrong():
+    found = branch()
+    unstable = np.flatnonzero(~found.is_stable)
+    assert unstable.size > 100
+    law = designed_law(plant())
+    softer = replace(HARDENING, stiffnesses=tuple(0.9 * each for each in HARDENING.stiffnesses))
+    wrong = (plant(), plant(gain=3.48), plant(gain=2.84), plant(specimen=softer))
+    for index in (*unstable[[0, 70, -1]], 10, len(found.frequencies_hz) - 1):
+        slopes = motion_slopes(HARDENING, found, index, RATE_HZ)
+        for each in wrong:
+            assert loop_multiplier(each, law, *slopes) < 0.99
+
+
+def test_two_gains_of_m0_hold_the_branch_and_those_of_the_base_do_not():
+    unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
+    of_m0, of_base = pd_law(plant(), 1), pd_law(plant(), 0)
+    assert of_m0.direct[0, 0] == of_base.direct[0, 1] == 0.0
+    assert branch_multipliers(plant(), of_m0, branch(), unstable).max() < 0.96
+    assert branch_multipliers(plant(gain=3.48), of_m0, branch(), unstable).max() < 0.99
+    assert branch_multipliers(plant(), of_base, branch(), unstable[:1] + 100).max() > 1.0
+
+
+def test_neither_no_gains_nor_twice_the_designed_ones_cost_less():
+    """All that is weighed, by simulation under its noises."""
+    weights, model, rng = LawWeights(), plant(specimen=LINEAR), np.random.default_rng(5)
+    step, volt = model.step
+    into, relative = model.spring
+    count = 20_000
+    pushes, unknown = rng.normal(0, weights.push_n, count), rng.normal(0, weights.volt, count)
+    heard = rng.normal(0, 1, (count, 2)) * (weights.acceleration, weights.velocity)
+
+    def cost(law):
+        state, memory, total = np.zeros(model.size), np.zeros(2), 0.0
+        omega = 2 * np.pi * LINEAR.natural_frequencies_hz[0]
+        for push, more, noise in zip(pushes, unknown, heard, strict=True):
+            seen = model.shown @ state + noise
+            answer = (law.output @ memory + law.direct @ seen)[0]
+            motion = (relative @ state) ** 2 + ((state[7] - state[8]) / omega) ** 2
+            total += motion * (0.1 / weights.relative_m) ** 2 + answer**2
+            memory = law.step @ memory + law.inlet @ seen
+            state = step @ (state + into * push * model.timing.step_s) + volt * (answer + more)
+        return total
+
+    best = pd_law(model, 1)
+    least = cost(best)
+    for factor in (0.0, 2.0):
+        assert cost(replace(best, output=factor * best.output, direct=factor * best.direct)) > least
+
+
+def test_a_late_law_loses_motions_that_need_none_and_that_is_told():
+    late = plant(2e-3)
+    hold = branch_hold(late, designed_law(late), 3e-6, 94.0, (90.0, 112.0))
+    found = branch()
+    stable = np.flatnonzero(found.frequencies_hz > 112.0)[0]
+    assert found.is_stable[stable]
+    assert hold.multiplier > 1.02
+    assert hold.at_hz == pytest.approx(112.0, abs=0.5)
+
+
+def test_beyond_a_millisecond_of_latency_no_law_of_the_kind_holds_the_branch():
+    unstable = np.flatnonzero(~branch().is_stable)[[0, 70, -1]]
+    largest = [
+        branch_multipliers(each, designed_law(each), branch(), unstable).max()
+        for each in map(plant, (1e-4, 5e-4, 1.5e-3))
+    ]
+    assert largest[0] < 0.95
+    assert largest[1] < 0.95
+    assert largest[2] > 1.1
+
+
+def test_what_is_played_moves_the_base_as_the_transfer_says():
+    model = plant(specimen=LINEAR)
+    law = designed_law(model)
+    step, volt = model.step
+    state, memory, shown, turns = np.zeros(model.size), np.zeros(len(law.step)), [], []
+    for k in range(20_000):
+        seen = model.shown @ state
+        played = np.cos(2 * np.pi * 130.0 * k / RATE_HZ)
+        answer = (law.output @ memory + law.direct @ seen)[0] + played
+        memory = law.step @ memory + law.inlet @ seen
+        shown.append(state[0])
+        turns.append(np.exp(-2j * np.pi * 130.0 * k / RATE_HZ))
+        state = step @ state + volt * answer
+    tail = slice(-10_240, None)
+    found = 2 * np.mean(np.array(shown[tail]) * np.array(turns[tail]))
+    assert found == pytest.approx(loop_transfer(model, law, 130.0), rel=1e-3)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("begin", "ratio"), [("rest", 0.42), ("above", 2.79)])
+def test_a_branch_among_stops_is_the_one_of_the_side_from_which_its_level_is_met(begin, ratio):
+    branch = impact_branch(gong2025(), 1e-6, 97.5, (97.4, 97.6), begin)
+    at = np.argmin(np.abs(branch.frequencies_hz - 97.5))
+    assert branch.response_ii[at, 0] == pytest.approx(ratio, rel=0.02)
+    assert np.abs(branch.multipliers[at, 0]) < 1

@@ -1,0 +1,43 @@
+"""What a fast loop noted of a branch, as numbers and sentences."""
+
+import numpy as np
+
+from vibench.acquisition.recording import BranchPointNote, BranchStabilityNote, Stability
+from vibench_fast_loop.held_branch import branch_sentences, held_branch
+
+HERTZ = 94.0, 95.0, 94.6, 94.2
+
+
+def point(number, hertz):
+    return BranchPointNote(
+        point=number, frequency_hz=hertz, base_m=3e-6, m0_m=9e-6, phase_deg=-90.0, residue=0.002,
+        residue_acceleration=0.02, reference_v=0.1, tries=2,
+    )  # fmt: skip
+
+
+def told(number, stability, multiplier):
+    return BranchStabilityNote(
+        point=number, stability=stability, multiplier=multiplier,
+        multiplier_u=None if multiplier is None else 0.01, perturbation=0.02, moved=1e-4,
+    )  # fmt: skip
+
+
+POINTS = [point(number, hertz) for number, hertz in enumerate(HERTZ)]
+
+
+def test_each_point_has_what_was_told_of_it_however_notes_are_ordered():
+    # The third was asked in vain, and the last not at all: the run ended.
+    notes = [told(1, Stability.STABLE, 0.96), told(0, Stability.UNSTABLE, 1.1), told(2, Stability.OPEN, None)]
+    found = held_branch([*POINTS, *notes])
+    assert found.stability == ("unstable", "stable", "not determined", "")
+    np.testing.assert_array_equal(found.multiplier, [1.1, 0.96, np.nan, np.nan])
+    np.testing.assert_array_equal(found.multiplier_u, [0.01, 0.01, np.nan, np.nan])
+    said = branch_sentences([*POINTS, *notes])
+    wanted = "Without feedback they would be: 1 stable, 1 unstable, 1 not determined"
+    assert any(each.startswith(wanted) for each in said), said
+
+
+def test_a_branch_that_nobody_asked_says_nothing_of_stability():
+    assert held_branch(POINTS).stability == ("",) * 4
+    assert not any("Without feedback" in each for each in branch_sentences(POINTS))
+    assert held_branch([]).multiplier.size == 0

@@ -1,0 +1,278 @@
+"""The example of a real-time controller, against a board that was made after its documents."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.acquisition.contract.test_plug_ins import run
+from vibench.acquisition import (
+    ConfigurationError,
+    InstrumentError,
+    InstrumentLost,
+    open_bench,
+    open_recording,
+    run_measurement,
+)
+from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench.acquisition.plan import (
+    Measurement,
+)
+from vibench.acquisition.recording import BranchPointNote, feedback_note
+from vibench.acquisition.rig import confirm_simulated, load_rig, specimen_of
+from vibench.sim.periodic.balance_branch import balance_branch_within
+from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.branch_following import FrequencyPath
+from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.restoring_force import spring_of
+from vibench_fast_loop.branch_continuation import BranchContinuation
+from vibench_fast_loop.contract import test_controller as contract
+from vibench_fast_loop.protocol import LoopFeedback, LoopProgram, LoopState
+
+from .helic_board import BUSY, on_rig
+
+ROOT = Path(__file__).resolve().parents[3]
+PACKAGE = ROOT / "examples" / "controller_package"
+SERIES = LoopProgram(frequency_hz=100, reference_v=((0.1, 0.05),))
+PLAYED_V = float(np.hypot(0.1, 0.05))
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """Install the example package where nothing else is, and let this process find it."""
+    target = tmp_path_factory.mktemp("installed")
+    options = ("--quiet", "install", "--no-deps", "--no-build-isolation", "--target", target, PACKAGE)
+    done = run("-m", "pip", *options)
+    assert done.returncode == 0, done.stderr
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(target))
+        yield target
+
+
+@pytest.fixture
+def rig(installed):
+    """The example's bench on the virtual rig, its board at half the rate."""
+    rig, shipped = load_rig(PACKAGE / "bench.toml"), load_rig("virtual_rig_controller")
+    quiet = {name: 0.2 * value for name, value in shipped.virtual if "_noise_" in name}
+    return rig.model_copy(
+        update={
+            "virtual": shipped.virtual.model_copy(update={"grid_rate_hz": 64_000.0, **quiet}),
+            "daq": rig.daq.model_copy(update={"sample_rate_hz": 12_800}),
+            "controller": rig.controller.model_copy(update={"rate_hz": 4000.0}),
+        }
+    )
+
+
+@pytest.fixture
+def found(rig):
+    """A board that is switched on, and the rig as its host finds it."""
+    with on_rig(rig) as (board, found):
+        yield board, found
+
+
+@pytest.fixture
+def played(found):
+    """A board that plays, and the bench that it does so on."""
+    board, rig = found
+    with open_bench(rig, confirm=confirm_simulated) as bench:
+        bench.digitizer.start()
+        bench.controller.play(SERIES)
+        contract.listened(bench, 0.3)
+        assert board.is_armed
+        yield board, bench
+
+
+def pd(kp, kd, tau_s, step_s):
+    """The law in the form in which vibench tells it, in memory of the filtered rate and the sample before."""
+    share = step_s / (tau_s + step_s)
+    rate = (1 - share, -share / step_s)
+    return LoopFeedback(
+        step=(rate, (0.0, 0.0)),
+        inlet=((0.0, share / step_s), (0.0, 1.0)),
+        output=(-kd * rate[0], -kd * rate[1]),
+        direct=(0.0, -kp - kd * share / step_s),
+    )
+
+
+def test_a_frame_is_the_one_of_the_documents(installed):
+    from helic_link import frame
+
+    assert frame(1, 1, b"\0\0").hex(" ") == "48 4c 01 01 02 00 00 00 89 0c"
+    assert frame(2, 1, b"").hex(" ") == "48 4c 02 01 00 00 98 5e"
+    assert frame(6, 3, bytes.fromhex("0c0004030201")).hex(" ") == "48 4c 06 03 06 00 0c 00 04 03 02 01 08 d1"
+
+
+def test_a_law_of_two_gains_is_told_exactly_and_any_other_is_refused_with_what_to_do(installed):
+    from helic_signals import pd_gains
+
+    rng = np.random.default_rng(22)
+    for step_s in (1 / 1000, 1 / 8000):
+        for kp, kd in rng.normal(0, (3, 3e-3), (50, 2)):
+            tau_s = rng.choice([0.0, 1e-4, 2e-3])
+            assert pd_gains(pd(kp, kd, tau_s, step_s), step_s) == pytest.approx(
+                (kp, kd, tau_s), rel=1e-6, abs=1e-12
+            )
+        assert pd_gains(pd(2.0, 0.0, 1e-3, step_s), step_s)[:2] == (2.0, 0.0)
+        assert pd_gains(None, step_s) == (0.0, 0.0, 0.0)
+    of_base = LoopFeedback(step=(), inlet=(), output=(), direct=(1.0, 0.0))
+    slow = LoopFeedback(step=((-0.5,),), inlet=((0.0, 1.0),), output=(1.0,), direct=(0.0, 0.0))
+    second = LoopFeedback(
+        step=((0.9, 0.0), (0.0, 0.5)), inlet=((0.0, 1.0), (0.0, 1.0)), output=(1.0, 1.0), direct=(0.0, 0.0)
+    )
+    for other in (of_base, slow, second):
+        with pytest.raises(InstrumentError, match=r'Nothing was changed; write pd_of = "m0_velocity"'):
+            pd_gains(other, 1e-3)
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("promise", [name for name in dir(contract) if name.startswith("test_")])
+def test_the_board_keeps_the_contract(found, promise):
+    _, rig = found
+    with open_bench(rig, confirm=confirm_simulated) as bench:
+        getattr(contract, promise)(bench)
+
+
+@pytest.mark.thorough
+def test_another_version_of_the_protocol_a_missing_gate_and_an_occupied_board_are_refused(found):
+    board, rig = found
+    board.version = 4
+    with pytest.raises(
+        InstrumentError, match=r"speaks version 4 .* this driver version 3\. Nothing was played"
+    ):
+        open_bench(rig, confirm=confirm_simulated)
+    board.version, board.is_gated = 3, False
+    with pytest.raises(
+        InstrumentError, match=r"gate of the board at .* does not open.*build its rig with SAFETY"
+    ):
+        open_bench(rig, confirm=confirm_simulated)
+    board.is_gated = True
+    for wrong, said in (
+        ({"rate_hz": 8000.0}, r"takes 4000 samples a second .* says 8000"),
+        ({"pd_of": None}, r'pd_of = nothing.*make them agree \(pd_of = "m0_velocity"\)'),
+        ({"options": {"base": "laser"}}, r"laser, m0 is no source in volts at .*: adc0, adc1"),
+    ):
+        told = rig.model_copy(update={"controller": rig.controller.model_copy(update=wrong)})
+        with pytest.raises(ConfigurationError, match=said):
+            open_bench(told, confirm=confirm_simulated)
+    assert not board.is_armed
+
+
+@pytest.mark.thorough
+def test_a_connection_that_is_lost_is_told_and_the_gate_has_closed(played):
+    board, bench = played
+    board.drop()
+    assert board.is_left.wait(10)
+    assert not board.is_armed
+    with pytest.raises(InstrumentLost, match=r"does not answer .*Its gate closes by itself"):
+        bench.controller.report()
+    assert contract.line_v(contract.heard_v(bench, 0.2), 100, 12_800) < 0.02 * PLAYED_V
+
+
+@pytest.mark.thorough
+def test_a_stream_that_ends_is_told_and_silenced(played):
+    board, bench = played
+    board.is_mute = True
+    bench.digitizer.read(6400)
+    with pytest.raises(InstrumentError, match=r"its samples do not arrive any more\. It was silenced"):
+        bench.controller.report()
+    assert not board.is_armed
+
+
+@pytest.mark.thorough
+def test_what_the_board_refuses_ends_in_silence_with_its_word(played):
+    board, bench = played
+    board.refuses = {"forcing_coeffs": BUSY}
+    bench.controller.play(SERIES.model_copy(update={"reference_v": ((0.2, 0.0),)}))
+    contract.listened(bench, 0.2)
+    told = bench.controller.report()
+    assert told.state is LoopState.SILENT
+    assert "refused" in told.reason
+    assert "busy" in told.reason
+    assert not board.is_armed
+    board.refuses = {"ctrl_kp": BUSY}
+    with pytest.raises(InstrumentError, match=r"refused .* as ctrl_kp: busy\. It was silenced"):
+        bench.controller.play(SERIES.model_copy(update={"feedback": pd(1.0, 0.0, 0.0, 1 / 4000)}))
+    assert not board.is_armed
+
+
+@pytest.mark.thorough
+def test_a_gate_that_trips_ends_the_run_that_plays(found, tmp_path):
+    board, rig = found
+    plan = BranchContinuation(
+        amplitude_vpp=4, base_level=BaseLevel(displacement_m=3e-6), start_hz=94, low_hz=90, high_hz=118
+    )
+    with open_bench(rig, confirm=confirm_simulated) as bench:
+        bench.controller.play(SERIES)
+        board.trips = True
+        told = bench.controller.report()
+        assert (told.state, told.reason) == (LoopState.SILENT, "its safety gate tripped")
+        with pytest.raises(InstrumentError, match=r"the safety gate .* has tripped"):
+            run_measurement(bench, Measurement(name="branch", excitation=plan), tmp_path / "tripped.h5")
+    assert not board.is_armed
+
+
+HOST = """
+import sys
+from vibench_fast_loop.protocol import LoopProgram
+from vibench.acquisition.rig import ControllerConfig
+from helic_controller import HelicController
+config = ControllerConfig.model_validate_json(sys.argv[1])
+controller = HelicController.open(config)
+controller.play(LoopProgram(frequency_hz=100, reference_v=((0.5, 0.0),)))
+print("playing", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.thorough
+def test_a_board_whose_host_is_killed_closes_its_gate_at_once(found, installed, monkeypatch):
+    board, rig = found
+    monkeypatch.setenv("PYTHONPATH", str(installed), prepend=":")
+    command = [sys.executable, "-c", HOST, rig.controller.model_dump_json()]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as host:
+        assert host.stdout.readline() == "playing\n"
+        assert board.is_armed
+        host.kill()
+        assert board.is_left.wait(10)
+    assert not board.is_armed
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_unstable_motions_are_held_through_the_board_behind_their_fold(found, tmp_path):
+    _, rig = found
+    level_m = 1.6e-6
+    plan = BranchContinuation(
+        amplitude_vpp=4,
+        base_level=BaseLevel(displacement_m=level_m),
+        start_hz=94,
+        low_hz=90,
+        high_hz=118,
+        step_hz=2,
+        most_points=12,
+        record_s=0.3,
+    )
+    with open_bench(rig, confirm=confirm_simulated) as bench:
+        outcome = run_measurement(
+            bench, Measurement(name="branch", excitation=plan, ramp_s=0.4), tmp_path / "b.h5"
+        )
+    with open_recording(outcome.path) as recording:
+        notes = [feedback_note(event) for event in recording.events]
+    points = [each for each in notes if isinstance(each, BranchPointNote)]
+    structure, spring = structure_of(specimen_of(rig)), spring_of(specimen_of(rig))
+    start = balance(structure, spring, 90.0, level_m)
+    branch = balance_branch_within(structure, spring, start, FrequencyPath((level_m,)), 89.0, 120.0)
+    folds = [each for each in branch.events if each.kind.value == "fold"]
+    hertz = [each.frequency_hz for each in points]
+    assert max(hertz) == pytest.approx(folds[0].frequency_hz, abs=0.3)
+    behind = points[int(np.argmax(hertz)) + 1 :]
+    assert len(behind) >= 2
+    unstable = slice(folds[0].index + 1, folds[1].index + 1)
+    f, ratio = branch.frequencies_hz[unstable][::-1], branch.response_ii[unstable, 0][::-1]
+    for each in behind:
+        assert each.base_m == pytest.approx(level_m, rel=0.005)
+        assert each.residue < 0.005
+        if each.frequency_hz < f[-1] - 0.05:
+            assert each.m0_m == pytest.approx(level_m * np.interp(each.frequency_hz, f, ratio), rel=0.02)

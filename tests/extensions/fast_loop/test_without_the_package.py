@@ -1,0 +1,117 @@
+"""Without vibench-fast-loop its plans, benches and recordings are refused with one sentence that names it."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import vibench_fast_loop
+from tests.analysis.conftest import synthetic
+from vibench.acquisition.excitation.feedback import BaseLevel
+from vibench_fast_loop.branch_continuation import BranchContinuation
+
+ROOT = Path(__file__).resolve().parents[3]
+PORTIONS = ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig")
+SENTENCE = (
+    "needs vibench-fast-loop, which is not installed: run 'pip install extensions/fast_loop' in the "
+    "folder of vibench's sources"
+)
+
+
+@pytest.fixture(scope="module")
+def bare(tmp_path_factory):
+    """Everything that is installed, but for the package: links, and no site that would add it again."""
+    folder = tmp_path_factory.mktemp("packages")
+    for path in Path(pytest.__file__).parents[1].iterdir():
+        if not path.name.startswith(("vibench_fast_loop", "_vibench")):
+            (folder / path.name).symlink_to(path)
+    return os.pathsep.join(map(str, (*(ROOT / each for each in PORTIONS), folder)))
+
+
+@pytest.fixture
+def run(bare, tmp_path):
+    def run(*arguments):
+        return subprocess.run(
+            [sys.executable, "-S", *map(str, arguments)],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONPATH": bare},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """Two points of a branch."""
+    frequencies = (95.0, 96.0)
+    motions = [synthetic.sine(4.0, each, 0.5e-6) for each in frequencies]
+    base = synthetic.Motion(
+        *(
+            synthetic.np.concatenate([getattr(each, name) for each in motions])
+            for name in ("displacement_m", "acceleration")
+        )
+    )
+    velocity = synthetic.np.concatenate([synthetic.response_of(each)[0] for each in motions])
+    parts = [
+        synthetic.Part("branch", 4.5 * n + 2.5, 4.5 * n + 3.5, {"point": n, "frequency_hz": each})
+        for n, each in enumerate(frequencies)
+    ]
+    plan = BranchContinuation(
+        amplitude_vpp=1,
+        base_level=BaseLevel(displacement_m=0.5e-6),
+        start_hz=95,
+        low_hz=94,
+        high_hz=97,
+        record_s=1.0,
+    )
+    return synthetic.write_recording(tmp_path, plan, base, velocity, parts, name="branch")
+
+
+def test_the_package_is_missing_there_and_only_there(run):
+    assert vibench_fast_loop.__file__.startswith(str(ROOT))
+    assert "No module named 'vibench_fast_loop'" in run("-c", "import vibench_fast_loop").stderr
+
+
+@pytest.mark.parametrize(
+    "given", [("branch",), ("quick", "--bench", "virtual_rig_controller")], ids=["plan", "bench"]
+)
+def test_nothing_is_measured(run, given, tmp_path):
+    told = run("-m", "vibench.cli", "measure", *given, "--out", "out", "--estimate")
+    assert told.returncode == 1
+    assert SENTENCE in " ".join(told.stderr.split())
+    assert len(told.stderr.strip().splitlines()) <= 4
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_old_recording_is_told_by_command_and_report(run, recording, tmp_path):
+    told = run("-m", "vibench.cli", "analyse", recording, "--json")
+    assert told.returncode == 1
+    assert SENTENCE in " ".join(told.stderr.split())
+    assert "update vibench" not in told.stderr
+    drawn = run("-m", "vibench.cli", "analyse", recording, "--out", "report")
+    assert SENTENCE in " ".join((drawn.stdout + drawn.stderr).split())
+    with_it = subprocess.run(
+        [sys.executable, "-m", "vibench.cli", "analyse", recording, "--json"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert len(json.dumps(json.loads(with_it.stdout))) > 100
+
+
+def test_the_window_lists_every_other_test(run):
+    code = (
+        "from vibench.gui.pages.test.test_form import shipped_tests\n"
+        "print(*sorted({each.measurement.excitation.kind for each in shipped_tests()}))"
+    )
+    listed = run("-c", code)
+    assert listed.returncode == 0, listed.stderr
+    assert "dwell" in listed.stdout
+    assert "branch_continuation" not in listed.stdout
