@@ -37,13 +37,14 @@ FOR_OUR_PROGRAMS = (
     "vibench.acquisition.first_day",
     "vibench.sim.engine",
     "vibench.sim.shaker",
+    "vibench.sim.background",
     "vibench.sim.hdf5_files",
     "vibench.sim.operating_system",
     "vibench.stop_files",
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
 )
-ONE_FILE_ROOMS = ("errors", "figure_choices", "tables", "analogue", "command", "stop_files")
+ONE_FILE_ROOMS = ("background", "errors", "figure_choices", "tables", "analogue", "command", "stop_files")
 
 
 def sources():

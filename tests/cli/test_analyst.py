@@ -11,8 +11,8 @@ def test_the_end_of_the_process_that_analyses_is_told_and_ends_no_measurement(tm
     recording = tmp_path / "of today" / "dwell.h5"
     with second_process("campaign", 5) as analyst:
         analyst.take(recording)
-        (pid,) = analyst._pool._processes
-        os.kill(pid, signal.SIGTERM)
+        (worker,) = analyst._pool.workers
+        os.kill(worker.process.pid, signal.SIGTERM)
         with pytest.raises(AnalysisError, match=r"every recording is kept: vibench analyse '.*of today'"):
             list(analyst.results())
         analyst.take(recording)

@@ -1,56 +1,54 @@
 """A second process that analyses each recording while the next one is measured."""
 
 import shlex
-import signal
 from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from multiprocessing import get_context
 from pathlib import Path
 
-from vibench.acquisition import follow_parent
 from vibench.analysis import AnalysisError, CampaignResults, analyse_files, merged_results
+from vibench.sim.background import Pool
+
+LOOK_S = 1.0
 
 
 class Analyst:
     """Takes recordings as they are finished, and gives their results in the same order."""
 
-    def __init__(self, pool: ProcessPoolExecutor, name: str, draws: int) -> None:
+    def __init__(self, pool: Pool, name: str, draws: int) -> None:
         self._pool = pool
         self._draws = draws
         self._name = name
         self._folder = Path()
-        self._parts: list[Future[CampaignResults]] = []
+        self._parts: list[CampaignResults | BaseException] = []
+        self.asked = 0
+        """Recordings taken so far."""
 
     def take(self, recording: Path) -> None:
-        """Analyse this one next; that this cannot be done is said by `results`: what is measured goes on."""
-        try:
-            part = self._pool.submit(analyse_files, [recording], self._name, draws=self._draws)
-        except BrokenProcessPool as error:
-            part = Future()
-            part.set_exception(error)
+        """Analyse this one next."""
+        self.asked += 1
         self._folder = recording.parent
-        self._parts.append(part)
-
-    @property
-    def asked(self) -> int:
-        """Recordings taken so far."""
-        return len(self._parts)
+        take = self._parts.append
+        self._pool.ask(analyse_files, take, take, [recording], self._name, draws=self._draws)
+        self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
         """Give the results one by one; waits for those that are not ready.
 
         Raises AnalysisError when the process ended before it was done.
         """
-        try:
-            for part in self._parts:
-                yield part.result()
-        except BrokenProcessPool as error:
-            raise AnalysisError(
-                "the process that analyses has ended (somebody ended it, or memory was short); every "
-                f"recording is kept: vibench analyse {shlex.quote(str(self._folder))}"
-            ) from error
+        for number in range(self.asked):
+            while number == len(self._parts):
+                self._pool.poll(LOOK_S)
+            match self._parts[number]:
+                case ChildProcessError() as error:
+                    raise AnalysisError(
+                        "the process that analyses has ended (somebody ended it, or memory was short); every "
+                        f"recording is kept: vibench analyse {shlex.quote(str(self._folder))}"
+                    ) from error
+                case BaseException() as error:
+                    raise error
+                case results:
+                    yield results
 
     def together(self) -> CampaignResults:
         """Give the results as one campaign's."""
@@ -59,16 +57,9 @@ class Analyst:
 
 @contextmanager
 def second_process(name: str, draws: int) -> Iterator[Analyst]:
-    """Keep an analyst at work while inside; what it has not begun when an error leaves is dropped."""
-    # A fresh interpreter: a fork would copy the threads' locks of the instrument libraries.
-    pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=_follow)
+    """Keep an analyst at work while inside; what it has not done when an error leaves is dropped."""
+    pool = Pool(1)
     try:
         yield Analyst(pool, name, draws)
     finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _follow() -> None:
-    """Leave Ctrl-C to the command, and end with it."""
-    follow_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        pool.close()

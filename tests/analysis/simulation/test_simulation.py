@@ -1,7 +1,6 @@
 """What a person may ask of the simulation, and the answer as it grows; linear scenes need no compiling."""
 
 import re
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +14,9 @@ from vibench.analysis.simulation.progress import (
     SimulationRequest,
     Trouble,
 )
-from vibench.analysis.simulation.worker import Begin, Cancel, Ended, Grown, serve, simulate
+from vibench.analysis.simulation.worker import answer, simulate
 from vibench.sim import Accuracy, base_transmissibility, gong2025, load_specimen
+from vibench.sim.background import Pool
 
 LINEAR = {"model": "linear", "compared_with": "", "signal_hz": None, "step_hz": 50.0, "start_hz": 50.0}
 
@@ -136,30 +136,18 @@ def test_a_stricter_accuracy_is_said_to_cost_more():
     assert MEASURED[Accuracy.REFERENCE].chaos < MEASURED[Accuracy.QUICK].chaos
 
 
-def test_the_process_that_simulates_drops_what_is_no_longer_wanted():
-    """The real process: a long request is overtaken by a short one, whose answer comes whole."""
-    context = get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=serve, args=(theirs,), daemon=True)
-    process.start()
-    theirs.close()
-    try:
-        ours.send(Begin(1, SimulationRequest(**{**LINEAR, "step_hz": 0.05})))
-        ours.send(Cancel())
-        ours.send(Begin(2, SimulationRequest(**LINEAR)))
-        counts = {1: 0, 2: 0}
-        while True:
-            assert ours.poll(60)
-            message = ours.recv()
-            match message:
-                case Grown():
-                    counts[message.number] += len(message.parts)
-                case Ended(number=2):
-                    break
-        assert counts[1] < 11_001
-        assert counts[2] == 12
-        ours.close()
-        process.join(20)
-        assert process.exitcode == 0
-    finally:
-        process.kill()
+def test_a_long_request_that_is_dropped_is_overtaken_by_a_short_one():
+    """The real process; the answer to the short request comes whole."""
+    first, second, pool = [], [], Pool(1)
+    long = SimulationRequest(**{**LINEAR, "step_hz": 0.05})
+    dropped = pool.stream(answer, first.extend, first.append, first.append, long)
+    while not first:
+        pool.poll(0.1)
+    dropped.drop()
+    job = pool.stream(answer, second.extend, second.append, second.append, SimulationRequest(**LINEAR))
+    while not job.is_over:
+        pool.poll(0.1)
+    pool.close()
+    assert 0 < len(first) < 11_001
+    assert len(second) == 12 + 1
+    assert second[-1] is None

@@ -1,19 +1,12 @@
-"""The process that simulates for a window: it computes one request after another, and can be told to stop.
+"""Simulations for a window: each tells its answer piece by piece, and stops when it is told to."""
 
-A simulation that tells its answers as they come, and stops when it is told to.
-"""
-
-import signal
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from multiprocessing.connection import Connection
 
 import numpy as np
 
 from vibench.acquisition import AcquisitionError
 from vibench.sim import Harmonic, Outcome, ScenePrediction, integrate
-from vibench.sim.operating_system.this import lower_priority
+from vibench.sim.background import Cancelled
 from vibench.sim.study import (
     MESSAGE,
     MemoryStore,
@@ -38,7 +31,6 @@ from .map_request import MapRequest, MotionRequest, map_pictures, settled_motion
 from .progress import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 
 Tell = Callable[[tuple[PartialResult, ...]], None]
-Cancelled = Callable[[], bool]
 SIGNAL_PERIODS = 12
 SAMPLES_PER_PERIOD = 400
 
@@ -144,19 +136,22 @@ Asked = SimulationRequest | BranchRequest | SpectrumRequest | ChainRequest | Map
 
 def answer(request: Asked, tell: Tell, cancelled: Cancelled) -> None:
     """Compute whatever is asked for, telling it piece by piece; returns early when cancelled."""
-    match request:
-        case SimulationRequest():
-            simulate(request, tell, cancelled)
-        case BranchRequest():
-            _tell_each(branch_lines(request), tell, cancelled)
-        case SpectrumRequest():
-            _tell_each(spectrum_points(request), tell, cancelled)
-        case ChainRequest():
-            _tell_each(chain_runs(request), tell, cancelled)
-        case MapRequest():
-            map_pictures(request, lambda picture: tell((picture,)), cancelled)
-        case MotionRequest():
-            tell((settled_motion(request),))
+    try:
+        match request:
+            case SimulationRequest():
+                simulate(request, tell, cancelled)
+            case BranchRequest():
+                _tell_each(branch_lines(request), tell, cancelled)
+            case SpectrumRequest():
+                _tell_each(spectrum_points(request), tell, cancelled)
+            case ChainRequest():
+                _tell_each(chain_runs(request), tell, cancelled)
+            case MapRequest():
+                map_pictures(request, lambda picture: tell((picture,)), cancelled)
+            case MotionRequest():
+                tell((settled_motion(request),))
+    except (ValueError, AcquisitionError) as error:
+        tell((Trouble(str(error)),))
 
 
 def _tell_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled) -> None:
@@ -164,74 +159,3 @@ def _tell_each(parts: Iterable[PartialResult], tell: Tell, cancelled: Cancelled)
         if cancelled():
             return
         tell((part,))
-
-
-@dataclass(frozen=True)
-class Begin:
-    """Compute this; what was being computed is dropped."""
-
-    number: int
-    request: Asked
-
-
-@dataclass(frozen=True)
-class Cancel:
-    """Compute nothing any more."""
-
-
-@dataclass(frozen=True)
-class Grown:
-    """More of an answer."""
-
-    number: int
-    parts: tuple[PartialResult, ...]
-
-
-@dataclass(frozen=True)
-class Ended:
-    """There is no more of an answer; it was cancelled, or it is complete."""
-
-    number: int
-
-
-Order = Begin | Cancel
-
-
-def serve(connection: "Connection[Grown | Ended, Order]") -> None:
-    """Obey until the other end is closed."""
-    # Ctrl-C belongs to whoever began this process, and ends it by closing the connection.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with suppress(OSError):
-        lower_priority(5)  # A window, and a measurement, come first.
-    waiting: Begin | None = None
-    with suppress(EOFError, BrokenPipeError):
-        while True:
-            match waiting or connection.recv():
-                case Begin() as begin:
-                    waiting = _computed(connection, begin)
-                case Cancel():
-                    waiting = None
-
-
-def _computed(connection: "Connection[Grown | Ended, Order]", begin: Begin) -> Begin | None:
-    """Compute one request; gives the next, when it came meanwhile."""
-    following: Begin | None = None
-    is_over = False
-
-    def is_cancelled() -> bool:
-        nonlocal following, is_over
-        while connection.poll():
-            order = connection.recv()
-            following = order if isinstance(order, Begin) else None
-            is_over = True
-        return is_over
-
-    def tell(parts: tuple[PartialResult, ...]) -> None:
-        connection.send(Grown(begin.number, parts))
-
-    try:
-        answer(begin.request, tell, is_cancelled)
-    except (ValueError, AcquisitionError) as error:
-        tell((Trouble(str(error)),))
-    connection.send(Ended(begin.number))
-    return following

@@ -29,7 +29,7 @@ def page(shared_context):
     page.resize(1300, 900)
     page.show()
     yield page
-    page.simulator.close()
+    page.simulator.background.close()
     page.close()
 
 

@@ -30,7 +30,7 @@ def page(shared_context):
     page.show()
     yield page
     for view in (page, page.branches, page.spectrum, page.chain):
-        view.simulator.close()
+        view.simulator.background.close()
     page.close()
 
 
@@ -154,7 +154,7 @@ def test_waves_alone_are_drawn_without_a_run_and_what_cannot_be_driven_is_said(p
     asked(view, ChainRequest(drive="recorded", recording=str(tmp_path / "nowhere.h5")))
     waited(lambda: not view.simulator.is_busy, 100.0)
     assert "nowhere.h5" in said[-1].what
-    assert view.simulator._is_alive()
+    assert view.simulator.background.workers[0].process.is_alive()
 
 
 def test_what_is_not_allowed_cannot_be_asked(page):

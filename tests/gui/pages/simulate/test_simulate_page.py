@@ -21,7 +21,7 @@ def page(shared_context):
     page.resize(1300, 800)
     page.show()
     yield page
-    page.simulator.close()
+    page.simulator.background.close()
     page.close()
 
 
@@ -71,7 +71,7 @@ def test_a_dead_process_is_told_and_the_next_request_begins_another(page, waited
     page.context.noticed.connect(said.append)
     asked(page, step_hz=0.05)
     waited(lambda: page.progress.done > 0, 60.0)
-    page.simulator._process.kill()
+    page.simulator.background.workers[0].process.kill()
     waited(lambda: bool(said), 30.0)
     assert "has ended" in said[0].what
     assert not page.simulator.is_busy
@@ -199,5 +199,5 @@ def test_curves_of_another_scene_than_the_form_says_lie_under_a_veil_and_the_sce
     again.form.form.show_content({"model": "continuous n=5"})
     assert "continuous n=5" in again._cost.text()
     assert "hertz" in [again.form.form.editors["model"].widget.itemText(row) for row in range(9)]
-    again.simulator.close()
+    again.simulator.background.close()
     again.deleteLater()

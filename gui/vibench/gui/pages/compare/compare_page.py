@@ -17,8 +17,8 @@ from PySide6.QtWidgets import (
 
 from vibench.analysis import AnalysisOptions, ComparedRecording, Curve, compare_recording
 from vibench.analysis.dynamics import branch_curves
+from vibench.sim.background import Job
 
-from ...background.background import Job
 from ...forms.model_form import JudgedForm
 from ...page.app_context import AppContext
 from ...page.file_kind import FileKind

@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import RecordingError, open_recording, printable
 from vibench.acquisition.recording import Recording, name_now
 from vibench.analysis.live import RecordingOverview, Thumbnail, has_overview, kept_levels
+from vibench.sim.background import Job
 
-from ...background.background import Job
 from ...forms.field_edge import LineField
 from ...page.app_context import AppContext, Remembered
 from ...page.file_kind import FileKind

@@ -16,8 +16,8 @@ from vibench.analysis.simulation.map_request import (
     settled_motion,
 )
 from vibench.analysis.simulation.progress import PartialResult, Trouble
+from vibench.sim.background import Job
 
-from ...background.background import Job
 from ...forms.editor import Choice
 from ...forms.model_form import JudgedForm
 from ...page.app_context import AppContext
