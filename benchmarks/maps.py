@@ -89,9 +89,9 @@ def cost(asked: argparse.Namespace) -> int:
     steps: list[str] = []
 
     def tell(progress) -> None:
-        if progress.kept >= (progress.points if steps else before.coarse_points):
+        if progress.done >= (progress.of if steps else before.coarse_points):
             steps.append(
-                f"{progress.points} points after {time.perf_counter() - began_s:.1f} s, "
+                f"{progress.of} points after {time.perf_counter() - began_s:.1f} s, "
                 f"{time.process_time() - began_cpu_s:.1f} s of processor time"
             )
 

@@ -46,7 +46,6 @@ from .model_updating.updated_specimen import (
     UpdatedSpecimen as UpdatedSpecimen,
     update_model as update_model,
 )
-from .recordings.channels import ProgressObserver as ProgressObserver
 from .results.campaign_results import (
     AnalysisFailure as AnalysisFailure,
     CampaignResults as CampaignResults,

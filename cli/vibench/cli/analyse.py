@@ -21,7 +21,6 @@ from vibench.analysis import (
     InvalidRequest,
     MagnitudeScale,
     Parameter,
-    ProgressObserver,
     Simulation,
     UpdatedSpecimen,
     Window,
@@ -35,13 +34,14 @@ from vibench.analysis import (
 from vibench.analysis.dynamics import BranchDiagram, read_diagram
 from vibench.analysis.hidden_motion import HiddenMotion, hidden_motion, keep_hidden_motion, tracked_specimen
 from vibench.sim import Specimen
+from vibench.sim.background import Observer
 from vibench.sim.maps import MapResults, open_map
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
 from .output import bold, console, errors, print_json
 from .paths import AsJson, room_for_folder, unused
-from .reading_bar import reading_bar
+from .progress_bars import reading_bar
 from .specimen_option import SpecimenOption, described
 
 
@@ -302,7 +302,7 @@ def _analyse(
 
 
 def hidden_motions(
-    results: CampaignResults, specimen: Specimen | None, observer: ProgressObserver, hidden: _Hidden
+    results: CampaignResults, specimen: Specimen | None, observer: Observer, hidden: _Hidden
 ) -> Iterator[HiddenMotion]:
     """Tell the hidden motion of each recording with a result; says on standard error where there is none."""
     for facts in results.facts if hidden is not _Hidden.LEFT_OUT else ():
@@ -317,7 +317,7 @@ def hidden_motions(
 
 
 def fitted_to(
-    paths: Sequence[Path], name: str, observer: ProgressObserver, also_free: Sequence[Parameter] = ()
+    paths: Sequence[Path], name: str, observer: Observer, also_free: Sequence[Parameter] = ()
 ) -> UpdatedSpecimen:
     """Fit the specimen to recordings, whatever the report is to show of them."""
     measured = analyse_files(paths, name, Simulation.LEFT_OUT, observer=observer)

@@ -10,6 +10,7 @@ from vibench.acquisition.campaign import PointOutcome, PointResult
 from vibench.acquisition.engine import CampaignRequest
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import DRAWS, FEWEST_DRAWS, campaign_summary
+from vibench.sim.background import Progress
 
 from .analyse import complain_about
 from .analyst import second_process
@@ -57,9 +58,9 @@ def demo(
             if point_result.outcome is PointOutcome.RECORDED
         } != set(campaign.recording_names()):
             raise typer.Exit(ExitCode.STOPPED)
-        with analysis_bar(analyst.asked) as step:
-            for _ in analyst.results():
-                step()
+        with analysis_bar(analyst.asked) as observer:
+            for done, _ in enumerate(analyst.results(), start=1):
+                observer(Progress(done, analyst.asked))
         results = analyst.together()
     report = write_report(results, folder / "report.html", folder / "figures")
     summary = campaign_summary(results)

@@ -1,19 +1,19 @@
 """Progress bars on standard error; without a terminal, a line every ten seconds."""
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from threading import Event, Thread
 
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
-    Progress,
+    Progress as Bars,
     TaskProgressColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
 
-from vibench.sim.study import StudyObserver, StudyProgress
+from vibench.sim.background import Observer, Progress
 
 from .output import console, errors, words
 
@@ -22,7 +22,7 @@ LINE_INTERVAL_S = 10.0
 
 
 @contextmanager
-def shown(bars: Progress, interval_s: float = LINE_INTERVAL_S) -> Iterator[Progress]:
+def shown(bars: Bars, interval_s: float = LINE_INTERVAL_S) -> Iterator[Bars]:
     """Draw progress bars on a terminal; print a line of them every few seconds into anything else."""
     if bars.console.is_terminal:
         with bars:
@@ -42,7 +42,7 @@ def shown(bars: Progress, interval_s: float = LINE_INTERVAL_S) -> Iterator[Progr
         ending.set()
 
 
-def progress_line(bars: Progress) -> str:
+def progress_line(bars: Bars) -> str:
     """Put all bars into one line of text."""
     return "; ".join(
         each.description
@@ -52,41 +52,44 @@ def progress_line(bars: Progress) -> str:
     )
 
 
-@contextmanager
-def analysis_bar(recordings: int) -> Iterator[Callable[[], None]]:
-    """Show how many of the recordings are analysed; call what it gives after each."""
-    columns = (words("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
-    with shown(Progress(*columns, TimeElapsedColumn(), console=console)) as bars:
-        bar = bars.add_task("analysis and simulation", total=recordings)
-        yield lambda: bars.advance(bar)
-
-
 SECONDS_OF_A_MINUTE = 60.0
 MINUTES_OF_AN_HOUR = 60.0
 
 
 @contextmanager
-def study_bar(points: int) -> Iterator[StudyObserver]:
-    """Show the bar while inside; what it gives is told how far the study is."""
-    columns = (
-        words("points"),
-        BarColumn(bar_width=30),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        words("{task.fields[left]}"),
-    )
-    with shown(Progress(*columns, console=errors)) as bars:
-        bar = bars.add_task("points", total=points, left="")
+def _bar(bars: Bars, what: str, total: int | None) -> Iterator[Observer]:
+    """Show one bar while inside; gives the function that draws a progress on it."""
+    with shown(bars):
+        bar = bars.add_task(what, total=total, left="")
 
-        def watch(progress: StudyProgress) -> None:
-            bars.update(bar, total=progress.points, completed=progress.kept, left=_left(progress))
+        def draw(progress: Progress) -> None:
+            if not progress.of:
+                bars.reset(bar, total=None, description=progress.note)
+                return
+            left = "" if progress.left_s is None else f"{_duration(progress.left_s)} left"
+            left += f", {progress.note}" if progress.note else ""
+            bars.update(bar, total=progress.of, completed=progress.done, left=left)
 
-        yield watch
+        yield draw
 
 
-def _left(progress: StudyProgress) -> str:
-    failed = f", {progress.failed} failed" if progress.failed else ""
-    return ("" if progress.left_s is None else f"{_duration(progress.left_s)} left") + failed
+def analysis_bar(recordings: int) -> AbstractContextManager[Observer]:
+    """Show how many of the recordings are analysed."""
+    columns = (words("{task.description:<24}"), BarColumn(bar_width=30), MofNCompleteColumn())
+    return _bar(Bars(*columns, TimeElapsedColumn(), console=console), "analysis and simulation", recordings)
+
+
+def study_bar(points: int) -> AbstractContextManager[Observer]:
+    """Show how many points of a study or map have an answer."""
+    left = words("{task.fields[left]}")
+    columns = (words("points"), BarColumn(bar_width=30), MofNCompleteColumn(), TimeElapsedColumn(), left)
+    return _bar(Bars(*columns, console=errors), "points", points)
+
+
+def reading_bar() -> AbstractContextManager[Observer]:
+    """Show the stage of an analysis, and how much of the recording was read; leave nothing on a terminal."""
+    columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
+    return _bar(Bars(*columns, TimeElapsedColumn(), console=errors, transient=True), "opening", None)
 
 
 def _duration(seconds: float) -> str:
@@ -102,6 +105,6 @@ def _duration(seconds: float) -> str:
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
     """Show the bar while inside; what it gives is told how many values came since the last call."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
-    with shown(Progress(*columns, TimeRemainingColumn(), console=errors)) as bars:
+    with shown(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)
         yield lambda done: bars.advance(bar, done)

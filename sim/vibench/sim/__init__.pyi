@@ -1,3 +1,4 @@
+from .background import Progress as Progress
 from .exponents.lyapunov import (
     ExponentVerdict as ExponentVerdict,
     LyapunovEstimate as LyapunovEstimate,

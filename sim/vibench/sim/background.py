@@ -37,6 +37,7 @@ class Progress:
 
     done: int
     of: int
+    """0 where it is not known yet."""
     left_s: float | None = None
     """Expected time until all is done [s]; None where it is not known."""
     note: str = ""
@@ -46,6 +47,18 @@ Observer = Callable[[Progress], None]
 """Called with each progress, in the thread that does the work."""
 Cancelled = Callable[[], bool]
 """Whether to end early; called several times a second, in the thread that does the work."""
+
+
+def unobserved(progress: Progress) -> None:
+    """Observe nothing."""
+
+
+def stage(observer: Observer, note: str) -> Callable[[int, int], None]:
+    """Report that a stage begins; return the function that reports how much is done, and of how much."""
+    observer(Progress(0, 0, note=note))
+    return lambda done, of: observer(Progress(done, of, note=note))
+
+
 Asked = ParamSpec("Asked")
 Answer = TypeVar("Answer")
 Part = TypeVar("Part")

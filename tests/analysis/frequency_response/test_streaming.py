@@ -61,26 +61,13 @@ def test_four_times_the_record_needs_no_more_memory():
     assert channels.longest_read < channels.samples / 5
 
 
-class Notes:
-    """Keeps what a watcher is told."""
-
-    def __init__(self):
-        self.stages = []
-        self.reads = []
-
-    def begin(self, recording, stage):
-        self.stages.append((recording, stage))
-        self.reads.append([])
-
-    def read(self, samples, of):
-        self.reads[-1].append(samples / of)
-
-
 def test_a_watcher_hears_every_stage_and_how_far_it_is_read(streamed_file):
-    notes = Notes()
+    heard = []
     with open_recording(streamed_file()) as recording:
-        analyse(recording, observer=notes)
-    assert notes.stages == [("streamed.h5", "looking at every channel"), ("streamed.h5", "analysing")]
-    for shares in notes.reads:
+        analyse(recording, observer=heard.append)
+    stages = ["streamed.h5: looking at every channel", "streamed.h5: analysing"]
+    assert [each.note for each in heard if each.of == 0] == stages
+    for stage in stages:
+        shares = [each.done / each.of for each in heard if each.note == stage and each.of]
         assert shares == sorted(shares)
         assert shares[-1] == pytest.approx(1.0)

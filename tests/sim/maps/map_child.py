@@ -15,7 +15,7 @@ PLAN = Map(
 
 def main(path):
     def tell(progress):
-        sys.stdout.write(f"{progress.kept}\n")
+        sys.stdout.write(f"{progress.done}\n")
         sys.stdout.flush()
 
     solve_map(PLAN, Path(path), ExistingStudy.RESUME, workers=2, observer=tell)

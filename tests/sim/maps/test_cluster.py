@@ -31,9 +31,9 @@ def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(cluster, 
     killed_at = []
 
     def watch(progress):
-        if progress.kept >= 60 and not killed_at:
+        if progress.done >= 60 and not killed_at:
             workers[0].kill()
-            killed_at.append(progress.kept)
+            killed_at.append(progress.done)
 
     results = solve_map(PLAN, tmp_path / "map.h5", cluster=address, observer=watch)
     truth = solve_map(PLAN)

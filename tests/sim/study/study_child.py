@@ -17,7 +17,7 @@ STUDY = Study(
 
 def main(path):
     def tell(progress):
-        sys.stdout.write(f"{progress.kept}\n")
+        sys.stdout.write(f"{progress.done}\n")
         sys.stdout.flush()
 
     solve_study(STUDY, Path(path), ExistingStudy.RESUME, workers=2, observer=tell)

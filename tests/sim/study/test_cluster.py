@@ -103,9 +103,9 @@ def test_a_worker_killed_half_way_loses_no_point_and_changes_no_answer(
     kept_at_kill = []
 
     def watch(progress):
-        if progress.kept >= progress.points // 3 and not kept_at_kill:
+        if progress.done >= progress.of // 3 and not kept_at_kill:
             workers[0].kill()
-            kept_at_kill.append(progress.kept)
+            kept_at_kill.append(progress.done)
 
     results = solve_study(longer, tmp_path / "a.h5", cluster=address, observer=watch)
     assert kept_at_kill[0] < longer.grid.size
@@ -122,7 +122,7 @@ def test_a_cluster_that_dies_is_told_and_what_was_kept_goes_on_elsewhere(
     path = tmp_path / "a.h5"
 
     def watch(progress):
-        if progress.kept >= progress.points // 3:
+        if progress.done >= progress.of // 3:
             running.kill()
 
     executor = ClusterExecutor(address, patience_s=SHORT_S)

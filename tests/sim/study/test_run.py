@@ -210,7 +210,7 @@ def test_a_cancelled_study_stops_at_once_and_keeps_what_was_done(study, require_
 
     store = MemoryStore(study)
     executor = ThreadExecutor(2, solver)
-    end = run_study(study, executor, store, seen.append, lambda: seen[-1].kept >= 10 if seen else False)
+    end = run_study(study, executor, store, seen.append, lambda: seen[-1].done >= 10 if seen else False)
     assert end is StudyEnd.CANCELLED
     results = results_of(study, store.arrays)
     kept = int(np.count_nonzero(results.state))
@@ -225,11 +225,11 @@ def test_a_cancelled_study_stops_at_once_and_keeps_what_was_done(study, require_
 def test_progress_counts_every_point_once_and_ends_with_nothing_left(study):
     seen = []
     solve_study(study, workers=2, observer=seen.append)
-    counts = [each.kept for each in seen]
+    counts = [each.done for each in seen]
     assert counts == sorted(set(counts))
-    assert counts[-1] == seen[-1].points == study.grid.size
+    assert counts[-1] == seen[-1].of == study.grid.size
     assert seen[-1].left_s == 0.0
-    assert seen[-1].failed == 0
+    assert seen[-1].note == ""
 
 
 def test_no_workers_are_refused():

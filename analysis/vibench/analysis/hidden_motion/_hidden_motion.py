@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from vibench.acquisition.recording import Recording, ResultArray
 from vibench.sim import Specimen
+from vibench.sim.background import Observer, stage, unobserved
 
 from ..errors import InvalidRequest
-from ..recordings.channels import BASE, RESPONSE, ProgressObserver, Unobserved
+from ..recordings.channels import BASE, RESPONSE
 from ..recordings.facts import require_checked, specimen_of
 from ..signals.arrays import Reals, Samples
 from ..tables import Labelled
@@ -143,7 +144,7 @@ def hidden_motion(
     start_s: float = 0.0,
     stop_s: float | None = None,
     numbers: Numbers = Numbers.FOUND,
-    observer: ProgressObserver | None = None,
+    observer: Observer = unobserved,
 ) -> HiddenMotion:
     """Tell the relative motion of m1 and its collisions from base acceleration and m0's velocity.
 
@@ -177,16 +178,15 @@ def hidden_motion(
         When the stretch is too short.
 
     """
-    watcher = Unobserved() if observer is None else observer
     require_checked(recording)
     described = tracked_specimen(specimen_of(recording.bench) if specimen is None else specimen)
     motion = prepared_motion(recording, *_stretch(recording, start_s, stop_s))
     name = recording.path.name.removesuffix(".part").removesuffix(".h5")
     found = None
     if numbers is Numbers.FOUND:
-        watcher.begin(name, "finding gaps and m1")
+        stage(observer, f"{name}: finding gaps and m1")
         found = found_specimen(described, motion)
-    return hidden_motion_of(motion, described if found is None else found.tracked, found, name, watcher)
+    return hidden_motion_of(motion, described if found is None else found.tracked, found, name, observer)
 
 
 def hidden_motion_in_samples(
@@ -230,9 +230,7 @@ def hidden_motion_in_samples(
     motion = motion_in_samples(acceleration, velocity, sample_rate_hz)
     described = tracked_specimen(specimen)
     found = found_specimen(described, motion) if numbers is Numbers.FOUND else None
-    return hidden_motion_of(
-        motion, described if found is None else found.tracked, found, "samples", Unobserved()
-    )
+    return hidden_motion_of(motion, described if found is None else found.tracked, found, "samples")
 
 
 def hidden_motion_of(
@@ -240,21 +238,17 @@ def hidden_motion_of(
     tracked: TrackedSpecimen,
     found: FoundSpecimen | None,
     name: str,
-    watcher: ProgressObserver,
+    observer: Observer = unobserved,
 ) -> HiddenMotion:
     """Go through a prepared motion both ways."""
     model = motion_model(tracked, motion)
-
-    def told(sample: int) -> None:
-        watcher.read(sample, motion.samples)
-
-    watcher.begin(name, "tracking the hidden motion")
-    followed = _tracked(motion, tracked, found, told)
+    on_read = stage(observer, f"{name}: tracking the hidden motion")
+    followed = _tracked(motion, tracked, found, lambda sample: on_read(sample, motion.samples))
     why_not = _why_not_believed(followed)
     if found is not None and why_not:
         found = not_believed(found, why_not)
-    watcher.begin(name, "hidden motion without a contact model")
-    free = free_motion(model, motion, told)
+    on_free = stage(observer, f"{name}: hidden motion without a contact model")
+    free = free_motion(model, motion, lambda sample: on_free(sample, motion.samples))
     found_motion = HiddenMotion(
         name,
         motion.sample_rate_hz,

@@ -12,12 +12,12 @@ from pathlib import Path
 from vibench.acquisition import open_recording
 from vibench.acquisition.recording import Recording, SegmentLabel
 from vibench.sim import Specimen
+from vibench.sim.background import Observer, stage
 
 from ..errors import AnalysisError
 from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, hidden_motion
 from ..model.driven_rig import says_shaker
 from ..model.shaker_fit import FittedShaker, fitted_shaker
-from ..recordings.channels import ProgressObserver
 from ..results.campaign_results import CampaignResults
 from ..sine.dwell_analysis import DwellAnalysis
 from .specimen_fit import SpecimenFit
@@ -144,7 +144,7 @@ def numbers_from_statistics(
     results: CampaignResults,
     specimen: Specimen,
     linear: SpecimenFit | None,
-    observer: ProgressObserver,
+    observer: Observer,
 ) -> tuple[CollisionNumbers | None, str]:
     """Compare statistics of the recording that tells most with those of simulated specimens.
 
@@ -155,7 +155,7 @@ def numbers_from_statistics(
     """
     why: dict[str, list[str]] = {}
     for each in list(_colliding(results))[:_MOST_RECORDINGS]:
-        observer.begin(each.name, "comparing its statistics with those of specimens drawn at random")
+        stage(observer, f"{each.name}: comparing its statistics with those of specimens drawn at random")
         try:
             with open_recording(each.path) as recording:
                 shaker = _fitted_shaker(recording, results, specimen)

@@ -8,6 +8,7 @@ import numpy as np
 
 from vibench.acquisition import open_recording
 from vibench.sim import Specimen, SpecimenDescription, SpecimenTable
+from vibench.sim.background import Observer, unobserved
 
 from ..errors import AnalysisError, NotEnoughData
 from ..frequency_response.distortion import scatters_beyond_noise
@@ -15,10 +16,8 @@ from ..frequency_response.noise_response import NoiseAnalysis
 from ..kinds.analysis_kind import NoiseResult
 from ..model.driven_rig import described_shaker
 from ..model.shaker_fit import fitted_shaker
-from ..recordings.channels import ProgressObserver
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
-from ..results.measurement_analysis import UNOBSERVED
 from ..tables import Labelled, named, plain, plus_minus
 from ..uncertainty.stated import stated_of
 from .bracketed_gap import bracketed_gap
@@ -262,7 +261,7 @@ def _said(found: FittedValue) -> str:
 def update_model(
     results: CampaignResults,
     also_free: Sequence[Parameter | str] = (),
-    observer: ProgressObserver = UNOBSERVED,
+    observer: Observer = unobserved,
 ) -> UpdatedSpecimen:
     """Fit a specimen to recordings, or say which assumption of the model they contradict.
 
@@ -345,7 +344,7 @@ def _table(weakest: NoiseResult, linear: SpecimenFit, not_told: list[str]) -> Ta
 
 
 def _with_gaps(
-    updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str], observer: ProgressObserver
+    updated: UpdatedSpecimen, results: CampaignResults, not_told: list[str], observer: Observer
 ) -> UpdatedSpecimen:
     """Give each side's gap by tracking, else by statistics; else the nearer one by where collisions begin."""
     found, why = tracked_numbers(results, updated.specimen)

@@ -3,7 +3,7 @@
 Who is told how far an analysis is: a progress bar, or nobody.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -212,32 +212,13 @@ def read_whole(channels: Channels, stretch: Stretch) -> Reals:
     return data
 
 
-class ProgressObserver(Protocol):
-    """Told what is computed and how much of the recording was read."""
-
-    def begin(self, recording: str, stage: str) -> None:
-        """Hear that a stage of one recording begins, ``"averaging spectra"`` for example."""
-
-    def read(self, samples: int, of: int) -> None:
-        """Hear how many samples per channel of the stage are read."""
-
-
-class Unobserved:
-    """Tells nobody."""
-
-    def begin(self, recording: str, stage: str) -> None:
-        """Ignore it."""
-
-    def read(self, samples: int, of: int) -> None:
-        """Ignore it."""
-
-
 @dataclass(frozen=True, eq=False)
 class ObservedChannels:
     """Channels whose reading is watched."""
 
     channels: Channels
-    observer: ProgressObserver
+    on_read: Callable[[int, int], None]
+    """Called with the samples that were read, and how many there are."""
 
     @property
     def sample_rate_hz(self) -> float:
@@ -265,7 +246,7 @@ class ObservedChannels:
     def read(self, start: int, stop: int) -> Reals:
         """Give drive, base and response, shape (3, samples), and say how far the record is read."""
         data = self.channels.read(start, stop)
-        self.observer.read(stop, self.samples)
+        self.on_read(stop, self.samples)
         return data
 
     def overloaded(self, start: int, stop: int) -> Flags:

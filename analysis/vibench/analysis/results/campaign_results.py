@@ -10,6 +10,7 @@ from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.plan import present_word
 from vibench.acquisition.recording import Recording
 from vibench.sim import Accuracy, Specimen
+from vibench.sim.background import Observer, Progress, unobserved
 
 from ..errors import AnalysisError, NotEnoughData, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST, NoiseAnalysis
@@ -21,12 +22,11 @@ from ..model.draws import DRAWS, DrawSource, base_source, drawn, voltage_source
 from ..model.driven_rig import says_shaker
 from ..model.overlay import AbstractOverlay, Simulation
 from ..model.shaker_fit import FittedShaker, fitted_shaker
-from ..recordings.channels import ProgressObserver
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import RecordingFacts, specimen_of
 from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.sweep_analysis import SweepAnalysis
-from .measurement_analysis import UNOBSERVED, analyse
+from .measurement_analysis import analyse
 
 Stage = Callable[[str], None]
 """Told, in a few words, what is being computed."""
@@ -168,7 +168,7 @@ def analyse_files(
     name: str,
     simulation: Simulation = Simulation.UNDER_VOLTAGE,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    observer: ProgressObserver = UNOBSERVED,
+    observer: Observer = unobserved,
     specimen: Specimen | None = None,
     draws: int = DRAWS,
 ) -> CampaignResults:
@@ -266,7 +266,7 @@ def result_of(
     recording: Recording,
     simulation: Simulation = Simulation.UNDER_VOLTAGE,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    observer: ProgressObserver = UNOBSERVED,
+    observer: Observer = unobserved,
     specimen: Specimen | None = None,
     *,
     shaker: FittedShaker | None = None,
@@ -288,7 +288,7 @@ def result_of(
             simulation=simulation,
             shaker=shaker,
             draws=draws,
-            stage=lambda stage: observer.begin(name, stage),
+            stage=lambda note: observer(Progress(0, 0, note=f"{name}: {note}")),
         )
     except AnalysisError as error:
         return Result(analysis, None), (AnalysisFailure(name, FailedStep.SIMULATION, str(error)),)

@@ -4,17 +4,17 @@ from pathlib import Path
 from typing import Any
 
 from vibench.acquisition.recording import Recording, open_recording
+from vibench.sim.background import Observer, stage, unobserved
 
 from ..errors import AnalysisError, UnusableData
 from ..frequency_response.noise_response import DEFAULT_REQUEST
 from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES
 from ..recordings.channel_levels import require_moving_channels
-from ..recordings.channels import ObservedChannels, ProgressObserver, RecordedChannels, Unobserved
+from ..recordings.channels import ObservedChannels, RecordedChannels
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import recording_facts
 
-UNOBSERVED = Unobserved()
 CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueError)
 """What a calculation raises over a recording that is well formed, and whose parts do not go together."""
 
@@ -22,7 +22,7 @@ CONTRADICTIONS = (ArithmeticError, LookupError, MemoryError, TypeError, ValueErr
 def analyse(
     recording: Recording | Path | str,
     request: FrequencyResponseRequest = DEFAULT_REQUEST,
-    observer: ProgressObserver = UNOBSERVED,
+    observer: Observer = unobserved,
 ) -> AbstractAnalysis[Any, Any]:
     """Analyse a recording, complete or not, by the excitation that its plan names.
 
@@ -46,11 +46,9 @@ def analyse(
         with open_recording(Path(recording)) as opened:
             return analyse(opened, request, observer)
     name = recording.path.name
-    observer.begin(name, "looking at every channel")
-    facts = recording_facts(recording, observer.read)
-    observer.begin(name, "analysing")
+    facts = recording_facts(recording, stage(observer, f"{name}: looking at every channel"))
     try:
-        channels = ObservedChannels(RecordedChannels(recording), observer)
+        channels = ObservedChannels(RecordedChannels(recording), stage(observer, f"{name}: analysing"))
         require_moving_channels(facts.channels)
         plan = facts.measurement.excitation
         found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)

@@ -5,16 +5,15 @@ from typing import Literal
 
 import numpy as np
 
+from ..background import Cancelled, Observer
 from ..model.arrays import Floats
 from ..study import (
     Arrays,
-    Cancelled,
     Executor,
     ExistingStudy,
     PointState,
     Store,
     StudyEnd,
-    StudyObserver,
     executor_of,
     run_points,
     store_of,
@@ -45,7 +44,7 @@ def solve_map(
     existing: ExistingStudy | Literal["refuse", "resume"] = ExistingStudy.REFUSE,
     workers: int | None = None,
     cluster: str | None = None,
-    observer: StudyObserver | None = None,
+    observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> MapResults:
     """Compute a map, or what its file does not hold yet.
@@ -86,7 +85,7 @@ def compute_map(
     plan: Map,
     executor: Executor,
     store: Store,
-    observer: StudyObserver | None = None,
+    observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
     """Compute what a store misses of a map, until ``cancelled``, and fill in the rest.

@@ -38,10 +38,7 @@ from ._layout import (
     PointState as PointState,
 )
 from ._point_scheduler import (
-    Cancelled as Cancelled,
     GridPlan as GridPlan,
-    StudyObserver as StudyObserver,
-    StudyProgress as StudyProgress,
 )
 from ._results import (
     GridResults as GridResults,

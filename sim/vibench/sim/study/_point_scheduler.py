@@ -5,8 +5,7 @@ How long each point of a study will take: first as planned, then as its neighbou
 
 import heapq
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 from typing import ClassVar, Self
 
 import numpy as np
@@ -185,28 +184,6 @@ class PointScheduler:
                 number = int(self._after[number])
                 behind[number] = sum_s
         return behind
-
-
-@dataclass(frozen=True)
-class StudyProgress:
-    """How much is done, and how long the rest will take."""
-
-    points: int
-    """That are wanted: of a study all, of a map more as it is refined."""
-    kept: int
-    """With an answer; those of earlier sessions too."""
-    failed: int
-    """Of these, how many have an error for an answer, or a run that did not reach its end."""
-    elapsed_s: float
-    """Since this session began."""
-    left_s: float | None
-    """Until everything has an answer, as far as can be told; None before the first answer."""
-
-
-StudyObserver = Callable[[StudyProgress], None]
-"""Told in the thread that runs the study, after every batch of answers."""
-Cancelled = Callable[[], bool]
-"""Asked in the thread that runs the study, several times a second."""
 
 
 class GridPlan(FrozenModel, ABC):

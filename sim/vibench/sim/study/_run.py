@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..background import Cancelled, Observer, Progress
 from ..model.arrays import Floats
 from ..scene.scene import Scene
 from ..scene.side_by_side import Solved
@@ -17,7 +18,7 @@ from ._columns import TAKEN
 from ._executor import Bundle, Executor, Reply
 from ._expansion import Expansion
 from ._layout import PointState
-from ._point_scheduler import Cancelled, Costs, PointScheduler, StudyObserver, StudyProgress
+from ._point_scheduler import Costs, PointScheduler
 from ._store import Arrays, PointAnswer, Store, is_failed, states
 from ._study import Study
 
@@ -73,7 +74,7 @@ def run_study(
     study: Study,
     executor: Executor,
     store: Store,
-    observer: StudyObserver | None = None,
+    observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
     """Compute every point that the store misses, longest first.
@@ -103,7 +104,7 @@ def run_points(
     points: Points,
     executor: Executor,
     store: Store,
-    observer: StudyObserver | None = None,
+    observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyEnd:
     """Compute all points that are wanted and that the store misses, until ``cancelled``; as `run_study`."""
@@ -140,7 +141,6 @@ class _Session:
         self._out = 0
         self._looked_s = -math.inf
         self._work_left_s = 0.0
-        self._began_s = time.monotonic()
         self._first_s = math.nan
         self._taken_s = 0.0
 
@@ -181,15 +181,11 @@ class _Session:
             # Workers spend their first moments on starting: what comes after tells their pace.
             self._first_s, self._taken_s = time.monotonic(), 0.0
 
-    def progress(self) -> StudyProgress:
+    def progress(self) -> Progress:
         """Where it stands."""
-        return StudyProgress(
-            points=self._scheduler.released,
-            kept=self._scheduler.released - self._scheduler.left,
-            failed=self._failed,
-            elapsed_s=time.monotonic() - self._began_s,
-            left_s=self._left_s(),
-        )
+        released = self._scheduler.released
+        note = f"{self._failed} failed" if self._failed else ""
+        return Progress(released - self._scheduler.left, released, self._left_s(), note)
 
     def _left_s(self) -> float | None:
         """Time that the rest takes, at the pace of the workers since the first answer."""

@@ -6,12 +6,13 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Literal
 
+from ..background import Cancelled, Observer
 from ..model.stops import chosen
 from ..scene.solve import solve_scene
 from ._errors import ClusterLost
 from ._executor import Executor, Solver
 from ._expansion import study_solver
-from ._point_scheduler import Cancelled, GridPlan, StudyObserver
+from ._point_scheduler import GridPlan
 from ._results import StudyResults, open_study, results_of
 from ._run import run_study
 from ._store import MemoryStore, Store
@@ -35,7 +36,7 @@ def solve_study(
     existing: ExistingStudy | ExistingWord = ExistingStudy.REFUSE,
     workers: int | None = None,
     cluster: str | None = None,
-    observer: StudyObserver | None = None,
+    observer: Observer | None = None,
     cancelled: Cancelled | None = None,
 ) -> StudyResults:
     """Compute what a study asks for, and what its file does not hold yet.
