@@ -169,8 +169,7 @@ def with_window(rig: Rig, plan: Campaign, folder: Path) -> Iterator[Callable[[fl
     from PySide6.QtWidgets import QApplication  # noqa: PLC0415
 
     from vibench.gui.page.app_context import AppContext, Settings  # noqa: PLC0415
-    from vibench.gui.window.page_catalogue import PAGES  # noqa: PLC0415
-    from vibench.gui.window.window import Window  # noqa: PLC0415
+    from vibench.gui.window.window import PAGES, Window  # noqa: PLC0415
 
     app = QApplication(["vibench"])
     window = Window(AppContext(Settings(folder.parent / "window.ini")), PAGES)

@@ -435,8 +435,7 @@ def show_window(rig: Rig, sheet: KnobSheet, request: CampaignRequest) -> None:
 
     from vibench.gui.page.app_context import AppContext, Settings  # noqa: PLC0415
     from vibench.gui.window.open_window import application  # noqa: PLC0415
-    from vibench.gui.window.page_catalogue import PAGES  # noqa: PLC0415
-    from vibench.gui.window.window import Window  # noqa: PLC0415
+    from vibench.gui.window.window import PAGES, Window  # noqa: PLC0415
 
     app = application(["vibench"])
     window = Window(AppContext(Settings(request.folder.with_suffix(".ini"))), PAGES)

@@ -20,7 +20,7 @@ import sys, time
 from pathlib import Path
 from vibench.gui.window.open_window import application
 from vibench.gui.page.app_context import AppContext
-from vibench.gui.window.page_catalogue import PAGES
+from vibench.gui.window.window import PAGES
 from vibench.gui.page.app_context import Settings
 from vibench.gui.window.window import Window
 app = application(["vibench"])

@@ -176,7 +176,7 @@ def loaded_by(program):
         ("from vibench.virtual_rig import plug_in_remote", {"nidaqmx"}),
         ("import vibench.cli", {"numpy", "typer"}),
         (
-            "import vibench.gui.window.page_catalogue",
+            "import vibench.gui.window.window",
             {"pyvisa", "nidaqmx", "grpc", "scipy.signal", "scipy.stats"},
         ),
     ],

@@ -11,8 +11,7 @@ from PySide6.QtGui import QColor, QImage, QPainter
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.window.event_loop_monitor import BOUND_S
 from vibench.gui.window.open_window import application
-from vibench.gui.window.page_catalogue import PAGES
-from vibench.gui.window.window import Window
+from vibench.gui.window.window import PAGES, Window
 
 YARDSTICK_S = 0.0054
 """What `yardstick` takes where the bound was set; a slower processor is given as much more."""

@@ -24,8 +24,7 @@ from vibench.gui.widgets.notice import Notice, NoticeKind
 from vibench.gui.widgets.theme import Tone
 from vibench.gui.window.banner import StateIndicator, StatusField
 from vibench.gui.window.open_window import application
-from vibench.gui.window.page_catalogue import PAGES
-from vibench.gui.window.window import Window
+from vibench.gui.window.window import PAGES, Window
 
 SENTENCE = "Simulating; the first answer waits for the program to be made ready, and says so at length. " * 4
 NAME = "a_recording_whose_name_was_chosen_by_somebody_who_likes_to_say_everything_in_it_" * 2

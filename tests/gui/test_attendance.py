@@ -9,7 +9,7 @@ from vibench.acquisition import shipped
 from vibench.acquisition.engine import DRIVING, EngineClient, EngineState
 from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import load_rig
-from vibench.gui.widgets.page_names import QUEUE, RUN
+from vibench.gui.widgets.notice import QUEUE, RUN
 
 DWELL = {"kind": "dwell", "amplitude_vpp": 0.5, "frequency_hz": 180, "settle_s": 0.2, "duration_s": 600}
 PATIENCE_MS = 100_000

@@ -18,9 +18,8 @@ from vibench.analysis import analyse
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.page.user_actions import ABORT_KEY, OPERATOR_STOP
 from vibench.gui.pages.rig.rig_page import PACES
-from vibench.gui.widgets.page_names import COMPARE, FILES, RUN, TEST
-from vibench.gui.window.page_catalogue import PAGES
-from vibench.gui.window.window import Window
+from vibench.gui.widgets.notice import COMPARE, FILES, RUN, TEST
+from vibench.gui.window.window import PAGES, Window
 
 CONTROL = Qt.KeyboardModifier.ControlModifier
 ALT = Qt.KeyboardModifier.AltModifier

@@ -22,7 +22,7 @@ from vibench.acquisition.engine import (
 )
 from vibench.acquisition.recording import RecordingState
 from vibench.gui.page.app_context import USUAL_PATIENCE_S
-from vibench.gui.widgets.page_names import RUN
+from vibench.gui.widgets.notice import RUN
 
 ROOT = Path(__file__).resolve().parents[2]
 SILENT_WITHIN_S = {"SIGKILL": 1.0, "SIGSTOP": USUAL_PATIENCE_S + 1.0}

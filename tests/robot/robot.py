@@ -38,10 +38,9 @@ from vibench.acquisition.engine import DRIVING, EngineState
 from vibench.acquisition.plan import Dwell, Measurement
 from vibench.gui.page.app_context import AppContext, Settings
 from vibench.gui.plots.plot import Plot
-from vibench.gui.widgets.page_names import TEST
+from vibench.gui.widgets.notice import TEST
 from vibench.gui.window.open_window import application
-from vibench.gui.window.page_catalogue import PAGES
-from vibench.gui.window.window import Window
+from vibench.gui.window.window import PAGES, Window
 
 NASTY = (
     *(

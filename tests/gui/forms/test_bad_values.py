@@ -11,10 +11,10 @@ from vibench.analysis.simulation.map_request import MapRequest
 from vibench.analysis.simulation.progress import SimulationRequest
 from vibench.gui.forms.editor import Choice
 from vibench.gui.forms.model_form import GroupEditor, JudgedForm
-from vibench.gui.pages.queue.sweep_form import SweepForm
-from vibench.gui.pages.simulate.dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
-from vibench.gui.pages.test.test_form import TestForm as FormOfATest
-from vibench.gui.window.settings_dialog import Preferences
+from vibench.gui.pages.queue.queue_page import SweepForm
+from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN, SPECTRUM
+from vibench.gui.pages.test.test_page import TestForm as FormOfATest
+from vibench.gui.window.menus import Preferences
 
 BAD = (
     *("", " ", "abc", "-1", "0", "--5", "1e99", "-1e99", "1e-99", "1e999", "nan", "inf", "-inf", "½", "0x10"),

@@ -6,7 +6,7 @@ from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpectrumReque
 from vibench.analysis.simulation.map_request import MapRequest
 from vibench.analysis.simulation.progress import SimulationRequest
 from vibench.gui.forms.model_form import JudgedForm
-from vibench.gui.pages.simulate.dynamics_kinds import BRANCHES, CHAIN
+from vibench.gui.pages.simulate.dynamics_view import BRANCHES, CHAIN
 
 HIDDEN = BRANCHES.hidden | CHAIN.hidden
 GIVEN = {"start": 60.0, "stop": 62.0}

@@ -21,9 +21,9 @@ from vibench.acquisition.recording import (
 from vibench.analysis import Curve, CurveKind, CurveOrigin
 from vibench.analysis.live import LiveChannel, LiveView
 from vibench.analysis.simulation.progress import SimulatedPoint, SimulatedSignal, SimulationProgress
-from vibench.gui.engine_link.live_run import warm_up
+from vibench.gui.engine_link.bridge import warm_up
 from vibench.gui.pages.queue.draft import with_sweep
-from vibench.gui.widgets.page_names import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
+from vibench.gui.widgets.notice import COMPARE, FILES, QUEUE, RUN, SIMULATE, TEST
 from vibench.gui.widgets.theme import DARK, LIGHT
 from vibench.gui.window.open_window import load_ahead
 from vibench.gui.window.screenshots import SHOWN, SHOWN_TOO

@@ -24,12 +24,12 @@ from vibench.analysis.simulation.map_request import SettledMotion
 from vibench.gui.forms.model_form import JudgedForm
 from vibench.gui.forms.quantity_edit import QuantityEdit, parsed_quantity, quantity_text
 from vibench.gui.page.app_context import AppContext, Settings
-from vibench.gui.pages.test.test_form import TestForm as FormOfATest
+from vibench.gui.pages.test.test_page import TestForm as FormOfATest
 from vibench.gui.pages.test.test_preview import TestPreview as Previewed, preview_test
 from vibench.gui.plots.plot import Plot
-from vibench.gui.widgets.page_names import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
+from vibench.gui.widgets.notice import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
 from vibench.gui.widgets.units import CHOICES, UNITS, fitted_unit
-from vibench.gui.window.settings_dialog import SettingsDialog
+from vibench.gui.window.menus import SettingsDialog
 
 OLD = re.compile(r"(?:\d|\()\s?(?:µm|m/s²|m/s2|m s-[12]|mm/s)(?![\w/²·])")
 """A number, or the label of an axis, in a unit that was not chosen."""

@@ -6,18 +6,17 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import Qt as Text, QTextDocument
 
 from vibench.analysis import Curve, CurveKind, CurveOrigin
-from vibench.gui.pages.compare.curve_list import CurveList, PairBox
+from vibench.gui.pages.compare.curve_plots import CurveList, PairBox
 from vibench.gui.pages.rig.rig_page import RigChoice
 from vibench.gui.plots.axis import TIME, PlotAxis
 from vibench.gui.plots.line_style import LIMIT, curve_style
 from vibench.gui.plots.plot import Plot
-from vibench.gui.widgets.elided_label import ElidedLabel
+from vibench.gui.widgets.boxes import ElidedLabel
 from vibench.gui.widgets.notice import Notice, NoticeKind
 from vibench.gui.widgets.read_table import ReadTable
 from vibench.gui.widgets.theme import LIGHT
 from vibench.gui.widgets.units import SentenceLabel
-from vibench.gui.window.banner import StatusField, StatusLine
-from vibench.gui.window.message_strip import MessageStrip
+from vibench.gui.window.banner import MessageStrip, StatusField, StatusLine
 
 HOSTILE = "<img src='x'><h1>a\x1b[2J\u202eb\x9d</h1>"
 SHOWN = r"<img src='x'><h1>a\x1b[2J\u202eb\x9d</h1>"

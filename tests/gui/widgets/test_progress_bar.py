@@ -2,9 +2,9 @@
 
 import pytest
 
-from vibench.gui.pages.run.watch_card import WatchCard
+from vibench.gui.pages.run.run_page import WatchCard
+from vibench.gui.widgets.boxes import ProgressBar, TimedBar
 from vibench.gui.widgets.theme import LIGHT
-from vibench.gui.widgets.timed_bar import ProgressBar, TimedBar
 
 WORDS = "ramping up as far as the first tenth, 11:22:33 left"
 

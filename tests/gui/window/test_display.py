@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from vibench.gui.window import display as _display
+from vibench.gui.window import open_window as _display
 
 
 def started(tmp_path, **environment):

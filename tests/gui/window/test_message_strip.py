@@ -7,7 +7,7 @@ from PySide6.QtWidgets import QLabel, QPlainTextEdit, QPushButton
 
 from vibench.acquisition import LimitExceeded
 from vibench.gui.widgets.notice import Notice, NoticeKind, notice_of
-from vibench.gui.window.message_strip import MessageStrip
+from vibench.gui.window.banner import MessageStrip
 
 
 def shown(strip):

@@ -9,10 +9,9 @@ from PySide6.QtWidgets import QApplication, QDialogButtonBox, QLabel, QMenu
 
 from vibench.acquisition import save_toml, shipped
 from vibench.gui.__main__ import NO_WINDOW, _sign_of_life, main
-from vibench.gui.widgets.page_names import COMPARE, FILES, QUEUE, RIG, TEST
+from vibench.gui.widgets.notice import COMPARE, FILES, QUEUE, RIG, TEST
 from vibench.gui.widgets.theme import DARK
-from vibench.gui.window.menus import show_about, show_manual
-from vibench.gui.window.settings_dialog import SettingsDialog
+from vibench.gui.window.menus import SettingsDialog, show_about, show_manual
 
 
 def dropped(window, *paths):

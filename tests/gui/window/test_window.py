@@ -4,10 +4,9 @@ import pytest
 from PySide6.QtCore import Qt
 
 from vibench.gui.page.app_context import AppContext, Settings
-from vibench.gui.widgets.page_names import RIG, TEST
+from vibench.gui.widgets.notice import RIG, TEST
 from vibench.gui.widgets.theme import DARK
-from vibench.gui.window.page_catalogue import PAGES
-from vibench.gui.window.window import Window
+from vibench.gui.window.window import PAGES, Window
 
 
 def test_every_page_can_be_shown_by_its_key(window, qtbot):

@@ -1,7 +1,12 @@
 """The bridge between window and engine: what the engine says comes in, what a person wants goes out."""
 
+import threading
 from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import IntEnum
+from itertools import count
 from pathlib import Path
+from queue import Empty, PriorityQueue, SimpleQueue
 from typing import Any, Concatenate, ParamSpec
 
 import numpy as np
@@ -14,11 +19,13 @@ from vibench.acquisition.engine import (
     AdoptedEngine,
     Announcement,
     ArmedPlan,
+    Attendant,
     BenchFacts,
     CampaignRequest,
     EngineClient,
     EngineGone,
     EngineMessage,
+    EngineProcess,
     EngineSilent,
     EngineState,
     EngineStatus,
@@ -26,14 +33,157 @@ from vibench.acquisition.engine import (
     Supervision,
     start_engine,
 )
-from vibench.acquisition.plan import Campaign
+from vibench.acquisition.plan import Campaign, Measurement, lead_in_s
 from vibench.acquisition.rig import KnobSheet, Rig
-from vibench.analysis.live import LiveView
+from vibench.analysis.live import LiveChannel, LiveView
 from vibench.stop_files import SWITCH_OFF
 
 from ..widgets.notice import Notice, NoticeKind, notice_of
-from .engine_line import EngineLine, Starter, Urgency
-from .live_run import live_view, warm_up
+
+WHOLE_BAND_HZ = (20.0, 2000.0)
+"""Looked at when the plan is not known: it was armed by somebody else."""
+WARM_RATE_HZ, WARM_S, WARM_HZ = 51200.0, 3.0, 200.0
+
+
+def live_view(bench: BenchFacts, rig: Rig | None, campaign: Campaign | None, name: str) -> LiveView:
+    """Begin to watch the run of the recording ``name``."""
+    measurement = measurement_called(campaign, name)
+    band_hz = WHOLE_BAND_HZ if measurement is None else measurement.excitation.band_hz
+    channels = [
+        LiveChannel(each.role, each.unit, each.units_per_volt, each.full_scale_v) for each in bench.channels
+    ]
+    delay_s = 0.0 if rig is None else rig.vibrometer.delay_s
+    begins_s = 0.0 if measurement is None else lead_in_s(measurement)
+    return LiveView(channels, bench.sample_rate_hz, band_hz=band_hz, delay_s=delay_s, lead_in_s=begins_s)
+
+
+def warm_up() -> None:
+    """Watch a moment of silence and a sine, so that everything is loaded and every window is known."""
+    roles = ("drive_voltage", "base_acceleration", "m0_velocity")
+    channels = [LiveChannel(role, "V", 1.0, 1.0) for role in roles]
+    view = LiveView(channels, WARM_RATE_HZ, band_hz=WHOLE_BAND_HZ)
+    time_s = np.arange(round(WARM_S * WARM_RATE_HZ)) / WARM_RATE_HZ
+    sine = np.sin(2 * np.pi * WARM_HZ * time_s)
+    view.add(0, np.tile(sine, (len(roles), 1)).astype(np.float32))
+    view.time_histories(1.0, 100)
+    view.spectrum()
+    view.frequency_response()
+    view.portrait()
+
+
+def measurement_called(campaign: Campaign | None, name: str) -> Measurement | None:
+    """Find the measurement that a recording is one of."""
+    if campaign is None:
+        return None
+    return next((each for recording, each in campaign.recordings() if recording == name), None)
+
+
+Starter = Callable[[], EngineProcess | AdoptedEngine]
+Question = Callable[[EngineClient], Any]
+Listener = Callable[[Any], None]
+
+
+class Urgency(IntEnum):
+    """Whose turn it is when several wait."""
+
+    STOP = 0
+    ORDER = 1
+    LOOK = 2
+    END = 3
+    LEAVE = 4
+
+
+@dataclass(order=True)
+class _Call:
+    urgency: Urgency
+    number: int
+    question: Question = field(compare=False)
+    on_answer: Listener = field(compare=False)
+    on_refusal: Callable[[AcquisitionError], None] = field(compare=False)
+
+
+class EngineLine:
+    """Starts an engine and asks it, in a thread without Qt; answers wait until `drain` fetches them.
+
+    Nothing is asked unless the window asks: a window that hangs falls silent, and the engine notices.
+    """
+
+    def __init__(self, start: Starter = start_engine) -> None:
+        self._start = start
+        self._calls: PriorityQueue[_Call] = PriorityQueue()
+        self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
+        self._numbers = count()
+        self._engine: EngineProcess | AdoptedEngine | None = None
+        self._attendant: Attendant | None = None
+        self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int | None:
+        """The engine's process, None before it runs."""
+        return None if self._engine is None else self._engine.pid
+
+    @property
+    def attendant(self) -> Attendant | None:
+        """Tells the engine that the window is alive; None before there is an engine."""
+        return self._attendant
+
+    def ask(
+        self,
+        urgency: Urgency,
+        question: Question,
+        on_answer: Listener,
+        on_refusal: Callable[[AcquisitionError], None],
+    ) -> None:
+        """Ask when it is its turn; one of the two listeners is called by `drain`."""
+        self._calls.put(_Call(urgency, next(self._numbers), question, on_answer, on_refusal))
+
+    def drain(self) -> None:
+        """Tell the answers that have come, in the thread that calls."""
+        while True:
+            try:
+                tell = self._answers.get_nowait()
+            except Empty:
+                return
+            tell()
+
+    def leave(self, how: Urgency = Urgency.END) -> None:
+        """Let the engine ramp down and end, or go on alone; nobody waits for that."""
+        self._calls.put(_Call(how, next(self._numbers), _nothing, _nothing, _nothing))
+
+    def close(self, how: Urgency = Urgency.END) -> None:
+        """Let the engine ramp down and end, or go on alone, and wait for that."""
+        self.leave(how)
+        self._thread.join()
+
+    def _run(self) -> None:
+        while (call := self._calls.get()).urgency not in (Urgency.END, Urgency.LEAVE):
+            self._answer(call)
+        if self._attendant is not None:
+            self._attendant.close()
+        if self._engine is None:
+            return
+        if call.urgency is Urgency.LEAVE:
+            self._engine.leave()
+        else:
+            self._engine.close()
+
+    def _answer(self, call: _Call) -> None:
+        try:
+            if self._engine is None:
+                self._engine = self._start()
+                self._attendant = Attendant(self._engine.address)
+            answer = call.question(self._engine.client)
+        except AcquisitionError as error:
+            refusal = error
+            self._answers.put(lambda: call.on_refusal(refusal))
+        else:
+            self._answers.put(lambda: call.on_answer(answer))
+
+
+def _nothing(_: object) -> None:
+    """Do nothing with an answer."""
+
 
 CATCH_UP_S = 2.0
 """Older samples than this are not asked for after a pause: the picture shows now, the file holds all."""

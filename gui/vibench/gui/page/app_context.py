@@ -12,8 +12,7 @@ from vibench.acquisition.plan import Campaign, Measurement
 from vibench.acquisition.rig import Rig
 
 from ..background.background import Background
-from ..engine_link.bridge import Bridge
-from ..engine_link.engine_line import Starter
+from ..engine_link.bridge import Bridge, Starter
 from ..widgets.notice import Notice
 from ..widgets.theme import LIGHT, THEMES, Theme
 from ..widgets.units import CHOICES, UNITS

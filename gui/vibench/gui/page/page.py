@@ -1,18 +1,76 @@
 """What a page of the window is: a widget that follows the engine and the theme, whole or in two parts."""
 
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum, auto
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import Generic, Protocol, TypeVar, runtime_checkable
 
 from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QLayout, QSplitter, QWidget
 
+from vibench.acquisition import ConfigurationError, RecordingError, open_recording
+
 from ..widgets.boxes import Scrolled, column, title_of
 from ..widgets.theme import Theme
 from .app_context import AppContext, Remembered
-from .file_kind import FileKind
+
+
+class FileKind(Enum):
+    """What the window can open; each page says which of them it takes."""
+
+    FOLDER = auto()
+    RECORDING = auto()
+    BRANCHES = auto()
+    TEST = auto()
+    CAMPAIGN = auto()
+    RIG = auto()
+
+
+_TABLES = {
+    "excitation": FileKind.TEST,
+    "measurements": FileKind.CAMPAIGN,
+    "sweeps": FileKind.CAMPAIGN,
+    "generator": FileKind.RIG,
+}
+"""Keys of a TOML file that tell what it is."""
+
+
+def file_kind(path: Path) -> FileKind:
+    """Look at a file, or a folder.
+
+    Raises
+    ------
+    ConfigurationError
+        In one sentence, when it is nothing that the window opens.
+
+    """
+    if path.is_dir():
+        return FileKind.FOLDER
+    if path.name.endswith((".h5", ".h5.part")):
+        return _of_hdf5(path)
+    allowed = "open a recording (.h5), or a test, campaign or hardware configuration (.toml)"
+    if path.suffix != ".toml":
+        raise ConfigurationError(f"{path} is nothing that can be opened here; {allowed}")
+    try:
+        keys = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise ConfigurationError(f"{path} cannot be read ({error}); {allowed}") from error
+    found = next((kind for key, kind in _TABLES.items() if key in keys), None)
+    if found is None:
+        raise ConfigurationError(f"{path} is no test, campaign or hardware configuration; {allowed}")
+    return found
+
+
+def _of_hdf5(path: Path) -> FileKind:
+    try:
+        open_recording(path).close()
+    except RecordingError:
+        # Compare reads it, or says why it cannot.
+        return FileKind.BRANCHES if path.exists() else FileKind.RECORDING
+    return FileKind.RECORDING
 
 
 @dataclass(frozen=True)
@@ -157,3 +215,36 @@ class SideAndPicture(QSplitter):
         if not self._was_moved:
             wanted = min(self.side.sizeHint().width(), round(self.WIDEST_SIDE * self.width()))
             self.setSizes([wanted, self.width() - wanted])
+
+
+State = TypeVar("State")
+MOST_KEPT = 200
+
+
+class History(Generic[State]):
+    """States of a plan in their order, and where in them it stands."""
+
+    def __init__(self) -> None:
+        self._states: list[State] = []
+        self._now = -1
+
+    def note(self, state: State) -> None:
+        """Note a state that was made; what had been taken back before is forgotten."""
+        if self._states and self._states[self._now] == state:
+            return
+        self._states = [*self._states[: self._now + 1], state][-MOST_KEPT:]
+        self._now = len(self._states) - 1
+
+    def undo(self) -> State | None:
+        """Go back; None where nothing was before."""
+        return self._go(-1)
+
+    def redo(self) -> State | None:
+        """Go on; None where nothing comes after."""
+        return self._go(1)
+
+    def _go(self, step: int) -> State | None:
+        if not 0 <= self._now + step < len(self._states):
+            return None
+        self._now += step
+        return self._states[self._now]

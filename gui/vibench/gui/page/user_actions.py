@@ -9,8 +9,7 @@ from vibench.acquisition.campaign import ExistingRecordings
 from vibench.acquisition.engine import CampaignRequest, EngineClient, EngineState, Supervision
 from vibench.acquisition.plan import Campaign, Measurement
 
-from ..widgets.notice import Notice, NoticeKind
-from ..widgets.page_names import RUN
+from ..widgets.notice import RUN, Notice, NoticeKind
 from .app_context import AppContext
 
 OPERATOR_STOP = "stopped by the operator, in the window"

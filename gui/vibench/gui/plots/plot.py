@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from vibench.acquisition import printable
 
-from ..widgets.hint import paint_hint
+from ..widgets.boxes import paint_hint
 from ..widgets.theme import Theme
 from ..widgets.units import UNITS
 from .axis import AxisItem, Blankness, Grid, PlotAxis, Scale

@@ -8,8 +8,7 @@ from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMessageBox
 
-from ..widgets.elided_label import plain_tip
-from ..widgets.new_path import new_path
+from ..widgets.boxes import new_path, plain_tip
 
 if TYPE_CHECKING:
     from .plot import Plot

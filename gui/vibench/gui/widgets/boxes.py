@@ -1,18 +1,32 @@
 """Boxes of a layout, filled in one expression: parts below or beside one another."""
 
+from collections.abc import Callable
+from html import escape
+from pathlib import Path
+from time import monotonic
 from typing import TypeVar
 
-from PySide6.QtCore import QSize
+from PySide6.QtCore import QRect, QSize, Qt
+from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
+    QFileDialog,
     QGroupBox,
     QHBoxLayout,
     QLabel,
     QLayout,
+    QProgressBar,
+    QPushButton,
     QScrollArea,
+    QStyle,
+    QStyleOption,
     QVBoxLayout,
     QWidget,
 )
+
+from vibench.acquisition import printable
+
+from .notice import clock
 
 Box = TypeVar("Box", bound=QBoxLayout)
 Content = QWidget | QLayout
@@ -97,3 +111,133 @@ class Scrolled(QScrollArea):
         bar = self.verticalScrollBar().sizeHint().width() + self.fontMetrics().height() // 2
         least = self._content.minimumSizeHint()
         return QSize(least.width() + bar, least.height())
+
+
+def push_button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
+    """Make one; ``act`` is called without what Qt tells of it."""
+    button = QPushButton(text)
+    button.setToolTip(tip)
+    button.setAccessibleName(text.replace("&", "").rstrip("…"))
+    button.clicked.connect(lambda _checked=False: act())
+    return button
+
+
+def new_path(parent: QWidget, title: str, wish: Path, filters: str) -> Path | None:
+    """Ask for the path of a new file, with the ending of the chosen filter where none is typed."""
+    options = QFileDialog.Option.DontConfirmOverwrite
+    given, kind = QFileDialog.getSaveFileName(parent, title, str(wish), filters, options=options)
+    if not given:
+        return None
+    path = Path(given)
+    return path if path.suffix else path.with_suffix(kind[kind.index("*") + 1 : kind.index(")")])
+
+
+_WIDEST = 0.8
+"""Part of the area that the words may take."""
+
+
+def paint_hint(painter: QPainter, area: QRect, text: str, colour: str | QColor) -> None:
+    """Write words into the middle of an area."""
+    margin = round(0.5 * (1 - _WIDEST) * area.width())
+    painter.setPen(QColor(colour))
+    flags = Qt.AlignmentFlag.AlignCenter | Qt.TextFlag.TextWordWrap
+    painter.drawText(area.adjusted(margin, 0, -margin, 0), flags, text)
+
+
+def plain_lines(text: str) -> str:
+    """Write every line of a text without control characters."""
+    return text if text.isprintable() else "\n".join(map(printable, text.split("\n")))
+
+
+def plain_tip(text: str) -> str:
+    """Write a tooltip whose markup is shown, and not obeyed."""
+    lines = plain_lines(text)
+    return f"<p style='white-space:pre-wrap'>{escape(lines)}</p>" if "<" in lines else lines
+
+
+class ElidedLabel(QLabel):
+    """A line that asks for little width: what finds no room ends in dots, and is whole in the tooltip."""
+
+    LETTERS = 3
+
+    def __init__(self, text: str = "") -> None:
+        super().__init__()
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setText(text)
+
+    def setText(self, text: str) -> None:
+        """Show a text as one line."""
+        super().setText(printable(text))
+
+    def setToolTip(self, text: str) -> None:
+        """Say more under the pointer."""
+        super().setToolTip(plain_tip(text))
+
+    def minimumSizeHint(self) -> QSize:
+        """Room for some letters: a long text must not widen the window."""
+        hint = super().minimumSizeHint()
+        least = self.LETTERS * self.fontMetrics().averageCharWidth()
+        return QSize(min(hint.width(), least), hint.height())
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Draw the text whole where it fits, and shortened elsewhere."""
+        room = self.contentsRect()
+        if self.sizeHint().width() <= self.width() or room.width() <= 0:
+            super().paintEvent(event)
+            return
+        painter, option = QPainter(self), QStyleOption()
+        option.initFrom(self)
+        self.style().drawPrimitive(QStyle.PrimitiveElement.PE_Widget, option, painter, self)
+        painter.setPen(self.palette().color(self.foregroundRole()))
+        text = self.fontMetrics().elidedText(self.text(), Qt.TextElideMode.ElideRight, room.width())
+        painter.drawText(room, self.alignment(), text)
+        if not self.toolTip():
+            self.setToolTip(self.text())
+
+
+LEAST_S = 1.0
+"""Before this much of it is done nobody can say how long the rest takes [s]."""
+
+
+class ProgressBar(QProgressBar):
+    """A bar whose words end in dots where they find no room; the tooltip says them whole."""
+
+    def text(self) -> str:
+        """Give as many of the words as fit."""
+        whole = super().text()
+        room = self.width() - self.fontMetrics().averageCharWidth()
+        shown = self.fontMetrics().elidedText(whole, Qt.TextElideMode.ElideRight, room)
+        self.setToolTip(whole if shown != whole else "")
+        return shown
+
+
+class TimedBar(ProgressBar):
+    """Counts pieces of work; the time left follows from those that are done."""
+
+    def __init__(self, name: str, pieces: str) -> None:
+        super().__init__()
+        self.setAccessibleName(name)
+        self._pieces = pieces
+        self._begun_s = 0.0
+        self._asked = 0
+        self.show_done(0, 0)
+
+    def begin(self) -> None:
+        """Count the time from now on."""
+        self._begun_s = monotonic()
+
+    def show_done(self, done: int, asked: int) -> None:
+        """Show how many pieces are done; 0 asked: nothing was begun."""
+        if asked and not self._asked:
+            self.begin()
+        self._asked = asked
+        self.setMaximum(max(asked, 1))
+        self.setValue(done)
+        if not asked:
+            self.setFormat(f"no {self._pieces} yet")
+            return
+        elapsed_s = monotonic() - self._begun_s
+        left = ""
+        if 0 < done < asked and elapsed_s > LEAST_S:
+            left = f", {clock(elapsed_s * (asked - done) / done)} left"
+        self.setFormat(f"{done} of {asked} {self._pieces}{left}")

@@ -1,6 +1,7 @@
 """What the window tells a person: what happened, what was done about it, what to do next."""
 
 from dataclasses import dataclass
+from datetime import datetime
 from enum import StrEnum
 
 from vibench.acquisition import printable
@@ -46,3 +47,33 @@ def notice_of(error: BaseException, next_step: str = "") -> Notice:
         code=type(error).__name__,
         details="\n".join(getattr(error, "__notes__", ())),
     )
+
+
+def clock(seconds: float) -> str:
+    """Write a time as people read it on a clock."""
+    whole = max(0, round(seconds))
+    hours, minutes = whole // 3600, whole // 60 % 60
+    return f"{hours}:{minutes:02}:{whole % 60:02}" if hours else f"{minutes}:{whole % 60:02}"
+
+
+def moment_text(utc: str) -> str:
+    """Write when a recording began, by this machine's clock: ``"2026-03-01 13:00:05"``."""
+    try:
+        return datetime.fromisoformat(utc).astimezone().strftime("%Y-%m-%d %H:%M:%S")
+    except ValueError:
+        return utc
+
+
+def outcome_text(state: str, reason: str) -> str:
+    """Join state and reason: ``"stopped by the operator"``, ``"failed: the laser was lost"``."""
+    return reason if reason.startswith(state) else f"{state}: {reason}" if reason else state
+
+
+RIG = "Rig"
+TEST = "Test"
+RUN = "Run"
+FILES = "Files"
+COMPARE = "Compare"
+SIMULATE = "Simulate"
+MAPS = "Maps"
+QUEUE = "Queue"

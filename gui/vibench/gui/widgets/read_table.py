@@ -6,8 +6,7 @@ from PySide6.QtCore import QAbstractItemModel, QModelIndex, QPersistentModelInde
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView, QTableWidget, QTableWidgetItem
 
-from .elided_label import plain_lines, plain_tip
-from .hint import paint_hint
+from .boxes import paint_hint, plain_lines, plain_tip
 from .units import UNITS
 
 Cell = QModelIndex | QPersistentModelIndex

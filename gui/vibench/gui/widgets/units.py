@@ -16,7 +16,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QLabel
 from shiboken6 import isValid
 
-from .elided_label import plain_lines, plain_tip
+from .boxes import plain_lines, plain_tip
 
 STANDARD_GRAVITY = 9.80665
 """Of g [m/s²]; ISO 80000-3."""

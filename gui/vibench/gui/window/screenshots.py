@@ -25,11 +25,10 @@ from ..pages.maps.maps_page import MapsPage
 from ..pages.queue.queue_page import QueuePage
 from ..pages.simulate.simulate_page import SimulatePage
 from ..pages.test.test_page import TestPage
-from ..widgets.page_names import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
+from ..widgets.notice import COMPARE, FILES, MAPS, QUEUE, RUN, SIMULATE, TEST
 from ..widgets.theme import THEMES, Theme
 from .open_window import application
-from .page_catalogue import PAGES
-from .window import Window
+from .window import PAGES, Window
 
 SIZE = (1280, 800)
 OTHER_SIZES = ((1024, 700), (1920, 1080))

@@ -2,16 +2,20 @@
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import monotonic
 
-from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QShowEvent
 from PySide6.QtWidgets import (
     QApplication,
+    QListWidget,
+    QListWidgetItem,
     QMainWindow,
     QMessageBox,
+    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -20,21 +24,123 @@ from PySide6.QtWidgets import (
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.engine import Announcement, CampaignRequest, left_alone
 
-from ..engine_link.engine_line import Urgency
+from ..engine_link.bridge import Urgency
 from ..page.app_context import AppContext, Remembered
-from ..page.file_kind import file_kind
-from ..page.page import Page
+from ..page.page import Page, file_kind
 from ..page.user_actions import UserActions
+from ..pages.compare.compare_page import ComparePage
+from ..pages.files.files_page import FilesPage
+from ..pages.maps.maps_page import MapsPage
+from ..pages.queue.queue_page import QueuePage
+from ..pages.rig.rig_page import RigPage
+from ..pages.run.run_page import RunPage
+from ..pages.simulate.simulate_page import SimulatePage
+from ..pages.test.test_page import TestPage
 from ..widgets.boxes import filled, row
-from ..widgets.notice import Notice, NoticeKind, notice_of
-from ..widgets.page_names import RUN
+from ..widgets.notice import (
+    COMPARE,
+    FILES,
+    MAPS,
+    QUEUE,
+    RIG,
+    RUN,
+    SIMULATE,
+    TEST,
+    Notice,
+    NoticeKind,
+    notice_of,
+)
 from ..widgets.theme import Theme, palette, style_sheet
-from .banner import NEXT_STEPS, Banner, StatusField, StatusLine, indicator_of, status_fields
+from .banner import NEXT_STEPS, Banner, MessageStrip, StatusField, StatusLine, indicator_of, status_fields
 from .event_loop_monitor import EventLoopMonitor
 from .menus import AbortKey, build_menus
-from .message_strip import MessageStrip
-from .navigation_bar import NavigationBar
-from .page_catalogue import PageEntry
+
+
+@dataclass(frozen=True)
+class PageEntry:
+    """A page by its name, its place on the rail, and how it is made."""
+
+    name: str
+    number: int
+    """Ctrl and this number shows it."""
+    make: Callable[[AppContext], Page]
+
+
+PAGES: tuple[PageEntry, ...] = (
+    PageEntry(RIG, 1, RigPage),
+    PageEntry(TEST, 2, TestPage),
+    PageEntry(RUN, 3, RunPage),
+    PageEntry(FILES, 4, FilesPage),
+    PageEntry(COMPARE, 5, ComparePage),
+    PageEntry(SIMULATE, 6, SimulatePage),
+    PageEntry(QUEUE, 7, QueuePage),
+    PageEntry(MAPS, 8, MapsPage),
+)
+
+
+DONE = "✔"
+
+
+class NavigationBar(QListWidget):
+    """Names of the pages; the chosen one is shown."""
+
+    chosen = Signal(str)
+
+    def __init__(self, names: tuple[str, ...]) -> None:
+        super().__init__()
+        self.setObjectName("rail")
+        self.setAccessibleName("Pages")
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
+        self._names = names
+        self._done: dict[str, bool] = {}
+        for number, name in enumerate(names, start=1):
+            item = QListWidgetItem()
+            item.setToolTip(f"{name} page (Ctrl+{number})")
+            self.addItem(item)
+        self.show_done({})
+        self.currentRowChanged.connect(self._chosen)
+
+    @property
+    def chosen_name(self) -> str:
+        """The page that is marked."""
+        return self._names[self.currentRow()] if self.currentRow() >= 0 else ""
+
+    def choose(self, name: str) -> None:
+        """Mark a page as the one that is shown."""
+        self.setCurrentRow(self._names.index(name))
+
+    def show_done(self, done: dict[str, bool]) -> None:
+        """Tick what is done."""
+        if done == self._done and self.item(0).text():
+            return
+        self._done = done
+        for place, name in enumerate(self._names):
+            tick = DONE if done.get(name) else " "
+            self.item(place).setText(f"{place + 1}  {name}  {tick}")
+            spoken = f"{name}, done" if done.get(name) else name
+            self.item(place).setData(Qt.ItemDataRole.AccessibleTextRole, spoken)
+        self._fit()
+
+    def changeEvent(self, event: QEvent) -> None:
+        """Follow the font at once."""
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.FontChange and self.count():
+            self._fit()
+
+    def _fit(self) -> None:
+        """As wide as its longest name in bold with a tick: bold is what the chosen one is."""
+        bold = self.font()
+        bold.setBold(True)
+        metrics = self.fontMetrics()
+        longest = max(self._names, key=metrics.horizontalAdvance)
+        em = metrics.height()
+        self.setFixedWidth(round(metrics.horizontalAdvance(f"8  {longest}  {DONE}") * 1.15) + 2 * em)
+
+    def _chosen(self, row: int) -> None:
+        if row >= 0:
+            self.chosen.emit(self._names[row])
+
 
 SPAN_S = 1.0
 MOST_DROPPED = 20

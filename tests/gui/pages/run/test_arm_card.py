@@ -6,7 +6,7 @@ from PySide6.QtGui import QFont
 
 from vibench.acquisition.engine import ArmedPlan, EngineState, EngineStatus, Supervision
 from vibench.gui.pages.run.run_page import UNREAD
-from vibench.gui.widgets.page_names import RUN
+from vibench.gui.widgets.notice import RUN
 
 LINES = tuple(
     f"Line {number}: what is played, how loud, and under which limits it is stopped." for number in range(20)

@@ -14,9 +14,8 @@ from vibench.acquisition.engine import (
     TwinSwitch,
 )
 from vibench.acquisition.plan import RunState
-from vibench.gui.pages.run.hidden_motion_plot import HiddenMotionPlot
-from vibench.gui.pages.run.sweep_plots import sweep_history
-from vibench.gui.pages.run.watch_card import WatchCard
+from vibench.gui.pages.run.live_plots import HiddenMotionPlot, sweep_history
+from vibench.gui.pages.run.run_page import WatchCard
 
 STEP_S, STOPS_M = 1.6e-4, (-44e-6, 46e-6)
 P_M = tuple((40e-6 * np.sin(np.arange(300) / 7)).tolist())

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis.live import LiveChannel, LiveView
-from vibench.gui.pages.run.time_histories import TimeHistoryPlots, channel_axis
+from vibench.gui.pages.run.live_plots import TimeHistoryPlots, channel_axis
 from vibench.gui.widgets.theme import LIGHT
 
 FOUR = (

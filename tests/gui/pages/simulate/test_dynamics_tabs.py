@@ -17,7 +17,7 @@ from vibench.analysis.dynamics import (
 )
 from vibench.gui.pages.simulate.simulate_page import SimulatePage
 from vibench.gui.plots.line_style import Dash
-from vibench.gui.widgets.page_names import COMPARE
+from vibench.gui.widgets.notice import COMPARE
 from vibench.gui.widgets.theme import DARK
 from vibench.sim import Parameter
 

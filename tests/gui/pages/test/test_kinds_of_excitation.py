@@ -8,8 +8,8 @@ from PySide6.QtWidgets import QStyleOptionViewItem
 
 from vibench.acquisition.plan import EXCITATION_KINDS, preview_measurement
 from vibench.acquisition.rig import load_rig
-from vibench.gui.pages.test import test_form as _test_form
-from vibench.gui.pages.test.test_form import shipped_tests
+from vibench.gui.pages.test import test_page as _test_form
+from vibench.gui.pages.test.test_page import shipped_tests
 
 RIG = load_rig(Path(__file__).parents[4] / "hardware_configs" / "virtual_rig.toml")
 

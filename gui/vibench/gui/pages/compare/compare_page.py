@@ -5,15 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QGroupBox,
-    QPushButton,
-    QSplitter,
-    QTabWidget,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QGroupBox, QPushButton, QSplitter, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.analysis import AnalysisOptions, ComparedRecording, Curve, compare_recording
 from vibench.analysis.dynamics import branch_curves
@@ -21,16 +13,19 @@ from vibench.sim.background import Job
 
 from ...forms.model_form import JudgedForm
 from ...page.app_context import AppContext
-from ...page.file_kind import FileKind
-from ...page.page import Page, SideAndPicture
-from ...widgets.boxes import column, filled, row
-from ...widgets.new_path import new_path
-from ...widgets.notice import Notice, NoticeKind, notice_of
-from ...widgets.page_names import COMPARE
-from ...widgets.push_button import push_button
-from ...widgets.timed_bar import TimedBar
-from .curve_list import CurveList, PairBox
-from .curve_plots import PEAK_HEADINGS, CurvePlots, NumberTable, marker_headings, marker_rows, peak_rows
+from ...page.page import FileKind, Page, SideAndPicture
+from ...widgets.boxes import TimedBar, column, filled, new_path, push_button, row
+from ...widgets.notice import COMPARE, Notice, NoticeKind, notice_of
+from .curve_plots import (
+    PEAK_HEADINGS,
+    CurveList,
+    CurvePlots,
+    NumberTable,
+    PairBox,
+    marker_headings,
+    marker_rows,
+    peak_rows,
+)
 
 
 def exported_elsewhere(

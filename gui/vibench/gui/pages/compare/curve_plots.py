@@ -1,20 +1,45 @@
 """Two plots over one frequency axis: the curves with their bounds, and the difference of two of them."""
 
+from collections.abc import Callable
 from math import isfinite, log10
 
 import numpy as np
 import pyqtgraph as pg
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QAbstractItemView, QSplitter, QTableWidgetItem, QVBoxLayout, QWidget
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QColor, QGuiApplication, QPainter, QPaintEvent, QPixmap
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QFormLayout,
+    QGroupBox,
+    QLabel,
+    QListWidget,
+    QListWidgetItem,
+    QSplitter,
+    QTableWidgetItem,
+    QVBoxLayout,
+    QWidget,
+)
 
-from vibench.analysis import Curve, CurveDifference, CurveOrigin, curve_peaks, readings
+from vibench.acquisition import printable
+from vibench.analysis import (
+    AnalysisError,
+    Curve,
+    CurveDifference,
+    CurveKind,
+    CurveOrigin,
+    curve_difference,
+    curve_peaks,
+    readings,
+)
 
+from ...forms.editor import Choice
 from ...plots.axis import LOG_FREQUENCY, PlotAxis, Scale
-from ...plots.line_style import GUIDE, Dash, LineStyle, curve_style
+from ...plots.line_style import GUIDE, Dash, LineStyle, curve_style, dashed_pen
 from ...plots.plot import Plot
-from ...widgets.boxes import filled
+from ...widgets.boxes import filled, paint_hint, plain_tip
 from ...widgets.read_table import ReadTable
 from ...widgets.theme import Theme
+from ...widgets.units import UNITS, SentenceLabel
 
 MAGNITUDE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
 DIFFERENCE = PlotAxis("Difference", "dB")
@@ -192,3 +217,210 @@ def marker_rows(curves: tuple[Curve, ...], markers_hz: tuple[float, ...]) -> lis
 
 def _number(value: float, form: str) -> str:
     return f"{value:{form}}" if isfinite(value) else "–"
+
+
+_DASHES = {
+    CurveOrigin.MEASURED: (Dash.SOLID, Dash.DOTTED),
+    CurveOrigin.SIMULATED: (Dash.DASHED, Dash.DASH_DOTTED),
+    CurveOrigin.PREDICTED: (Dash.LONG, Dash.DASH_DOT_DOTTED),
+    CurveOrigin.STABLE: (Dash.SOLID, Dash.DOTTED),
+    CurveOrigin.UNSTABLE: (Dash.DASHED, Dash.DASH_DOTTED),
+}
+"""Of the transmission or Response I, and of Response II."""
+_SHOWN_FIRST = {CurveKind.TRANSMISSIBILITY, CurveKind.RESPONSE_I}
+"""Of a sweep's two responses the first is shown at once: both lie on one another where nothing collides."""
+_SWATCH = (28, 12)
+
+
+class CurveList(QListWidget):
+    """Curves with a tick for those in the picture: a colour for each source, a dash for each kind."""
+
+    changed = Signal()
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.setAccessibleName("Curves")
+        self.setSelectionMode(QListWidget.SelectionMode.ExtendedSelection)
+        self.setWordWrap(True)
+        self._theme = theme
+        self._curves: list[Curve] = []
+        self.itemChanged.connect(lambda _item: self.changed.emit())
+        UNITS.on_change(self._tell_anew)
+
+    @property
+    def curves(self) -> tuple[Curve, ...]:
+        """All of them."""
+        return tuple(self._curves)
+
+    def shown(self) -> tuple[tuple[Curve, LineStyle], ...]:
+        """Those that are ticked, with the ink they are drawn in."""
+        return tuple(
+            (each, self.line_style(each))
+            for row, each in enumerate(self._curves)
+            if self.item(row).checkState() is Qt.CheckState.Checked
+        )
+
+    def paintEvent(self, event: QPaintEvent) -> None:
+        """Say what will be here."""
+        super().paintEvent(event)
+        if not self._curves:
+            words = "No curves yet: add recordings, or simulate and lay over."
+            paint_hint(QPainter(self.viewport()), self.viewport().rect(), words, self._theme.muted)
+
+    def line_style(self, curve: Curve) -> LineStyle:
+        """Colour of its source, dash of its kind."""
+        sources = list(dict.fromkeys(each.source for each in self._curves))
+        first, second = _DASHES[curve.origin]
+        dash = second if curve.response is CurveKind.RESPONSE_II else first
+        return curve_style(sources.index(curve.source), dash)
+
+    def replace_source(self, source: str, curves: tuple[Curve, ...]) -> None:
+        """Put curves of a source in the place of those it had."""
+        ticked = {each.name for each, _ in self.shown()}
+        known = {each.name for each in self._curves}
+        others = [each for each in self._curves if not _is_of(each, source)]
+        place = next((n for n, each in enumerate(self._curves) if _is_of(each, source)), len(others))
+        place = min(place, len(others))
+        self._curves = [*others[:place], *curves, *others[place:]]
+        self._list(lambda each: each.name in ticked or (each.name not in known and _is_first(each)))
+
+    def remove_chosen(self) -> tuple[str, ...]:
+        """Take the chosen curves away; gives the sources that have none left."""
+        before = {each.source for each in self._curves}
+        ticked = {each.name for each, _ in self.shown()}
+        rows = {index.row() for index in self.selectedIndexes()}
+        self._curves = [each for row, each in enumerate(self._curves) if row not in rows]
+        self._list(lambda each: each.name in ticked)
+        return tuple(before - {each.source for each in self._curves})
+
+    def tick(self, name: str, state: Qt.CheckState) -> None:
+        """Show or hide a curve."""
+        for row, each in enumerate(self._curves):
+            if each.name == name:
+                self.item(row).setCheckState(state)
+
+    def retheme(self, theme: Theme) -> None:
+        """Draw the swatches in other colours."""
+        self._theme = theme
+        blocked = self.blockSignals(True)
+        for row, each in enumerate(self._curves):
+            self.item(row).setIcon(_swatch(self.line_style(each), theme))
+        self.blockSignals(blocked)
+
+    def _tell_anew(self) -> None:
+        """Name them in other units."""
+        ticked = {each.name for each, _ in self.shown()}
+        self._list(lambda each: each.name in ticked)
+
+    def _list(self, is_ticked: Callable[[Curve], bool]) -> None:
+        blocked = self.blockSignals(True)
+        self.clear()
+        for each in self._curves:
+            item = QListWidgetItem(_name(each))
+            item.setFlags(item.flags() | Qt.ItemFlag.ItemIsUserCheckable)
+            wanted = is_ticked(each)
+            item.setCheckState(Qt.CheckState.Checked if wanted else Qt.CheckState.Unchecked)
+            item.setToolTip(plain_tip(UNITS.told(each.note)))
+            item.setIcon(_swatch(self.line_style(each), self._theme))
+            self.addItem(item)
+        self.blockSignals(blocked)
+        self.changed.emit()
+
+
+def _name(each: Curve) -> str:
+    return printable(UNITS.told(each.name))
+
+
+def _is_of(each: Curve, source: str) -> bool:
+    """Tell whether a curve is a recording's; steps up and down of one are two sources with one beginning."""
+    return each.source == source or each.source in (f"{source} up", f"{source} down")
+
+
+def _is_first(each: Curve) -> bool:
+    return each.response in _SHOWN_FIRST
+
+
+def _swatch(line_style: LineStyle, theme: Theme) -> QPixmap:
+    ratio = QGuiApplication.primaryScreen().devicePixelRatio()
+    picture = QPixmap(QSize(*_SWATCH) * ratio)
+    picture.setDevicePixelRatio(ratio)
+    picture.fill(QColor(theme.base))
+    painter = QPainter(picture)
+    painter.setPen(dashed_pen(line_style.colour(theme), 2, line_style.dash))
+    painter.drawLine(1, _SWATCH[1] // 2, _SWATCH[0] - 1, _SWATCH[1] // 2)
+    painter.end()
+    return picture
+
+
+def _caution(curve: Curve, reference: Curve) -> str:
+    """Say that two curves may hold for two levels: of what collides, that alone is a difference."""
+    levels = (curve.level_m, reference.level_m)
+    if levels[0] == levels[1]:
+        return ""
+    said = ["as driven" if each is None else f"{1e6 * each:.4g} µm" for each in levels]
+    return f". ⚠ Levels of the base: {said[0]} and {said[1]}; what collides differs by that alone"
+
+
+_NOBODY = "– nothing –"
+
+
+class PairBox(QGroupBox):
+    """A curve and its reference; by default the second one shown over the first."""
+
+    changed = Signal()
+
+    def __init__(self) -> None:
+        super().__init__("Difference in dB")
+        self._curves: dict[str, Curve] = {}
+        self._curve, self._reference, self._said = Choice(), Choice(), SentenceLabel(rank="second")
+        form = QFormLayout(self)
+        form.setFieldGrowthPolicy(QFormLayout.FieldGrowthPolicy.AllNonFixedFieldsGrow)
+        for text, choice in (("C&urve", self._curve), ("Ov&er", self._reference)):
+            label = QLabel(text)
+            label.setBuddy(choice)
+            choice.setAccessibleName(f"Difference: {text.replace('&', '').lower()}")
+            choice.setMinimumContentsLength(16)
+            choice.currentIndexChanged.connect(lambda _index: self.changed.emit())
+            form.addRow(label, choice)
+        form.addRow(self._said)
+
+    @property
+    def said(self) -> str:
+        """How far the two differ, or why that cannot be said."""
+        return self._said.text()
+
+    def offer(self, curves: tuple[Curve, ...], shown: tuple[Curve, ...]) -> None:
+        """Let these be chosen; what was chosen stays."""
+        self._curves = {_name(each): each for each in curves}
+        names = list(self._curves)
+        for place, box in enumerate((self._reference, self._curve)):
+            if names == [box.itemText(number) for number in range(1, box.count())]:
+                continue
+            chosen = box.currentText()
+            blocked = box.blockSignals(True)
+            box.clear()
+            box.addItems([_NOBODY, *names])
+            default = _name(shown[place]) if len(shown) > 1 else _NOBODY
+            box.setCurrentText(chosen if chosen in names else default)
+            box.blockSignals(blocked)
+
+    def pair(self) -> tuple[Curve, Curve] | None:
+        """Give the curve and its reference, if both are chosen and differ."""
+        curve, reference = (self._curves.get(box.currentText()) for box in (self._curve, self._reference))
+        return None if curve is None or reference is None or curve is reference else (curve, reference)
+
+    def difference(self) -> CurveDifference | None:
+        """Give how far they differ, and say it; None where nothing can be compared."""
+        pair = self.pair()
+        self._said.setText("")
+        if pair is None:
+            return None
+        try:
+            found = curve_difference(*pair)
+        except AnalysisError as error:
+            self._said.setText(str(error))
+            return None
+        self._said.setText(
+            f"Median {found.median_abs_db:.2g} dB, root mean square {found.rms_db:.2g} dB{_caution(*pair)}"
+        )
+        return found

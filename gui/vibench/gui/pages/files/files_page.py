@@ -6,14 +6,7 @@ from pathlib import Path
 from time import monotonic
 
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import (
-    QFileDialog,
-    QInputDialog,
-    QLabel,
-    QSplitter,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QFileDialog, QInputDialog, QLabel, QSplitter, QVBoxLayout, QWidget
 
 from vibench.acquisition import RecordingError, open_recording, printable
 from vibench.acquisition.recording import Recording, name_now
@@ -22,14 +15,9 @@ from vibench.sim.background import Job
 
 from ...forms.field_edge import LineField
 from ...page.app_context import AppContext, Remembered
-from ...page.file_kind import FileKind
-from ...page.page import Page, Shown
-from ...widgets.boxes import Scrolled, column, filled, row
-from ...widgets.elided_label import ElidedLabel
-from ...widgets.new_path import new_path
-from ...widgets.notice import Notice, NoticeKind, notice_of
-from ...widgets.page_names import COMPARE, FILES
-from ...widgets.push_button import push_button
+from ...page.page import FileKind, Page, Shown
+from ...widgets.boxes import ElidedLabel, Scrolled, column, filled, new_path, push_button, row
+from ...widgets.notice import COMPARE, FILES, Notice, NoticeKind, notice_of
 from ...widgets.units import SentenceLabel
 from .listing import Levels, Listing, exported, listed, made_levels, noted, thumbnails
 from .recording_table import CampaignChoice, RecordingTable, facts_text

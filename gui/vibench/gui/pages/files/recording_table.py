@@ -24,10 +24,8 @@ from vibench.acquisition.recording import Recording, RecordingState, SealDepth, 
 from vibench.analysis.live import THUMBNAIL_COLUMNS, Thumbnail
 
 from ...forms.editor import Choice
-from ...widgets.clock import moment_text
-from ...widgets.elided_label import plain_tip
-from ...widgets.hint import paint_hint
-from ...widgets.outcome_text import outcome_text
+from ...widgets.boxes import paint_hint, plain_tip
+from ...widgets.notice import moment_text, outcome_text
 from ...widgets.read_table import offer_copies
 from ...widgets.theme import Theme
 from .listing import ListedCampaign, ListedRecording, notes_of

@@ -20,8 +20,7 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.rig import Rig
 
-from ...widgets.clock import clock
-from ...widgets.outcome_text import outcome_text
+from ...widgets.notice import clock, outcome_text
 
 USUAL_NAME = "queue"
 

@@ -37,15 +37,10 @@ from vibench.sim import SpecimenWarning
 from ...forms.editor import Choice
 from ...forms.field_edge import LineField
 from ...page.app_context import AppContext, Remembered
-from ...page.file_kind import FileKind
-from ...page.page import Page, SideAndPicture
+from ...page.page import FileKind, Page, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import boxed, column, filled
-from ...widgets.clock import moment_text
-from ...widgets.elided_label import plain_tip
-from ...widgets.notice import Notice, NoticeKind, notice_of
-from ...widgets.page_names import RIG
-from ...widgets.push_button import push_button
+from ...widgets.boxes import boxed, column, filled, plain_tip, push_button
+from ...widgets.notice import RIG, Notice, NoticeKind, moment_text, notice_of
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel, fitted_unit
 

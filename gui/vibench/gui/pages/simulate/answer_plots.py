@@ -17,9 +17,9 @@ from ...plots.plot import Plot
 from ...widgets.theme import Theme
 
 RESPONSE = PlotAxis("Motion of m0 over base, |x / U|", short="|x / U|", scale=Scale.LOGARITHMIC)
-EXPONENT = PlotAxis("Largest Lyapunov exponent", "1/s", short="Exponent")
+LARGEST_EXPONENT = PlotAxis("Largest Lyapunov exponent", "1/s", short="Exponent")
 DIFFERENCE = PlotAxis("Difference of log Response I", short="Difference", scale=Scale.LOGARITHMIC)
-TIME = PlotAxis("Time, to the end of the run", "ms", factor=1e3)
+RUN_TIME = PlotAxis("Time, to the end of the run", "ms", factor=1e3)
 DISPLACEMENT = PlotAxis("Displacement", "m")
 _COLLIDING = LineStyle(lambda theme: theme.muted, filled=0.14)
 _EDGE = LineStyle(lambda theme: theme.muted, Dash.DOTTED)
@@ -39,9 +39,9 @@ class AnswerPlots(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.responses = Plot("Responses over frequency", LOG_FREQUENCY, RESPONSE, theme)
-        self.exponents = Plot("Exponent over frequency", LOG_FREQUENCY, EXPONENT, theme)
+        self.exponents = Plot("Exponent over frequency", LOG_FREQUENCY, LARGEST_EXPONENT, theme)
         self.likeness = Plot("Difference of the two models over frequency", LOG_FREQUENCY, DIFFERENCE, theme)
-        self.motion = Plot("Motion over time", TIME, DISPLACEMENT, theme)
+        self.motion = Plot("Motion over time", RUN_TIME, DISPLACEMENT, theme)
         layout = QGridLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         for number, (plot, hint) in enumerate(zip(self.plots, _HINTS, strict=True)):

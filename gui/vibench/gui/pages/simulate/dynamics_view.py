@@ -3,12 +3,23 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar, cast
 
 from PySide6.QtWidgets import QLayout, QVBoxLayout, QWidget
 
 from vibench.analysis import Curve
-from vibench.analysis.dynamics import SpecimenChoice
+from vibench.analysis.dynamics import (
+    BranchDiagram,
+    BranchLine,
+    BranchRequest,
+    ChainAnswer,
+    ChainRequest,
+    ChainRun,
+    ExponentSpectrum,
+    SpecimenChoice,
+    SpectrumPoint,
+    SpectrumRequest,
+)
 from vibench.analysis.simulation.progress import PartialResult, Trouble
 from vibench.analysis.simulation.worker import Asked
 
@@ -16,10 +27,8 @@ from ...forms.model_form import JudgedForm
 from ...page.app_context import AppContext
 from ...page.page import Shown, SideAndPicture
 from ...page.simulator import Simulator
-from ...widgets.boxes import boxed, column, row
-from ...widgets.notice import Notice, NoticeKind
-from ...widgets.page_names import COMPARE
-from ...widgets.push_button import push_button
+from ...widgets.boxes import boxed, column, push_button, row
+from ...widgets.notice import COMPARE, Notice, NoticeKind
 from ...widgets.units import SentenceLabel
 
 Request = TypeVar("Request", bound=SpecimenChoice)
@@ -191,3 +200,61 @@ class DynamicsView(QWidget, Generic[Request, Answer]):
         )
         self._compare.setEnabled(False)
         return column((self.picture.widget, 1), row((self._state, 1), self._compare))
+
+
+def _diagram(request: BranchRequest, parts: tuple[PartialResult, ...], elapsed_s: float) -> BranchDiagram:
+    return BranchDiagram(request, cast("tuple[BranchLine, ...]", parts), elapsed_s)
+
+
+def _spectrum(
+    request: SpectrumRequest, parts: tuple[PartialResult, ...], elapsed_s: float
+) -> ExponentSpectrum:
+    return ExponentSpectrum(request, cast("tuple[SpectrumPoint, ...]", parts), elapsed_s)
+
+
+def _chain(request: ChainRequest, parts: tuple[PartialResult, ...], elapsed_s: float) -> ChainAnswer:
+    return ChainAnswer(request, cast("tuple[ChainRun, ...]", parts), elapsed_s)
+
+
+def _no_curves(_answer: ExponentSpectrum | ChainAnswer) -> tuple[Curve, ...]:
+    """Exponents and chains are no responses of a specimen: nothing to lay over a recording."""
+    return ()
+
+
+BRANCHES = DynamicsKind(
+    name="branches",
+    request=BranchRequest,
+    hidden=frozenset({"resonance_band_hz", "phase_of", "loop_time_s", "recorded_level", "described"}),
+    answer=_diagram,
+    cost=lambda answer: answer.cost_sentence,
+    curves=lambda answer: answer.curves(),
+    before=(
+        "A search runs every start for 300 drive periods, a branch takes a second to some; the error of each "
+        "motion is told with it (docs/branches.md)."
+    ),
+)
+SPECTRUM = DynamicsKind(
+    name="exponents",
+    request=SpectrumRequest,
+    hidden=frozenset({"described"}),
+    answer=_spectrum,
+    cost=lambda answer: answer.cost_sentence,
+    curves=_no_curves,
+    before=(
+        "Each point follows six small changes for its whole duration; the sum of the exponents, which the "
+        "dampers fix, is its check (docs/branches.md)."
+    ),
+)
+CHAIN = DynamicsKind(
+    name="chain",
+    request=ChainRequest,
+    hidden=frozenset({"others", "described"}),
+    answer=_chain,
+    cost=lambda answer: answer.cost_sentence,
+    curves=_no_curves,
+    before=(
+        "Waves need no run. A simulated second of 8 cells that strike takes some hundredths of a second, of "
+        "64 cells a third; contacts err as the accuracy says, energies carry their standard error "
+        "(docs/chains.md)."
+    ),
+)

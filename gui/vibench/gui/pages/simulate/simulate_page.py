@@ -5,12 +5,7 @@ import os
 from collections.abc import Callable
 from contextlib import suppress
 
-from PySide6.QtWidgets import (
-    QLayout,
-    QTabWidget,
-    QVBoxLayout,
-    QWidget,
-)
+from PySide6.QtWidgets import QLayout, QTabWidget, QVBoxLayout, QWidget
 
 from vibench.analysis.simulation.accuracy_cost import cost_sentences
 from vibench.analysis.simulation.progress import (
@@ -24,18 +19,13 @@ from ...forms.model_form import JudgedForm
 from ...page.app_context import AppContext, Remembered
 from ...page.page import Page, Shown, SideAndPicture
 from ...page.simulator import Simulator
-from ...widgets.boxes import boxed, column, filled, row
-from ...widgets.notice import Notice, NoticeKind
-from ...widgets.page_names import COMPARE, SIMULATE
-from ...widgets.push_button import push_button
+from ...widgets.boxes import TimedBar, boxed, column, filled, push_button, row
+from ...widgets.notice import COMPARE, SIMULATE, Notice, NoticeKind
 from ...widgets.read_table import ReadTable
-from ...widgets.timed_bar import TimedBar
 from ...widgets.units import SentenceLabel
 from .answer_plots import AnswerPlots
-from .chain_picture import ChainPicture
-from .dynamics_kinds import BRANCHES, CHAIN, SPECTRUM
-from .dynamics_pictures import BranchPicture, SpectrumPicture
-from .dynamics_view import DynamicsView
+from .dynamics_view import BRANCHES, CHAIN, SPECTRUM, DynamicsView
+from .pictures import BranchPicture, ChainPicture, SpectrumPicture
 
 _LINES = 6
 """Of the table of motions, headings among them."""

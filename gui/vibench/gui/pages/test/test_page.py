@@ -1,37 +1,282 @@
 """The Test page: a form of what will be played, and beside it exactly what that is and does."""
 
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import (
     QFileDialog,
     QGridLayout,
+    QGroupBox,
+    QHBoxLayout,
     QSizePolicy,
+    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
 
-from vibench.acquisition import ConfigurationError, printable, save_toml, toml_text, validated
-from vibench.acquisition.plan import LimitCheck, Measurement, MeasurementPreview, excitation_text
+from vibench.acquisition import (
+    ConfigurationError,
+    all_shipped,
+    load_campaign,
+    load_toml,
+    printable,
+    save_toml,
+    toml_text,
+    validated,
+)
+from vibench.acquisition.plan import (
+    EXCITATION_KINDS,
+    Family,
+    LimitCheck,
+    LimitSide,
+    Measurement,
+    MeasurementPreview,
+    excitation_text,
+    rows_by_kind,
+)
 from vibench.acquisition.rig import BaseQuantity, Rig
 
 from ...background.background import LatestRequest
 from ...forms.editor import Choice
+from ...forms.model_form import GroupEditor, JudgedForm
 from ...page.app_context import AppContext, Remembered
-from ...page.file_kind import FileKind
-from ...page.history import History
-from ...page.page import Page, Shown, SideAndPicture
+from ...page.page import FileKind, History, Page, Shown, SideAndPicture
 from ...page.user_actions import UserActions
-from ...widgets.boxes import boxed, column, filled, row
-from ...widgets.clock import clock
-from ...widgets.notice import Notice, NoticeKind, notice_of
-from ...widgets.page_names import TEST
-from ...widgets.push_button import push_button
+from ...plots.axis import FREQUENCY, LOG_FREQUENCY, TIME, PlotAxis, Scale
+from ...plots.bar_delegate import SHARE_ROLE, BarDelegate
+from ...plots.line_style import Dash, LineStyle, curve_style
+from ...plots.plot import Plot
+from ...plots.signal_curve import SignalCurve
+from ...widgets.boxes import boxed, column, filled, push_button, row
+from ...widgets.notice import TEST, Notice, NoticeKind, clock, notice_of
+from ...widgets.read_table import ReadTable
+from ...widgets.theme import Theme
 from ...widgets.units import SentenceLabel, fitted_unit
-from .preview_plots import LimitTable, PredictionPlot, PreviewPlots
-from .test_form import NamedTest, TestForm, load_test, own_tests, shipped_tests
 from .test_preview import TestPrediction, TestPreview, predict_test, preview_test
+
+if TYPE_CHECKING:
+    from vibench.analysis import MeasurementPrediction
+
+USUAL = {
+    "amplitude_vpp": 1.0,
+    "duration_s": 10.0,
+    "frequency_hz": 260.0,
+    "start_hz": 150.0,
+    "stop_hz": 350.0,
+    "low_hz": 80.0,
+    "high_hz": 350.0,
+    "band_start_hz": 40.0,
+    "band_stop_hz": 600.0,
+    "lowest_vpp": 0.2,
+    "step_vpp": 0.2,
+    "base_level": {"displacement_m": 5e-6},
+    "response_m": 5e-6,
+    "frequencies_hz": [240.0, 260.0, 280.0],
+    "spectrum": [{"frequency_hz": 40.0, "density": 1e-3}, {"frequency_hz": 600.0, "density": 1e-3}],
+    "accelerations_m_per_s2": [0.3, 0.6],
+}
+"""What a kind of test that needs a value, and was given none, begins with."""
+
+FRESH: Mapping[str, Mapping[str, float]] = rows_by_kind(
+    {
+        Family.NOISE: {"duration_s": 60.0},
+        Family.SWEEP: {"duration_s": 60.0},
+        Family.DWELL: {"duration_s": 10.0},
+        Family.STEPPED: {},
+    },
+    {},
+)
+"""What a kind begins with, whatever the one before it had."""
+
+
+class TestForm(JudgedForm[Measurement]):
+    """Every value of a measurement; `value` is None while one of them is not allowed."""
+
+    def __init__(self) -> None:
+        super().__init__(Measurement, "test", frozenset({"repeats"}))
+        limits = self.form.editors["limits"].widget
+        assert isinstance(limits, QGroupBox)
+        limits.setTitle("Limits  (1 = the rig's own)")
+        excitation = self.form.editors["excitation"]
+        assert isinstance(excitation, GroupEditor)
+        lines = {word: (each.group, each.about) for word, each in EXCITATION_KINDS.items()}
+        excitation.know(USUAL, FRESH, lines)
+        choice = excitation.kind_choice
+        assert choice is not None
+        choice.activated.connect(lambda _place: self._rename(str(choice.currentData())))
+
+    def _rename(self, kind: str) -> None:
+        """Give a test of a new kind its name: the old one would say something else."""
+        self.form.editors["name"].show_content(kind)
+        self.form.changed.emit()
+
+
+FIRST = "quick"
+"""The campaign whose tests are listed before all others."""
+MOST_OF_ONE = 12
+"""Tests listed of one campaign; sweeps make hundreds."""
+
+
+@dataclass(frozen=True)
+class NamedTest:
+    """A test and where it is from."""
+
+    label: str
+    measurement: Measurement
+
+
+def shipped_tests() -> tuple[NamedTest, ...]:
+    """Every measurement of the campaigns that come with vibench and need no package that is missing."""
+    campaigns = [campaign for _, campaign in _readable(all_shipped("campaigns"), load_campaign)]
+    return tuple(
+        NamedTest(f"{campaign.name} / {each.name}", each)
+        for campaign in sorted(campaigns, key=lambda each: (each.name != FIRST, each.name))
+        for each in sorted(campaign.measurements[:MOST_OF_ONE], key=lambda each: each.name)
+    )
+
+
+def own_tests(folder: Path) -> tuple[NamedTest, ...]:
+    """Every test that was saved in a folder; a file that cannot be read is left out."""
+    found = _readable(sorted(folder.glob("*.toml")), load_test)
+    return tuple(NamedTest(f"own / {path.stem}", test) for path, test in found)
+
+
+def _readable(paths: Iterable[Path], load: Callable[[Path], Any]) -> Iterator[tuple[Path, Any]]:
+    for path in paths:
+        with suppress(ConfigurationError):
+            yield path, load(path)
+
+
+def load_test(path: Path) -> Measurement:
+    """Read a test; raises ConfigurationError with file, key and what is allowed."""
+    return load_toml(path, Measurement)
+
+
+COLLISION = LineStyle(lambda theme: theme.traces[3], filled=0.18)
+
+
+class PredictionPlot(Plot):
+    """Simulated, and labelled so: dashed lines, the model in the legend, collision regions as stripes."""
+
+    def __init__(self, theme: Theme) -> None:
+        up = PlotAxis("Response", "x / A0", scale=Scale.LOGARITHMIC)
+        super().__init__("Predicted response and collision regions", FREQUENCY, up, theme)
+        self.with_legend()
+        self.with_hint("The specimen is being simulated under this test.")
+        self._first = self.curve(
+            LineStyle(lambda theme: theme.predicted, Dash.DASHED), "Response I, simulated"
+        )
+        self._second = self.curve(
+            LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "Response II, simulated"
+        )
+        self._linear = self.curve(curve_style(2, Dash.DOTTED), "without contact")
+        self._stripes = self.stripes(COLLISION)
+
+    def show_prediction(self, seen: "MeasurementPrediction | None") -> None:
+        """Draw a prediction; None clears the plot."""
+        if seen is None:
+            for curve in (self._first, self._second, self._linear):
+                curve.clear()
+        else:
+            found = seen.prediction
+            self._first.setData(found.frequency_hz, np.asarray(found.response_i))
+            self._second.setData(found.frequency_hz, np.asarray(found.response_ii))
+            self._linear.setData(found.frequency_hz, np.asarray(found.linear))
+        self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
+        self.show_everything()
+
+
+_FLOOR = 1e-5
+"""Lines this far below the highest are numerical dust."""
+_LEAST_HZ = 1.0
+"""Nothing below is of interest: no shaker moves there."""
+_LEAST_LINES = 9
+"""Of text: less says nothing."""
+
+
+class PreviewPlots(QWidget):
+    """Two plots side by side; a zoom into the time signal shows its samples."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.time = Plot("Signal at the generator, in time", TIME, PlotAxis("Generator", "V"), theme)
+        self.spectrum = Plot(
+            "Spectrum of the signal",
+            LOG_FREQUENCY,
+            PlotAxis("Amplitude", "V", scale=Scale.LOGARITHMIC),
+            theme,
+        )
+        for plot in (self.time, self.spectrum):
+            plot.setMinimumHeight(_LEAST_LINES * self.fontMetrics().height())
+        self._signal = SignalCurve(self.time, curve_style(0))
+        self._lines = self.spectrum.curve(curve_style(0))
+        filled(QHBoxLayout(self), (self.time, 1), (self.spectrum, 1), margin=0)
+
+    def show_preview(self, seen: MeasurementPreview) -> None:
+        """Draw another signal."""
+        self.time.show_everything()
+        self._signal.set_samples(seen.volts, seen.sample_rate_hz)
+        floor_v = _FLOOR * float(np.max(seen.spectrum_v))
+        self.spectrum.show_everything()
+        shown = seen.spectrum_hz >= min(_LEAST_HZ, float(seen.spectrum_hz[-1]))
+        self._lines.setData(seen.spectrum_hz[shown], np.maximum(seen.spectrum_v[shown], floor_v))
+
+
+_USED = 0
+_LEAST_LETTERS = 10
+_SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
+
+
+class LimitTable(ReadTable):
+    """One row a limit, the most used first."""
+
+    def __init__(self) -> None:
+        super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
+        self.setItemDelegateForColumn(_USED, BarDelegate(self))
+        # In a small window the limits are scrolled to: what they are of must be read in any.
+        self.horizontalHeader().setMinimumSectionSize(_LEAST_LETTERS * self.fontMetrics().averageCharWidth())
+
+    def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
+        """Show what was held against the rig."""
+        units = [fitted_unit(check.unit, check.limit) for check in checks]
+        self.show_rows(
+            [
+                (
+                    f"{100 * check.use:.1f} %",
+                    f"{_mark(check)}{_short(check.what)}",
+                    unit.text(check.value),
+                    f"{_SIGNS[check.side]} {unit.text(check.limit)}",
+                )
+                for check, unit in zip(checks, units, strict=True)
+            ],
+            [f"{check.what}\nLimit from: {check.source}{_remedy(check)}" for check in checks],
+        )
+        for place, check in enumerate(checks):
+            item = self.item(place, _USED)
+            if isinstance(item, QTableWidgetItem):
+                item.setData(SHARE_ROLE, float(check.use))
+                item.setTextAlignment(Qt.AlignmentFlag.AlignCenter)
+
+
+def _remedy(check: LimitCheck) -> str:
+    return "" if check.is_kept else f"\nTo do: {check.remedy}"
+
+
+def _mark(check: LimitCheck) -> str:
+    if check.is_kept:
+        return ""
+    return "✖ " if check.forbids else "⚠ "
+
+
+def _short(what: str) -> str:
+    return what.removeprefix("the ").replace("(at ", "(").replace("(about, at ", "(about, ").replace("_", " ")
+
 
 _SHOWN = {
     BaseQuantity.STROKE: "stroke",

@@ -1,0 +1,434 @@
+"""A sweep over the frequency really played, with the prediction and its collision regions beneath."""
+
+from collections.abc import Mapping
+from functools import partial
+from math import nan
+
+import numpy as np
+import pyqtgraph as pg
+from numpy.typing import NDArray
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
+
+from vibench.acquisition.engine import EngineStatus, TwinStatus
+from vibench.analysis import MeasurementPrediction
+from vibench.analysis.live import LiveView, Portrait, zigzag
+
+from ...plots.axis import FREQUENCY, LOG_FREQUENCY, PlotAxis, Scale
+from ...plots.line_style import LIMIT, PREDICTED, Dash, LineStyle, curve_style
+from ...plots.plot import Plot
+from ...widgets.boxes import filled
+from ...widgets.theme import Colour, Theme
+from ...widgets.units import UNITS, SentenceLabel, plain_unit
+
+Curves = Mapping[str, pg.PlotDataItem]
+"""By the field that they show."""
+
+
+def show_predicted(curves: Curves, seen: MeasurementPrediction | None) -> None:
+    """Draw fields of a prediction over its frequencies, or none."""
+    for name, curve in curves.items():
+        if seen is None:
+            curve.clear()
+        else:
+            curve.setData(seen.prediction.frequency_hz, getattr(seen.prediction, name))
+
+
+class SweepPlot(QWidget):
+    """Points of a sine or a sweep as it goes."""
+
+    def __init__(self, tab: str, plot: Plot) -> None:
+        super().__init__()
+        self.title, self.tab, self.plot = plot.accessibleName(), tab, plot
+        self._stripes = plot.stripes(LineStyle(lambda theme: theme.traces[3], filled=0.15))
+        self.predicted: Curves = {}
+        self.measured: Curves = {}
+        self._shown = 0
+        filled(QVBoxLayout(self), plot, margin=0)
+
+    def show_view(self, view: LiveView) -> None:
+        """Draw all points so far, in the order of time."""
+        history = view.history()
+        if len(history.time_s) == self._shown:
+            return
+        self._shown = len(history.time_s)
+        for name, curve in self.measured.items():
+            curve.setData(history.frequency_hz, getattr(history, name))
+
+    def show_prediction(self, seen: MeasurementPrediction | None) -> None:
+        """Lay a prediction beneath, and where it collides; or none."""
+        self._stripes.show_bands(() if seen is None else seen.collision_bands_hz)
+        show_predicted(self.predicted, seen)
+
+    def clear(self) -> None:
+        """Forget the last run."""
+        self._shown = 0
+        for curve in self.measured.values():
+            curve.clear()
+
+
+def sweep_history(theme: Theme) -> SweepPlot:
+    """Make the plot of Responses I and II."""
+    up = PlotAxis("Response I, II", "x / A0", scale=Scale.LOGARITHMIC)
+    plot = Plot("Response over frequency", FREQUENCY, up, theme).with_legend()
+    plot.with_hint("A point every tenth of a second of a dwell or a sweep; the prediction beneath.")
+    made = SweepPlot("Responses", plot)
+    made.predicted = {
+        "response_i": plot.curve(PREDICTED, "I, simulated"),
+        "response_ii": plot.curve(LineStyle(lambda theme: theme.traces[0], Dash.DOTTED), "II, simulated"),
+        "linear": plot.curve(curve_style(2, Dash.DOTTED), "linear, simulated"),
+    }
+    made.measured = {
+        "response_i": plot.dots(curve_style(3), "I, measured", 3),
+        "response_ii": plot.dots(curve_style(0), "II, measured", 3),
+    }
+    return made
+
+
+def sweep_envelope(theme: Theme) -> SweepPlot:
+    """Make the plot of the extremes of m0's velocity."""
+    plot = Plot("Sweep envelope", FREQUENCY, PlotAxis("m0 velocity", "m/s"), theme).with_legend()
+    plot.with_hint("Largest and smallest velocity of m0 while a sweep passes by.")
+    made = SweepPlot("Envelope", plot)
+    made.measured = {
+        "upper": plot.curve(curve_style(3), "largest"),
+        "lower": plot.curve(curve_style(0), "smallest"),
+    }
+    return made
+
+
+_WORDS = {
+    "drive_voltage": "drive",
+    "amplifier_voltage": "amplifier",
+    "base_acceleration": "base",
+    "m0_velocity": "m0",
+}
+_SHORT = {"amplifier_voltage": "amp."}
+
+
+def channel_word(role: str) -> str:
+    """Say a channel in a word."""
+    return _WORDS.get(role, role.replace("_", " "))
+
+
+def channel_axis(role: str, unit: str) -> PlotAxis:
+    """Give a channel's axis: its word, in the unit that is shown."""
+    return PlotAxis(channel_word(role), plain_unit(unit), short=_SHORT.get(role, channel_word(role)))
+
+
+AGO = PlotAxis("Time before now", "s")
+"""An axis that stands still: one that scrolls would be painted anew in every frame."""
+LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
+"""Of a plot: as many as there are lines side by side; between fewer, room would stay empty."""
+AXIS_EM, TIME_AXIS_EM = 4.0, 3
+USUAL_SPAN_S = 2.0
+"""What a plot shows at first."""
+
+
+class TimeHistoryPlots(QWidget):
+    """Plots over one time axis; they change with the channels of the run."""
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self._theme = theme
+        self._curves: list[pg.PlotDataItem] = []
+        self._span_s = 0.0
+        self._channels: tuple[tuple[str, str], ...] = ()
+        self.plots: list[Plot] = []
+        self._layout = QVBoxLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setSpacing(1)
+
+    def show_channels(self, channels: tuple[tuple[str, str], ...]) -> None:
+        """Have a plot for each channel, given by role and unit."""
+        if channels != self._channels:
+            self._build(channels)
+            self._channels = channels
+
+    def show_view(self, view: LiveView, span_s: float) -> None:
+        """Draw the newest seconds."""
+        self.show_channels(tuple((channel.role, channel.unit) for channel in view.channels))
+        if not self.plots:
+            return
+        seen = view.time_histories(span_s, min(max(LEAST_COLUMNS, self.plots[0].columns), MOST_COLUMNS))
+        if len(seen.time_s) == 0:
+            return
+        time_s = np.repeat(seen.time_s - seen.time_s[-1], 2)
+        for row, plot in enumerate(self.plots):
+            low, high = (np.asarray(edge[row], dtype=np.float64) for edge in (seen.low, seen.high))
+            self._curves[row].setData(time_s, zigzag(low, high))
+            known = np.isfinite(low)
+            if known.any():
+                plot.keep_in_view(up=(float(low[known].min()), float(high[known].max())))
+            if span_s != self._span_s:
+                plot.setXRange(-span_s, 0, padding=0)
+        self._span_s = span_s
+
+    def retheme(self, theme: Theme) -> None:
+        """Make further plots in other colours."""
+        self._theme = theme
+
+    def _build(self, channels: tuple[tuple[str, str], ...]) -> None:
+        """Have as many plots as channels; those that are there are used again, for a plot is slow to make."""
+        for plot in self.plots[len(channels) :]:
+            self._layout.removeWidget(plot)
+            plot.deleteLater()
+        del self.plots[len(channels) :], self._curves[len(channels) :]
+        for row in range(len(self.plots), len(channels)):
+            plot = Plot("Time history", AGO, channel_axis(*channels[row]), self._theme)
+            plot.setXRange(-USUAL_SPAN_S, 0, padding=0)
+            plot.up_em = AXIS_EM
+            plot.follow_font()
+            self._curves.append(plot.curve(curve_style(row)))
+            self._layout.addWidget(plot, 1)
+            self.plots.append(plot)
+        for (role, unit), plot, curve in zip(channels, self.plots, self._curves, strict=True):
+            curve.clear()
+            plot.setAccessibleName(f"Time history of {channel_word(role)}")
+            plot.with_hint(f"The newest seconds of {channel_word(role)}, while a test runs.")
+            plot.up.show_unit(channel_axis(role, unit))
+            is_last = plot is self.plots[-1]
+            plot.across.setStyle(showValues=is_last)
+            plot.across.showLabel(is_last)
+        self._span_s = 0.0
+        self._share_height()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        """Keep all plots equally high."""
+        super().resizeEvent(event)
+        self._share_height()
+
+    def _share_height(self) -> None:
+        """Give the last plot as much more as its time axis takes."""
+        axis = TIME_AXIS_EM * self.fontMetrics().height()
+        height = max(1, (self.height() - axis) // max(1, len(self.plots)))
+        for place in range(len(self.plots)):
+            self._layout.setStretch(place, height + (axis if place == len(self.plots) - 1 else 0))
+        # At once: a layout that comes after the first picture has everything painted twice.
+        self._layout.activate()
+
+
+MEASURED = "measured, 95 % bounds"
+
+
+class TransmissibilityPlot(QWidget):
+    """|x / U| over frequency."""
+
+    title = "Transmission from base to m0"
+    tab = "Transmission"
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        up = PlotAxis("|x / U|", scale=Scale.LOGARITHMIC)
+        self.magnitude = Plot("Transmission from base to m0", FREQUENCY, up, theme).with_legend()
+        self.magnitude.with_hint("Response of m0 over motion of the base, with bounds, while a test runs.")
+        self.coherence = Plot("Coherence", FREQUENCY, PlotAxis("Coherence", short="γ²"), theme)
+        shade = LineStyle(lambda theme: theme.traces[0], filled=0.25)
+        self._band = self.magnitude.band(shade, MEASURED)
+        self._predicted = {
+            "response_i": self.magnitude.curve(PREDICTED, "I under sines, simulated"),
+            "linear": self.magnitude.curve(curve_style(2, Dash.DOTTED), "linear, simulated"),
+        }
+        self._measured = self.magnitude.curve(curve_style(0), MEASURED)
+        self._coherence = self.coherence.curve(curve_style(0))
+        self.coherence.setYRange(0, 1, padding=0.3)
+        self.coherence.setXLink(self.magnitude)
+        # One frequency axis for both: the lower one's.
+        self.magnitude.across.show_nothing()
+        filled(QVBoxLayout(self), (self.magnitude, 2), (self.coherence, 1), margin=0).setSpacing(1)
+
+    def show_view(self, view: LiveView) -> None:
+        """Draw what is known by now."""
+        found = view.frequency_response()
+        if found is None:
+            return
+        self._measured.setData(found.frequency_hz, found.magnitude)
+        self._band.set_data(found.frequency_hz, found.magnitude_lower, found.magnitude_upper)
+        self._coherence.setData(found.frequency_hz, found.coherence)
+
+    def show_prediction(self, seen: MeasurementPrediction | None) -> None:
+        """Lay a prediction beneath, or none."""
+        show_predicted(self._predicted, seen)
+
+    def clear(self) -> None:
+        """Forget the last run."""
+        for curve in (self._measured, self._coherence):
+            curve.clear()
+        self._band.set_data([], [], [])
+
+
+_LEAST = 1e-12
+
+
+class SpectrumPlot(QWidget):
+    """All channels over one frequency axis."""
+
+    title = "Spectral density of every channel"
+    tab = "Spectrum"
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        label = "Amplitude density, channel's unit / √Hz"
+        up = PlotAxis(label, scale=Scale.LOGARITHMIC, short="unit / √Hz")
+        self.plot = Plot("Spectral density of every channel", LOG_FREQUENCY, up, theme).with_legend()
+        self.plot.with_hint("Spectra of all channels, of the newest seconds of a run.")
+        self._curves: list[pg.PlotDataItem] = []
+        self._view: LiveView | None = None
+        UNITS.on_change(self._draw_anew)
+        filled(QVBoxLayout(self), self.plot, margin=0)
+
+    def show_view(self, view: LiveView) -> None:
+        """Draw what is known by now."""
+        found = view.spectrum()
+        if found is None:
+            return
+        self._view = view
+        units = [UNITS.on_axis(channel.unit) for channel in view.channels]
+        for row in range(len(self._curves), len(units)):
+            name = f"{channel_word(view.channels[row].role)} ({units[row].name})"
+            self._curves.append(self.plot.curve(curve_style(row), name))
+        for curve, density, unit in zip(self._curves, found.amplitude_density, units, strict=False):
+            curve.setData(found.frequency_hz[1:], unit.per_si * np.maximum(density[1:], _LEAST))
+
+    def _draw_anew(self) -> None:
+        """Draw in other units: the axis has that of each channel."""
+        self.plot.wipe()
+        self._curves.clear()
+        if self._view is not None:
+            self.show_view(self._view)
+
+    def clear(self) -> None:
+        """Forget the last run."""
+        self._view = None
+        for curve in self._curves:
+            curve.clear()
+
+
+_ACROSS = PlotAxis("m0 displacement", "m", short="x")
+_UP = PlotAxis("m0 velocity", "m/s", short="v")
+
+
+def extent(values: NDArray[np.floating]) -> tuple[float, float]:
+    """Smallest and largest."""
+    return float(values.min()), float(values.max())
+
+
+class PortraitPlot(QWidget):
+    """Orbit on the left, points once a drive period on the right."""
+
+    title = "Phase portrait and Poincaré section"
+    tab = "Phase portrait, Poincaré"
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.orbit = Plot("Phase portrait of the newest periods", _ACROSS, _UP, theme)
+        self.section = Plot("Poincaré section of the run so far", _ACROSS, _UP, theme)
+        self.orbit.with_hint("The orbit of the newest periods of a sine.")
+        self.section.with_hint("One point a drive period, of the run so far.")
+        self._orbit = self.orbit.curve(curve_style(0))
+        self._strobe = self.orbit.dots(curve_style(3), size=6)
+        self._points = self.section.dots(curve_style(3), size=3)
+        self._shown: Portrait | None = None
+        filled(QHBoxLayout(self), (self.orbit, 1), (self.section, 1), margin=0)
+
+    def show_view(self, view: LiveView) -> None:
+        """Draw the newest periods."""
+        found = view.portrait()
+        if found is None or found is self._shown:
+            return
+        self._shown = found
+        self._orbit.setData(found.orbit_displacement_m, found.orbit_velocity_m_per_s)
+        self._strobe.setData(found.strobe_displacement_m, found.strobe_velocity_m_per_s)
+        self.orbit.keep_in_view(extent(found.orbit_displacement_m), extent(found.orbit_velocity_m_per_s))
+        section = view.section
+        if section.displacement_m.size:
+            self.section.keep_in_view(extent(section.displacement_m), extent(section.velocity_m_per_s))
+        self._points.setData(section.displacement_m, section.velocity_m_per_s)
+
+    def clear(self) -> None:
+        """Forget the last run."""
+        for item in (self._orbit, self._strobe, self._points):
+            item.clear()
+
+
+_FROM_NEWEST = PlotAxis("Time from the newest sample", "ms", 1e3, short="t")
+_BETWEEN_STOPS = PlotAxis("p = y - z", "m", short="p")
+_SHADES = 5
+"""Of a forecast; the last one is nearly gone where its error is a quarter of the gap, and it ends."""
+_WORTH_OF_GAP = 0.25
+_AHEAD_S, _BACK_S = 0.025, 0.05
+_HINT = "p of m1 between its stops, while a test runs and the live twin is on."
+
+
+def _faded(number: int, theme: Theme) -> Colour:
+    opacity = round(255 * (1.0 - number / _SHADES))
+    return f"{theme.traces[1]}{opacity:02x}"
+
+
+class HiddenMotionPlot(QWidget):
+    """The newest 50 ms, what comes, and the numbers found."""
+
+    title = "Hidden motion: m1 between its stops"
+    tab = "Hidden motion"
+
+    def __init__(self, theme: Theme) -> None:
+        super().__init__()
+        self.plot = Plot(self.title, _FROM_NEWEST, _BETWEEN_STOPS, theme).with_hint(_HINT)
+        self.told = self.plot.curve(curve_style(0))
+        self.forecast = [
+            self.plot.curve(LineStyle(partial(_faded, number), Dash.SOLID)) for number in range(_SHADES)
+        ]
+        self._stops = [self.plot.level(LIMIT, nan, "stop") for _ in range(2)]
+        self.said = SentenceLabel(rank="second")
+        self.said.setAccessibleName("What the live twin says")
+        self._end = (0, -1)
+        self.plot.setXRange(-_BACK_S, _AHEAD_S, padding=0)
+        filled(QVBoxLayout(self), self.said, (self.plot, 1)).setContentsMargins(8, 4, 0, 0)
+        self.clear()
+
+    def show_status(self, status: EngineStatus | None) -> None:
+        """Draw what the twin told last, if that is news."""
+        twin = None if status is None else status.twin
+        if twin is None:
+            self.clear()
+            return
+        self.said.setText(_words(twin))
+        if (twin.run_id, twin.end_sample) == self._end or not twin.p_m:
+            return
+        self._end = (twin.run_id, twin.end_sample)
+        p = np.array([np.nan if each is None else each for each in twin.p_m])
+        self.told.setData((np.arange(p.size) - p.size + 1) * twin.step_s, p, connect="finite")
+        self._draw_forecast(twin)
+        for line, place in zip(self._stops, twin.stops_m, strict=True):
+            self.plot.move_level(line, place)
+        reach = 1.15 * max(map(abs, twin.stops_m))
+        self.plot.keep_in_view(up=(-reach, reach))
+
+    def clear(self) -> None:
+        """Show nothing: there is no twin, or another run begins."""
+        for curve in (self.told, *self.forecast):
+            curve.setData([], [])
+        for line in self._stops:
+            self.plot.move_level(line, nan)
+        self.said.setText("The live twin is off.")
+        self._end = (0, -1)
+
+    def _draw_forecast(self, twin: TwinStatus) -> None:
+        """Draw it in pieces, each as faint as its error is large."""
+        p, error = np.array(twin.forecast_m), np.array(twin.forecast_error_m)
+        time_s = np.arange(1, p.size + 1) * twin.step_s
+        worth = _WORTH_OF_GAP * min(map(abs, twin.stops_m))
+        shade = np.minimum(_SHADES * error / worth, _SHADES - 1).astype(int) if p.size else np.empty(0)
+        for number, curve in enumerate(self.forecast):
+            here = np.flatnonzero(shade == number)
+            # A piece begins where the one before has ended.
+            part = slice(max(here[0] - 1, 0), here[-1] + 1) if here.size else slice(0, 0)
+            curve.setData(time_s[part], p[part])
+
+
+def _words(twin: TwinStatus) -> str:
+    numbers = "; ".join(f"{name} {value}" for name, value in twin.numbers[:3])
+    parts = [twin.state, twin.sentence, numbers]
+    if twin.missed_s:
+        parts.append(f"{twin.missed_s:.1f} s were not looked at: the computer was too busy")
+    return " · ".join(each for each in parts if each)
