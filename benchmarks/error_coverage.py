@@ -28,7 +28,7 @@ import numpy as np
 from plain_motion import plain_motion
 
 from vibench.sim import Accuracy, FixedDuration, Harmonic, Scene, gong2025, solve_scene
-from vibench.sim.scene.side_by_side import solve_in_lanes
+from vibench.sim.scene.solve import solve_in_lanes
 
 MODELS = (
     "hertz",

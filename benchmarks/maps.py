@@ -23,9 +23,8 @@ import numpy as np
 from vibench.acquisition import load_toml
 from vibench.sim import Accuracy, Given, Harmonic, MotionKind, gong2025, settle_scene, wilson_share
 from vibench.sim.maps import Map, MapResults, Range, compute_map, estimate_map, map_solver, open_map
-from vibench.sim.scene.followed_run import FollowedRun, Stretch, follow_together
-from vibench.sim.scene.observed_window import follow_strobed
-from vibench.sim.scene.side_by_side import settle_scenes
+from vibench.sim.scene.followed_run import FollowedRun, Stretch, follow_strobed, follow_together
+from vibench.sim.scene.solve import settle_scenes
 from vibench.sim.study import ExistingStudy, executor_of, store_of
 
 STANDARD = Accuracy.STANDARD.tolerance

@@ -11,7 +11,7 @@ import os
 import time
 
 from vibench.sim import Harmonic, Observable, Scene, gong2025, solve_scene
-from vibench.sim.scene.side_by_side import solve_in_lanes
+from vibench.sim.scene.solve import solve_in_lanes
 from vibench.sim.study import MemoryStore, Study, ThreadExecutor, run_study
 
 FIGURE = {

@@ -11,8 +11,7 @@ from vibench.sim.engine.batch import batches_pay
 from vibench.sim.maps import Map, Range, Spacing, estimate_map, map_solver, solve_map
 from vibench.sim.maps._columns import contact_energy_j
 from vibench.sim.scene.prediction import Method
-from vibench.sim.scene.side_by_side import settle_in_lanes, settle_scenes
-from vibench.sim.scene.solve import settle_scene, solve_scene
+from vibench.sim.scene.solve import settle_in_lanes, settle_scene, settle_scenes, solve_scene
 from vibench.sim.study import InvalidStudy
 
 FREQUENCIES = Range(start=100.0, stop=300.0, points=5)

@@ -3,7 +3,7 @@
 import pytest
 from scipy.special import chdtri, ndtri, stdtrit
 
-from vibench.sim.scene.quantiles import normal_quantile, poisson_mean, student_quantile
+from vibench.sim.scene.shares import normal_quantile, poisson_mean, student_quantile
 
 
 @pytest.mark.parametrize("probability", [0.6, 0.9, 0.975, 0.999])

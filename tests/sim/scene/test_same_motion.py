@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 
 from vibench.sim import MotionKind
-from vibench.sim.scene.ensemble import _error, counts_of
 from vibench.sim.scene.repetition import Growth
 from vibench.sim.scene.scatter import WindowScatter
-from vibench.sim.scene.several_starts import ReachedMotion, is_same, kind_among, motions_among
+from vibench.sim.scene.several_starts import (
+    ReachedMotion,
+    _error,
+    counts_of,
+    is_same,
+    kind_among,
+    motions_among,
+)
 
 RESPONSES = np.array([4.0, 3.0, 9.0, 8.0])
 PERIODIC, TORUS, CHAOS, OPEN = (

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, Scene, gong2025, solve_scene
-from vibench.sim.scene.observed_window import Block
+from vibench.sim.scene.followed_run import Block
 from vibench.sim.scene.prediction import MotionKind
 from vibench.sim.scene.scatter import draws_apart
 from vibench.sim.scene.scene import FixedDuration, Given

@@ -7,10 +7,10 @@ import pytest
 
 from vibench.sim import Harmonic, MotionKind, Rest, Scene, gong2025, solve_scene
 from vibench.sim.engine.batch import batches_pay
-from vibench.sim.scene import side_by_side as _side_by_side
+from vibench.sim.scene import solve as _side_by_side
 from vibench.sim.scene.prediction import Method, StartMemory
 from vibench.sim.scene.scene import FixedDuration, Given
-from vibench.sim.scene.side_by_side import solve_in_lanes, solve_scenes
+from vibench.sim.scene.solve import solve_in_lanes, solve_scenes
 from vibench.sim.study import Study, planned_work_s, solve_study
 from vibench.sim.study._expansion import study_solver
 

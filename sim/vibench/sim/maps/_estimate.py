@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..scene.side_by_side import settle_in_lanes
+from ..scene.solve import settle_in_lanes
 from ._expansion import MapPoints, map_solver
 from ._map import Map
 

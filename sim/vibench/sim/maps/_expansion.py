@@ -13,8 +13,7 @@ from ..model.outcome import Outcome
 from ..scene.measured_cost import expected_cost_s, longest_cost_s
 from ..scene.prediction import MotionKind
 from ..scene.scene import Given, Scene
-from ..scene.side_by_side import Solved, settle_in_lanes
-from ..scene.solve import settle_scene
+from ..scene.solve import Solved, settle_in_lanes, settle_scene
 from ..study import (
     NUMBERS,
     Arrays,

@@ -8,8 +8,7 @@ from ..costs.ledger import FEWEST, Expected, cost_ledger
 from .plan import ScenePlan, plan_scene
 from .prediction import ScenePrediction
 from .scene import Scene
-from .side_by_side import settle_in_lanes, solve_in_lanes
-from .solve import settle_scene, solve_scene
+from .solve import settle_in_lanes, settle_scene, solve_in_lanes, solve_scene
 
 MEASURED_S = 0.5
 """Processor time after which no further run is made to measure a cost [s]."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from ..costs.ledger import Expected, cost_ledger
 from ..model.power_law import PowerLaw
 from ..model.specimen import Specimen
+from .followed_run import whole_periods
 from .linear_motion import LinearMotion, linear_motion, never_touches
-from .observed_window import whole_periods
-from .pace import MOST_STATES
 from .prediction import Method
+from .repetition import MOST_STATES
 from .scene import AutomaticDuration, FixedDuration, Observable, Scene
 from .several_starts import CLEAR, FEWEST, MOST
 

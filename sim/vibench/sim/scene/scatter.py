@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model.arrays import Complex, Floats
-from .observed_window import Block
-from .quantiles import student_quantile
+from .followed_run import Block
+from .shares import student_quantile
 
 COVERED = 0.975
 """Share of one tail and the middle: 19 cases of 20 with both tails."""

@@ -6,7 +6,7 @@ until the budget is used up.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +17,14 @@ from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import Y, Z
-from .followed_run import FollowedRun, Stretch
-from .observed_window import ObservedWindow, follow_strobed, observe_window, window_of
-from .pace import Pace
-from .prediction import MotionKind
-from .repetition import NEUTRAL, Growth, kind_of
-from .scatter import WindowScatter, window_scatter
-from .shares import EscapeRate, escape_rate
+from .course import SceneRun
+from .followed_run import FollowedRun, ObservedWindow, Stretch, follow_strobed, observe_window, window_of
+from .linear_motion import LinearMotion, never_touches
+from .prediction import Ensemble, FoundMotion, MotionKind, StartMemory
+from .repetition import FEWEST_NEUTRAL, NEUTRAL, Growth, Pace, kind_of
+from .scatter import COVERED, WindowScatter, window_scatter
+from .scene import AutomaticDuration, FixedDuration, Observable, Scene
+from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile, wilson_share
 from .states_alone import Asking, Following, StatesAlone
 
 PUSH = 1e-6
@@ -356,3 +357,171 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
     largest = max(one.responses_m[0], other.responses_m[0])
     allowed = SAME + APART * counts(one.scatter.between_runs, other.scatter.between_runs)
     return bool(difference[0] <= allowed * largest)
+
+
+PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
+"""Motions that may still come to another."""
+FEWEST_DRAWS = 3
+"""Draws of one motion that its scatter is told from."""
+
+ErrorOf = Callable[[ReachedMotion], float | None]
+"""Gives the relative error of the responses of a motion."""
+
+
+def ensemble_of(
+    several: SeveralStarts, amplitude_m: float, forgetting_s: float, error_of: ErrorOf
+) -> Ensemble:
+    """Sort what the starts came to into motions, and count them.
+
+    Parameters
+    ----------
+    several
+        Followed as far as they are to be.
+    amplitude_m
+        Of the drive.
+    forgetting_s
+        Time in which the slowest mode without contact fades by e.
+    error_of
+        Asked once for each motion.
+
+    """
+    reached, escape = several.reached, several.escape
+    groups = motions_among(reached)
+    asked = next(group for group in groups if any(each is reached[0] for each in group))
+    groups = sorted(groups, key=len, reverse=True)
+    kinds = [lasting(kind_among(group, forgetting_s), escape) for group in groups]
+    counts = counts_of(kinds, [len(group) for group in groups])
+    shares = shares_of(counts)
+    pending = sum(each.trials for each in counts if not each.is_final)
+    return Ensemble(
+        starts=len(reached),
+        motions=tuple(
+            FoundMotion(
+                motion=kind,
+                period=group[0].period,
+                **_responses(group, amplitude_m),
+                error_estimate=_error(group, error_of),
+                starts=len(group),
+                share=share,
+            )
+            for group, kind, share in zip(groups, kinds, shares, strict=True)
+        ),
+        asked=next(place for place, group in enumerate(groups) if group is asked),
+        unseen_share=wilson_share(pending, len(reached)).high,
+        escape=escape,
+        scatter=_deviation([each.responses_m[0] for each in reached]),
+        followed_s=several.followed_s,
+    )
+
+
+def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]:
+    """Count the starts of each motion, and say which may still come to another.
+
+    Chaos that does not die out may: one chaotic motion becomes another as suddenly as a periodic one, and
+    only what becomes periodic is seen as an escape.
+    """
+    is_one_chaos = kinds.count(MotionKind.CHAOTIC) == 1
+    return [
+        Count(count, kind not in PENDING and (kind is not MotionKind.CHAOTIC or is_one_chaos))
+        for kind, count in zip(kinds, starts, strict=True)
+    ]
+
+
+def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
+    """Call chaos so only where none of it died out, and it surely lasts."""
+    if motion is not MotionKind.CHAOTIC:
+        return motion
+    lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S
+    return motion if lasts else MotionKind.CHAOTIC_SO_FAR
+
+
+def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
+    """Give those of the start that shows a motion that repeats best; of others, the mean."""
+    shown = group[:1] if group[0].period is not None else group
+    means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
+    return dict(
+        zip(("response_i", "response_ii", "relative_i", "relative_ii"), map(float, means), strict=True)
+    )
+
+
+def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
+    """Give what one more draw of a motion may differ by from the mean of these, in 19 cases of 20."""
+    if group[0].period is not None:
+        return error_of(group[0])
+    if len(group) < FEWEST_DRAWS:
+        # A calm start of chaos in bursts knows nothing of the bursts.
+        known = [each for each in map(error_of, group) if each is not None]
+        return max(known, default=None)
+    widened = math.sqrt(1.0 + 1.0 / len(group)) * student_quantile(len(group) - 1, COVERED)
+    return widened * (_deviation([each.responses_m[0] for each in group]) or 0.0)
+
+
+def _deviation(values: Sequence[float]) -> float | None:
+    """Divide the standard deviation by the mean; None of a single value."""
+    return float(np.std(values, ddof=1) / np.mean(values)) if len(values) > 1 else None
+
+
+ALONE = 0.5
+"""Share of a budget that is spent on following chaos on; other starts have the rest."""
+
+
+def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
+    """Say whether the start decided which motion was reached.
+
+    Parameters
+    ----------
+    scene
+        What was asked.
+    begin
+        The motion where it began.
+    seen
+        What it came to.
+    motion
+        It without stops.
+
+    """
+    if never_touches(scene.specimen, motion):
+        return StartMemory.KEPT
+    if seen.grew:
+        return StartMemory.LOST
+    if scene.budget_s == 0.0 or seen.path[-1].outcome is not Outcome.REACHED_END:
+        return StartMemory.UNKNOWN
+    return StartMemory.LOST if forgets_its_start(begin, seen.path) else StartMemory.KEPT
+
+
+def ensemble_beside(
+    scene: Scene,
+    begin: FollowedRun,
+    asked: ReachedMotion,
+    pace: Pace,
+    error_of: ErrorOf,
+    draw: Draw | None = None,
+) -> Asking[Ensemble | None]:
+    """Follow other starts beside the one asked for, as the budget of the scene allows or as ``draw`` says.
+
+    None where the budget allows too few.
+    """
+    several = SeveralStarts(begin, asked, pace, _horizon(scene, pace), draw or _draw(scene, asked))
+    yield from several.follow()
+    if len(several.reached) == 1:
+        return None
+    return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)
+
+
+def _draw(scene: Scene, asked: ReachedMotion) -> Draw:
+    """Say how many starts are followed at what cost: enough of them, where their scatter was asked for."""
+    if Observable.SCATTER in scene.observe:
+        return Draw(clear=FEWEST)
+    return Draw(budget_s=max(scene.budget_s - asked.run.cost_s, ALONE * scene.budget_s))
+
+
+def _horizon(scene: Scene, pace: Pace) -> Horizon:
+    """Say how far other starts are followed: as far as the one that was asked for."""
+    match scene.duration:
+        case FixedDuration(duration_s=longest_s, window_s=window_s):
+            first_s = longest_s
+        case AutomaticDuration(longest_s=longest_s, window_s=window_s):
+            first_s = pace.settling_s
+    judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - window_s))
+    last_s = max(0.0, longest_s - window_s - judging_s)
+    return Horizon(min(first_s, last_s), last_s, judging_s, window_s)

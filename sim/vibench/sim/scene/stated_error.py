@@ -17,11 +17,10 @@ from ..engine.run import Watch
 from ..model.accuracy import Accuracy
 from ..model.arrays import Floats
 from ..model.outcome import Outcome
-from .fixed_run import SceneRun, leads
-from .followed_run import FollowedRun
-from .observed_window import ObservedWindow, observe_window
-from .pace import Pace
+from .course import SceneRun, leads
+from .followed_run import FollowedRun, ObservedWindow, observe_window
 from .prediction import MotionKind, ScenePrediction
+from .repetition import Pace
 from .scatter import draws_apart, draws_of_starts
 from .scene import AutomaticDuration, Scene
 from .several_starts import SEED, pushes

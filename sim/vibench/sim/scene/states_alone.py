@@ -15,10 +15,8 @@ from ..engine.batch import batches_pay, is_batchable
 from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from .followed_run import FollowedRun, Stretch, follow_together
-from .observed_window import follow_strobed, whole_periods
-from .pace import Pace, growth_of
-from .repetition import Growth, Repetition, section_needed, wandered_until
+from .followed_run import FollowedRun, Stretch, follow_strobed, follow_together, whole_periods
+from .repetition import Growth, Pace, Repetition, growth_of, section_needed, wandered_until
 from .scene import AutomaticDuration, FixedDuration
 
 SLICE_S = 0.5

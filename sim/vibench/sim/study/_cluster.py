@@ -14,8 +14,7 @@ from distributed import CancelledError, Client, Future
 from distributed.comm import get_address_host_port
 
 from ..scene.scene import Scene
-from ..scene.side_by_side import Solved
-from ..scene.solve import solve_scene
+from ..scene.solve import Solved, solve_scene
 from ._errors import ClusterLost
 from ._executor import Bundle, Reply, Solver, solve_timed
 from ._software import software

@@ -12,7 +12,7 @@ from typing import Protocol
 from ..scene.measured_cost import learn_cost
 from ..scene.prediction import Method, ScenePrediction
 from ..scene.scene import Scene
-from ..scene.side_by_side import Solved, settle_in_lanes, settle_scenes, solve_in_lanes, solve_scenes
+from ..scene.solve import Solved, settle_in_lanes, settle_scenes, solve_in_lanes, solve_scenes
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..scene.measured_cost import expected_cost_s
 from ..scene.scene import Given, Rest, Scene
-from ..scene.side_by_side import Solved, solve_in_lanes
-from ..scene.solve import solve_scene
+from ..scene.solve import Solved, solve_in_lanes, solve_scene
 from ..scene.states_alone import lanes_are_worth_it
 from ._answers import cells_of, cut_text
 from ._axes import Grid

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..background import Cancelled, Observer, Progress
 from ..model.arrays import Floats
 from ..scene.scene import Scene
-from ..scene.side_by_side import Solved
+from ..scene.solve import Solved
 from ._axes import Grid
 from ._columns import TAKEN
 from ._executor import Bundle, Executor, Reply

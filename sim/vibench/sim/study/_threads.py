@@ -9,8 +9,7 @@ from functools import partial
 from typing import TypeVar
 
 from ..scene.scene import Scene
-from ..scene.side_by_side import Solved
-from ..scene.solve import solve_scene
+from ..scene.solve import Solved, solve_scene
 from ._errors import InvalidStudy
 from ._executor import Bundle, Reply, Solver, solve_timed
 
