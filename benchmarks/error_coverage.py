@@ -28,7 +28,7 @@ import numpy as np
 from plain_motion import plain_motion
 
 from vibench.sim import Accuracy, FixedDuration, Harmonic, Scene, gong2025, solve_scene
-from vibench.sim.scene.solve import solve_in_lanes
+from vibench.sim.scene.solve import solve_scenes
 
 MODELS = (
     "hertz",
@@ -118,6 +118,11 @@ def truth_of(scene):
     ]
     answers = [tight.responses, *(draw.responses for draw in draws if draw is not None)]
     return Truth("scattering", np.array(answers), np.zeros(4), None)
+
+
+def solve_in_a_batch(scene):
+    """Solve a scene as among many others."""
+    return solve_scenes([scene])[0].prediction
 
 
 def judged(scene, truth, level, solve):
@@ -224,7 +229,7 @@ def main():
     if arguments.tell:
         told([json.loads(line) for path in arguments.tell for line in path.read_text().splitlines()])
         return
-    solve = solve_in_lanes if arguments.lanes else solve_scene
+    solve = solve_in_a_batch if arguments.lanes else solve_scene
     shard, shards = (int(part) for part in arguments.shard.split("/"))
     indices = range(shard - 1, arguments.scenes, shards) if arguments.only is None else [arguments.only]
     rows, given_up = [], 0

@@ -24,7 +24,7 @@ from vibench.acquisition import load_toml
 from vibench.sim import Accuracy, Given, Harmonic, MotionKind, gong2025, settle_scene, wilson_share
 from vibench.sim.maps import Map, MapResults, Range, compute_map, estimate_map, map_solver, open_map
 from vibench.sim.scene.followed_run import FollowedRun, Stretch, follow_strobed, follow_together
-from vibench.sim.scene.solve import settle_scenes
+from vibench.sim.scene.solve import Question, solve_scenes
 from vibench.sim.study import ExistingStudy, executor_of, store_of
 
 STANDARD = Accuracy.STANDARD.tolerance
@@ -235,14 +235,14 @@ def labels(asked: argparse.Namespace) -> int:
     began_s = time.thread_time()
     alone = [settle_scene(scene) for scene in first]
     alone_s, began_s = time.thread_time() - began_s, time.thread_time()
-    beside = [each.prediction for each in settle_scenes(first)]
+    beside = [each.prediction for each in solve_scenes(first, Question.MOTION)]
     beside_s = time.thread_time() - began_s
     print(
         f"{asked.points} random points of a map: {1e3 * beside_s / asked.points:.2f} ms each in lanes, "
         f"{1e3 * alone_s / asked.points:.2f} ms one by one: {alone_s / beside_s:.2f} times"
     )
     others = [plan.scene((row, k, column)) for row, column in places for k in range(1, STARTS)]
-    reached = [each.prediction for each in settle_scenes(others)]
+    reached = [each.prediction for each in solve_scenes(others, Question.MOTION)]
     labels_of = [
         {(each.motion, each.period) for each in (beside[k], *reached[k * (STARTS - 1) :][: STARTS - 1])}
         for k in range(asked.points)

@@ -3,7 +3,7 @@
 The figures: every hertz from 10 to 600 at four amplitudes, 30 s each with the last 5 s observed, standard
 accuracy; Figure 10 asks for exponents besides. The curve: 121 points at 20 um, with other starts where the
 start is forgotten, as `vibench predict` draws it. As many threads as processors. Each
-by lanes, as studies of this size are solved, and one motion after the other.
+in batches, as studies of this size are solved, and one motion after the other.
 """
 
 import argparse
@@ -11,8 +11,9 @@ import os
 import time
 
 from vibench.sim import Harmonic, Observable, Scene, gong2025, solve_scene
-from vibench.sim.scene.solve import solve_in_lanes
+from vibench.sim.scene.solve import Question
 from vibench.sim.study import MemoryStore, Study, ThreadExecutor, run_study
+from vibench.sim.study._executor import solve_timed
 
 FIGURE = {
     "amplitudes_m": (1e-6, 5e-6, 10e-6, 50e-6),
@@ -24,7 +25,7 @@ ASKED = {
     "10": FIGURE | {"observe": (Observable.RESPONSE, Observable.LYAPUNOV)},
     "curve": {"amplitudes_m": (20e-6,), "frequencies_hz": {"start": 100, "stop": 400, "step": 2.5}},
 }
-SOLVERS = {"in lanes": solve_in_lanes, "one by one": solve_scene}
+SOLVERS = {"in batches": Question.ANSWER, "one by one": solve_scene}
 
 
 def main():
@@ -34,7 +35,8 @@ def main():
     for name in parser.parse_args().asked:
         study = Study(**ASKED[name])
         for way, solver in SOLVERS.items():
-            solver(Scene(gong2025(), Harmonic(260.0, 5e-6), study.observe, budget_s=study.budget_s))
+            first = Scene(gong2025(), Harmonic(260.0, 5e-6), study.observe, budget_s=study.budget_s)
+            list(solve_timed([first], solver))
             executor, store = ThreadExecutor(os.cpu_count(), solver), MemoryStore(study)
             began = time.perf_counter(), time.process_time()
             run_study(study, executor, store)

@@ -11,7 +11,7 @@ from vibench.sim.engine.batch import batches_pay
 from vibench.sim.maps import Map, Range, Spacing, estimate_map, map_solver, solve_map
 from vibench.sim.maps._columns import contact_energy_j
 from vibench.sim.scene.prediction import Method
-from vibench.sim.scene.solve import settle_in_lanes, settle_scene, settle_scenes, solve_scene
+from vibench.sim.scene.solve import Question, settle_scene, solve_scene, solve_scenes
 from vibench.sim.study import InvalidStudy
 
 FREQUENCIES = Range(start=100.0, stop=300.0, points=5)
@@ -183,17 +183,17 @@ def test_the_most_that_a_map_takes_grows_with_the_periods_for_which_motions_are_
 )
 def test_points_of_one_specimen_that_wait_for_nobody_go_through_lanes(said, lanes):
     plan = Map(frequency_hz=FREQUENCIES, **said)
-    assert (map_solver(plan) is settle_in_lanes) is lanes
+    assert (map_solver(plan) is Question.MOTION) is lanes
     assert ("lanes" in estimate_map(plan, 1).sentence) is lanes
 
 
 def test_a_scene_settles_the_same_in_lanes_whatever_is_settled_beside_it():
     plan = Map(frequency_hz=Range(start=240.0, stop=280.0, points=5), amplitude_m=LEVELS, periods=1200)
     scenes = [plan.scene((row, 0, column)) for row in (0, 1) for column in range(5)]
-    together = [each.prediction for each in settle_scenes(scenes)]
+    together = [each.prediction for each in solve_scenes(scenes, Question.MOTION)]
     assert sum(each.period is None for each in together) >= 3
     for number in (1, 6, 8):
-        alone = settle_in_lanes(scenes[number])
+        alone = solve_scenes([scenes[number]], Question.MOTION)[0].prediction
         assert alone.final_state == together[number].final_state
         assert (alone.response_i, alone.response_ii) == (
             together[number].response_i,
@@ -204,7 +204,8 @@ def test_a_scene_settles_the_same_in_lanes_whatever_is_settled_beside_it():
 @pytest.mark.parametrize(("frequency_hz", "amplitude_m"), [(130.0, 2e-5), (95.0, 5e-6)])
 def test_a_periodic_motion_has_the_same_responses_in_lanes(frequency_hz, amplitude_m):
     plan = Map(frequency_hz=Range(start=50.0, stop=frequency_hz, points=2), amplitude_m=amplitude_m)
-    alone, beside = (settle(plan.scene((0, 1))) for settle in (settle_scene, settle_in_lanes))
+    alone = settle_scene(plan.scene((0, 1)))
+    beside = solve_scenes([plan.scene((0, 1))], Question.MOTION)[0].prediction
     assert alone.motion is beside.motion is MotionKind.PERIODIC
     assert alone.period == beside.period
     assert beside.response_i == pytest.approx(alone.response_i, rel=1e-5)

@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..scene.solve import settle_in_lanes
+from ..scene.solve import Question
 from ._expansion import MapPoints, map_solver
 from ._map import Map
 
@@ -97,6 +97,6 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
         workers=(os.cpu_count() or 1) if workers is None else max(1, workers),
         file_bytes=plan.grid.size * row_bytes,
         followed="eight at a time, in lanes"
-        if map_solver(plan) is settle_in_lanes
+        if map_solver(plan) is Question.MOTION
         else "one after the other",
     )

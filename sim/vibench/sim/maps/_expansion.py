@@ -13,7 +13,7 @@ from ..model.outcome import Outcome
 from ..scene.measured_cost import expected_cost_s, longest_cost_s
 from ..scene.prediction import MotionKind
 from ..scene.scene import Given, Scene
-from ..scene.solve import Solved, settle_in_lanes, settle_scene
+from ..scene.solve import Question, Solved, settle_scene
 from ..study import (
     NUMBERS,
     Arrays,
@@ -46,13 +46,13 @@ BUNDLE_S = 0.3
 
 
 def map_solver(plan: Map) -> Solver:
-    """Choose what computes the points of a map: lanes, or one point after the other.
+    """Choose what computes the points of a map: batches, or one point after the other.
 
-    Lanes follow motions of one specimen that do not wait for each other, and pay where a processor has the
+    Batches follow motions of one specimen that do not wait for each other, and pay where a processor has the
     registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one.
     """
     is_one_specimen = not any(each in OF_SPECIMEN for each in plan.varied)
-    return settle_in_lanes if is_one_specimen and not plan.chain and batches_pay() else settle_scene
+    return Question.MOTION if is_one_specimen and not plan.chain and batches_pay() else settle_scene
 
 
 class MapPoints:

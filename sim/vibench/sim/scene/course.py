@@ -1,8 +1,8 @@
-"""A motion followed for a given time and observed at its end. SI units.
+"""The course of a scene's motion: for a given time (`FixedCourse`), or until it settles (`SettlingCourse`).
 
-It is looked at once a drive period. Where it has not begun to repeat by the time that it should have
-forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
-never repeats is known only by its growth and its statistics.
+Both are gone through in three steps, so that many scenes can be followed side by side: first `way` is
+followed; `watch` then looks more closely, and returns what is to be followed on; `seen` observes the end. In
+between, `StatesAlone.follow` follows one motion, `in_batches` those of many scenes. SI units.
 """
 
 import math
@@ -29,7 +29,8 @@ from .followed_run import (
 )
 from .prediction import MotionKind
 from .repetition import EXACTLY, Pace, Repetition, growth_of, kind_of, wandered_until
-from .states_alone import Asking, Following, StatesAlone
+from .scene import FixedDuration
+from .states_alone import StatesAlone
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,26 +59,49 @@ class SceneRun:
     (4,); zero unless the motion was found to repeat in the window only."""
 
 
-def run_for(run: FollowedRun, duration_s: float, window_s: float, pace: Pace) -> Asking[SceneRun]:
-    """Follow a motion that is at time zero for a while, and observe the last ``window_s`` of it."""
-    ((lead, is_settled),) = yield from leads([run], duration_s - window_s - pace.section_s, pace)
-    last = follow_strobed(run, duration_s - window_s)
-    before = pace.repeats([last])
-    if before is None:
-        run.follow_tangent()
-    window = observe_window(run, window_s, pace.cycle([last]), pace.is_chaos if before is None else None)
-    seen = judged(run, window, [last], pace, f"the {duration_s:g} s asked for are over")
-    cycle = pace.cycle([last, *window.stretches])
-    if window.line_periods % cycle != 0:
-        # Its period was found only now: the window is gone through once more, for lines that do not leak.
-        begins = window.begins.apart()
-        begins.drop_tangent()
-        whole = observe_window(begins, window_s, cycle)
-        leaked = np.abs(window.responses_m / whole.responses_m - 1.0)
-        seen = replace(seen, window=whole, leaked=leaked)
-    path = lead if is_settled else (*lead, last, *window.stretches)
-    # Since when it repeats was not looked for.
-    return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
+class FixedCourse:
+    """A motion at time zero that is followed for a given time and observed at its end.
+
+    It is looked at once a drive period. Where it has not begun to repeat by the time that it should have
+    forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
+    never repeats is known only by its growth and its statistics.
+    """
+
+    def __init__(self, run: FollowedRun, pace: Pace, duration: FixedDuration) -> None:
+        self._run, self._pace, self._duration = run, pace, duration
+        self._lead = Lead(run, duration.duration_s - duration.window_s - pace.section_s, pace)
+
+    @property
+    def way(self) -> StatesAlone | None:
+        """Motion up to where it should have settled; None where it is followed without looking."""
+        return self._lead.states
+
+    def watch(self) -> None:
+        """Nothing more is to be followed."""
+
+    def seen(self) -> SceneRun:
+        """Observe the end of it."""
+        run, pace, duration = self._run, self._pace, self._duration
+        lead = self._lead.end()
+        last = follow_strobed(run, duration.duration_s - duration.window_s)
+        before = pace.repeats([last])
+        if before is None:
+            run.follow_tangent()
+        is_chaos = pace.is_chaos if before is None else None
+        window = observe_window(run, duration.window_s, pace.cycle([last]), is_chaos)
+        seen = judged(run, window, [last], pace, f"the {duration.duration_s:g} s asked for are over")
+        cycle = pace.cycle([last, *window.stretches])
+        if window.line_periods % cycle != 0:
+            # Its period was found only now: the window is gone through once more, for lines that do not leak.
+            begins = window.begins.apart()
+            begins.drop_tangent()
+            whole = observe_window(begins, duration.window_s, cycle)
+            leaked = np.abs(window.responses_m / whole.responses_m - 1.0)
+            seen = replace(seen, window=whole, leaked=leaked)
+        has_settled = self.way is not None and self.way.repeats is not None
+        path = lead if has_settled else (*lead, last, *window.stretches)
+        # Since when it repeats was not looked for.
+        return replace(seen, was_settled=before is not None, path=path, wandered_until_s=0.0)
 
 
 def judged(
@@ -113,43 +137,38 @@ LONGEST_SLICE = 1 << 16
 """Drive periods between two looks, at most: their states are held."""
 
 
-def leads(
-    runs: Sequence[FollowedRun], until_s: float, pace: Pace
-) -> Asking[list[tuple[tuple[Stretch, ...], bool]]]:
-    """Advance motions to an instant, and keep some states on the way; and whether each repeated before.
+class Lead:
+    """A motion advanced to an instant, with some of its states on the way.
 
     What repeats to rounding is followed no further: the whole cycles that are left are passed over. Where
     steps follow one another without a break nothing repeats so nearly.
     """
-    until_s = max(until_s, *(run.time_s for run in runs))
-    periods = whole_periods(until_s, pace.frequency_hz)
-    every = max(1, math.ceil(periods / MOST_LOOKS))
-    if not pace.sharpness.noise < EXACTLY:
-        rate_hz = pace.frequency_hz / every
-        return [
-            ((run.follow(until_s, samples=samples_between(rate_hz, run.time_s, until_s)),), False)
-            for run in runs
-        ]
-    exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
-    slice_periods = min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE)
-    # On the way to its attractor a motion carries each error along; lanes begin at a whole drive period.
-    way_s = math.ceil(pace.attractor_s * pace.frequency_hz) / pace.frequency_hz
-    several = [StatesAlone(run, exact, slice_periods=slice_periods, every=every) for run in runs]
-    for states in several:
-        states.follow(min(until_s, way_s))
-    yield [Following(states, until_s, math.inf) for states in several]
-    for states in several:
+
+    def __init__(self, run: FollowedRun, until_s: float, pace: Pace) -> None:
+        self._run, self._until_s, self._frequency_hz = run, max(until_s, run.time_s), pace.frequency_hz
+        periods = whole_periods(self._until_s, pace.frequency_hz)
+        self._every = every = max(1, math.ceil(periods / MOST_LOOKS))
+        self.states: StatesAlone | None = None
+        """To be followed; None where the motion is advanced without looking."""
+        if pace.sharpness.noise < EXACTLY:
+            exact = replace(pace, sharpness=replace(pace.sharpness, tolerance=EXACTLY))
+            slice_periods = min(max(1, math.ceil(periods / LOOKS)), LONGEST_SLICE)
+            way_s = math.ceil(pace.attractor_s * pace.frequency_hz) / pace.frequency_hz
+            states = StatesAlone(run, exact, slice_periods=slice_periods, every=every, by_itself_s=way_s)
+            self.states = states.aim(self._until_s)
+
+    def end(self) -> tuple[Stretch, ...]:
+        """Bring a motion whose states were followed to the instant; returns its path."""
+        run, states = self._run, self.states
+        if states is None:
+            rate_hz = self._frequency_hz / self._every
+            samples = samples_between(rate_hz, run.time_s, self._until_s)
+            return (run.follow(self._until_s, samples=samples),)
         if states.repeats is not None:
-            left = (until_s - states.run.time_s) * pace.frequency_hz
-            states.run.pass_over(int(left / states.repeats.period) * states.repeats.period)
-    return [(tuple(states.path), states.repeats is not None) for states in several]
+            left = (self._until_s - run.time_s) * self._frequency_hz
+            run.pass_over(int(left / states.repeats.period) * states.repeats.period)
+        return tuple(states.path)
 
-
-# A motion followed until it has settled, for as long as that takes, and observed then. SI units.
-#
-# A motion that repeats is observed over one of its own periods, which holds all there is to see. One that
-# does not is observed over a window once it is certain that it never will. Because chaos can die out, it is
-# followed on by its states alone for as long as a budget allows.
 
 SLICE_S, SLICE_PERIODS = 0.25, 4
 """Between two looks pass this long and this many drive periods, if the window is not shorter."""
@@ -159,102 +178,136 @@ DRIFT_SHARE = 0.25
 """Share of the budget that a slow drift may use: finding its error repeats its path three times."""
 
 
-@dataclass(frozen=True)
-class Patience:
-    """How long a motion that has not settled is followed."""
+class SettlingCourse:
+    """A motion at time zero that is followed until it repeats or surely never will, and observed then.
 
-    window_s: float
-    """Observed of a motion that does not repeat; rounded to equal parts of whole drive periods."""
-    longest_s: float
-    """It is followed no longer, and called undecided if need be; for a window at least."""
-    alone_s: float
-    """Nominal cost of following chaos on by its states alone; zero does not follow it on."""
-    is_exact: bool = True
-    """On the way to its attractor a motion carries each error along: it is followed by itself there."""
+    A motion that repeats is observed over one of its own periods, which holds all there is to see. One that
+    does not is observed over a window once it is certain that it never will. Because chaos can die out, it
+    is followed on by its states alone for as long as a budget allows.
 
+    Parameters
+    ----------
+    run, pace
+        The motion, and what decides how long is long.
+    window_s
+        Observed of a motion that does not repeat; rounded to equal parts of whole drive periods.
+    longest_s
+        It is followed no longer, and called undecided if need be; for a window at least.
+    alone_s
+        Nominal cost of following chaos on by its states alone; zero does not follow it on.
+    by_itself_s
+        Until then it is not followed in a batch; see `StatesAlone`.
 
-def settling(run: FollowedRun, patience: Patience, pace: Pace) -> Asking[SceneRun]:
-    """Follow a motion that is at time zero until it repeats or surely never will, and observe it."""
-    slice_periods, in_window = _slices(patience.window_s, pace.frequency_hz)
-    longest_s = patience.longest_s
-    watched_after_s = min(pace.attractor_s, longest_s - in_window * slice_periods / pace.frequency_hz)
-    slices = max(0, math.ceil(watched_after_s * pace.frequency_hz / slice_periods))
-    begun = StatesAlone(run, pace, slice_periods=slice_periods, every=1)
-    way = Following(begun, slices * slice_periods / pace.frequency_hz, math.inf)
-    if patience.is_exact:
-        way.by_itself()
-    yield [way]
-    early = begun.path
-    if begun.repeats is not None:
-        return _observe_period(run, begun.repeats, early, pace)
-    late: list[Stretch] = []
-    starts: list[FollowedRun] = []
-    made = slices * slice_periods
-    while run.outcome is Outcome.REACHED_END:
-        repeats = pace.repeats([*early, *late])
-        if repeats is not None:
-            return _observe_period(run, repeats, [*early, *late], pace)
-        kind = kind_of(None, growth_of(late), pace.fading_s)
-        if kind is MotionKind.CHAOTIC and len(late) >= in_window and patience.alone_s > 0.0:
-            return (yield from _followed_on(run, [*early, *late], len(late), patience, pace))
-        if len(late) >= WINDOWS * in_window and kind is not MotionKind.UNDECIDED:
-            if pace.drifts(late):
-                less = replace(patience, alone_s=DRIFT_SHARE * patience.alone_s)
-                return (yield from _followed_on(run, [*early, *late], len(late), less, pace))
-            seen = _observed(run, late, starts, in_window, pace, f"it is {kind}")
-            return replace(seen, settled_s=late[0].start_s, path=(*early, *late))
-        made += slice_periods
-        end_s = made / pace.frequency_hz
-        if len(late) >= in_window and end_s > longest_s:
-            break
-        if not late:
-            run.follow_tangent()
-        starts.append(run.apart())
-        late.append(follow_strobed(run, end_s, Watch.PEAKS_AND_LINES))
-    before = late or early
-    seen = _observed(run, before, starts, in_window, pace, f"it has not settled within {longest_s:g} s")
-    return replace(seen, path=(*early, *late))
-
-
-def _followed_on(
-    run: FollowedRun, path: Sequence[Stretch], watched: int, patience: Patience, pace: Pace
-) -> Asking[SceneRun]:
-    """Follow chaos or a slow drift by its states until it ends or the budget is used up; then observe.
-
-    The last ``watched`` stretches of the path were observed.
     """
-    slice_periods, in_window = _slices(patience.window_s, pace.frequency_hz)
-    window_s = in_window * slice_periods / pace.frequency_hz
-    states = StatesAlone(run, pace, states_of(path))
-    until_s = whole_periods(patience.longest_s - window_s, pace.frequency_hz) / pace.frequency_hz
-    yield [Following(states, until_s, run.cost_s + patience.alone_s)]
-    if states.repeats is not None:
-        seen = _observe_period(run, states.repeats, path, pace)
-        return replace(seen, wandered_until_s=states.wandered_until_s)
-    # Chaos may have settled on a torus, which does not repeat either: only growth tells the two apart.
-    run.follow_tangent()
-    begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
-    last = [
-        follow_strobed(run, (made + number * slice_periods) / pace.frequency_hz, Watch.PEAKS_AND_LINES)
-        for number in range(1, in_window + 1)
-    ]
-    window = window_of(begins, last)
-    kind = kind_of(None, growth_of(last), pace.fading_s)
-    if kind is not MotionKind.CHAOTIC:
-        is_drifting = pace.drifts(last)
-        found = "still drifts" if is_drifting else f"is {kind}"
-        before = () if growth_of(path).is_certain else path[-watched:]
-        seen = judged(run, window, before, pace, f"after {run.time_s:.3g} s it {found}")
-        return replace(
-            seen,
-            motion=MotionKind.UNDECIDED if is_drifting else seen.motion,
-            grew=growth_of(path).is_certain,
-            wandered_until_s=last[0].start_s,
-        )
-    seen = judged(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
-    if run.outcome is not Outcome.REACHED_END:
-        return seen
-    return replace(seen, motion=MotionKind.CHAOTIC, repeats=None, settled_s=path[-watched].start_s, grew=True)
+
+    def __init__(
+        self,
+        run: FollowedRun,
+        pace: Pace,
+        window_s: float,
+        longest_s: float,
+        alone_s: float,
+        by_itself_s: float,
+    ) -> None:
+        self._run, self._pace, self._longest_s, self._alone_s = run, pace, longest_s, alone_s
+        self._slice_periods, self._in_window = _slices(window_s, pace.frequency_hz)
+        watched_after_s = min(pace.attractor_s, longest_s - self._window_s)
+        slices = max(0, math.ceil(watched_after_s * pace.frequency_hz / self._slice_periods))
+        self._made = slices * self._slice_periods
+        self.way = StatesAlone(
+            run, pace, slice_periods=self._slice_periods, every=1, by_itself_s=by_itself_s
+        ).aim(self._made / pace.frequency_hz)
+        self._path, self._watched = list[Stretch](), 0
+        self._on: StatesAlone | None = None
+        self._seen: SceneRun | None = None
+
+    @property
+    def _window_s(self) -> float:
+        return self._in_window * self._slice_periods / self._pace.frequency_hz
+
+    def watch(self) -> StatesAlone | None:
+        """Watch it until it repeats or surely never will; returns chaos, or a drift, to be followed on."""
+        run, pace, in_window = self._run, self._pace, self._in_window
+        early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
+        if self.way.repeats is not None:
+            self._seen = _observe_period(run, self.way.repeats, early, pace)
+            return None
+        made = self._made
+        while run.outcome is Outcome.REACHED_END:
+            path = [*early, *late]
+            repeats = pace.repeats(path)
+            if repeats is not None:
+                self._seen = _observe_period(run, repeats, path, pace)
+                return None
+            kind = kind_of(None, growth_of(late), pace.fading_s)
+            if kind is MotionKind.CHAOTIC and len(late) >= in_window and self._alone_s > 0.0:
+                return self._follow_on(path, len(late), self._alone_s)
+            if len(late) >= WINDOWS * in_window and kind is not MotionKind.UNDECIDED:
+                if pace.drifts(late):
+                    return self._follow_on(path, len(late), DRIFT_SHARE * self._alone_s)
+                seen = _observed(run, late, starts, in_window, pace, f"it is {kind}")
+                self._seen = replace(seen, settled_s=late[0].start_s, path=tuple(path))
+                return None
+            made += self._slice_periods
+            end_s = made / pace.frequency_hz
+            if len(late) >= in_window and end_s > self._longest_s:
+                break
+            if not late:
+                run.follow_tangent()
+            starts.append(run.apart())
+            late.append(follow_strobed(run, end_s, Watch.PEAKS_AND_LINES))
+        ended = f"it has not settled within {self._longest_s:g} s"
+        seen = _observed(run, late or early, starts, in_window, pace, ended)
+        self._seen = replace(seen, path=(*early, *late))
+        return None
+
+    def _follow_on(self, path: list[Stretch], watched: int, alone_s: float) -> StatesAlone:
+        """Let it be followed until it ends or a budget is used up; the last ``watched`` were observed."""
+        run, frequency_hz = self._run, self._pace.frequency_hz
+        self._path, self._watched = path, watched
+        until_s = whole_periods(self._longest_s - self._window_s, frequency_hz) / frequency_hz
+        self._on = StatesAlone(run, self._pace, states_of(path)).aim(until_s, run.cost_s + alone_s)
+        return self._on
+
+    def seen(self) -> SceneRun:
+        """Say what was seen; of a motion that was followed on, after a last window."""
+        if self._on is not None:
+            return self._after(self._on)
+        assert self._seen is not None
+        return self._seen
+
+    def _after(self, states: StatesAlone) -> SceneRun:
+        run, pace, path, watched = self._run, self._pace, self._path, self._watched
+        if states.repeats is not None:
+            seen = _observe_period(run, states.repeats, path, pace)
+            return replace(seen, wandered_until_s=states.wandered_until_s)
+        # Chaos may have settled on a torus, which does not repeat either: only growth tells the two apart.
+        run.follow_tangent()
+        begins, made = run.apart(), round(run.time_s * pace.frequency_hz)
+        last = [
+            follow_strobed(
+                run, (made + number * self._slice_periods) / pace.frequency_hz, Watch.PEAKS_AND_LINES
+            )
+            for number in range(1, self._in_window + 1)
+        ]
+        window = window_of(begins, last)
+        kind = kind_of(None, growth_of(last), pace.fading_s)
+        if kind is not MotionKind.CHAOTIC:
+            is_drifting = pace.drifts(last)
+            found = "still drifts" if is_drifting else f"is {kind}"
+            before = () if growth_of(path).is_certain else path[-watched:]
+            seen = judged(run, window, before, pace, f"after {run.time_s:.3g} s it {found}")
+            return replace(
+                seen,
+                motion=MotionKind.UNDECIDED if is_drifting else seen.motion,
+                grew=growth_of(path).is_certain,
+                wandered_until_s=last[0].start_s,
+            )
+        seen = judged(run, window, path[-watched:], pace, f"it is chaotic, for {run.time_s:.3g} s at least")
+        if run.outcome is not Outcome.REACHED_END:
+            return seen
+        settled_s = path[-watched].start_s
+        return replace(seen, motion=MotionKind.CHAOTIC, repeats=None, settled_s=settled_s, grew=True)
 
 
 def _slices(window_s: float, frequency_hz: float) -> tuple[int, int]:

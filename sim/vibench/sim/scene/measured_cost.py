@@ -8,7 +8,7 @@ from ..costs.ledger import FEWEST, Expected, cost_ledger
 from .plan import ScenePlan, plan_scene
 from .prediction import ScenePrediction
 from .scene import Scene
-from .solve import settle_in_lanes, settle_scene, solve_in_lanes, solve_scene
+from .solve import Question, settle_scene, solve_scene
 
 MEASURED_S = 0.5
 """Processor time after which no further run is made to measure a cost [s]."""
@@ -16,13 +16,13 @@ DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
 """Frequencies of the runs by which a cost is measured, over the scene's: neighbours differ as runs do."""
 
 
-Solver = Callable[[Scene], ScenePrediction]
-
+Solver = Callable[[Scene], ScenePrediction] | Question
+"""What answers scenes one by one; or the question that is answered for all of them in batches."""
 
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",
-    settle_in_lanes: "settled in lanes",
-    solve_in_lanes: "in lanes",
+    Question.MOTION: "settled in lanes",
+    Question.ANSWER: "in lanes",
 }
 """Solvers other than `solve_scene`, and what their runs are learnt as."""
 

@@ -25,7 +25,7 @@ from .repetition import FEWEST_NEUTRAL, NEUTRAL, Growth, Pace, kind_of
 from .scatter import COVERED, WindowScatter, window_scatter
 from .scene import AutomaticDuration, FixedDuration, Observable, Scene
 from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile, wilson_share
-from .states_alone import Asking, Following, StatesAlone
+from .states_alone import Follow, StatesAlone
 
 PUSH = 1e-6
 """Largest difference between starts: displacements over the gap, velocities over gap times 2 pi f."""
@@ -141,9 +141,16 @@ class SeveralStarts:
     """Starts beside the one that was asked for, and what they came to."""
 
     def __init__(
-        self, begin: FollowedRun, asked: ReachedMotion, pace: Pace, horizon: Horizon, draw: Draw
+        self,
+        begin: FollowedRun,
+        asked: ReachedMotion,
+        pace: Pace,
+        horizon: Horizon,
+        draw: Draw,
+        follow: Follow,
     ) -> None:
         self._pace = pace
+        self._follow_all = follow
         self._horizon = horizon
         self._draw = draw
         changes = pushes(begin.specimen, begin.drive.frequency_hz, draw.most - 1, draw.seed)
@@ -184,21 +191,21 @@ class SeveralStarts:
             return None
         return escape_rate(sum(is_over for life_s, is_over in chaos if life_s > 0.0), chaotic_s)
 
-    def follow(self) -> Asking[None]:
+    def follow(self) -> None:
         """Follow as many starts as the budget allows, as far as it takes, and observe them."""
         asked, budget_s = self._reached[0].run, self._draw.budget_s
         each_s = asked.cost_s * min(1.0, self._horizon.first_s / asked.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
             return
-        spent_s = yield from self._follow_some(self._draw.clear - 1, budget_s, each_s)
+        spent_s = self._follow_some(self._draw.clear - 1, budget_s, each_s)
         if not self._is_clear:
             more = self._draw.fewest - self._draw.clear
-            spent_s += yield from self._follow_some(more, budget_s - spent_s, each_s)
+            spent_s += self._follow_some(more, budget_s - spent_s, each_s)
         if any(each.period is not None for each in self.reached) and len(motions_among(self.reached)) > 1:
             # What a start took tells how many more the budget allows.
             each_s = spent_s / (len(self.reached) - 1)
             more = self._draw.most - self._draw.fewest
-            yield from self._follow_some(more, budget_s - spent_s, each_s)
+            self._follow_some(more, budget_s - spent_s, each_s)
 
     @property
     def _is_clear(self) -> bool:
@@ -206,12 +213,12 @@ class SeveralStarts:
         settled = all(each.period is not None for each in self._reached)
         return len(motions_among(self._reached)) == 1 and (settled or self._is_lasting)
 
-    def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> Asking[float]:
+    def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
         """Follow more starts, as many as a budget allows, and observe them; gives what it cost."""
         count = _as_many(wanted, budget_s, each_s)
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
-        yield from self._follow_rounds(budget_s)
+        self._follow_rounds(budget_s)
         found = [self._observed(each) for each in self._under_way]
         self._under_way = []
         self._reached += [each for each in found if each.run.outcome is Outcome.REACHED_END]
@@ -233,12 +240,12 @@ class SeveralStarts:
         reached = any(each.period is not None for each in self._reached)
         return reached or any(each.repeats is not None for each in self._under_way)
 
-    def _follow_rounds(self, budget_s: float) -> Asking[None]:
+    def _follow_rounds(self, budget_s: float) -> None:
         reach_s = min(self._horizon.first_s, self._horizon.last_s)
         while True:
             left = [each for each in self._under_way if not each.is_over]
             allowed_s = max(0.0, budget_s - self._cost_s) / max(1, len(left))
-            yield [Following(each, reach_s, each.run.cost_s + allowed_s) for each in left]
+            self._follow_all([each.aim(reach_s, each.run.cost_s + allowed_s) for each in left])
             left = [each for each in left if not each.is_over]
             if not left or self._cost_s >= budget_s or self._is_lasting:
                 return
@@ -495,14 +502,15 @@ def ensemble_beside(
     asked: ReachedMotion,
     pace: Pace,
     error_of: ErrorOf,
+    follow: Follow,
     draw: Draw | None = None,
-) -> Asking[Ensemble | None]:
+) -> Ensemble | None:
     """Follow other starts beside the one asked for, as the budget of the scene allows or as ``draw`` says.
 
     None where the budget allows too few.
     """
-    several = SeveralStarts(begin, asked, pace, _horizon(scene, pace), draw or _draw(scene, asked))
-    yield from several.follow()
+    several = SeveralStarts(begin, asked, pace, _horizon(scene, pace), draw or _draw(scene, asked), follow)
+    several.follow()
     if len(several.reached) == 1:
         return None
     return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)

@@ -2,8 +2,10 @@
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from ..exponents.lyapunov import LyapunovEstimate, Precision, lyapunov_exponent
 from ..model.accuracy import Accuracy
 from ..model.arrays import Floats
 from ..model.outcome import Outcome
-from .course import Patience, SceneRun, run_for, settling
+from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
 from .linear_motion import LinearMotion, linear_motion
 from .plan import plan_of, transient_decay_s
@@ -42,14 +44,23 @@ from .stated_error import (
     stated_errors,
     with_errors,
 )
-from .states_alone import REMEMBERED, Asking, Following, alone, follow_all, in_lanes, lanes_are_worth_it
+from .states_alone import REMEMBERED, Follow, batches_are_worth_it, in_batches, one_by_one
 
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
 EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
 
 
-def solve_scene(scene: Scene) -> ScenePrediction:
+class Question(StrEnum):
+    """What is asked of a scene."""
+
+    ANSWER = "answer"
+    """Its responses with their errors, and what other starts come to where its own is forgotten."""
+    MOTION = "motion"
+    """The motion and its responses alone: for maps, whose neighbouring points tell more than errors."""
+
+
+def solve_scene(scene: Scene, question: Question = Question.ANSWER) -> ScenePrediction:
     """Run a scene as planned, and say what was seen and how far to trust it.
 
     Each response has an error: how far, relatively, that of another run of the same scene at a far stricter
@@ -65,16 +76,108 @@ def solve_scene(scene: Scene) -> ScenePrediction:
         When the specimen cannot be followed in time, or not from such a start.
 
     """
-    return alone(solving_scene(scene))
+    method, motion = _planned(scene)
+    if method is Method.CLOSED_FORM:
+        return _in_closed_form(scene, motion, question)
+    begun = _Begun(scene, method, motion, question)
+    way = begun.course.way
+    if way is not None:
+        way.follow()
+    chaos = begun.course.watch()
+    if chaos is not None:
+        chaos.follow()
+    return begun.answer(one_by_one)
 
 
-def solving_scene(scene: Scene) -> Asking[ScenePrediction]:
-    """Do as `solve_scene`, and hand out what may be followed beside others."""
-    motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
-    plan = plan_of(scene, motion)
-    if plan.method is Method.CLOSED_FORM:
-        return _in_closed_form(scene, motion)
-    return (yield from _followed(scene, plan.method, motion))
+def settle_scene(scene: Scene) -> ScenePrediction:
+    """Run a scene as planned, and say what it came to, but neither errors nor what other starts come to.
+
+    It is the same motion that `solve_scene` describes, in a third of the time or less. Chaos is followed on
+    for as long as the scene's duration allows. One of an automatic duration ends after whole drive periods.
+
+    Raises
+    ------
+    ValueError
+        When the specimen cannot be followed in time, or not from such a start.
+
+    """
+    return solve_scene(scene, Question.MOTION)
+
+
+MOST_HELD = 2e7
+"""States of scenes that are solved together, about: a gigabyte."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What a scene came to that was solved beside others."""
+
+    prediction: ScenePrediction
+    taken_s: float
+    """Processor time of this thread for it [s]; of what was followed together, its part. NaN when what a
+    process pays once was part of it."""
+
+
+def solve_scenes(scenes: Sequence[Scene], question: Question = Question.ANSWER) -> list[Solved]:
+    """Solve several scenes as `solve_scene` does one, in batches as long as states are enough.
+
+    The answer to each does not depend on the others. Of chaos it is another draw than that of `solve_scene`.
+
+    Raises
+    ------
+    ValueError
+        When one of them cannot be followed in time, or not from its start.
+
+    """
+    found: list[Solved] = []
+    together: list[Scene] = []
+    held = 0.0
+    for scene in scenes:
+        states = REMEMBERED * scene.duration.longest_s / FEWEST_TIMES * scene.drive.frequency_hz
+        if together and held + states > MOST_HELD:
+            found += _solved_together(together, question)
+            together, held = [], 0.0
+        together.append(scene)
+        held += states
+    return found + _solved_together(together, question)
+
+
+def _solved_together(scenes: Sequence[Scene], question: Question) -> list[Solved]:
+    answers: dict[int, ScenePrediction] = {}
+    begun: dict[int, _Begun] = {}
+    taken_s = [0.0] * len(scenes)
+    for place, scene in enumerate(scenes):
+        with _counted(taken_s, [place]):
+            method, motion = _planned(scene)
+            if method is Method.CLOSED_FORM:
+                answers[place] = _in_closed_form(scene, motion, question)
+            else:
+                begun[place] = _Begun(scene, method, motion, question)
+    ways = {place: each.course.way for place, each in begun.items() if each.course.way is not None}
+    with _counted(taken_s, ways):
+        in_batches([*ways.values()])
+    chaos = {}
+    for place, each in begun.items():
+        with _counted(taken_s, [place]):
+            followed_on = each.course.watch()
+        if followed_on is not None:
+            chaos[place] = followed_on
+    with _counted(taken_s, chaos):
+        in_batches([*chaos.values()])
+    for place, each in begun.items():
+        with _counted(taken_s, [place]):
+            answers[place] = each.answer(in_batches)
+    return [Solved(answers[place], taken_s[place]) for place in range(len(scenes))]
+
+
+@contextmanager
+def _counted(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
+    """Add the processor time inside to that of these scenes, in equal parts."""
+    began_s = time.thread_time()
+    yield
+    part_s = (time.thread_time() - began_s) / max(1, len(places))
+    for place in places:
+        taken_s[place] += part_s
 
 
 def solve_ensemble(
@@ -109,23 +212,27 @@ def solve_ensemble(
     if starts < TOO_FEW:
         msg = f"An ensemble of {starts} starts is not allowed: ask for {TOO_FEW} or more."
         raise ValueError(msg)
+    method, motion = _planned(scene)
+    if method is Method.CLOSED_FORM:
+        return None
+    begun = _Begun(scene, method, motion, Question.ANSWER)
+    one_by_one([begun.course.way] if begun.course.way is not None else [])
+    chaos = begun.course.watch()
+    one_by_one([chaos] if chaos is not None else [])
+    seen = begun.course.seen()
+    if begun.run.outcome is not Outcome.REACHED_END:
+        return None
+    errors = begun.errors(seen, one_by_one)
+    follow = in_batches if batches_are_worth_it(starts, scene.duration) else one_by_one
+    return begun.ensemble(seen, errors, follow, Draw(starts, starts, starts, seed, budget_s))
+
+
+def _planned(scene: Scene) -> tuple[Method, LinearMotion]:
     motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
-    if plan_of(scene, motion).method is Method.CLOSED_FORM:
-        return None
-    begin = FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
-    run = begin.apart()
-    follow = in_lanes if lanes_are_worth_it(starts, scene.duration) else alone
-    seen, pace = alone(_seen(scene, run, motion))
-    if run.outcome is not Outcome.REACHED_END:
-        return None
-    asked = _asked(run, seen, _between_windows(seen))
-    errors = alone(stated_errors(scene, begin, run, seen, pace, motion.slowest_rate))
-    error_of = _error_of(scene.accuracy, asked, errors, pace)
-    draw = Draw(starts, starts, starts, seed, budget_s)
-    return follow(ensemble_beside(scene, begin, asked, pace, error_of, draw))
+    return plan_of(scene, motion).method, motion
 
 
-def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
+def _in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
     """Give the steady motion without contact."""
     amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None
@@ -170,127 +277,132 @@ def _in_closed_form(scene: Scene, motion: LinearMotion) -> ScenePrediction:
         count = whole_periods(window_s, scene.drive.frequency_hz)
         found = replace(found, section=np.tile(motion.state(periods * period_s), (count, 1)))
     if Observable.SPECTRUM in scene.observe:
-        return replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
+        found = replace(found, spectrum_hz=np.array([scene.drive.frequency_hz]), spectrum=np.array([x]))
+    if question is Question.MOTION:
+        # As a motion that is followed: what goes on from its end finds the drive where it was at its start.
+        duration_s = math.ceil(duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
+        found = replace(found, duration_s=duration_s, final_state=_state(motion.state(duration_s)))
     return found
 
 
-def settle_scene(scene: Scene) -> ScenePrediction:
-    """Run a scene as planned, and say what it came to, but neither errors nor what other starts come to.
+class _Begun:
+    """A scene whose motion is followed in time: first along its course, then judged.
 
-    It is the same motion that `solve_scene` describes, in a third of the time or less: for maps, whose
-    neighbouring points tell more than the error of each. Chaos is followed on for as long as the scene's
-    duration allows. One of an automatic duration ends after whole drive periods.
-
-    Raises
-    ------
-    ValueError
-        When the specimen cannot be followed in time, or not from such a start.
+    Parameters
+    ----------
+    scene, question
+        What is asked.
+    method, motion
+        As planned, and the motion as long as nothing is touched.
 
     """
-    return alone(settling_scene(scene))
 
+    def __init__(self, scene: Scene, method: Method, motion: LinearMotion, question: Question) -> None:
+        self._scene, self._method, self._motion, self._question = scene, method, motion, question
+        self._begin = FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
+        self.run = self._begin.apart()
+        self._pace = pace = pace_of(
+            scene.specimen,
+            scene.drive.frequency_hz,
+            scene.accuracy,
+            motion.slowest_rate,
+            scene.duration.longest_s,
+        )
+        self.course: FixedCourse | SettlingCourse
+        match scene.duration:
+            case FixedDuration():
+                self.course = FixedCourse(self.run, pace, scene.duration)
+            case AutomaticDuration(window_s=window_s, longest_s=longest_s):
+                is_judged = question is Question.ANSWER
+                self.course = SettlingCourse(
+                    self.run,
+                    pace,
+                    window_s,
+                    min(longest_s, MOST_STATES / scene.drive.frequency_hz),
+                    # Chaos is followed on for a part of the budget; other starts have the rest.
+                    alone_s=ALONE * scene.budget_s if is_judged else math.inf,
+                    by_itself_s=math.inf if is_judged else 0.0,
+                )
 
-def settling_scene(scene: Scene) -> Asking[ScenePrediction]:
-    """Do as `settle_scene`, and hand out what may be followed beside others."""
-    motion = linear_motion(scene.specimen, scene.drive, scene.start.state)
-    method = plan_of(scene, motion).method
-    if method is Method.CLOSED_FORM:
-        found = _in_closed_form(scene, motion)
-        # As a motion that is followed: what goes on from its end finds the drive where it was at its start.
-        length_s = math.ceil(found.duration_s * scene.drive.frequency_hz) / scene.drive.frequency_hz
-        return replace(found, duration_s=length_s, final_state=_state(motion.state(length_s)))
-    run = _begun(scene)
-    seen, _ = yield from _watching(scene, run, motion, math.inf, is_exact=False)
-    return _found(scene, method, run, seen, _Judged())
+    def answer(self, follow: Follow) -> ScenePrediction:
+        """Judge what was seen of the motion; other starts are followed by ``follow``."""
+        scene, seen = self._scene, self.course.seen()
+        if self._question is Question.MOTION:
+            return self._found(seen, UNKNOWN_ERRORS, StartMemory.UNKNOWN, None)
+        is_whole = self.run.outcome is Outcome.REACHED_END
+        errors = self.errors(seen, follow) if is_whole else UNKNOWN_ERRORS
+        memory = memory_of(scene, self._begin, seen, self._motion)
+        ensemble: Ensemble | None = None
+        if is_whole and (memory is StartMemory.LOST or Observable.SCATTER in scene.observe):
+            ensemble = self.ensemble(seen, errors, follow)
+        return self._found(seen, errors, memory, ensemble)
 
+    def errors(self, seen: SceneRun, follow: Follow) -> StatedErrors:
+        """Find the errors of a motion that reached its end."""
+        rate = self._motion.slowest_rate
+        return stated_errors(self._scene, self._begin, self.run, seen, self._pace, rate, follow)
 
-@dataclass(frozen=True, eq=False)
-class _Judged:
-    """What is known of a motion beyond what was seen of it."""
+    def ensemble(
+        self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
+    ) -> Ensemble | None:
+        """Follow other starts, as the budget of the scene allows or as ``draw`` says."""
+        asked = reached_motion(
+            self.run,
+            seen.motion,
+            None if seen.repeats is None else seen.repeats.period,
+            seen.window,
+            _between_windows(seen),
+            seen.wandered_until_s,
+            growth_of(seen.path),
+        )
+        error_of = _error_of(self._scene.accuracy, asked, errors, self._pace)
+        return ensemble_beside(self._scene, self._begin, asked, self._pace, error_of, follow, draw)
 
-    errors: StatedErrors = UNKNOWN_ERRORS
-    drawn: WindowScatter | None = None
-    memory: StartMemory = StartMemory.UNKNOWN
-    ensemble: Ensemble | None = None
-
-
-def _begun(scene: Scene) -> FollowedRun:
-    return FollowedRun(scene.specimen, scene.drive, scene.accuracy.tolerance, scene.start.state)
-
-
-def _followed(scene: Scene, method: Method, motion: LinearMotion) -> Asking[ScenePrediction]:
-    """Follow the motion in time, and judge it."""
-    begin = _begun(scene)
-    run = begin.apart()
-    seen, pace = yield from _seen(scene, run, motion)
-    is_whole = run.outcome is Outcome.REACHED_END
-    errors = UNKNOWN_ERRORS
-    if is_whole:
-        errors = yield from stated_errors(scene, begin, run, seen, pace, motion.slowest_rate)
-    drawn = _between_windows(seen) if is_whole else None
-    memory = memory_of(scene, begin, seen, motion)
-    ensemble: Ensemble | None = None
-    if is_whole and (memory is StartMemory.LOST or Observable.SCATTER in scene.observe):
-        asked = _asked(run, seen, drawn)
-        error_of = _error_of(scene.accuracy, asked, errors, pace)
-        ensemble = yield from ensemble_beside(scene, begin, asked, pace, error_of)
-    return _found(scene, method, run, seen, _Judged(errors, drawn, memory, ensemble))
-
-
-def _found(scene: Scene, method: Method, run: FollowedRun, seen: SceneRun, by: _Judged) -> ScenePrediction:
-    """Write down what was seen of a motion that was followed in time."""
-    window, amplitude = seen.window, scene.drive.amplitude_m
-    is_whole = run.outcome is Outcome.REACHED_END
-    exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
-    found = ScenePrediction(
-        frequency_hz=scene.drive.frequency_hz,
-        amplitude_m=amplitude,
-        response_i=window.largest_x_m / amplitude if is_whole else None,
-        response_ii=abs(window.line_x_m) / amplitude if is_whole else None,
-        relative_i=window.largest_p_m / amplitude if is_whole else None,
-        relative_ii=abs(window.line_p_m) / amplitude if is_whole else None,
-        impacts=window.impacts,
-        impact_rate_hz=window.impacts / window.length_s if window.length_s > 0.0 else 0.0,
-        motion=_lasting(scene, seen, by.ensemble),
-        period=None if seen.repeats is None else seen.repeats.period,
-        duration_s=run.time_s,
-        window_s=window.length_s,
-        settled_s=seen.settled_s,
-        ended=_ended(seen, by.ensemble),
-        integration_error=known(by.errors.integration),
-        scatter=_scatter(scene, by.ensemble, by.drawn),
-        lyapunov_per_s=known(exponent.exponent_per_s) if exponent is not None else None,
-        lyapunov_error_per_s=known(exponent.standard_error_per_s) if exponent is not None else None,
-        start=scene.start.name,
-        final_state=_state(run.state),
-        outcome=run.outcome,
-        method=method,
-        accuracy=scene.accuracy.value,
-        memory=by.memory,
-        ensemble=by.ensemble if by.memory is StartMemory.LOST else None,
-    )
-    found = with_errors(found, by.errors.stated)
-    return _with_pictures(scene, found, seen) if is_whole else found
-
-
-def _seen(scene: Scene, run: FollowedRun, motion: LinearMotion) -> Asking[tuple[SceneRun, Pace]]:
-    """Follow the motion for as long as was asked; chaos alone for a part of the budget."""
-    return _watching(scene, run, motion, ALONE * scene.budget_s)
-
-
-def _watching(
-    scene: Scene, run: FollowedRun, motion: LinearMotion, alone_s: float, *, is_exact: bool = True
-) -> Asking[tuple[SceneRun, Pace]]:
-    """Do the same, chaos alone for so long, and hand out what may be followed beside others."""
-    drive = scene.drive
-    longest_s = scene.duration.longest_s
-    pace = pace_of(scene.specimen, drive.frequency_hz, scene.accuracy, motion.slowest_rate, longest_s)
-    match scene.duration:
-        case FixedDuration(duration_s=duration_s, window_s=window_s):
-            return (yield from run_for(run, duration_s, window_s, pace)), pace
-        case AutomaticDuration(window_s=window_s):
-            patience = Patience(window_s, min(longest_s, MOST_STATES / drive.frequency_hz), alone_s, is_exact)
-            return (yield from settling(run, patience, pace)), pace
+    def _found(
+        self, seen: SceneRun, errors: StatedErrors, memory: StartMemory, ensemble: Ensemble | None
+    ) -> ScenePrediction:
+        """Write down what was seen of the motion."""
+        scene, run, window, amplitude = self._scene, self.run, seen.window, self._scene.drive.amplitude_m
+        is_whole = run.outcome is Outcome.REACHED_END
+        exponent = _exponent(scene, run) if is_whole and Observable.LYAPUNOV in scene.observe else None
+        drawn = _between_windows(seen) if is_whole and self._question is Question.ANSWER else None
+        scatter = None if drawn is None else drawn.relative
+        if Observable.SCATTER in scene.observe:
+            scatter = None if ensemble is None else ensemble.scatter
+        found = ScenePrediction(
+            frequency_hz=scene.drive.frequency_hz,
+            amplitude_m=amplitude,
+            response_i=window.largest_x_m / amplitude if is_whole else None,
+            response_ii=abs(window.line_x_m) / amplitude if is_whole else None,
+            relative_i=window.largest_p_m / amplitude if is_whole else None,
+            relative_ii=abs(window.line_p_m) / amplitude if is_whole else None,
+            impacts=window.impacts,
+            impact_rate_hz=window.impacts / window.length_s if window.length_s > 0.0 else 0.0,
+            motion=_lasting(scene, seen, ensemble),
+            period=None if seen.repeats is None else seen.repeats.period,
+            duration_s=run.time_s,
+            window_s=window.length_s,
+            settled_s=seen.settled_s,
+            ended=_ended(seen, ensemble),
+            integration_error=known(errors.integration),
+            scatter=scatter,
+            lyapunov_per_s=known(exponent.exponent_per_s) if exponent is not None else None,
+            lyapunov_error_per_s=known(exponent.standard_error_per_s) if exponent is not None else None,
+            start=scene.start.name,
+            final_state=_state(run.state),
+            outcome=run.outcome,
+            method=self._method,
+            accuracy=scene.accuracy.value,
+            memory=memory,
+            ensemble=ensemble if memory is StartMemory.LOST else None,
+        )
+        found = with_errors(found, errors.stated)
+        if is_whole and Observable.POINCARE in scene.observe:
+            found = replace(found, section=states_of(window.stretches))
+        if is_whole and Observable.SPECTRUM in scene.observe:
+            lines = spectrum_of(window)
+            found = replace(found, spectrum_hz=lines.frequency_hz, spectrum=lines.amplitude_m / amplitude)
+        return found
 
 
 def _between_windows(seen: SceneRun) -> WindowScatter | None:
@@ -298,13 +410,6 @@ def _between_windows(seen: SceneRun) -> WindowScatter | None:
     if seen.motion is MotionKind.PERIODIC:
         return None
     return window_scatter([block.peak_x_m for block in seen.blocks], len(seen.window.blocks))
-
-
-def _asked(run: FollowedRun, seen: SceneRun, drawn: WindowScatter | None) -> ReachedMotion:
-    """Describe what the start that was asked for came to."""
-    period = None if seen.repeats is None else seen.repeats.period
-    growth = growth_of(seen.path)
-    return reached_motion(run, seen.motion, period, seen.window, drawn, seen.wandered_until_s, growth)
 
 
 def _error_of(accuracy: Accuracy, asked: ReachedMotion, errors: StatedErrors, pace: Pace) -> ErrorOf:
@@ -337,13 +442,6 @@ def _ended(seen: SceneRun, ensemble: Ensemble | None) -> str:
     return seen.ended
 
 
-def _scatter(scene: Scene, ensemble: Ensemble | None, drawn: WindowScatter | None) -> float | None:
-    """Give the scatter of Response I over starts, where it was asked for, or else over windows."""
-    if Observable.SCATTER in scene.observe:
-        return None if ensemble is None else ensemble.scatter
-    return None if drawn is None else drawn.relative
-
-
 def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
     """Find the largest exponent of the motion that a run has come to."""
     drive = scene.drive
@@ -361,109 +459,6 @@ def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
     )
 
 
-def _with_pictures(scene: Scene, found: ScenePrediction, seen: SceneRun) -> ScenePrediction:
-    """Add the section and the spectrum where they were asked for."""
-    window = seen.window
-    if Observable.POINCARE in scene.observe:
-        found = replace(found, section=states_of(window.stretches))
-    if Observable.SPECTRUM in scene.observe:
-        lines = spectrum_of(window)
-        return replace(
-            found, spectrum_hz=lines.frequency_hz, spectrum=lines.amplitude_m / scene.drive.amplitude_m
-        )
-    return found
-
-
 def _state(values: Floats) -> State:
     x, y, z, vx, vy, vz = (float(value) for value in values)
     return (x, y, z, vx, vy, vz)
-
-
-MOST_HELD = 2e7
-"""States of scenes that are solved together, about: a gigabyte."""
-
-
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """What a scene came to that was solved beside others."""
-
-    prediction: ScenePrediction
-    taken_s: float
-    """Processor time of this thread for it [s]; of what was followed together, its part. NaN when what a
-    process pays once was part of it."""
-
-
-def solve_scenes(scenes: Sequence[Scene]) -> list[Solved]:
-    """Solve several scenes, each as `solve_scene` does, in lanes as long as states are enough.
-
-    The answer to each does not depend on the others.
-
-    Raises
-    ------
-    ValueError
-        When one of them cannot be followed in time, or not from its start.
-
-    """
-    return _side_by_side(scenes, solving_scene)
-
-
-def settle_scenes(scenes: Sequence[Scene]) -> list[Solved]:
-    """Settle several scenes, each as `settle_scene` does; as `solve_scenes` otherwise."""
-    return _side_by_side(scenes, settling_scene)
-
-
-def _side_by_side(
-    scenes: Sequence[Scene], asking: Callable[[Scene], Asking[ScenePrediction]]
-) -> list[Solved]:
-    found: list[Solved] = []
-    together: list[Scene] = []
-    for scene in scenes:
-        if together and sum(map(_held_states, (*together, scene))) > MOST_HELD:
-            found += _solved(together, asking)
-            together = []
-        together.append(scene)
-    return found + _solved(together, asking)
-
-
-def _held_states(scene: Scene) -> float:
-    """Say how many states of a scene are held at a time, of all its starts, at most."""
-    per_start = REMEMBERED * scene.duration.longest_s / FEWEST_TIMES * scene.drive.frequency_hz
-    return per_start * (FEWEST if scene.budget_s > 0.0 else 1.0)
-
-
-def _solved(scenes: Sequence[Scene], asking: Callable[[Scene], Asking[ScenePrediction]]) -> list[Solved]:
-    under_way = [asking(scene) for scene in scenes]
-    answers: dict[int, ScenePrediction] = {}
-    taken_s = [0.0] * len(scenes)
-    while len(answers) < len(scenes):
-        asked: dict[int, Sequence[Following]] = {}
-        for place, each in enumerate(under_way):
-            if place not in answers:
-                began_s = time.thread_time()
-                try:
-                    asked[place] = next(each)
-                except StopIteration as end:
-                    answers[place] = end.value
-                taken_s[place] += time.thread_time() - began_s
-        began_s = time.thread_time()
-        follow_all([each for several in asked.values() for each in several])
-        share_s = (time.thread_time() - began_s) / max(1, sum(len(each) for each in asked.values()))
-        for place, several in asked.items():
-            taken_s[place] += share_s * len(several)
-    return [Solved(answers[place], taken_s[place]) for place in range(len(scenes))]
-
-
-def solve_in_lanes(scene: Scene) -> ScenePrediction:
-    """Solve one scene as `solve_scenes` does among any others: to the last digit the same answer.
-
-    For one scene alone `solve_scene` is faster; of chaos it is another draw.
-    """
-    return solve_scenes([scene])[0].prediction
-
-
-def settle_in_lanes(scene: Scene) -> ScenePrediction:
-    """Settle one scene as `settle_scenes` does among any others: to the last digit the same answer.
-
-    For one scene alone `settle_scene` is faster; of chaos it is another draw.
-    """
-    return settle_scenes([scene])[0].prediction

@@ -17,14 +17,14 @@ from ..engine.run import Watch
 from ..model.accuracy import Accuracy
 from ..model.arrays import Floats
 from ..model.outcome import Outcome
-from .course import SceneRun, leads
+from .course import Lead, SceneRun
 from .followed_run import FollowedRun, ObservedWindow, observe_window
 from .prediction import MotionKind, ScenePrediction
 from .repetition import Pace
 from .scatter import draws_apart, draws_of_starts
 from .scene import AutomaticDuration, Scene
 from .several_starts import SEED, pushes
-from .states_alone import Asking
+from .states_alone import Follow
 
 STRICTER = {Accuracy.QUICK: 1e-10, Accuracy.STANDARD: 1e-10, Accuracy.REFERENCE: 1e-12}
 """Tolerance of the comparison. A hundredth of quick's would not do: a collision in one is better."""
@@ -70,8 +70,14 @@ UNKNOWN_ERRORS = StatedErrors(np.full(4, np.nan), np.nan)
 
 
 def stated_errors(
-    scene: Scene, begin: FollowedRun, run: FollowedRun, seen: SceneRun, pace: Pace, slowest_rate: float
-) -> Asking[StatedErrors]:
+    scene: Scene,
+    begin: FollowedRun,
+    run: FollowedRun,
+    seen: SceneRun,
+    pace: Pace,
+    slowest_rate: float,
+    follow: Follow,
+) -> StatedErrors:
     """Find the errors of an answer.
 
     Parameters
@@ -84,6 +90,8 @@ def stated_errors(
         What was seen of it, and what decided how long is long.
     slowest_rate
         Of the slowest mode without contact [1/s], zero or negative.
+    follow
+        How other starts are followed.
 
     """
     answer = seen.window.responses_m
@@ -100,7 +108,7 @@ def stated_errors(
         if float(np.max(off)) < PARTED:
             return StatedErrors(SAFETY * off + sure, float(np.max(off)))
     added = error_per_period(run, scene.accuracy)
-    drawn = yield from _drawn(begin, seen, strict, pace, slowest_rate)
+    drawn = _drawn(begin, seen, strict, pace, slowest_rate, follow)
     return StatedErrors(drawn + SAFETY * added + seen.leaked, added)
 
 
@@ -139,19 +147,26 @@ class _StrictRun:
 
 
 def _drawn(
-    begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace, slowest_rate: float
-) -> Asking[Floats]:
+    begin: FollowedRun,
+    seen: SceneRun,
+    strict: _StrictRun,
+    pace: Pace,
+    slowest_rate: float,
+    follow: Follow,
+) -> Floats:
     """Find what two draws differ by, relatively, shape (4,)."""
     memories = -slowest_rate * seen.window.begins.time_s
     if seen.motion is MotionKind.CHAOTIC and memories >= MEMORIES:
         drawn = draws_apart(seen.blocks, len(seen.window.blocks))
         if drawn is not None:
             return drawn
-    others = yield from _more_starts(begin, seen, strict, pace)
+    others = _more_starts(begin, seen, strict, pace, follow)
     return draws_of_starts(seen.window.responses_m, others)
 
 
-def _more_starts(begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace) -> Asking[list[Floats]]:
+def _more_starts(
+    begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: Pace, follow: Follow
+) -> list[Floats]:
     """Follow a few more starts, and observe the same window of them; NaN where one is lost.
 
     The stricter run is one of them: what the steps have changed before starts come apart is common to all
@@ -163,8 +178,11 @@ def _more_starts(begin: FollowedRun, seen: SceneRun, strict: _StrictRun, pace: P
     if not found:
         runs.append(strict.run.apart(begin.tolerance))
     window = seen.window
-    yield from leads(runs, window.begins.time_s - pace.section_s, pace)
-    for run in runs:
+    until_s = max(window.begins.time_s - pace.section_s, *(run.time_s for run in runs))
+    leads = [Lead(run, until_s, pace) for run in runs]
+    follow([lead.states for lead in leads if lead.states is not None])
+    for run, lead in zip(runs, leads, strict=True):
+        lead.end()
         run.follow(window.begins.time_s)
         found.append(_responses_in(observe_window(run, window.length_s), run))
     return found

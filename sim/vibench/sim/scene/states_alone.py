@@ -1,13 +1,13 @@
 """A motion followed by its states alone, until it repeats: leads, lasting chaos, other starts. SI units.
 
-Who needs one yields it, and goes on when it has been followed: alone, or in lanes beside others.
+Each is followed by itself (`StatesAlone.follow`), or several in SIMD batches of the native engine
+(`in_batches`): a motion comes to the same states whatever is in its batch.
 """
 
 import math
 from collections import defaultdict
-from collections.abc import Generator, Sequence
-from dataclasses import dataclass
-from typing import TypeVar, cast
+from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
@@ -15,7 +15,14 @@ from ..engine.batch import batches_pay, is_batchable
 from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from .followed_run import FollowedRun, Stretch, follow_strobed, follow_together, whole_periods
+from .followed_run import (
+    FollowedRun,
+    Stretch,
+    follow_strobed,
+    follow_together,
+    samples_between,
+    whole_periods,
+)
 from .repetition import Growth, Pace, Repetition, growth_of, section_needed, wandered_until
 from .scene import AutomaticDuration, FixedDuration
 
@@ -28,7 +35,23 @@ REMEMBERED = 16.0
 
 
 class StatesAlone:
-    """A run without a tangent, looked at now and then."""
+    """A run without a tangent, looked at now and then.
+
+    Parameters
+    ----------
+    run, pace
+        The motion, and what decides how long is long.
+    recent
+        States once a drive period before now, shape (n, 6).
+    slice_periods
+        Drive periods between two looks.
+    every
+        Keep every so manyth state in `path`; None keeps none.
+    by_itself_s
+        Until then it is not followed in a batch [s]: on the way to its attractor a motion carries each
+        error along. A whole number of drive periods, where batches begin.
+
+    """
 
     def __init__(
         self,
@@ -37,11 +60,14 @@ class StatesAlone:
         recent: Floats | None = None,
         slice_periods: int | None = None,
         every: int | None = None,
+        by_itself_s: float = 0.0,
     ) -> None:
         run.drop_tangent()
         self.run = run
+        self.until_s = self.cost_s = math.inf
+        self.by_itself_s = by_itself_s
         self.path: list[Stretch] = []
-        """What was seen of it, with ``every`` so manyth state; nothing unless that is asked for."""
+        """What was seen of it, with the states that are kept."""
         self.repeats: Repetition | None = None
         """Found; it is followed no further then."""
         self.recent = np.empty((0, 6)) if recent is None else recent
@@ -62,21 +88,45 @@ class StatesAlone:
         """When it was last seen to change from period to period; now, if it does not repeat."""
         return self.run.time_s if self._settled_s is None else self._settled_s
 
-    def follow(self, until_s: float, cost_s: float = math.inf) -> None:
-        """Follow it until it repeats, an instant is reached, or its cost from its beginning is."""
-        frequency_hz = self._pace.frequency_hz
-        while not self.is_over and self.run.time_s < until_s and self.run.cost_s < cost_s:
-            made = round(self.run.time_s * frequency_hz)
+    def aim(self, until_s: float, cost_s: float = math.inf) -> Self:
+        """Set how far it is to be followed: to an instant, or to a cost from its beginning."""
+        self.until_s, self.cost_s = until_s, cost_s
+        return self
+
+    def follow(self, at_most_s: float = math.inf) -> None:
+        """Follow it until it repeats or its aim is reached, but not beyond ``at_most_s``."""
+        run, frequency_hz, until_s = self.run, self._pace.frequency_hz, min(self.until_s, at_most_s)
+        while not self.is_over and run.time_s < until_s and run.cost_s < self.cost_s:
+            made = round(run.time_s * frequency_hz)
+            goal_s = min(until_s, self.by_itself_s) if run.time_s < self.by_itself_s else until_s
             # An end between two periods is reached, but nothing is looked for there.
-            end_s = min((made + self._slice_periods) / frequency_hz, until_s)
-            stretch = follow_strobed(self.run, end_s)
+            end_s = min((made + self._slice_periods) / frequency_hz, goal_s)
+            stretch = run.follow(end_s, samples=samples_between(frequency_hz, run.time_s, end_s))
             self.repeats = self._noted(stretch)
             if self.repeats is not None:
                 since = wandered_until(self.recent, 2.0 * math.pi * frequency_hz, self.repeats.period)
-                self._settled_s = self.run.time_s - (len(self.recent) - since) / frequency_hz
+                self._settled_s = run.time_s - (len(self.recent) - since) / frequency_hz
+
+    @property
+    def batch_periods(self) -> int:
+        """Whole drive periods of the next round in a batch; none between two periods, or within a contact."""
+        run = self.run
+        if self.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
+            return 0
+        frequency_hz = run.drive.frequency_hz
+        left = whole_periods(self.until_s, frequency_hz) - run.periods
+        return min(left, math.ceil(ROUND_S * frequency_hz), ROUND_PERIODS)
+
+    def follow_to_flight(self) -> None:
+        """Follow a motion that is in contact now until a drive period ends in flight, if one does soon."""
+        run = self.run
+        for _ in range(TRIES):
+            if run.is_in_flight or run.periods is None:
+                return
+            self.follow((run.periods + 1) / run.drive.frequency_hz)
 
     def note(self, stretch: Stretch) -> bool:
-        """Keep the states of a stretch that lanes have followed; says whether the motion seems to repeat.
+        """Keep the states of a stretch that was followed in a batch; says whether the motion seems to repeat.
 
         `follow` finds that out: it goes on from here by itself.
         """
@@ -99,59 +149,14 @@ class StatesAlone:
         return growth_of(stretches)
 
 
-ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
-"""Time between two looks at motions in lanes, and drive periods at most: their states are held meanwhile."""
-HELD_STATES, FULL = 1 << 20, 16
-"""States of all motions in lanes together, at most, and motions at least: more fill lanes no better."""
-TRIES = 8
-"""Drive periods that a motion is followed by itself until one ends in flight: lanes begin there."""
+Follow = Callable[[Sequence[StatesAlone]], None]
+"""Follows motions as far as each aims: `one_by_one` or `in_batches`."""
 
 
-@dataclass(frozen=True, eq=False)
-class Following:
-    """A motion to be followed, and how far."""
-
-    alone: StatesAlone
-    until_s: float
-    cost_s: float
-    """From its beginning; see `StatesAlone.follow`."""
-
-    def by_itself(self) -> None:
-        """Follow it, and nothing beside it."""
-        self.alone.follow(self.until_s, self.cost_s)
-
-    @property
-    def periods(self) -> int:
-        """Whole drive periods of the next round in lanes; none between two periods, or within a contact."""
-        run = self.alone.run
-        if self.alone.is_over or run.periods is None or not run.is_in_flight or not run.cost_s < self.cost_s:
-            return 0
-        frequency_hz = run.drive.frequency_hz
-        left = whole_periods(self.until_s, frequency_hz) - run.periods
-        return min(left, math.ceil(ROUND_S * frequency_hz), ROUND_PERIODS)
-
-    def to_flight(self) -> None:
-        """Follow a motion that is in contact now until a drive period ends in flight, if one does soon."""
-        run = self.alone.run
-        for _ in range(TRIES):
-            if run.is_in_flight or run.periods is None:
-                return
-            self.alone.follow(min((run.periods + 1) / run.drive.frequency_hz, self.until_s), self.cost_s)
-
-
-Answer = TypeVar("Answer")
-Asking = Generator[Sequence[Following], None, Answer]
-"""What asks for motions to be followed, and goes on when they have been."""
-
-
-def alone(asking: Asking[Answer]) -> Answer:
-    """Bring what asks to its end by itself, one motion after the other."""
-    try:
-        while True:
-            for each in next(asking):
-                each.by_itself()
-    except StopIteration as end:
-        return cast("Answer", end.value)
+def one_by_one(several: Sequence[StatesAlone]) -> None:
+    """Follow each motion by itself."""
+    for each in several:
+        each.follow()
 
 
 WORTH_A_FIT_S = 3000.0
@@ -160,8 +165,8 @@ AUTOMATIC_S = 10.0
 """What an automatic duration counts for there [s]."""
 
 
-def lanes_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
-    """Whether so many motions of one specimen are followed in less time in lanes than one after the other.
+def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
+    """Whether so many motions of one specimen are followed in less time in batches than one after the other.
 
     It hangs on what is asked for and on the processor, and not on what runs took lately: who asks twice has
     the same answer twice.
@@ -170,38 +175,36 @@ def lanes_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration
     return motions * each_s >= WORTH_A_FIT_S and batches_pay()
 
 
-def in_lanes(asking: Asking[Answer]) -> Answer:
-    """Bring what asks to its end, its motions side by side as far as lanes serve."""
-    try:
-        while True:
-            follow_all(next(asking))
-    except StopIteration as end:
-        return cast("Answer", end.value)
+ROUND_S, ROUND_PERIODS = 2.0, 1 << 16
+"""Time between two looks at motions in a batch, and drive periods at most: their states are held."""
+HELD_STATES, FULL = 1 << 20, 16
+"""States of all motions in a batch, at most, and motions at least: more fill lanes no better."""
+TRIES = 8
+"""Drive periods that a motion is followed by itself until one ends in flight: batches begin there."""
 
 
-def follow_all(several: Sequence[Following]) -> None:
-    """Follow motions as far as is asked: in lanes where these serve, else one by one.
+def in_batches(several: Sequence[StatesAlone]) -> None:
+    """Follow motions in batches where the specimen allows, else one by one.
 
-    Each comes to the same states whatever is followed beside it. Lanes follow states and nothing else:
-    whether a motion repeats is found, and its last state reached, as it is without them.
+    Batches follow states and nothing else: whether a motion repeats is found, and its last state reached,
+    as it is without them.
     """
-    alike = defaultdict[tuple[Specimen, float], list[Following]](list)
+    alike = defaultdict[tuple[Specimen, float], list[StatesAlone]](list)
     for each in several:
-        run = each.alone.run
-        if is_batchable(run.specimen, run.tolerance):
-            alike[run.specimen, run.tolerance].append(each)
+        if is_batchable(each.run.specimen, each.run.tolerance):
+            each.follow(each.by_itself_s)
+            alike[each.run.specimen, each.run.tolerance].append(each)
     for group in alike.values():
         _follow_rounds(group)
-    for each in several:
-        each.by_itself()
+    one_by_one(several)
 
 
-def _follow_rounds(group: Sequence[Following]) -> None:
+def _follow_rounds(group: Sequence[StatesAlone]) -> None:
     under_way = list(group)
     while under_way:
         for each in under_way:
-            each.to_flight()
-        ready = [(each, each.periods) for each in under_way if each.periods > 0]
+            each.follow_to_flight()
+        ready = [(each, periods) for each in under_way if (periods := each.batch_periods) > 0]
         longest = max((periods for _, periods in ready), default=1)
         size = max(FULL, HELD_STATES // longest)
         under_way = [
@@ -209,12 +212,12 @@ def _follow_rounds(group: Sequence[Following]) -> None:
         ]
 
 
-def _round(ready: Sequence[tuple[Following, int]]) -> list[Following]:
-    """Follow motions in lanes, each for so many drive periods; gives those that are to be followed on."""
-    found = follow_together([each.alone.run for each, _ in ready], [periods for _, periods in ready])
-    # One that a lane has lost is where it was, and followed by itself.
+def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
+    """Follow motions in a batch, each for so many drive periods; gives those that are to be followed on."""
+    found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
+    # One that the batch has lost is where it was, and followed by itself.
     return [
         each
         for (each, _), stretch in zip(ready, found, strict=True)
-        if stretch is not None and not each.alone.note(stretch)
+        if stretch is not None and not each.note(stretch)
     ]

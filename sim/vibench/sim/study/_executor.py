@@ -7,12 +7,12 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeAlias
 
-from ..scene.measured_cost import learn_cost
+from ..scene.measured_cost import Solver as SceneSolver, learn_cost
 from ..scene.prediction import Method, ScenePrediction
 from ..scene.scene import Scene
-from ..scene.solve import Solved, settle_in_lanes, settle_scenes, solve_in_lanes, solve_scenes
+from ..scene.solve import Question, Solved, solve_scenes
 
 
 @dataclass(frozen=True)
@@ -62,51 +62,33 @@ class Executor(Protocol):
         """Let go of every worker. Legal at any time."""
 
 
-Solver = Callable[[Scene], ScenePrediction]
+Solver: TypeAlias = SceneSolver
 Kind = tuple[object, ...]
-
-TOGETHER: dict[Solver, Callable[[Sequence[Scene]], Sequence[Solved]]] = {
-    settle_in_lanes: settle_scenes,
-    solve_in_lanes: solve_scenes,
-}
-"""Solvers that answer several scenes in less time than one after the other."""
-
 _solved_before: set[Kind] = set()
 """Kinds of scenes for which this process is prepared."""
 
 
 def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
-    """Solve scenes, together if the solver can, and say what each cost this thread.
+    """Solve scenes, in batches or one by one, and say what each cost this thread.
 
-    A scene that begins before one of its kind has ended may have loaded modules and made tables: its
-    time says nothing.
+    What they cost is learnt. A scene that begins before one of its kind has ended may have loaded modules and
+    made tables: its time says nothing.
     """
-    together = TOGETHER.get(solver)
-    if together is None:
-        for scene in scenes:
-            yield from _noted([scene], solver, lambda each: [_timed(each[0], solver)])
-    else:
-        yield from _noted(scenes, solver, together)
+    for group in [scenes] if isinstance(solver, Question) else [[scene] for scene in scenes]:
+        kinds: list[Kind] = [
+            (solver, type(each.specimen.contact), each.observe, type(each.duration)) for each in group
+        ]
+        are_prepared = [kind in _solved_before for kind in kinds]
+        found = solve_scenes(group, solver) if isinstance(solver, Question) else [_timed(group[0], solver)]
+        _solved_before.update(kinds)
+        for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
+            # To plan a closed form takes about as long as to evaluate it.
+            if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
+                learn_cost(scene, each.taken_s, solver)
+            yield Solved(each.prediction, each.taken_s if is_prepared else math.nan)
 
 
-def _timed(scene: Scene, solver: Solver) -> Solved:
+def _timed(scene: Scene, solver: Callable[[Scene], ScenePrediction]) -> Solved:
     start_s = time.thread_time()
     prediction = solver(scene)
     return Solved(prediction, time.thread_time() - start_s)
-
-
-def _noted(
-    scenes: Sequence[Scene], solver: Solver, solve: Callable[[Sequence[Scene]], Sequence[Solved]]
-) -> Iterator[Solved]:
-    """Solve scenes, and learn what they cost from those that were prepared for before."""
-    kinds: list[Kind] = [
-        (solver, type(each.specimen.contact), each.observe, type(each.duration)) for each in scenes
-    ]
-    are_prepared = [kind in _solved_before for kind in kinds]
-    found = solve(scenes)
-    _solved_before.update(kinds)
-    for scene, is_prepared, each in zip(scenes, are_prepared, found, strict=True):
-        # To plan a closed form takes about as long as to evaluate it.
-        if is_prepared and each.prediction.method is not Method.CLOSED_FORM:
-            learn_cost(scene, each.taken_s, solver)
-        yield Solved(each.prediction, each.taken_s if is_prepared else math.nan)

@@ -17,8 +17,8 @@ from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..scene.measured_cost import expected_cost_s
 from ..scene.scene import Given, Rest, Scene
-from ..scene.solve import Solved, solve_in_lanes, solve_scene
-from ..scene.states_alone import lanes_are_worth_it
+from ..scene.solve import Question, Solved, solve_scene
+from ..scene.states_alone import batches_are_worth_it
 from ._answers import cells_of, cut_text
 from ._axes import Grid
 from ._columns import CONTINUES, DURATION, FINAL_STATE, IDENTITY, IDENTITY_DIGITS, MESSAGE, PHASE, TAKEN, Cell
@@ -111,17 +111,17 @@ OTHER_STARTS = 8
 
 
 def study_solver(study: Study) -> Solver:
-    """Choose what computes the points of a study: lanes, or one point after the other.
+    """Choose what computes the points of a study: batches, or one point after the other.
 
-    Lanes follow motions that do not wait for each other, and pay where a processor has the registers and a
+    Batches follow motions that do not wait for each other, and pay where a processor has the registers and a
     specimen is moved for long enough. What they cannot follow (other stops than Hertz's, accuracy
     *reference*) goes one by one either way.
     """
     is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1
     motions = starts * math.prod(study.grid.shape[AXES_OF_SPECIMEN:])
-    pays = not is_chained and lanes_are_worth_it(motions, study.duration)
-    return solve_in_lanes if pays else solve_scene
+    pays = not is_chained and batches_are_worth_it(motions, study.duration)
+    return Question.ANSWER if pays else solve_scene
 
 
 class Expansion:
