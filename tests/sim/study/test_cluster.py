@@ -23,12 +23,11 @@ from vibench.sim.study import (
     run_study,
     solve_study,
 )
-from vibench.sim.study._columns import SESSION
+from vibench.sim.study._columns import SESSION, STATE
 from vibench.sim.study._errors import ClusterLost
 from vibench.sim.study._file_store import FileStore
-from vibench.sim.study._layout import STATE
+from vibench.sim.study._queue import StudyEnd
 from vibench.sim.study._results import results_of
-from vibench.sim.study._run import StudyEnd
 
 pytest.importorskip("distributed", reason="a cluster needs the extra 'cluster'")
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from vibench.sim.study._axes import Grid
-from vibench.sim.study._point_scheduler import Costs
+from vibench.sim.study._grid import Grid
+from vibench.sim.study._queue import Costs
 
 
 def line_of(planned_s):

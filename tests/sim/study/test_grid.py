@@ -3,7 +3,7 @@ import math
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
-from vibench.sim.study._axes import Grid
+from vibench.sim.study._grid import Grid
 
 axes = st.lists(st.tuples(st.integers(1, 4), st.booleans()), min_size=1, max_size=4)
 

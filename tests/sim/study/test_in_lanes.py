@@ -11,8 +11,7 @@ from vibench.sim.scene import solve as _solve
 from vibench.sim.scene.prediction import Method, StartMemory
 from vibench.sim.scene.scene import FixedDuration, Given
 from vibench.sim.scene.solve import Question, solve_scenes
-from vibench.sim.study import Study, planned_work_s, solve_study
-from vibench.sim.study._expansion import study_solver
+from vibench.sim.study import Study, planned_work_s, solve_study, study_solver
 
 
 def solve_in_lanes(scene):

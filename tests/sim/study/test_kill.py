@@ -12,10 +12,9 @@ import pytest
 
 from vibench.sim import solve_scene
 from vibench.sim.study import PointState, ThreadExecutor, open_study, run_study, solve_study
-from vibench.sim.study._columns import SESSION
+from vibench.sim.study._columns import SESSION, STATE
 from vibench.sim.study._file_store import FileStore
-from vibench.sim.study._layout import STATE
-from vibench.sim.study._run import StudyEnd
+from vibench.sim.study._queue import StudyEnd
 
 CHILD = Path(__file__).with_name("study_child.py")
 SPEC = importlib.util.spec_from_file_location("study_child", CHILD)

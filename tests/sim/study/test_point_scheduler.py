@@ -3,8 +3,8 @@ import random
 import numpy as np
 from hypothesis import given, settings, strategies as st
 
-from vibench.sim.study._axes import Grid
-from vibench.sim.study._point_scheduler import NOBODY, Costs, PointScheduler
+from vibench.sim.study._grid import Grid
+from vibench.sim.study._queue import NOBODY, Costs, PointScheduler
 
 
 def scheduler_of(planned_s, after=None, is_done=None):

@@ -13,8 +13,8 @@ from vibench.sim.study import MemoryStore, PointState, Study, ThreadExecutor, ru
 from vibench.sim.study._columns import CONTINUES, PHASE
 from vibench.sim.study._errors import InvalidStudy
 from vibench.sim.study._executor import Reply, solve_timed
+from vibench.sim.study._queue import StudyEnd
 from vibench.sim.study._results import results_of
-from vibench.sim.study._run import StudyEnd
 from vibench.sim.study._study import GivenStart
 
 

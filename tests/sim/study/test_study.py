@@ -4,7 +4,7 @@ from pydantic import ValidationError
 from vibench.sim import RigidStops, SpecimenWarning, gong2025
 from vibench.sim.scene.scene import Rest
 from vibench.sim.study import Start, Study
-from vibench.sim.study._axes import FREQUENCY
+from vibench.sim.study._grid import FREQUENCY
 from vibench.sim.study._study import GivenStart
 
 LEAST = {"frequencies_hz": [100.0, 200.0], "amplitudes_m": [1e-6]}

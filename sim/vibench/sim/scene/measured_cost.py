@@ -1,23 +1,17 @@
 """What runs of a scene's kind take on this machine: learnt from each, or measured where none was made."""
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 
 from ..costs.ledger import FEWEST, Expected, cost_ledger
 from .plan import ScenePlan, plan_scene
-from .prediction import ScenePrediction
 from .scene import Scene
-from .solve import Question, settle_scene, solve_scene
+from .solve import Question, Solver, settle_scene, solve_scene
 
 MEASURED_S = 0.5
 """Processor time after which no further run is made to measure a cost [s]."""
 DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
 """Frequencies of the runs by which a cost is measured, over the scene's: neighbours differ as runs do."""
-
-
-Solver = Callable[[Scene], ScenePrediction] | Question
-"""What answers scenes one by one; or the question that is answered for all of them in batches."""
 
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",

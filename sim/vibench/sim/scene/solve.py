@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -58,6 +58,10 @@ class Question(StrEnum):
     """Its responses with their errors, and what other starts come to where its own is forgotten."""
     MOTION = "motion"
     """The motion and its responses alone: for maps, whose neighbouring points tell more than errors."""
+
+
+Solver = Callable[[Scene], ScenePrediction] | Question
+"""What answers scenes one by one; or the question that is answered for all of them in batches."""
 
 
 def solve_scene(scene: Scene, question: Question = Question.ANSWER) -> ScenePrediction:

@@ -1,16 +1,10 @@
-from ._answers import (
-    prediction_at as prediction_at,
-)
-from ._axes import (
-    Grid as Grid,
-    StudyAxis as StudyAxis,
-)
 from ._columns import (
     COLUMNS as COLUMNS,
     MESSAGE as MESSAGE,
     NUMBERS as NUMBERS,
     Cell as Cell,
     Column as Column,
+    PointState as PointState,
 )
 from ._errors import (
     InvalidStudy as InvalidStudy,
@@ -19,36 +13,25 @@ from ._errors import (
 from ._executor import (
     Executor as Executor,
     Solver as Solver,
+    ThreadExecutor as ThreadExecutor,
 )
-from ._expansion import (
-    continued_point as continued_point,
-    end_phase as end_phase,
-    failed_point as failed_point,
-    planned_times as planned_times,
-    planned_work_s as planned_work_s,
-    predecessors as predecessors,
-)
-from ._file_reading import (
-    Plan as Plan,
-    read_arrays as read_arrays,
-    read_plan as read_plan,
-    read_sessions as read_sessions,
-)
-from ._layout import (
-    PointState as PointState,
-)
-from ._point_scheduler import (
+from ._grid import (
+    Grid as Grid,
     GridPlan as GridPlan,
+    StudyAxis as StudyAxis,
+)
+from ._queue import (
+    StudyEnd as StudyEnd,
+    run_points as run_points,
 )
 from ._results import (
     GridResults as GridResults,
+    Plan as Plan,
     StudyResults as StudyResults,
     open_study as open_study,
-)
-from ._run import (
-    StudyEnd as StudyEnd,
-    run_points as run_points,
-    run_study as run_study,
+    read_arrays as read_arrays,
+    read_plan as read_plan,
+    read_sessions as read_sessions,
 )
 from ._software import (
     PACKAGES as PACKAGES,
@@ -56,7 +39,14 @@ from ._software import (
 )
 from ._solve import (
     ExistingStudy as ExistingStudy,
+    continued_point as continued_point,
+    end_phase as end_phase,
     executor_of as executor_of,
+    failed_point as failed_point,
+    planned_times as planned_times,
+    planned_work_s as planned_work_s,
+    predecessors as predecessors,
+    run_study as run_study,
     solve_study as solve_study,
     store_of as store_of,
 )
@@ -65,6 +55,7 @@ from ._store import (
     MemoryStore as MemoryStore,
     PointAnswer as PointAnswer,
     Store as Store,
+    prediction_at as prediction_at,
 )
 from ._study import (
     GivenStart as GivenStart,
@@ -73,7 +64,5 @@ from ._study import (
     StudyObservable as StudyObservable,
     frequency_range as frequency_range,
     plausibility_warnings as plausibility_warnings,
-)
-from ._threads import (
-    ThreadExecutor as ThreadExecutor,
+    study_solver as study_solver,
 )

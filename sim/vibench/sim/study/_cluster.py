@@ -16,9 +16,8 @@ from distributed.comm import get_address_host_port
 from ..scene.scene import Scene
 from ..scene.solve import Solved, solve_scene
 from ._errors import ClusterLost
-from ._executor import Bundle, Reply, Solver, solve_timed
+from ._executor import Bundle, Reply, Solver, arrived_in, solve_timed
 from ._software import software
-from ._threads import arrived_in
 
 CONNECT_PATIENCE_S = 30.0
 """How long the scheduler, and then its first worker, is waited for."""

@@ -22,8 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
-from . import _layout as layout
-from ._axes import StudyAxis
+from . import _columns as layout
 from ._columns import (
     COORDINATE,
     COORDINATES,
@@ -33,8 +32,8 @@ from ._columns import (
     Column,
 )
 from ._errors import StudyError
-from ._file_reading import places_of, read_arrays, read_plan
-from ._point_scheduler import GridPlan
+from ._grid import GridPlan, StudyAxis
+from ._results import places_of, read_arrays, read_plan
 from ._software import software
 from ._store import Arrays, PointAnswer, put
 

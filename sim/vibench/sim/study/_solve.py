@@ -1,23 +1,223 @@
 """One call that does it all: a study, workers, a place for the answers, and the answers."""
 
-from collections.abc import Iterator
+import hashlib
+import json
+import math
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from enum import StrEnum
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
 from ..background import Cancelled, Observer
+from ..model.arrays import Floats
+from ..model.outcome import Outcome
 from ..model.stops import chosen
-from ..scene.solve import solve_scene
+from ..scene.measured_cost import expected_cost_s
+from ..scene.scene import Given, Rest, Scene
+from ..scene.solve import Solved, solve_scene
+from ._columns import (
+    CONTINUES,
+    DURATION,
+    FINAL_STATE,
+    IDENTITY,
+    IDENTITY_DIGITS,
+    MESSAGE,
+    PHASE,
+    TAKEN,
+    Cell,
+    PointState,
+)
 from ._errors import ClusterLost
-from ._executor import Executor, Solver
-from ._expansion import study_solver
-from ._point_scheduler import GridPlan
+from ._executor import Executor, Solver, ThreadExecutor
+from ._grid import Grid, GridPlan
+from ._queue import NOBODY, StudyEnd, run_points
 from ._results import StudyResults, open_study, results_of
-from ._run import run_study
-from ._store import MemoryStore, Store
-from ._study import Study
-from ._threads import ThreadExecutor
+from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of, cut_text
+from ._study import GivenStart, Start, Study, continued_from, study_solver
+
+# A study's points as scenes: what each one begins from, and what is kept of its answer.
+#
+# The identity of a scene: a digest of everything it says, the same in every process on every machine.
+
+_scenes = TypeAdapter(Scene)
+
+
+def scene_identity(scene: Scene, continued: str = "") -> str:
+    """Digest of a scene's content.
+
+    Parameters
+    ----------
+    scene
+        Numbers count to the last bit; the order of fields does not.
+    continued
+        Identity of the scene whose end is this one's start, if it continues one. It stands for the state and
+        the phase at the start, which follow from it.
+
+    """
+    content = _scenes.dump_python(scene, mode="python")
+    # A name changes no motion.
+    content["start"].pop("name", None)
+    if continued:
+        content["start"] = {"continues": continued}
+        del content["drive"]["phase_rad"]
+    # Python writes floats with as many digits as tell them apart, and infinity as a word.
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:IDENTITY_DIGITS]
+
+
+PLANNED = 2000
+"""Points that are planned one by one; of a larger study every so manyth, for all up to the next."""
+
+
+def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
+    """Give whom each point continues, or NOBODY, shape (points,); ``starts`` are the last axis but one."""
+    blocks = np.full(grid.shape, NOBODY)
+    numbers = np.arange(grid.size).reshape(grid.shape)
+    for index, start in enumerate(starts):
+        match start:
+            case Start.UP:
+                blocks[..., index, 1:] = numbers[..., index, :-1]
+            case Start.DOWN:
+                blocks[..., index, :-1] = numbers[..., index, 1:]
+            case _:
+                pass
+    return blocks.reshape(-1)
+
+
+def planned_times(grid: Grid, planned: Callable[[int], float]) -> Floats:
+    """Give the time that each point is ``planned`` to take [s], shape (points,)."""
+    every = max(1, math.ceil(grid.size / PLANNED))
+    some = [planned(number) for number in range(0, grid.size, every)]
+    return np.repeat(some, every)[: grid.size]
+
+
+def continued_point(before: int, arrays: Arrays) -> int:
+    """Give a point's predecessor, ``before``; NOBODY where ``arrays`` have no finite end of it."""
+    if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
+        return NOBODY
+    return before
+
+
+def end_phase(frequency_hz: float, before: int, arrays: Arrays) -> float:
+    """Phase [rad] at which the drive of ``before`` stopped, by ``arrays``: the next one goes on there."""
+    turns = math.fmod(frequency_hz * float(arrays[DURATION][before]), 1.0)
+    return math.fmod(2.0 * math.pi * turns + float(arrays[PHASE][before]), 2.0 * math.pi)
+
+
+def failed_point(number: int, error: BaseException) -> PointAnswer:
+    """Say what is kept of scene ``number`` that ended in ``error``: a refusal is a sentence by itself."""
+    match error:
+        case ValueError():
+            said = str(error)
+        case _:
+            said = f"{type(error).__name__}: {error}"
+    return PointAnswer(number, PointState.FAILED, {MESSAGE: cut_text(said)})
+
+
+BUNDLE_S, LANES_S = 0.05, 0.5
+"""Worker time worth a trip to a worker and back, which costs a few milliseconds on a cluster; and that of
+scenes that fill the lanes."""
+
+
+class Expansion:
+    """The scenes of a study, made when they are asked for."""
+
+    def __init__(self, study: Study) -> None:
+        self._study = study
+        self.grid = study.grid
+        self._solver = study_solver(study)
+        self.bundle_s = BUNDLE_S if self._solver is solve_scene else LANES_S
+
+    @cached_property
+    def after(self) -> NDArray[np.int64]:
+        """Point that each one continues, or NOBODY, shape (points,)."""
+        return predecessors(self.grid, self._study.starts)
+
+    @cached_property
+    def planned_s(self) -> Floats:
+        """Time that each point is planned to take, shape (points,)."""
+        return planned_times(self.grid, self._planned)
+
+    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+        """Ask for every point."""
+        return np.arange(len(arrays[FINAL_STATE]))
+
+    def scene(self, number: int, arrays: Arrays) -> Scene:
+        """Make the scene of a point whose predecessor, if it has one, is done.
+
+        A point whose predecessor ended in no finite state begins at rest; its ``continues`` says so. Raises
+        ValueError when a scene of these numbers is not allowed.
+        """
+        before = self._predecessor(number, arrays)
+        if before == NOBODY:
+            return self._unchained(number)
+        state = tuple(float(value) for value in arrays[FINAL_STATE][before])
+        x, y, z, vx, vy, vz = state
+        name = continued_from(self._study.frequencies_hz[self.grid.place(before)[-1]])
+        start = Given((x, y, z, vx, vy, vz), name)
+        return self._study.scene(self.grid.place(number), start, self._end_phase(before, arrays))
+
+    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+        """Say what is kept of a prediction."""
+        is_at_end = solved.prediction.outcome == Outcome.REACHED_END
+        cells = {**cells_of(solved.prediction), **self._origin(number, scene, arrays), TAKEN: solved.taken_s}
+        state = PointState.DONE if is_at_end else PointState.STOPPED
+        return PointAnswer(number, state, cells, solved.taken_s)
+
+    def failure(self, number: int, error: BaseException) -> PointAnswer:
+        """Say what is kept of a scene that could not be computed."""
+        return failed_point(number, error)
+
+    def _origin(self, number: int, scene: Scene, arrays: Arrays) -> dict[str, Cell]:
+        """Say where a point began, and which scene it is."""
+        before = self._predecessor(number, arrays)
+        known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
+        return {
+            CONTINUES: before,
+            PHASE: scene.drive.phase_rad,
+            IDENTITY: scene_identity(scene, known).encode(),
+        }
+
+    def _predecessor(self, number: int, arrays: Arrays) -> int:
+        return continued_point(int(self.after[number]), arrays)
+
+    def _end_phase(self, before: int, arrays: Arrays) -> float:
+        """Phase at which the predecessor's drive stopped: the base goes on from where it is."""
+        return end_phase(self._study.frequencies_hz[self.grid.place(before)[-1]], before, arrays)
+
+    def _unchained(self, number: int) -> Scene:
+        """Make the scene of a point that continues no other."""
+        place = self.grid.place(number)
+        start = self._study.starts[place[-2]]
+        match start:
+            case GivenStart():
+                return self._study.scene(place, Given(start.state, start.label))
+            case _:
+                return self._study.scene(place, Rest())
+
+    def _planned(self, number: int) -> float:
+        """Planned time of a point; none when its scene is not allowed, which its answer will say."""
+        try:
+            return expected_cost_s(self._unchained(number), self._solver)
+        except ValueError:
+            return 0.0
+
+
+def planned_work_s(study: Study) -> float:
+    """Time that all points of a study together are planned to take on one core [s]; none is run.
+
+    >>> from vibench.sim.study import Study
+    >>> study = Study(frequencies_hz=(200.0, 260.0), amplitudes_m=(1e-6,))
+    >>> 0.0 < planned_work_s(study) < 60.0
+    True
+    """
+    return float(Expansion(study).planned_s.sum())
 
 
 class ExistingStudy(StrEnum):
@@ -106,3 +306,33 @@ def _cluster_executor(address: str, solver: Solver) -> Executor:
             " install vibench with its extra 'cluster'."
         ) from error
     return ClusterExecutor(address, solver)
+
+
+def run_study(
+    study: Study,
+    executor: Executor,
+    store: Store,
+    observer: Observer | None = None,
+    cancelled: Cancelled | None = None,
+) -> StudyEnd:
+    """Compute every point that the store misses, longest first.
+
+    The answers do not depend on the executor or on the order: each scene is computed alone, and a point
+    that continues another waits for it. An error in one scene is that point's answer.
+
+    Parameters
+    ----------
+    study, executor, store
+        What is asked, who computes, and where it is kept.
+    observer
+        Told of every answer.
+    cancelled
+        Asked between answers whether to end.
+
+    Raises
+    ------
+    StudyError
+        When the store or the executor fails; what was kept before is kept.
+
+    """
+    return run_points(Expansion(study), executor, store, observer, cancelled)

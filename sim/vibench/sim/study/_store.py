@@ -8,11 +8,33 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from . import _layout as layout
-from ._axes import Grid
-from ._columns import Cell, Column
-from ._layout import PointState
-from ._point_scheduler import GridPlan
+from ..model.accuracy import Accuracy, AccuracyWord
+from ..model.outcome import Outcome
+from ..model.stops import chosen
+from ..scene.prediction import Ensemble, FoundMotion, Method, MotionKind, ScenePrediction, StartMemory
+from ..scene.shares import EscapeRate, Share
+from . import _columns as layout
+from ._columns import (
+    ENDED,
+    ENSEMBLE_NUMBERS,
+    ESCAPE_NUMBERS,
+    FINAL_STATE,
+    FOUND_KIND,
+    FOUND_NUMBERS,
+    FOUND_SHARE,
+    MEMORY,
+    METHOD,
+    MOST_FOUND,
+    MOTION,
+    NUMBERS,
+    OUTCOME,
+    STARTS,
+    TEXT_BYTES,
+    Cell,
+    Column,
+    PointState,
+)
+from ._grid import Grid, GridPlan
 
 Arrays = dict[str, NDArray[np.generic]]
 
@@ -107,3 +129,122 @@ class MemoryStore:
         for name, values in cells.items():
             self._arrays[name][numbers] = values
         self._arrays[layout.STATE][numbers] = layout.PointState.FILLED
+
+
+def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:
+    """Turn a prediction into cells; what was not asked, or not found, stays missing."""
+    return {
+        **_known(prediction, NUMBERS),
+        **_cells_of_ensemble(prediction.ensemble),
+        MOTION: list(MotionKind).index(prediction.motion),
+        MEMORY: list(StartMemory).index(prediction.memory),
+        METHOD: list(Method).index(prediction.method),
+        OUTCOME: int(prediction.outcome),
+        ENDED: cut_text(prediction.ended),
+        FINAL_STATE: prediction.final_state,
+    }
+
+
+def _known(value: object, columns: Mapping[str, Column]) -> dict[str, Cell]:
+    numbers = {column.name: getattr(value, field) for field, column in columns.items()}
+    return {name: number for name, number in numbers.items() if number is not None}
+
+
+def _cells_of_ensemble(ensemble: Ensemble | None) -> dict[str, Cell]:
+    """Cells of an ensemble; those of its motions have a place for each."""
+    if ensemble is None:
+        return {}
+    kept = ensemble.motions[:MOST_FOUND]
+    cells = _known(ensemble, ENSEMBLE_NUMBERS)
+    if ensemble.escape is not None:
+        cells |= _known(ensemble.escape, ESCAPE_NUMBERS)
+    cells[FOUND_KIND.name] = _placed(FOUND_KIND, [list(MotionKind).index(each.motion) for each in kept])
+    for field, column in FOUND_NUMBERS.items():
+        cells[column.name] = _placed(column, [getattr(each, field) for each in kept])
+    for field, column in FOUND_SHARE.items():
+        cells[column.name] = _placed(column, [getattr(each.share, field) for each in kept])
+    return cells
+
+
+def _placed(column: Column, values: list[float | None]) -> Cell:
+    """Fill the places of a column, those of absent values and of absent motions with what is missing."""
+    filled = [column.missing if value is None else value for value in values]
+    return tuple(filled + [column.missing] * (MOST_FOUND - len(filled)))  # type: ignore[arg-type]
+
+
+def _ensemble_at(arrays: Arrays, number: int) -> Ensemble | None:
+    """Make the ensemble of a point from its cells; None where it has none."""
+    if _number(arrays[STARTS][number]) is None:
+        return None
+    ensemble = {field: _number(arrays[column.name][number]) for field, column in ENSEMBLE_NUMBERS.items()}
+    escape = {field: _number(arrays[column.name][number]) for field, column in ESCAPE_NUMBERS.items()}
+    kinds = arrays[FOUND_KIND.name][number]
+    return Ensemble(
+        **ensemble,  # type: ignore[arg-type]
+        motions=tuple(_motion_at(arrays, number, k) for k in range(MOST_FOUND) if int(kinds[k]) >= 0),
+        escape=None if escape["chaotic_s"] is None else EscapeRate(**escape),  # type: ignore[arg-type]
+    )
+
+
+def _motion_at(arrays: Arrays, number: int, place: int) -> FoundMotion:
+    found = {field: _number(arrays[column.name][number, place]) for field, column in FOUND_NUMBERS.items()}
+    share = {field: _number(arrays[column.name][number, place]) for field, column in FOUND_SHARE.items()}
+    return FoundMotion(
+        **found,  # type: ignore[arg-type]
+        motion=list(MotionKind)[int(arrays[FOUND_KIND.name][number, place])],
+        share=Share(**share),  # type: ignore[arg-type]
+    )
+
+
+def prediction_at(
+    arrays: Arrays,
+    number: int,
+    frequency_hz: float,
+    amplitude_m: float,
+    accuracy: Accuracy | AccuracyWord,
+    start: str,
+) -> ScenePrediction:
+    """Make the prediction of a point from its cells and from what the study says of it.
+
+    Parameters
+    ----------
+    arrays
+        Columns of a study, each of shape (points,).
+    number
+        Which point.
+    frequency_hz, amplitude_m, accuracy, start
+        What the study asked there.
+
+    """
+    numbers = {field: _number(arrays[column.name][number]) for field, column in NUMBERS.items()}
+    x, y, z, vx, vy, vz = (float(value) for value in arrays[FINAL_STATE][number].astype(np.float64))
+    return ScenePrediction(
+        **numbers,  # type: ignore[arg-type]
+        frequency_hz=frequency_hz,
+        amplitude_m=amplitude_m,
+        motion=list(MotionKind)[int(arrays[MOTION][number])],
+        method=list(Method)[int(arrays[METHOD][number])],
+        outcome=Outcome(int(arrays[OUTCOME][number])),
+        ended=bytes(arrays[ENDED][number]).decode(),
+        final_state=(x, y, z, vx, vy, vz),
+        start=start,
+        memory=list(StartMemory)[int(arrays[MEMORY][number])],
+        ensemble=_ensemble_at(arrays, number),
+        accuracy=chosen(Accuracy, accuracy).value,
+    )
+
+
+def cut_text(text: str) -> bytes:
+    """UTF-8 bytes of a text, as many as a column holds, cut between characters."""
+    return text.encode()[:TEXT_BYTES].decode(errors="ignore").encode()
+
+
+def _number(cell: np.generic) -> float | int | None:
+    value = cell.item()
+    match value:
+        case float():
+            return value if np.isfinite(value) else None
+        case int():
+            return value if value >= 0 else None
+        case _:
+            raise TypeError(f"{value!r} is no number")

@@ -21,10 +21,10 @@ from ..model.drive import Harmonic
 from ..model.frozen_model import FrozenModel
 from ..model.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from ._axes import FREQUENCY, MODEL, START, StudyAxis
-from ._columns import COLUMNS, Column
-from ._layout import FORMAT
-from ._point_scheduler import GridPlan
+from ..scene.solve import Question, Solver, solve_scene
+from ..scene.states_alone import batches_are_worth_it
+from ._columns import COLUMNS, FORMAT, Column
+from ._grid import FREQUENCY, MODEL, START, GridPlan, StudyAxis
 
 LONGEST = 1_000_000
 """Values of all ranges together; more is a slip of the pen."""
@@ -292,6 +292,29 @@ def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> Stud
         if values is None
         else StudyAxis(name, values, units, long_name)
     )
+
+
+def continued_from(frequency_hz: float) -> str:
+    """Name of a start that is the end of another point."""
+    return f"end at {frequency_hz:g} Hz"
+
+
+OTHER_STARTS = 8
+"""What a point counts for whose start may be forgotten: then so many are followed at least."""
+
+
+def study_solver(study: Study) -> Solver:
+    """Choose what computes the points of a study: batches, or one point after the other.
+
+    Batches follow motions that do not wait for each other, and pay where a processor has the registers and a
+    specimen is moved for long enough. What they cannot follow (other stops than Hertz's, accuracy
+    *reference*) goes one by one either way.
+    """
+    is_chained = any(start in (Start.UP, Start.DOWN) for start in study.starts)
+    starts = OTHER_STARTS if study.budget_s > 0.0 else 1
+    motions = starts * math.prod(study.grid.shape[AXES_OF_SPECIMEN:])
+    pays = not is_chained and batches_are_worth_it(motions, study.duration)
+    return Question.ANSWER if pays else solve_scene
 
 
 MOST_GAPS = 1000.0

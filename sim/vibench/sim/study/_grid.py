@@ -4,8 +4,13 @@ The points of a study as places in a grid, and which of them lie side by side.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar, Self
+
+from ..model.frozen_model import FrozenModel
+from ._columns import Column
 
 
 @dataclass(frozen=True)
@@ -67,3 +72,37 @@ class StudyAxis:
 def grid_of(axes: tuple[StudyAxis, ...]) -> Grid:
     """Grid over these axes, the last one running fastest."""
     return Grid(tuple(len(axis.values) for axis in axes), tuple(axis.is_ordered for axis in axes))
+
+
+class GridPlan(FrozenModel, ABC):
+    """What is to be computed, completely: two equal plans have equal answers."""
+
+    called: ClassVar[str]
+    """How messages call such a plan."""
+    format: ClassVar[str]
+    """How its files call themselves."""
+
+    @property
+    @abstractmethod
+    def axes(self) -> tuple[StudyAxis, ...]:
+        """Dimensions of the results, in order."""
+
+    @property
+    @abstractmethod
+    def columns(self) -> tuple[Column, ...]:
+        """What is kept of each point."""
+
+    @property
+    def grid(self) -> Grid:
+        """All points."""
+        return grid_of(self.axes)
+
+    def coordinates(self, number: int) -> dict[str, float | str]:
+        """Values of the axes at a point."""
+        place = self.grid.place(number)
+        return {axis.name: axis.values[index] for axis, index in zip(self.axes, place, strict=True)}
+
+    def differences(self, other: Self) -> tuple[str, ...]:
+        """Names of what differs between two plans."""
+        mine, theirs = self.model_dump(mode="json"), other.model_dump(mode="json")
+        return tuple(name for name in mine if mine[name] != theirs[name])

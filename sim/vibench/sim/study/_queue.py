@@ -1,0 +1,361 @@
+"""Running a study: one queue, whatever computes; answers are kept as they come."""
+
+import heapq
+import math
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..background import Cancelled, Observer, Progress
+from ..model.arrays import Floats
+from ..scene.scene import Scene
+from ..scene.solve import Solved
+from ._columns import TAKEN, PointState
+from ._executor import Bundle, Executor, Reply
+from ._grid import Grid
+from ._store import Arrays, PointAnswer, Store, is_failed, states
+
+# Which points of a study may be computed now: those whose predecessor is done, longest first.
+#
+# How long each point of a study will take: first as planned, then as its neighbours took.
+
+SHORTEST_S = 1e-6
+"""No point is thought to take less: it keeps ratios finite."""
+
+
+class Costs:
+    """Estimates that get better as points are done.
+
+    A run costs about 4 us an impact, and neighbours strike about as often: once a neighbour's time is
+    known, it says more than any plan.
+    """
+
+    def __init__(self, grid: Grid, planned_s: Floats) -> None:
+        self._grid = grid
+        self._planned_s = np.maximum(planned_s, SHORTEST_S)
+        self._taken_s = np.full(grid.size, np.nan)
+        self._estimate_s = self._planned_s.copy()
+        self._is_informed = np.zeros(grid.size, dtype=np.bool_)
+
+    def estimate_s(self, number: int) -> float:
+        """Time that a point is expected to take on one worker."""
+        return float(self._estimate_s[number])
+
+    def learn(self, number: int, taken_s: float) -> Iterator[int]:
+        """Note what a point took; the neighbours whose estimates change come back."""
+        self._taken_s[number] = max(taken_s, SHORTEST_S)
+        for each in self._grid.neighbours(number):
+            if np.isnan(self._taken_s[each]):
+                known = [self._taken_s[other] for other in self._grid.neighbours(each)]
+                self._estimate_s[each] = np.nanmean(known)
+                self._is_informed[each] = True
+                yield each
+
+    def left_s(self, is_missing: NDArray[np.bool_]) -> float:
+        """Worker time of the points that are missing, shape (points,).
+
+        Plans that no neighbour has corrected are scaled by how far plans have been off so far.
+        """
+        known = ~np.isnan(self._taken_s)
+        off = self._taken_s[known].sum() / self._planned_s[known].sum() if known.any() else 1.0
+        informed = is_missing & self._is_informed
+        planned = is_missing & ~self._is_informed
+        return float(self._estimate_s[informed].sum() + off * self._planned_s[planned].sum())
+
+
+NOBODY = -1
+"""Predecessor of a point that depends on none."""
+
+
+class PointScheduler:
+    """The work that is left, in the order in which it should begin.
+
+    Starting the longest first keeps all workers busy to the end; a point counts with the planned time of
+    all that wait for it in its chain. Points are handed out once, until they are put back.
+    """
+
+    def __init__(self, after: NDArray[np.int64], is_done: NDArray[np.bool_], costs: Costs) -> None:
+        self._after = after
+        self._costs = costs
+        self._is_done = is_done.copy()
+        self._is_released = np.zeros(len(after), dtype=np.bool_)
+        self._left = 0
+        self._is_out = np.zeros(len(after), dtype=np.bool_)
+        self._is_alone = np.zeros(len(after), dtype=np.bool_)
+        self._next = np.full(len(after), NOBODY, dtype=np.int64)
+        chained = np.flatnonzero(after != NOBODY)
+        self._next[after[chained]] = chained
+        self._behind_s = self._times_behind()
+        self._queue: list[tuple[float, int]] = []
+
+    def release(self, numbers: NDArray[np.int64]) -> None:
+        """Let these points be computed, those that have an answer excepted."""
+        new = numbers[~self._is_released[numbers]]
+        self._is_released[new] = True
+        self._left += int(np.count_nonzero(~self._is_done[new]))
+        for number in new:
+            if self._is_ready(int(number)):
+                self._push(int(number))
+
+    @property
+    def released(self) -> int:
+        """How many points were let be computed, those with an answer too."""
+        return int(np.count_nonzero(self._is_released))
+
+    @property
+    def is_missing(self) -> NDArray[np.bool_]:
+        """Released points without an answer, shape (points,); those under way too."""
+        return self._is_released & ~self._is_done
+
+    @property
+    def left(self) -> int:
+        """How many released points have no answer."""
+        return self._left
+
+    def take(self, worth_s: float, most: int) -> tuple[int, ...]:
+        """Hand out the longest point that is ready, and short ones with it until they are ``worth_s``."""
+        taken: list[int] = []
+        sum_s = 0.0
+        while len(taken) < most and sum_s < worth_s:
+            number = self._pop()
+            if number is None:
+                break
+            if taken and self._is_alone[number]:
+                self._push(number)
+                break
+            self._is_out[number] = True
+            taken.append(number)
+            sum_s += self._costs.estimate_s(number)
+            if self._is_alone[number]:
+                break
+        return tuple(taken)
+
+    def learn(self, number: int, taken_s: float) -> None:
+        """Note what a point took: its neighbours' times are known better."""
+        for changed in self._costs.learn(number, taken_s):
+            if self._is_ready(changed):
+                self._push(changed)
+
+    def finish(self, number: int) -> None:
+        """Take note of an answer, good or bad: who waited for it may begin."""
+        self._is_done[number] = True
+        self._left -= 1
+        self._is_out[number] = False
+        follower = int(self._next[number])
+        if follower != NOBODY and self._is_ready(follower):
+            self._push(follower)
+
+    def put_back(self, number: int) -> None:
+        """Let a point that was handed out be handed out again."""
+        self._is_out[number] = False
+        self._push(number)
+
+    def put_back_alone(self, number: int) -> None:
+        """Put back one that came to grief among others, to see whether it does so by itself."""
+        self._is_alone[number] = True
+        self.put_back(number)
+
+    def _is_ready(self, number: int) -> bool:
+        before = int(self._after[number])
+        is_free = before == NOBODY or bool(self._is_done[before])
+        return bool(
+            is_free and self._is_released[number] and not self._is_done[number] and not self._is_out[number]
+        )
+
+    def _weight(self, number: int) -> float:
+        return self._costs.estimate_s(number) + float(self._behind_s[number])
+
+    def _push(self, number: int) -> None:
+        heapq.heappush(self._queue, (-self._weight(number), number))
+
+    def _pop(self) -> int | None:
+        """Longest point that is ready; entries overtaken by an answer or a better estimate are dropped."""
+        while self._queue:
+            weight, number = heapq.heappop(self._queue)
+            if self._is_ready(number) and -weight == self._weight(number):
+                return number
+        return None
+
+    def _times_behind(self) -> NDArray[np.float64]:
+        """Planned time of everything that waits for a point, directly or through others, shape (points,)."""
+        behind = np.zeros(len(self._after))
+        for last in np.flatnonzero(self._next == NOBODY):
+            number, sum_s = int(last), 0.0
+            while self._after[number] != NOBODY:
+                if not self._is_done[number]:
+                    sum_s += self._costs.estimate_s(number)
+                number = int(self._after[number])
+                behind[number] = sum_s
+        return behind
+
+
+MOST_IN_BUNDLE = 64
+"""Answers that may be lost together with their worker."""
+SHARE = 8
+"""A bundle is at most this part of what is left for each worker, so that all end together."""
+QUEUED_PER_SLOT = 2
+"""Bundles handed over for each worker: one to compute, and the next, so that it never waits."""
+LOOK_S = 0.2
+"""How often a cancellation is asked for."""
+
+
+class StudyEnd(StrEnum):
+    """How a session ended."""
+
+    COMPLETE = "complete"
+    CANCELLED = "cancelled"
+
+
+class Points(Protocol):
+    """The points of a plan as scenes, and which of them are to be computed."""
+
+    bundle_s: float
+    """Worker time of the scenes that are handed over together, at most."""
+
+    @property
+    def grid(self) -> Grid:
+        """All of them."""
+
+    @property
+    def after(self) -> NDArray[np.int64]:
+        """Point that each one continues, or NOBODY, shape (points,)."""
+
+    @property
+    def planned_s(self) -> Floats:
+        """Time that each point is planned to take, shape (points,)."""
+
+    def wanted(self, arrays: Arrays) -> NDArray[np.int64]:
+        """Numbers of the points that what is known so far asks for; asked again when all have an answer."""
+
+    def scene(self, number: int, arrays: Arrays) -> Scene:
+        """Make the scene of a point whose predecessor, if it has one, is done; ValueError if not allowed."""
+
+    def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
+        """Say what is kept of a prediction."""
+
+    def failure(self, number: int, error: BaseException) -> PointAnswer:
+        """Say what is kept of a scene that could not be computed."""
+
+
+def run_points(
+    points: Points,
+    executor: Executor,
+    store: Store,
+    observer: Observer | None = None,
+    cancelled: Cancelled | None = None,
+) -> StudyEnd:
+    """Compute all points that are wanted and that the store misses, until ``cancelled``; as `run_study`."""
+    session = _Session(points, executor, store)
+    if session.is_unfinished:
+        store.begin(executor.description)
+    while session.is_unfinished:
+        session.feed()
+        replies = executor.replies(LOOK_S)
+        session.keep(replies)
+        if replies and observer is not None:
+            observer(session.progress())
+        if cancelled is not None and cancelled():
+            session.keep(executor.cancel())
+            return StudyEnd.COMPLETE if not session.is_unfinished else StudyEnd.CANCELLED
+    return StudyEnd.COMPLETE
+
+
+class _Session:
+    """One go at a study."""
+
+    def __init__(self, points: Points, executor: Executor, store: Store) -> None:
+        self._executor = executor
+        self._store = store
+        self._points = points
+        is_done = states(store.arrays) != PointState.MISSING
+        self._costs = Costs(points.grid, points.planned_s)
+        for number in np.flatnonzero(is_done & np.isfinite(store.arrays[TAKEN].astype(float))):
+            for _ in self._costs.learn(int(number), float(store.arrays[TAKEN][number])):
+                pass
+        self._scheduler = PointScheduler(points.after, is_done, self._costs)
+        self._scheduler.release(points.wanted(store.arrays))
+        self._failed = int(np.count_nonzero(is_failed(states(store.arrays))))
+        self._out = 0
+        self._looked_s = -math.inf
+        self._work_left_s = 0.0
+        self._first_s = math.nan
+        self._taken_s = 0.0
+
+    @property
+    def is_unfinished(self) -> bool:
+        """Whether points are missing."""
+        return self._scheduler.left > 0
+
+    def feed(self) -> None:
+        """Hand bundles to the executor until every worker has enough."""
+        self._look()
+        slots = self._executor.slots
+        while self._out < slots * QUEUED_PER_SLOT:
+            worth_s = min(self._points.bundle_s, self._work_left_s / (slots * SHARE))
+            numbers = self._scheduler.take(worth_s, MOST_IN_BUNDLE)
+            if not numbers:
+                return
+            scenes = tuple(self._points.scene(number, self._store.arrays) for number in numbers)
+            self._executor.submit(Bundle(numbers, scenes))
+            self._out += 1
+
+    def keep(self, replies: Sequence[Reply]) -> None:
+        """Keep all answers in one commit, and note what they mean for the rest."""
+        answers = [answer for reply in replies for answer in self._answers(reply)]
+        if answers:
+            self._store.keep(answers)
+        for answer in answers:
+            self._scheduler.finish(answer.number)
+            self._failed += bool(is_failed(answer.state))
+        for number, taken_s in [
+            (each.number, each.taken_s) for each in answers if math.isfinite(each.taken_s)
+        ]:
+            self._scheduler.learn(number, taken_s)
+            self._taken_s += taken_s
+        if answers and not self.is_unfinished:
+            self._scheduler.release(self._points.wanted(self._store.arrays))
+        if answers and math.isnan(self._first_s):
+            # Workers spend their first moments on starting: what comes after tells their pace.
+            self._first_s, self._taken_s = time.monotonic(), 0.0
+
+    def progress(self) -> Progress:
+        """Where it stands."""
+        released = self._scheduler.released
+        note = f"{self._failed} failed" if self._failed else ""
+        return Progress(released - self._scheduler.left, released, self._left_s(), note)
+
+    def _left_s(self) -> float | None:
+        """Time that the rest takes, at the pace of the workers since the first answer."""
+        if not self.is_unfinished:
+            return 0.0
+        if self._taken_s == 0.0:
+            return None
+        return self._work_left_s * (time.monotonic() - self._first_s) / self._taken_s
+
+    def _look(self) -> None:
+        """Add up the work that is left, now and then: there may be millions of points."""
+        now_s = time.monotonic()
+        if now_s - self._looked_s >= LOOK_S:
+            self._looked_s = now_s
+            self._work_left_s = self._costs.left_s(self._scheduler.is_missing)
+
+    def _answers(self, reply: Reply) -> Iterable[PointAnswer]:
+        """Take a reply apart; what has no answer goes back to the agenda."""
+        self._out -= 1
+        numbers = reply.bundle.numbers
+        for number, scene, solved in zip(numbers, reply.bundle.scenes, reply.solved, strict=False):
+            yield self._points.answer(number, scene, solved, self._store.arrays)
+        rest = numbers[len(reply.solved) :]
+        match reply.error, rest:
+            case None, _:
+                for number in rest:
+                    self._scheduler.put_back(number)
+            case error, (number,) if len(numbers) == 1:
+                yield self._points.failure(number, error)
+            case _:
+                for number in rest:
+                    self._scheduler.put_back_alone(number)
