@@ -15,7 +15,8 @@ from .output import bold, console, leave_output_to_json, print_json
 from .paper.figures import FILES, paper_figure
 from .paper.options import FigureOptions, FrequencyGrid
 from .paths import AsJson, room_for_folder
-from .study import KeptStudies, Workers
+from .points import Workers
+from .study import KeptStudies
 
 if TYPE_CHECKING:
     from vibench.analysis.report import DrawnFigure

@@ -27,8 +27,8 @@ from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
 from .output import bold, console, print_json, print_warnings
 from .paths import AsJson, room_for_folder
+from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
-from .study import Cluster, Workers, complain_about_points
 
 FILE = "map.h5"
 SHOWN_MOTIONS = 12
@@ -118,7 +118,7 @@ def map_motions(
     else:
         tell(results, stability)
         console.print("The figure:", bold(drawn[0].resolve()))
-    complain_about_points(results)
+    complain_about_points(asked, list(results.failures()), results.kept)
 
 
 def _ends(given: float | Range) -> tuple[float, ...]:

@@ -6,34 +6,39 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
-import numpy as np
 import typer
 from pydantic import ValidationError
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
-from vibench.sim import BUDGET_S, Accuracy, Observable, Rest, ScenePlan, measure_cost, plan_scene
-from vibench.sim.study import (
-    ExistingStudy,
-    Start,
-    Study,
-    StudyResults,
-    plausibility_warnings,
-    software,
-    solve_study,
+from vibench.sim import (
+    BUDGET_S,
+    Accuracy,
+    Observable,
+    Outcome,
+    Rest,
+    ScenePlan,
+    ScenePrediction,
+    plan_scene,
+    solve_scene,
 )
+from vibench.sim.background import Progress
+from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
 from .found_motions import forgetting_text, motions_table, share_text
 from .frequency_option import frequencies
 from .interruption import told_to_stop
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
+from .points import Cluster, Failure, Workers, complain_about_points
 from .progress_bars import study_bar
 from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, described, given_options
-from .study import Cluster, Workers, complain_about_points
+
+if TYPE_CHECKING:
+    from vibench.sim.study import StudyResults
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
@@ -117,16 +122,58 @@ def predict(
         plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
     )
     began = time.monotonic()
-    existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
     with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:
-        results = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
+        if asked.grid.size == 1 and out is None and cluster is None and study_solver(asked) is solve_scene:
+            # One point needs neither a queue nor a file.
+            try:
+                found = _Found.one(asked, solve_scene(asked.scene((0,) * len(asked.axes), Rest())))
+            except (ValueError, RuntimeError) as error:
+                found = _Found.none(asked, error)
+            observer(Progress(1, 1, 0.0, "1 failed" if found.failures else ""))
+        else:
+            from vibench.sim.study import solve_study
+
+            existing: Literal["resume", "refuse"] = "resume" if resume else "refuse"
+            found = _Found.of(solve_study(asked, out, existing, workers, cluster, observer, is_stopped))
     if as_json:
-        print_json(document(results, time.monotonic() - began))
+        print_json(_document(found, time.monotonic() - began))
     else:
-        _tell(results)
+        _tell(found)
     if explain:
-        (errors if as_json else console).print(paragraph(explanation(results)))
-    complain_about_points(results)
+        (errors if as_json else console).print(paragraph(_explanation(found)))
+    complain_about_points(asked, found.failures, found.kept)
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """What is known of the points that were asked for."""
+
+    study: Study
+    points: Sequence[ScenePrediction]
+    failures: Sequence[Failure]
+    taken_s: Sequence[float]
+    """Processor time of each point; NaN where it includes what a process pays once."""
+    kept: int
+    """Points with an answer, good or bad."""
+
+    @classmethod
+    def one(cls, study: Study, point: ScenePrediction) -> Self:
+        """Make it of the only point of a study."""
+        is_whole = point.outcome is Outcome.REACHED_END
+        return cls(study, [point], [] if is_whole else [(study.coordinates(0), point.ended)], [math.nan], 1)
+
+    @classmethod
+    def none(cls, study: Study, error: Exception) -> Self:
+        """Make it of the error that the only point of a study ended in; a refusal is a sentence by itself."""
+        why = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        return cls(study, [], [(study.coordinates(0), why)], [math.nan], 1)
+
+    @classmethod
+    def of(cls, results: "StudyResults") -> Self:
+        """Make it of a study's results."""
+        taken_s = results.values("taken").ravel().tolist()
+        failures = list(results.failures())
+        return cls(results.study, list(results.predictions()), failures, taken_s, results.kept)
 
 
 def _study(options: dict[str, object]) -> Study:
@@ -165,13 +212,15 @@ def _budget(text: str) -> float:
         raise InvalidRequest(f"a budget of {text!r} was given; give seconds, as in 1s or 0.5") from error
 
 
-def document(results: StudyResults, elapsed_s: float) -> dict[str, object]:
+def _document(found: _Found, elapsed_s: float) -> dict[str, object]:
     """Say every point with its options, for other programs; what is not known is null."""
+    from vibench.sim.study import software
+
     return {
-        "points": [each.to_dict() for each in results.predictions()],
-        "failures": [{**where, "message": why} for where, why in results.failures()],
-        "is_complete": results.is_complete,
-        "options": results.study.model_dump(mode="json"),
+        "points": [each.to_dict() for each in found.points],
+        "failures": [{**where, "message": why} for where, why in found.failures],
+        "is_complete": found.kept == found.study.grid.size,
+        "options": found.study.model_dump(mode="json"),
         "software": software(),
         "elapsed_s": elapsed_s,
     }
@@ -187,21 +236,22 @@ class _Planned:
     """NaN where it includes what a process pays once."""
 
 
-def explanation(results: StudyResults) -> str:
+def _explanation(found: _Found) -> str:
     """Say how the points are answered: one passage for each run of points that are answered alike."""
-    study = results.study
+    from vibench.sim import measure_cost
+
+    study = found.study
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
-    taken_s = np.broadcast_to(results.values("taken").ravel(), len(scenes))
     plans = [
-        _Planned(scene.drive.frequency_hz, plan_scene(scene), float(each_s))
-        for scene, each_s in zip(scenes, taken_s, strict=True)
+        _Planned(scene.drive.frequency_hz, plan_scene(scene), taken_s)
+        for scene, taken_s in zip(scenes, found.taken_s, strict=True)
     ]
     passages = []
     for _, run in groupby(zip(plans, scenes, strict=True), lambda each: each[0].plan.alike):
         alike = list(run)
         measure_cost(alike[len(alike) // 2][1])
         passages.append(_passage([planned for planned, _ in alike]))
-    forgotten = forgetting_text(list(results.predictions()))
+    forgotten = forgetting_text(found.points)
     return "\n".join([*passages, forgotten] if forgotten else passages)
 
 
@@ -228,18 +278,18 @@ def _cost(points: Sequence[_Planned]) -> str:
     return f"{whole} {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."
 
 
-def _tell(results: StudyResults) -> None:
+def _tell(found: _Found) -> None:
     rows = Table(
         title="Responses I and II of m0 and of p = y - z, over the base amplitude [-]",
         box=SIMPLE_HEAD,
         padding=0,
         show_edge=False,
     )
-    has_exponents = Observable.LYAPUNOV in results.study.observe
+    has_exponents = Observable.LYAPUNOV in found.study.observe
     headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
     for heading in headings + ["exponent [1/s]"] * has_exponents:
         rows.add_column(heading, justify="right")
-    points = list(results.predictions())
+    points = found.points
     step = max(1, -(-len(points) // _SHOWN))
     for each in points[::step]:
         rows.add_row(

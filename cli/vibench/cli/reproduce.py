@@ -14,7 +14,8 @@ from .output import bold, console, leave_output_to_json, print_json, print_table
 from .paper.case import OPTIONS, case_with
 from .paper.options import FigureOptions, FrequencyGrid
 from .paths import AsJson, room_for_folder, room_for_page
-from .study import KeptStudies, Workers
+from .points import Workers
+from .study import KeptStudies
 
 if TYPE_CHECKING:
     from .paper.page import Reproduction

@@ -9,8 +9,6 @@ import typer
 from vibench.acquisition import load_toml, named
 from vibench.sim.study import (
     ExistingStudy,
-    GridResults,
-    Plan,
     Study,
     StudyResults,
     planned_work_s,
@@ -23,18 +21,8 @@ from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
 from .output import console, errors, print_json, print_warnings
 from .paths import AsJson
+from .points import Cluster, Workers, complain_about_points, say_failures
 from .progress_bars import study_bar
-
-SHOWN_FAILURES = 5
-
-Workers = Annotated[
-    int | None,
-    typer.Option("--workers", min=1, metavar="N", help="Threads; one for each processor if absent."),
-]
-Cluster = Annotated[
-    str | None,
-    typer.Option("--cluster", metavar="ADDRESS", help="Let the workers of this Dask scheduler compute."),
-]
 
 
 def study(
@@ -73,7 +61,7 @@ def study(
         print_json(document(results, out))
     else:
         tell(results, out)
-    complain_about_points(results)
+    complain_about_points(asked, list(results.failures()), results.kept)
 
 
 def tell_work(study: Study, as_json: bool) -> None:
@@ -105,33 +93,6 @@ def tell(results: StudyResults, out: Path) -> None:
     console.print(f"{out}: {results.kept} of {results.study.grid.size} points, {failed} failed ({state})")
 
 
-def complain_about_points(results: GridResults[Plan]) -> None:
-    """End with a sentence for each of the first points without an answer, or as a study that was stopped.
-
-    Returns where every point is answered.
-    """
-    if say_failures(results) > 0:
-        raise typer.Exit(ExitCode.FAILED)
-    if not results.is_complete:
-        kept, size = results.kept, results.plan.grid.size
-        errors.print(f"stopped after {kept} of {size} points; a file goes on with --resume")
-        raise typer.Exit(ExitCode.STOPPED)
-
-
-def say_failures(results: GridResults[Plan]) -> int:
-    """Say on standard error which points have no answer, and why; gives how many."""
-    failures = list(results.failures())
-    for where, why in failures[:SHOWN_FAILURES]:
-        # An axis of one value tells no point from another.
-        told = [axis for axis in results.axes if len(axis.values) > 1] or [results.axes[-1]]
-        place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in told)
-        errors.print(f"error: {place}: {why}")
-    if len(failures) > SHOWN_FAILURES:
-        more = len(failures) - SHOWN_FAILURES
-        errors.print(f"error: {more} more points have no answer: see `failures` with --json")
-    return len(failures)
-
-
 _DIGEST = 16
 
 
@@ -156,7 +117,9 @@ class KeptStudies:
                 observer=observer,
                 cancelled=is_stopped,
             )
-        self._failed += say_failures(results)
+        failures = list(results.failures())
+        say_failures(study, failures)
+        self._failed += len(failures)
         if not results.is_complete:
             errors.print(
                 f"stopped after {results.kept} of {study.grid.size} points; the same command continues"

@@ -1,0 +1,50 @@
+"""What the commands that compute many points share: who computes, and which points have no answer."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .exit_code import ExitCode
+from .output import errors
+
+if TYPE_CHECKING:
+    from vibench.sim.study import GridPlan
+
+SHOWN_FAILURES = 5
+
+Workers = Annotated[
+    int | None,
+    typer.Option("--workers", min=1, metavar="N", help="Threads; one for each processor if absent."),
+]
+Cluster = Annotated[
+    str | None,
+    typer.Option("--cluster", metavar="ADDRESS", help="Let the workers of this Dask scheduler compute."),
+]
+Failure = tuple[Mapping[str, float | str], str]
+"""Values of the axes at a point without an answer, and why there is none."""
+
+
+def complain_about_points(plan: "GridPlan", failures: Sequence[Failure], kept: int) -> None:
+    """End with a sentence for each of the first points without an answer, or as a study that was stopped.
+
+    Returns where every point is answered; ``kept`` are those with an answer, good or bad.
+    """
+    say_failures(plan, failures)
+    if failures:
+        raise typer.Exit(ExitCode.FAILED)
+    if kept < plan.grid.size:
+        errors.print(f"stopped after {kept} of {plan.grid.size} points; a file goes on with --resume")
+        raise typer.Exit(ExitCode.STOPPED)
+
+
+def say_failures(plan: "GridPlan", failures: Sequence[Failure]) -> None:
+    """Say on standard error which points have no answer, and why."""
+    for where, why in failures[:SHOWN_FAILURES]:
+        # An axis of one value tells no point from another.
+        told = [axis for axis in plan.axes if len(axis.values) > 1] or [plan.axes[-1]]
+        place = ", ".join(f"{axis.name} {where[axis.name]} {axis.units}".strip() for axis in told)
+        errors.print(f"error: {place}: {why}")
+    if len(failures) > SHOWN_FAILURES:
+        more = len(failures) - SHOWN_FAILURES
+        errors.print(f"error: {more} more points have no answer: see `failures` with --json")
