@@ -5,8 +5,7 @@ import time
 import numpy as np
 
 from vibench.sim import Accuracy, Harmonic, LinearSweep, Sampled, gong2025, integrate
-from vibench.sim.engine.cubic_run import CubicRun
-from vibench.sim.engine.run import RunRecord
+from vibench.sim.engine.run import CubicRun, RunRecord
 
 REPEATS = 3
 UNITS = np.repeat([1e-4, 0.1], 3)

@@ -52,11 +52,10 @@ from vibench.acquisition.rig import (
 )
 from vibench.analysis.figures.style import MEASURED, SIMULATED, legend_above, new_figure, styled
 from vibench.sim import Specimen
-from vibench.sim.periodic.balance_branch import balance_branch_within
-from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.branch import Branch
 from vibench.sim.periodic.branch_following import FrequencyPath
-from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench.virtual_rig import VirtualRig
 from vibench_fast_loop import continuation_controller as _continuation_controller

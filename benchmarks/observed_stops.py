@@ -18,8 +18,8 @@ from scipy.linalg import solve_discrete_are
 
 from vibench.acquisition.rig import amplifier_of, load_rig, shaker_of, specimen_of
 from vibench.sim import Harmonic
-from vibench.sim.periodic.period_map import PeriodMap
 from vibench.sim.periodic.restoring_force import spring_of
+from vibench.sim.periodic.shooting import PeriodMap
 from vibench_fast_loop.fast_loop import branch_multipliers, impact_branch
 from vibench_fast_loop.law import LawWeights, designed_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant

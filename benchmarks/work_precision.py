@@ -27,10 +27,16 @@ from scipy.integrate import solve_ivp
 
 from vibench.sim import Accuracy, PowerLaw
 from vibench.sim.accuracy_benchmark.figures import MOTIONS, Regime
-from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
+from vibench.sim.accuracy_benchmark.independent_solution import (
+    Place,
+    independent_state,
+    law_of,
+    numbers_of,
+    rates_at,
+    state_error,
+)
 from vibench.sim.accuracy_benchmark.measuring import settled_state
-from vibench.sim.accuracy_benchmark.plain_equations import Place, law_of, numbers_of, rates_at
-from vibench.sim.model.arrays import Floats
+from vibench.sim.model.state import Floats
 from vibench.sim.scene.followed_run import FollowedRun
 from vibench.sim.study import software
 

@@ -23,7 +23,7 @@ from vibench.sim import (
     lyapunov_spectrum,
 )
 from vibench.sim.exponents.lyapunov import ExponentVerdict, Source
-from vibench.sim.exponents.settling import FinalMotion
+from vibench.sim.exponents.tangent_run import FinalMotion
 
 HEAVY, FAST, SLOW = 1e10, 3.0, 2.0
 """Mass of m0 and m2 over that of m1, and their natural frequencies; they are damped by half."""

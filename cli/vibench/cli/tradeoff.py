@@ -11,8 +11,14 @@ from rich.table import Table
 
 from vibench.analysis import InvalidRequest
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark.figures import MOTIONS, TRANSIENTS, AccuracyBenchmark, MotionBenchmark
-from vibench.sim.accuracy_benchmark.lotteries import LOTTERIES, LotteryFigures
+from vibench.sim.accuracy_benchmark.figures import (
+    LOTTERIES,
+    MOTIONS,
+    TRANSIENTS,
+    AccuracyBenchmark,
+    LotteryFigures,
+    MotionBenchmark,
+)
 from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
 
 from .output import console, errors, print_json, print_table, words

@@ -22,14 +22,11 @@ from vibench.sim import (
     periodic_branch_within,
     periodic_orbit,
 )
-from vibench.sim.model.arrays import Floats
-from vibench.sim.model.state import VY, VZ, Y, Z
-from vibench.sim.periodic.balance_branch import balance_branch_within
-from vibench.sim.periodic.balance_solver import balance
-from vibench.sim.periodic.condensation import structure_of
-from vibench.sim.periodic.harmonic_balance import BalanceEnd
-from vibench.sim.periodic.period_map import PeriodMap
+from vibench.sim.model.state import VY, VZ, Floats, Y, Z
+from vibench.sim.periodic.balance_branch import balance, balance_branch_within
+from vibench.sim.periodic.harmonic_balance import BalanceEnd, structure_of
 from vibench.sim.periodic.restoring_force import spring_of
+from vibench.sim.periodic.shooting import PeriodMap
 
 from .branch_continuation import BranchContinuation
 from .law import LinearLaw, designed_law, loop_multiplier, loop_transfer, pd_law

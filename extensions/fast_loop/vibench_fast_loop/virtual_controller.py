@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from vibench.acquisition.rig import ControllerConfig
+from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
-from vibench.sim.engine.structures import Structure
 from vibench.sim.shaker.loaded_shaker import LoadedShaker, ShakenMotion
 from vibench.virtual_rig.generator.scpi_instrument import Reply
 from vibench.virtual_rig.world.sensors import SensorParts

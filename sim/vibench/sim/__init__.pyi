@@ -18,9 +18,13 @@ from .model.drive import (
     LogarithmicSweep as LogarithmicSweep,
     Sampled as Sampled,
 )
-from .model.elasticity import Elasticity as Elasticity, hertz_stiffness as hertz_stiffness
-from .model.frozen_model import FrozenModel as FrozenModel
-from .model.hertz import Hertz as Hertz
+from .model.frozen_model import (
+    FrozenModel as FrozenModel,
+    UnreadableTomlError as UnreadableTomlError,
+    fault_in_words as fault_in_words,
+    toml_table as toml_table,
+)
+from .model.hertz import Elasticity as Elasticity, Hertz as Hertz, hertz_stiffness as hertz_stiffness
 from .model.hunt_crossley import HuntCrossley as HuntCrossley
 from .model.linear_gap import LinearGap as LinearGap
 from .model.modes import (
@@ -44,16 +48,16 @@ from .model.specimen_description import (
     shipped_specimens as shipped_specimens,
     usual_specimen as usual_specimen,
 )
-from .model.toml_table import (
-    UnreadableTomlError as UnreadableTomlError,
-    fault_in_words as fault_in_words,
-    toml_table as toml_table,
+from .motion.integrate import (
+    FollowedMotion as FollowedMotion,
+    Impacts as Impacts,
+    Trajectory as Trajectory,
+    follow_samples as follow_samples,
+    integrate as integrate,
 )
-from .motion.integrate import Impacts as Impacts, Trajectory as Trajectory, integrate as integrate
 from .motion.response import Response as Response, steady_response as steady_response
-from .motion.sample_by_sample import FollowedMotion as FollowedMotion, follow_samples as follow_samples
 from .operating_system.state_folder import state_folder as state_folder
-from .periodic.balance_solver import BalanceOptions as BalanceOptions
+from .periodic.balance_branch import BalanceOptions as BalanceOptions
 from .periodic.branch import (
     BifurcationKind as BifurcationKind,
     Branch as Branch,
@@ -65,19 +69,21 @@ from .periodic.branch_following import (
     DrivePath as DrivePath,
     FrequencyPath as FrequencyPath,
 )
-from .periodic.condensation import LinearStructure as LinearStructure, structure_of as structure_of
 from .periodic.continuation import ArcEnd as ArcEnd, ArcSteps as ArcSteps
 from .periodic.first_order_balance import (
     FirstOrderState as FirstOrderState,
     first_order_states as first_order_states,
 )
-from .periodic.harmonic_balance import Balance as Balance, HarmonicSet as HarmonicSet
+from .periodic.harmonic_balance import (
+    Balance as Balance,
+    HarmonicSet as HarmonicSet,
+    LinearStructure as LinearStructure,
+    structure_of as structure_of,
+)
 from .periodic.orbit_branch import (
     periodic_branch as periodic_branch,
     periodic_branch_within as periodic_branch_within,
 )
-from .periodic.period_map import OrbitShape as OrbitShape
-from .periodic.phase_reference import PhaseReference as PhaseReference
 from .periodic.phase_resonance import phase_resonance_branch as phase_resonance_branch
 from .periodic.restoring_force import (
     PowerSpring as PowerSpring,
@@ -85,7 +91,9 @@ from .periodic.restoring_force import (
     spring_of as spring_of,
 )
 from .periodic.shooting import (
+    OrbitShape as OrbitShape,
     PeriodicOrbit as PeriodicOrbit,
+    PhaseReference as PhaseReference,
     ShootingEnd as ShootingEnd,
     periodic_orbit as periodic_orbit,
 )

@@ -7,8 +7,7 @@ import pytest
 
 from vibench.analysis.report import accuracy_document, tradeoff_figure, worst_error
 from vibench.sim import Accuracy
-from vibench.sim.accuracy_benchmark.figures import MOTIONS, TRANSIENTS
-from vibench.sim.accuracy_benchmark.lotteries import LOTTERIES
+from vibench.sim.accuracy_benchmark.figures import LOTTERIES, MOTIONS, TRANSIENTS
 from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
 
 PAGE = Path(__file__).parents[3] / "docs" / "accuracy.md"

@@ -16,8 +16,7 @@ from vibench.sim import (
     spring_of,
     structure_of,
 )
-from vibench.sim.periodic.balance_branch import balance_branch_within
-from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 
 TIME_S = 0.1 * np.arange(2000)
 FREQUENCY_HZ = 150 + TIME_S

@@ -8,13 +8,11 @@ import pytest
 
 from vibench.sim import gong2025
 from vibench.sim.model.power_law import PowerLaw
-from vibench.sim.periodic.balance_branch import balance_branch_within
-from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.branch_following import FrequencyPath
-from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
-from vibench.sim.shaker.loaded_shaker import LoadedShaker
-from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
 from vibench_fast_loop.fast_loop import branch_hold, branch_multipliers, impact_branch, motion_slopes
 from vibench_fast_loop.law import LawWeights, LinearLaw, designed_law, loop_multiplier, loop_transfer, pd_law
 from vibench_fast_loop.plant import LoopTiming, SampledPlant

@@ -22,10 +22,9 @@ from vibench.acquisition.plan import (
 )
 from vibench.acquisition.recording import BranchPointNote, feedback_note
 from vibench.acquisition.rig import confirm_simulated, load_rig, specimen_of
-from vibench.sim.periodic.balance_branch import balance_branch_within
-from vibench.sim.periodic.balance_solver import balance
+from vibench.sim.periodic.balance_branch import balance, balance_branch_within
 from vibench.sim.periodic.branch_following import FrequencyPath
-from vibench.sim.periodic.condensation import structure_of
+from vibench.sim.periodic.harmonic_balance import structure_of
 from vibench.sim.periodic.restoring_force import spring_of
 from vibench_fast_loop.branch_continuation import BranchContinuation
 from vibench_fast_loop.contract import test_controller as contract

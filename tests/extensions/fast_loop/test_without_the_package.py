@@ -108,7 +108,7 @@ def test_an_old_recording_is_told_by_command_and_report(run, recording, tmp_path
 
 def test_the_window_lists_every_other_test(run):
     code = (
-        "from vibench.gui.pages.test.test_form import shipped_tests\n"
+        "from vibench.gui.pages.test.test_page import shipped_tests\n"
         "print(*sorted({each.measurement.excitation.kind for each in shipped_tests()}))"
     )
     listed = run("-c", code)

@@ -6,8 +6,14 @@ import pytest
 from scipy.linalg import expm
 
 from vibench.sim import Accuracy, Harmonic, Hertz, RigidStops, gong2025, integrate
-from vibench.sim.accuracy_benchmark.independent_solution import independent_state, state_error
-from vibench.sim.accuracy_benchmark.plain_equations import Place, law_of, numbers_of, rates_at
+from vibench.sim.accuracy_benchmark.independent_solution import (
+    Place,
+    independent_state,
+    law_of,
+    numbers_of,
+    rates_at,
+    state_error,
+)
 
 STILL = Harmonic(100.0, 0.0)
 MOVING = np.array([0.0, 0.0, 0.0, 0.0, 0.2, -0.1])

@@ -18,9 +18,8 @@ from vibench.sim import (
     structure_of,
 )
 from vibench.sim.branches import MotionSearch, balanced_branches, shot_branches
-from vibench.sim.periodic.balance_branch import balance_branch_within
-from vibench.sim.periodic.balance_solver import balance
-from vibench.sim.periodic.condensation import LinearStructure
+from vibench.sim.periodic.balance_branch import balance, balance_branch_within
+from vibench.sim.periodic.harmonic_balance import LinearStructure
 
 ONE = np.array([[1.0]])
 FIRST = BalanceOptions(HarmonicSet.ODD, fewest=1, most=1)

@@ -20,7 +20,7 @@ from vibench.sim import (
 )
 from vibench.sim.branches import BranchOrigin, MotionSearch, shot_branches
 from vibench.sim.motion.poincare import state_scales
-from vibench.sim.periodic.period_map import OrbitShape, PeriodMap
+from vibench.sim.periodic.shooting import OrbitShape, PeriodMap
 
 pytestmark = pytest.mark.timeout(300)
 """Whoever comes first compiles the kernels, a minute of processor time, beside others who compile."""

@@ -20,7 +20,7 @@ from vibench.sim import (
     integrate,
 )
 from vibench.sim.chain import Chain, chain_of, chain_transmissibility, integrate_chain
-from vibench.sim.chain._run import ChainRun
+from vibench.sim.chain._integrate import ChainRun
 from vibench.sim.chain._tables import chain_tables
 
 pytestmark = pytest.mark.timeout(300)

@@ -10,7 +10,7 @@ import numpy as np
 from native_calls import calls
 
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine.collision_fit import collision_fit
+from vibench.sim.engine.batch import collision_fit
 from vibench.sim.engine.library import Engine, EngineError
 from vibench.sim.engine.scene import (
     collision_structure,

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vibench.sim import Harmonic, gong2025
-from vibench.sim.engine.cubic_run import cubic_tables, start_on_cubics
+from vibench.sim.engine.run import cubic_tables, start_on_cubics
 from vibench.sim.engine.scene import collision_structure, fill_cell, fill_drive, power_structure
 
 LAWS = (

@@ -7,8 +7,7 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 from vibench.sim import Accuracy, Outcome, gong2025
-from vibench.sim.engine.cubic_run import CubicRun
-from vibench.sim.engine.run import RunRecord
+from vibench.sim.engine.run import CubicRun, RunRecord
 from vibench.sim.model.modes import state_matrix
 
 UNITS = np.repeat([1e-4, 0.1], 3)

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from vibench.sim.exponents.blocking import blocked_mean
+from vibench.sim.exponents.tangent_run import blocked_mean
 
 
 def autoregression(memory, count, seed):

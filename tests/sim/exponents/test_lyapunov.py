@@ -7,7 +7,7 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, LinearGap, Outcome, Specimen, gong2025, lyapunov_exponent
 from vibench.sim.exponents.lyapunov import FEWEST_INTERVALS, ExponentVerdict, Precision, Source
-from vibench.sim.exponents.settling import FinalMotion
+from vibench.sim.exponents.tangent_run import FinalMotion
 
 CHAOS = Harmonic(260.0, 5e-6)
 

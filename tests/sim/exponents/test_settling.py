@@ -5,8 +5,7 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, Outcome, gong2025, lyapunov_exponent
 from vibench.sim.exponents.lyapunov import ExponentVerdict, Source
-from vibench.sim.exponents.settling import FinalMotion, settling
-from vibench.sim.exponents.tangent_run import Interval, TangentRun
+from vibench.sim.exponents.tangent_run import FinalMotion, Interval, TangentRun, settling
 
 COUNT = 400
 CHAOTIC_SECTION = np.random.default_rng(5).standard_normal((COUNT, 6))

@@ -14,10 +14,9 @@ from numpy.typing import ArrayLike
 
 from vibench.sim import Accuracy, Harmonic, Outcome, Specimen
 from vibench.sim.engine.run import NativeRun, RunRecord, most_impacts
-from vibench.sim.exponents.blocking import BlockedMean, blocked_mean
 from vibench.sim.exponents.lyapunov import intervals_to_skip
-from vibench.sim.exponents.tangent_run import energy_metric, interval_for
-from vibench.sim.model.arrays import Floats
+from vibench.sim.exponents.tangent_run import BlockedMean, blocked_mean, energy_metric, interval_for
+from vibench.sim.model.state import Floats
 from vibench.sim.motion.integrate import MAX_IMPACT_RATE_HZ, start_motion
 
 DISTANCE = 1e-7

@@ -9,7 +9,7 @@ import pytest
 from vibench.sim import Hertz, MotionKind, gong2025, integrate
 from vibench.sim.engine.batch import batches_pay
 from vibench.sim.maps import Map, Range, Spacing, estimate_map, map_solver, solve_map
-from vibench.sim.maps._columns import contact_energy_j
+from vibench.sim.maps._map import contact_energy_j
 from vibench.sim.scene.prediction import Method
 from vibench.sim.scene.solve import Question, settle_scene, solve_scene, solve_scenes
 from vibench.sim.study import InvalidStudy

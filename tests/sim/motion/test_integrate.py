@@ -16,7 +16,7 @@ from vibench.sim import (
     gong2025,
     integrate,
 )
-from vibench.sim.motion.base_motion import HERMITE, sweep_interval_s
+from vibench.sim.motion.integrate import HERMITE, sweep_interval_s
 
 PERIODIC = Harmonic(130.0, 20e-6)
 """Strikes about 260 times a second and settles on a stable period."""

@@ -11,13 +11,11 @@ from vibench.sim import (
     spring_of,
     structure_of,
 )
-from vibench.sim.periodic.balance_branch import balance_branch_within
-from vibench.sim.periodic.balance_solver import BalanceOptions, balance
+from vibench.sim.periodic.balance_branch import BalanceOptions, balance, balance_branch_within
 from vibench.sim.periodic.branch import BifurcationKind
 from vibench.sim.periodic.branch_following import AmplitudePath, FrequencyPath
-from vibench.sim.periodic.condensation import LinearStructure
 from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
-from vibench.sim.periodic.harmonic_balance import BalanceEnd, HarmonicSet
+from vibench.sim.periodic.harmonic_balance import BalanceEnd, HarmonicSet, LinearStructure
 from vibench.sim.periodic.restoring_force import GapSpring, NoForce
 
 ONE = np.array([[1.0]])

@@ -11,8 +11,8 @@ from vibench.sim import (
     gong2025,
     structure_of,
 )
-from vibench.sim.periodic.condensation import LinearStructure, condense
 from vibench.sim.periodic.first_order_balance import fundamental_share
+from vibench.sim.periodic.harmonic_balance import LinearStructure, condense
 
 FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5
 

@@ -6,10 +6,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vibench.sim import Accuracy, Harmonic, PowerSpring, gong2025, integrate, spring_of, structure_of
-from vibench.sim.periodic.balance_solver import BalanceOptions, Guess, balance
-from vibench.sim.periodic.condensation import LinearStructure
+from vibench.sim.periodic.balance_branch import BalanceOptions, Guess, balance
 from vibench.sim.periodic.floquet import Motion, crossings, multipliers, transition
-from vibench.sim.periodic.frequency_time import phasors_of
+from vibench.sim.periodic.harmonic_balance import LinearStructure, phasors_of
 from vibench.sim.periodic.restoring_force import GapSpring, NoForce
 
 ONE = np.array([[1.0]])

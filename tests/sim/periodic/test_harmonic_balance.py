@@ -14,10 +14,16 @@ from vibench.sim import (
     spring_of,
     structure_of,
 )
-from vibench.sim.periodic.balance_solver import BalanceOptions, Guess, balance
-from vibench.sim.periodic.condensation import LinearStructure
-from vibench.sim.periodic.frequency_time import phasors_of, waveform
-from vibench.sim.periodic.harmonic_balance import BalanceEnd, BalanceProblem, HarmonicSet, harmonics_up_to
+from vibench.sim.periodic.balance_branch import BalanceOptions, Guess, balance
+from vibench.sim.periodic.harmonic_balance import (
+    BalanceEnd,
+    BalanceProblem,
+    HarmonicSet,
+    LinearStructure,
+    harmonics_up_to,
+    phasors_of,
+    waveform,
+)
 from vibench.sim.periodic.restoring_force import GapSpring, NoForce
 
 FIT_LENGTH, FIT_FORCE = 46e-6, 4.891e9 * 1e-6**1.5

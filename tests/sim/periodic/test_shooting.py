@@ -5,8 +5,7 @@ import pytest
 
 from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, integrate, periodic_orbit
 from vibench.sim.motion.poincare import smallest_period, state_scales, stroboscopic_section
-from vibench.sim.periodic.period_map import OrbitShape, PeriodMap
-from vibench.sim.periodic.shooting import ShootingEnd
+from vibench.sim.periodic.shooting import OrbitShape, PeriodMap, ShootingEnd
 
 SPECIMEN = gong2025(damping_time_s=3e-5)
 TRACE = 390.081

@@ -8,8 +8,7 @@ from hypothesis import given, strategies as st
 
 from vibench.sim import Specimen, base_transmissibility, gong2025
 from vibench.sim.shaker.linear_motion import linear_motion
-from vibench.sim.shaker.loaded_shaker import LoadedShaker
-from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier, LoadedShaker, Shaker
 
 TABLE = Shaker(
     moving_mass_kg=0.127,

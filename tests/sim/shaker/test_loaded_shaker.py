@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import base_transmissibility, gong2025
-from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, LoadedShaker, MotionFailed
-from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.loaded_shaker import MOTION_COLUMNS, Amplifier, LoadedShaker, MotionFailed, Shaker
 
 AMPLIFIER = Amplifier(
     gain=10**0.5, low_cut_hz=0.3, high_cut_hz=30e3, clip_v=21.0, current_limit_a=5.0 * np.sqrt(2.0)

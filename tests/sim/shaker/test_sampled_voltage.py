@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import base_transmissibility, gong2025
-from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
 from vibench.sim.shaker.sampled_voltage import DrivenTable, follow_voltage
 
 SHAKER = Shaker(

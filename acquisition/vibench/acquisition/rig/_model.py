@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vibench.sim import NoContact, Specimen
 from vibench.sim.shaker.linear_motion import SINE_COLUMNS, LinearMotion, linear_motion
-from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
 
 from ._configuration import Rig, ShakerConfig
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from vibench.sim import Specimen
+from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
-from vibench.sim.engine.structures import Structure
 
 from ..signals.arrays import Flags, Reals
 from ._prepared_motion import ChannelNoise, PreparedMotion

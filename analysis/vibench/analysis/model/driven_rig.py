@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from vibench.acquisition.recording import Recording, coupling_cut_hz
 from vibench.acquisition.rig import Rig, amplifier_of, shaker_of
 from vibench.sim import Specimen
-from vibench.sim.shaker.parts import Amplifier, Shaker
+from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
 from vibench.sim.shaker.sampled_voltage import DrivenTable
 
 from ..errors import UnusableData

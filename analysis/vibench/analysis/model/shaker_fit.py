@@ -9,7 +9,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from vibench.acquisition.plan import StreamedNoise
 from vibench.acquisition.recording import Recording
 from vibench.sim import Specimen, base_transmissibility
-from vibench.sim.shaker.parts import Shaker
+from vibench.sim.shaker.loaded_shaker import Shaker
 
 from ..errors import UnusableData
 from ..frequency_response.noise_response import NoiseAnalysis, repeated_response, streamed_response

@@ -7,11 +7,12 @@ from vibench.sim.accuracy_benchmark.figures import (
     LEAST_GAIN,
     AccuracyBenchmark,
     LevelFigures,
+    LotteryFigures,
     MotionBenchmark,
     SolverFigures,
+    StatedShare,
     TransientFigures,
 )
-from vibench.sim.accuracy_benchmark.lotteries import LotteryFigures, StatedShare
 
 _HEAD = (
     "| level or solver | simulated s per s | error of the state "

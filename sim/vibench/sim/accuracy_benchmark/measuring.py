@@ -14,28 +14,36 @@ from scipy.integrate import solve_ivp
 
 from ..exponents.lyapunov import lyapunov_exponent
 from ..model.accuracy import Accuracy
-from ..model.arrays import Floats
-from ..motion.flow_derivative import flow_derivative
+from ..model.state import Floats
 from ..motion.integrate import integrate
-from ..motion.poincare import smallest_period, state_scales, stroboscopic_section
+from ..motion.poincare import flow_derivative, smallest_period, state_scales, stroboscopic_section
 from ..motion.response import steady_response
 from ..scene.scene import FixedDuration, Scene
 from ..scene.solve import solve_scene
 from ..study import software
 from .figures import (
+    LOTTERIES,
     MOTIONS,
     TRANSIENTS,
     AccuracyBenchmark,
     LevelFigures,
+    Lottery,
     Motion,
     MotionBenchmark,
     Regime,
     SolverFigures,
     TransientFigures,
+    measured_lottery,
 )
-from .independent_solution import STATE_UNITS, independent_state, state_error
-from .lotteries import LOTTERIES, Lottery, measured_lottery
-from .plain_equations import Place, law_of, numbers_of, rates_at
+from .independent_solution import (
+    STATE_UNITS,
+    Place,
+    independent_state,
+    law_of,
+    numbers_of,
+    rates_at,
+    state_error,
+)
 
 LEVELS = tuple(Accuracy)
 Solver = Literal["DOP853", "LSODA", "Radau"]

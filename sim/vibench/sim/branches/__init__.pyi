@@ -1,20 +1,16 @@
 from ._balanced_branches import (
     balanced_branches as balanced_branches,
 )
-from ._found_branch import (
-    BranchOrigin as BranchOrigin,
-    FoundBranch as FoundBranch,
-)
-from ._holding import (
-    UPDATES_TO_HOLD as UPDATES_TO_HOLD,
-    growth_time_s as growth_time_s,
-    least_growth_time_s as least_growth_time_s,
-)
 from ._motion_search import (
     MotionSearch as MotionSearch,
     periodic_motions as periodic_motions,
     random_state as random_state,
 )
 from ._shot_branches import (
+    UPDATES_TO_HOLD as UPDATES_TO_HOLD,
+    BranchOrigin as BranchOrigin,
+    FoundBranch as FoundBranch,
+    growth_time_s as growth_time_s,
+    least_growth_time_s as least_growth_time_s,
     shot_branches as shot_branches,
 )

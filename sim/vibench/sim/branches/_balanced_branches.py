@@ -5,17 +5,20 @@ from functools import partial
 
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
-from ..periodic.balance_branch import balance_branch_within, orbit_guess
-from ..periodic.balance_solver import BalanceOptions, balance, first_order_guesses
+from ..periodic.balance_branch import (
+    BalanceOptions,
+    balance,
+    balance_branch_within,
+    first_order_guesses,
+    orbit_guess,
+)
 from ..periodic.branch_following import DrivePath
-from ..periodic.condensation import structure_of
 from ..periodic.continuation import ArcSteps
-from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet
-from ..periodic.period_map import OrbitShape
+from ..periodic.harmonic_balance import Balance, BalanceEnd, HarmonicSet, structure_of
 from ..periodic.restoring_force import PowerSpring, spring_of
-from ._branch_search import BranchStart, branches_from
-from ._found_branch import BranchOrigin, FoundBranch
+from ..periodic.shooting import OrbitShape
 from ._motion_search import MotionSearch, periodic_motions
+from ._shot_branches import BranchOrigin, BranchStart, FoundBranch, branches_from
 
 STEPS = ArcSteps(first=0.01, longest=0.03, shortest=1e-7, tolerance=1e-10, most_points=3000)
 

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model.accuracy import Accuracy
-from ..model.arrays import Floats, Vector
 from ..model.drive import Harmonic
 from ..model.modes import base_transmissibility
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
+from ..model.state import Floats, Vector
 from ..motion.integrate import integrate
 from ..motion.poincare import smallest_period, state_scales
-from ..periodic.period_map import OrbitShape, PeriodMap
-from ..periodic.shooting import PeriodicOrbit, ShootingEnd, periodic_orbit
+from ..periodic.shooting import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
 
 SETTLED = 1e-3
 """A section repeats when it changes by less, over the state's scale: Newton's iteration does the rest."""

@@ -1,22 +1,129 @@
 """Branches of exact motions: from every motion that a search finds, and from every bifurcation on them."""
 
-from collections.abc import Iterator
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import Generic, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from ..model.arrays import Vector
 from ..model.drive import Harmonic
 from ..model.specimen import Specimen
+from ..model.state import Floats, Vector
 from ..motion.poincare import state_scales
-from ..periodic.branch import BifurcationKind, BranchEvent
-from ..periodic.branch_following import DrivePath
-from ..periodic.continuation import ArcSteps
+from ..periodic.branch import NEUTRAL, BifurcationKind, Branch, BranchEvent
+from ..periodic.branch_following import DrivePath, parameter_value
+from ..periodic.continuation import ArcEnd, ArcSteps
 from ..periodic.orbit_branch import periodic_branch_within
-from ..periodic.period_map import OrbitShape, PeriodMap
-from ..periodic.shooting import PeriodicOrbit, ShootingEnd, periodic_orbit
-from ._branch_search import BranchStart, branches_from
-from ._found_branch import BranchOrigin, FoundBranch
+from ..periodic.shooting import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
 from ._motion_search import MotionSearch, orbit_states, periodic_motions, simplest
+
+INTERPOLATED = 0.06
+"""A straight line between two points of a branch misses it by less than this part of its length: by as much
+as the tangent may turn between them."""
+SAME_MOTION = 1e-5
+"""Over the state's scale."""
+LENGTHS = 10.0
+"""As many units long counts the parameter's range: as when a branch is followed."""
+
+
+class BranchOrigin(StrEnum):
+    """How a branch came to be known."""
+
+    SEARCH = "a motion found from rest, between the stops or from a random state"
+    SYMMETRY_BREAKING = "switched to where a symmetry breaks"
+    PERIOD_DOUBLING = "switched to where a period doubles"
+    PHASE_RESONANCE = "the phase resonance of the motion without contacts"
+    FIRST_ORDER = "a solution of the first-order balance"
+
+
+@dataclass(frozen=True, eq=False)
+class FoundBranch:
+    """A branch, how its motions repeat, how it was found, and what it cost."""
+
+    branch: Branch
+    shape: OrbitShape
+    periods: int
+    """Drive periods of a motion."""
+    origin: BranchOrigin
+    has_twin: bool
+    """Another branch holds the mirror images of these motions."""
+    elapsed_s: float = 0.0
+    """To find and follow it."""
+
+    @property
+    def is_isolated(self) -> bool:
+        """It closes on itself: no sweep leads there from outside."""
+        return self.branch.begin is self.branch.end is ArcEnd.CLOSED
+
+
+def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats) -> bool:
+    """Say whether any of some states at one drive, shape (n, 6), belongs to a branch."""
+    branch, value = found.branch, parameter_value(path, drive)
+    scales = state_scales(specimen, drive)
+    along = branch.parameters
+    reach = max(float(np.ptp(along)), 1e-9 * value)
+    for k in np.flatnonzero((along[:-1] - value) * (along[1:] - value) <= 0.0):
+        span = along[k + 1] - along[k]
+        part = 0.0 if span == 0.0 else (value - along[k]) / span
+        here, there = branch.states[k] / scales, branch.states[k + 1] / scales
+        nearest = np.abs(here + part * (there - here) - states / scales).max(axis=1).min()
+        length = float(np.linalg.norm(there - here)) + LENGTHS * abs(float(span)) / reach
+        if nearest < INTERPOLATED * length + SAME_MOTION:
+            return True
+    return False
+
+
+def known_among(
+    known: Iterable[FoundBranch], specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats
+) -> bool:
+    """Say whether a motion, as one of its states or of its mirror's, lies on a known branch."""
+    return any(lies_on(each, specimen, path, drive, states) for each in known)
+
+
+M = TypeVar("M")
+"""A motion, as the method knows it."""
+
+
+@dataclass(frozen=True, eq=False)
+class BranchStart(Generic[M]):
+    """A motion that a branch may be begun from."""
+
+    motion: M
+    origin: BranchOrigin
+    drive: Harmonic
+    states: Floats
+    """Of it and, where they are known, of its mirror image, once a drive period, shape (n, 6)."""
+
+
+def branches_from(
+    specimen: Specimen,
+    path: DrivePath,
+    bounds: tuple[float, float],
+    search: MotionSearch,
+    starts: Callable[[Harmonic], Iterator[BranchStart[M]]],
+    follow: Callable[[BranchStart[M]], FoundBranch],
+    leaving: Callable[[FoundBranch], Iterable[BranchStart[M]]],
+) -> Iterator[FoundBranch]:
+    """Follow a branch from every start that lies on none that is known, and from all that leaves it."""
+    known: list[FoundBranch] = []
+    for value in np.linspace(*bounds, search.places):
+        began = time.perf_counter()
+        for start in starts(Harmonic(*path.drive(float(value)))):
+            fresh = [start]
+            while fresh and len(known) < search.most_branches:
+                one = fresh.pop()
+                if known_among(known, specimen, path, one.drive, one.states):
+                    continue
+                found = replace(follow(one), elapsed_s=time.perf_counter() - began)
+                known.append(found)
+                yield found
+                fresh += leaving(found)
+                began = time.perf_counter()
+
 
 STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=3000)
 PUSHES = (0.01, 0.03, 0.1, 0.3)
@@ -133,3 +240,48 @@ def _direction(mapping: PeriodMap, state: Vector, drive: Harmonic) -> Vector:
 
 def _has_left(orbit: PeriodicOrbit) -> bool:
     return simplest(orbit) is orbit and float(np.abs(orbit.signs.apart).max(initial=1.0)) > LEFT
+
+
+UPDATES_TO_HOLD = 10.0
+"""A loop holds what takes this many of its updates to grow by e: it must see a departure and answer it."""
+
+
+def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
+    """Give the time in which a small distance from a motion grows by e; infinite where it does not grow.
+
+    It is T / ln|mu| with T the period of the motion, and holds where the base moves as prescribed.
+
+    Parameters
+    ----------
+    frequency_hz
+        Of the drive [Hz].
+    multiplier
+        Magnitude of the largest Floquet multiplier over the whole period of the motion; same shape.
+    periods
+        Drive periods of the motion.
+
+    """
+    size = np.asarray(multiplier, dtype=np.float64)
+    rate = np.where(size > 1.0 + NEUTRAL, np.log(np.maximum(size, 1.0)), 0.0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(periods / (np.asarray(frequency_hz, dtype=np.float64) * rate))
+
+
+def least_growth_time_s(loop_time_s: float) -> float:
+    """Give the shortest growth time that a loop can hold against [s].
+
+    Parameters
+    ----------
+    loop_time_s
+        From a motion to the drive that answers it [s].
+
+    Raises
+    ------
+    ValueError
+        When it is not positive and finite.
+
+    """
+    if not 0.0 < loop_time_s < math.inf:
+        msg = f"A loop time of {loop_time_s} s is not allowed: positive and finite."
+        raise ValueError(msg)
+    return UPDATES_TO_HOLD * loop_time_s

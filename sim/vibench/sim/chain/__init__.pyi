@@ -8,11 +8,7 @@ from ._dispersion import (
     band_frequencies_hz as band_frequencies_hz,
     band_gaps as band_gaps,
     bloch_factor as bloch_factor,
-)
-from ._energy import (
-    MeanEnergies as MeanEnergies,
-    chain_energies as chain_energies,
-    mean_energies as mean_energies,
+    chain_transmissibility as chain_transmissibility,
 )
 from ._integrate import (
     ChainImpacts as ChainImpacts,
@@ -23,10 +19,10 @@ from ._lyapunov import (
     ChainExponent as ChainExponent,
     chain_lyapunov_exponent as chain_lyapunov_exponent,
 )
-from ._modes import (
-    chain_transmissibility as chain_transmissibility,
-)
 from ._response import (
     ChainResponse as ChainResponse,
+    MeanEnergies as MeanEnergies,
+    chain_energies as chain_energies,
     chain_response as chain_response,
+    mean_energies as mean_energies,
 )

@@ -12,18 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..exponents.blocking import BlockedMean, blocked_mean
+from ..exponents.tangent_run import BlockedMean, blocked_mean
 from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.arrays import Floats, Table
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
+from ..model.state import Floats, Table
 from ..model.stops import chosen
 from ..motion.integrate import MAX_IMPACT_RATE_HZ
-from ._base_force import longest_window_s
 from ._chain import MASSES_PER_CELL, Chain
-from ._integrate import check_work, integrate_chain, most_chain_impacts
-from ._run import ChainRun
-from ._tables import chain_tables
+from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impacts
+from ._tables import chain_tables, longest_window_s
 
 NEARNESS = 1e-6
 """Distance of the two motions over the size of the first."""

@@ -14,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Self
 
-from ..engine.sources import physics_digest
+from ..engine.library import physics_digest
 from ..operating_system.state_folder import state_folder, state_place
 
 MEMORY = 30

@@ -8,16 +8,195 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from threading import Lock
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..model.hertz import Hertz
 from ..model.modes import modal_form
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from ..model.state import Y, Z
-from .collision_fit import collision_fit
+from ..model.state import VY, VZ, Y, Z
+from .collision_shapes import (
+    DEPTHS,
+    DURATION,
+    HALF_FORCE,
+    HARDEST,
+    HEIGHTS,
+    POINTS,
+    SHARES,
+    SOFTEST,
+    SPACING,
+    TERMS,
+    Table,
+    Vector,
+    collision_shapes,
+)
+from .library import Engine, Structure
 from .run import DIRECTIONS, Floats, NativeRun, native_engine
+
+# Fit of the polynomials by which a batch resolves Hertz collisions (native/collision_fit.hpp). SI units.
+#
+# In units of the depth and the time u that a collision of its speed would have with nothing else acting, a
+# collision depends on the acceleration that all other springs give the pair meanwhile, and on u: through u
+# alone it knows the specimen. The acceleration about the middle of a collision, its first four derivatives
+# there, and u are the variables; the duration and the moments of the force about the middle are fitted to
+# collisions that are solved at sixteen points.
+
+MIDDLE = 1.47
+"""Of a collision, in u."""
+DERIVATIVES = 5
+"""Of the acceleration, itself among them."""
+VARIABLES = DERIVATIVES + 1
+MOMENTS = 5
+POLYNOMIALS = 1 + MOMENTS
+MONOMIALS = 289
+SLOWEST, FASTEST = 0.06, 5.0
+"""Speeds that are fitted, over gap times fastest rate."""
+HARDEST_PRESS = 0.24
+"""Accelerations that are fitted, either way, over speed / u."""
+FIRST_DERIVATIVE, LATER = 0.03, 0.1
+"""The first derivative over speed / u^2, of the paper's specimen, and each one over the one before."""
+PAPER_TURN = 0.053
+"""Fastest rate times u, of the paper's specimen in the middle of its speeds."""
+SLOWEST_TURN = 0.15
+"""Fastest rate times u, at most: a collision lasts three times as long [rad]."""
+COLLISIONS = 1500
+CHECKED = 200
+SEED = 1
+NEWTON_STEPS = 8
+FIT_ERROR = 2e-7
+"""Largest error of a speed after a collision, over the speed before, that a fit may have."""
+GUESS_POINTS = 64
+
+
+_ONE_THREAD = Lock()
+
+
+def collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
+    """Return the `CollisionFit` of native/structures.hpp: about a second for each specimen.
+
+    None where stops are so soft that the other springs move on meanwhile, or the fit is not close enough.
+    """
+    with _ONE_THREAD:
+        return _collision_fit(engine, specimen)
+
+
+@lru_cache(maxsize=8)
+def _collision_fit(engine: Engine, specimen: Specimen) -> Structure | None:
+    """Fit to collisions drawn at random from a box."""
+    middle, half = _box(specimen)
+    if not np.all(half > 0.0) or _fastest(specimen) * (middle[-1] + half[-1]) > SLOWEST_TURN:
+        return None
+    rng = np.random.default_rng(SEED)
+    count = COLLISIONS + CHECKED
+    places = rng.uniform(-1.0, 1.0, (count, VARIABLES))
+    # Denser towards the ends, as Chebyshev's points are.
+    places[:COLLISIONS] = np.sin(0.5 * math.pi * places[:COLLISIONS])
+    variables = middle + half * places
+    solved = _solve(variables[:, :DERIVATIVES], variables[:, -1], _coupling(specimen))
+    powers, counts = np.zeros((MONOMIALS, VARIABLES)), np.zeros(POLYNOMIALS)
+    engine.call("describe_collisions", engine.new("CollisionMonomials", powers=powers, counts=counts))
+    monomials = np.prod(places[:, None, :] ** powers, axis=2)
+    parts, errors = [], []
+    for most, wanted in zip(counts.astype(int), solved.T, strict=True):
+        known = monomials[:, :most]
+        part = np.linalg.lstsq(known[:COLLISIONS], wanted[:COLLISIONS], rcond=None)[0]
+        parts.append(part)
+        errors.append(float(np.abs(known[COLLISIONS:] @ part - wanted[COLLISIONS:]).max()))
+    turn = _fastest(specimen) * variables[:, -1].max()
+    if not max(error * turn**m / math.factorial(m) for m, error in enumerate(errors[1:])) < FIT_ERROR:
+        return None
+    unit = _time_over_fifth_root(specimen)
+    roots = np.linspace(middle[-1] - half[-1], middle[-1] + half[-1], GUESS_POINTS) / unit
+    fit = engine.new("CollisionFit", unit=unit)
+    fit["coefficients"], fit["middle"], fit["half"] = np.concatenate(parts), middle, half
+    fit["guess"] = np.polyfit(roots ** (-5.0 / 4.0), roots, 3)
+    return fit
+
+
+def _fastest(specimen: Specimen) -> float:
+    return float(np.max(np.abs(modal_form(specimen).rates)))
+
+
+def _time_over_fifth_root(specimen: Specimen) -> float:
+    """Give u times the fifth root of the speed: u = depth / speed, and m v^2 / 2 = 2 k d^(5/2) / 5."""
+    m1, m2 = specimen.masses[1:]
+    reduced = m1 * m2 / (m1 + m2)
+    return float((HALF_FORCE * reduced / specimen.contact.stops.contact_stiffness) ** 0.4)
+
+
+def _box(specimen: Specimen) -> tuple[Vector, Vector]:
+    """Choose the collisions that are fitted: middle and half width of each variable."""
+    unit = min(specimen.gaps_m) * _fastest(specimen)
+    shortest, longest = (
+        _time_over_fifth_root(specimen) * (part * unit) ** -0.2 for part in (FASTEST, SLOWEST)
+    )
+    turn = 0.5 * (shortest + longest) * _fastest(specimen) / PAPER_TURN
+    later = [FIRST_DERIVATIVE * turn * (LATER * turn) ** k for k in range(DERIVATIVES - 1)]
+    half = np.array([HARDEST_PRESS, *later, 0.5 * (longest - shortest)])
+    return np.array([0.0] * DERIVATIVES + [0.5 * (longest + shortest)]), half
+
+
+def _coupling(specimen: Specimen) -> Vector:
+    """Give what the integrals of a force do to p, over what the second one does."""
+    modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
+    kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
+    onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
+    return np.asarray(onto_p / onto_p[1])
+
+
+def _free(accelerations: Table) -> Table:
+    """Give the depth without force in powers of the time after the middle, shape (n, DERIVATIVES + 2)."""
+    powers = np.arange(2, DERIVATIVES + 2)
+    bent = accelerations / [math.factorial(k) for k in powers]
+    speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)
+    depth = MIDDLE * speed - (bent * (-MIDDLE) ** powers).sum(axis=1)
+    return np.column_stack([depth, speed, bent])
+
+
+def _solve(accelerations: Table, units: Vector, coupling: Vector) -> Table:
+    """Solve collisions by Newton's method: duration and moments about its middle, shape (n, POLYNOMIALS)."""
+    shapes, durations = collision_shapes()
+    press = np.clip(accelerations[:, 0] - MIDDLE * accelerations[:, 1], SOFTEST, HARDEST)
+    place = np.rint((press - SOFTEST) / SPACING).astype(int)
+    depths, length = shapes[place, DEPTHS].copy(), durations[place, DURATION].copy()
+    times, free, orders = np.append(HEIGHTS, 1.0), _free(accelerations), np.arange(TERMS)
+    through = coupling * units[:, None] ** (orders - 1.0) * (orders > 0)
+    for _ in range(NEWTON_STEPS):
+        root = np.sqrt(np.maximum(depths, 0.0))
+        pushed = np.einsum("nk,mki->nmi", HALF_FORCE * depths * root, SHARES)
+        weights = through * length[:, None] ** (orders + 1)
+        later = length[:, None] * times - MIDDLE
+        powers = later[:, :, None] ** np.arange(free.shape[1])
+        rates = (powers[:, :, :-1] * (free[:, 1:] * np.arange(1, free.shape[1]))[:, None, :]).sum(axis=2)
+        misfit = (powers * free[:, None, :]).sum(axis=2) - np.einsum("nm,nmi->ni", weights, pushed)
+        misfit[:, :POINTS] -= depths
+        slopes = np.empty((len(depths), POINTS + 1, POINTS + 1))
+        # What comes after three integrals is small, and corrected with the rest.
+        slopes[:, :, :POINTS] = -np.einsum("nm,mki->nik", weights[:, 1:4], SHARES[1:4])
+        slopes[:, :, :POINTS] *= (1.5 * HALF_FORCE * root)[:, None, :]
+        slopes[:, range(POINTS), range(POINTS)] -= 1.0
+        slopes[:, :, POINTS] = rates * times
+        slopes[:, :, POINTS] -= np.einsum("nm,nmi->ni", weights * (orders + 1) / length[:, None], pushed)
+        step = np.linalg.solve(slopes, misfit[:, :, None])[:, :, 0]
+        depths, length = depths - step[:, :POINTS], length - step[:, POINTS]
+    force = HALF_FORCE * depths * np.sqrt(np.maximum(depths, 0.0))
+    ends = np.einsum("nk,mk->nm", force, SHARES[:, :, POINTS]) * length[:, None] ** (orders + 1)
+    return np.column_stack([length, _about_the_middle(ends, length)])
+
+
+def _about_the_middle(ends: Table, length: NDArray[np.float64]) -> Table:
+    """Turn integrals of F (T - t)^m into those of F (T / 2 - t)^m."""
+    return np.stack(
+        [
+            sum(math.comb(m, j) * (-0.5 * length) ** (m - j) * ends[:, j] for j in range(m + 1))
+            for m in range(MOMENTS)
+        ],
+        axis=1,
+    )
+
 
 LEAST_TOLERANCE = 1e-7
 """Polynomials know a collision no better; as in native/collision.hpp."""

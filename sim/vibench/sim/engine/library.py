@@ -1,17 +1,108 @@
 """A library of the native engine: found, loaded, and called by `ctypes`, which releases Python's lock."""
 
 import ctypes
+import hashlib
 import importlib.util
+import platform
+import re
 import subprocess
 import sys
+from collections.abc import Iterable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-from .processor import usable_families
-from .structures import Structure, StructureType, parse_structures
+Structure = NDArray[np.void]
+"""One structure, shape (); or a row of them."""
+StructureType = np.dtype[np.void]
+_STRUCTURE = re.compile(r"(\w+) \{ (.*) \}")
+_NAME = re.compile(r"(\*?)\s*(\w+)((?:\[\d+\])*)")
+_NUMBERS: dict[str, DTypeLike] = {"double": np.float64, "int64_t": np.int64, "Phasor": np.complex128}
+
+
+def parse_structures(texts: Iterable[str]) -> dict[str, StructureType]:
+    """Return numpy's type of every structure.
+
+    Parameters
+    ----------
+    texts
+        C++ as native/structures.hpp declares it, such as ``State { double motion[6]; double side; }``; a
+        structure may hold those before it.
+
+    Raises
+    ------
+    ValueError
+        When a text is not of this form.
+
+    """
+    known: dict[str, StructureType] = {}
+    for text in texts:
+        whole = _STRUCTURE.fullmatch(text)
+        if whole is None:
+            msg = f"{text!r} is not a structure of the native engine: its form is 'Name {{ double field; }}'."
+            raise ValueError(msg)
+        name, fields = whole.groups()
+        declared = [each.strip().removeprefix("const ") for each in fields.split(";") if each.strip()]
+        rows = [field for each in declared for field in _fields(each, known)]
+        known[name] = np.dtype(rows, align=True)
+    return known
+
+
+def _fields(
+    declaration: str, known: dict[str, StructureType]
+) -> Iterable[tuple[str, DTypeLike, tuple[int, ...]]]:
+    kind, _, names = declaration.partition(" ")
+    for name in names.split(","):
+        found = _NAME.fullmatch(name.strip())
+        if found is None:
+            msg = f"{name!r} is not a field of a structure: its form is 'name', 'name[6]' or '*name'."
+            raise ValueError(msg)
+        pointer, word, sizes = found.groups()
+        shape = tuple(int(size) for size in re.findall(r"\d+", sizes))
+        yield word, np.uintp if pointer else _NUMBERS.get(kind) or known[kind], shape
+
+
+# Which family of processors this computer's belongs to: the native engine is compiled for each.
+#
+# The build hook reads this file too, so it needs nothing but the standard library.
+
+FAMILIES = ("x86_64", "x86_64_v3", "x86_64_v4", "arm64")
+"""As compilers call them: every x86-64 processor; those with AVX2; those with AVX-512; ARM."""
+_ARM = {"arm64", "aarch64"}
+_X86 = {"x86_64", "amd64"}
+_V3 = {"avx2", "bmi1", "bmi2", "fma", "movbe", "abm"}
+_V4 = _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}
+_WINDOWS_AVX2, _WINDOWS_AVX512 = 40, 41
+"""What IsProcessorFeaturePresent takes (winnt.h)."""
+
+
+def usable_families() -> tuple[str, ...]:
+    """Return the families whose code this processor runs, the fastest first; none for an unknown one."""
+    machine = platform.machine().lower()
+    if machine in _ARM:
+        return ("arm64",)
+    if machine not in _X86:
+        return ()
+    level = _level()
+    return tuple(reversed(FAMILIES[:level]))
+
+
+def _level() -> int:
+    """Return 3 for AVX-512, 2 for AVX2, else 1; what the system does not tell counts as absent."""
+    if sys.platform == "win32":
+        has = ctypes.windll.kernel32.IsProcessorFeaturePresent
+        return 1 + bool(has(_WINDOWS_AVX2)) * (1 + bool(has(_WINDOWS_AVX512)))
+    else:  # noqa: RET505 - a type checker for Windows must see that the rest is another system's
+        described = Path("/proc/cpuinfo")
+        if not described.is_file():
+            return 1
+        lines = described.read_text(encoding="utf-8", errors="replace").splitlines()
+        flags = next((set(line.split()) for line in lines if line.startswith("flags")), set())
+        return 3 if flags >= _V4 else 2 if flags >= _V3 else 1
+
 
 FOLDER = Path(__file__).parent / "libraries"
 """Where the build puts libraries: ``engine-FAMILY-DIGEST.EXT``, with a digest of the native sources."""
@@ -258,3 +349,16 @@ def _newest_of(families: tuple[str, ...], digest: str | None) -> Path | None:
         if found:
             return found[0]
     return None
+
+
+SIM = Path(__file__).parents[1]
+
+
+@cache
+def physics_digest() -> str:
+    """Return the digest, the same in a checkout and in an installed wheel."""
+    digest = hashlib.sha256(native_digest().encode())
+    for path in sorted(each for kind in ("*.py", "*.pyi") for each in SIM.rglob(kind)):
+        digest.update(path.relative_to(SIM).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

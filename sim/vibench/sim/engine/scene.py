@@ -19,7 +19,7 @@ from ..model.rigid_stops import RigidStops
 from ..model.specimen import Specimen
 from ..model.state import Y, Z
 from .collision_shapes import ABOUT_MIDDLE, HEIGHTS, POINTS, SHARES, collision_shapes
-from .library import Engine
+from .library import Engine, Structure
 from .power_shapes import (
     AT_END,
     AT_START,
@@ -33,7 +33,6 @@ from .power_shapes import (
     POINTS_AT,
     POWER_SHARES,
 )
-from .structures import Structure
 
 NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)
 """`Law` in native/structures.hpp."""

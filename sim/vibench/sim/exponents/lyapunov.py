@@ -14,18 +14,28 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.modes import modal_form
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
+from ..model.state import Floats
 from ..model.stops import chosen
-from ..motion.flow_derivative import flow_derivative
 from ..motion.integrate import MAX_IMPACT_RATE_HZ
-from ..motion.poincare import state_scales
-from .blocking import BlockedMean, blocked_mean
-from .settling import ALIGNING, SURE, FinalMotion, Settling, settling
-from .tangent_run import ALMOST, Interval, TangentRun, interval_for, run_with_tangent
+from ..motion.poincare import flow_derivative, state_scales
+from .tangent_run import (
+    ALIGNING,
+    ALMOST,
+    SURE,
+    BlockedMean,
+    FinalMotion,
+    Interval,
+    Settling,
+    TangentRun,
+    blocked_mean,
+    interval_for,
+    run_with_tangent,
+    settling,
+)
 
 FEWEST_INTERVALS = 32
 """Intervals that must fit into the duration, so that a mean can have an error."""

@@ -16,18 +16,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import DIRECTIONS
 from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.modes import state_matrix
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
+from ..model.state import Floats
 from ..model.stops import chosen
 from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ..motion.poincare import state_scales
-from .blocking import BlockedMean, blocked_mean
 from .lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
-from .settling import FinalMotion, settling
-from .tangent_run import TangentRun, interval_for, run_with_tangent
+from .tangent_run import (
+    BlockedMean,
+    FinalMotion,
+    TangentRun,
+    blocked_mean,
+    interval_for,
+    run_with_tangent,
+    settling,
+)
 
 
 @dataclass(frozen=True, eq=False)

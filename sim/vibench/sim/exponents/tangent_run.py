@@ -9,18 +9,106 @@ natural norm: free motion can only shrink in it, so that what grows was made to 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..engine.run import GrowthReadings, NativeRun, RunRecord, most_impacts
 from ..model.accuracy import Accuracy
-from ..model.arrays import Floats, Table
 from ..model.drive import Harmonic
 from ..model.modes import modal_form
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
+from ..model.state import Floats, Table
 from ..motion.integrate import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
+from ..motion.poincare import smallest_period
+
+# How well the mean of a correlated series is known: its standard error, by blocks as long as they must be.
+#
+# Neighbouring values are averaged in pairs, again and again; the error of the mean that the blocks suggest
+# grows until they are longer than the memory of the series, and stays (Flyvbjerg and Petersen, J. Chem.
+# Phys. 91 (1989) 461). That it stays is tested by the correlation of neighbouring blocks, at one length and
+# all longer ones together (Jonsson, Phys. Rev. E 98 (2018) 043304).
+
+FEWEST_BLOCKS = 16
+"""With fewer independent blocks an error is itself known to less than 20 per cent."""
+CONFIDENCE = 0.99
+"""Blocks count as independent unless the test says otherwise this surely."""
+
+
+@dataclass(frozen=True)
+class BlockedMean:
+    """A mean with its standard error."""
+
+    mean: float
+    standard_error: float
+    """Of the mean; zero where all values are equal, NaN for a single one."""
+    block_length: int
+    """Values in a block: a power of two, as few as make neighbouring blocks independent."""
+    blocks: int
+    correlation_length: float
+    """Values that carry as much as one independent value: variance of the mean over that of as many
+    independent ones."""
+    is_long_enough: bool
+    """The series holds `FEWEST_BLOCKS` independent blocks or more: else the error is a lower bound."""
+
+
+def blocked_mean(values: ArrayLike) -> BlockedMean:
+    """Average a series of evenly spaced values, shape (n,), n >= 1.
+
+    Raises ValueError when there is no value, or one is not finite.
+    """
+    series = np.asarray(values, dtype=np.float64)
+    if series.ndim != 1 or len(series) == 0 or not bool(np.all(np.isfinite(series))):
+        msg = f"A series of shape {series.shape} has no mean here: give one row of finite numbers."
+        raise ValueError(msg)
+    mean = float(series.mean())
+    variances, correlations, counts = _levels(series - mean)
+    if len(counts) == 0 or variances[0] == 0.0:
+        error = 0.0 if len(series) > 1 else math.nan
+        return BlockedMean(mean, error, 1, len(series), 1.0, len(series) >= FEWEST_BLOCKS)
+    level = _first_independent(variances, correlations, counts)
+    variance = variances[level] / (counts[level] - 1)
+    return BlockedMean(
+        mean=mean,
+        standard_error=math.sqrt(variance),
+        block_length=2**level,
+        blocks=int(counts[level]),
+        correlation_length=float(variance / (variances[0] / (counts[0] - 1))),
+        is_long_enough=bool(counts[level] >= FEWEST_BLOCKS),
+    )
+
+
+def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
+    """Variance, covariance of neighbours and number of blocks at every length that leaves two or more."""
+    variances, correlations, counts = [], [], []
+    while len(centred) > 1:
+        variances.append(float(np.mean(centred**2)))
+        correlations.append(float(np.sum(centred[:-1] * centred[1:])) / len(centred))
+        counts.append(len(centred))
+        pairs = len(centred) // 2
+        centred = 0.5 * (centred[: 2 * pairs : 2] + centred[1 : 2 * pairs : 2])
+    return np.array(variances), np.array(correlations), np.array(counts, dtype=np.float64)
+
+
+def _first_independent(variances: Floats, correlations: Floats, counts: Floats) -> int:
+    """Find the shortest blocks from which on no neighbours are correlated."""
+    ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
+    # Of independent values the lagged correlation has the mean -1/n and the variance 1/n.
+    evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
+    passes = np.flatnonzero(evidence < _largest_by_chance(len(counts)))
+    return int(passes[0]) if len(passes) else len(counts) - 1
+
+
+@cache
+def _largest_by_chance(levels: int) -> Floats:
+    """Evidence from each length and all longer ones, if blocks are independent."""
+    from scipy.special import chdtri  # noqa: PLC0415 - a fifth of a second, which few motions need
+
+    return np.asarray(chdtri(np.arange(levels, 0, -1), 1.0 - CONFIDENCE))
+
 
 LONGEST_TURN, LONGEST_DECAY = 2.0 * math.pi, 20.0
 """Several changes are made orthogonal at least this often, in radians and decays of the fastest mode: they
@@ -152,3 +240,79 @@ def starting_changes(metric: Table, changes: int) -> Table:
     root = np.linalg.cholesky(metric)
     rows, lengths = np.linalg.qr((general / np.sqrt(np.diag(metric)) @ root).T)
     return np.linalg.solve(root.T, rows * np.sign(np.diag(lengths))).T
+
+
+# Where a run comes to rest in its final kind of motion, and whether it was chaotic before. SI units.
+#
+# A run can strike its stops thousands of times and then leave them for good: chaos that was a transient
+# (Grebogi, Ott and Yorke, Physica D 7 (1983) 181). An exponent averaged over such a run belongs to no state
+# at all.
+
+SAME_STATE, NEARLY_SAME = 1e-6, 1e-3
+"""A section repeats when it changes by less than the first, over the state's scale, from cycle to cycle; it
+has done so since it last changed by more than the second."""
+LONGEST_CYCLE = 16
+"""Intervals in a cycle that is looked for."""
+SURE = 3.0
+"""Standard errors that a number must be away from zero to have a sign."""
+CHANGED = 5.0
+"""Standard errors between the means before and after a change: the best of many places is looked for."""
+FEWEST_INTERVALS = 32
+"""Intervals on each side of a change of the exponent's sign."""
+ALIGNING = 8
+"""Intervals in which a small change of the state turns towards its direction of growth."""
+
+
+class FinalMotion(StrEnum):
+    """What a run ends in."""
+
+    QUIET = "no impact will follow: the linear motion"
+    PERIODIC = "a periodic motion"
+    SETTLED = "a motion of another kind than before"
+    THROUGHOUT = "the motion of the whole run"
+
+
+@dataclass(frozen=True)
+class Settling:
+    """Since when a run was in its final kind of motion."""
+
+    motion: FinalMotion
+    since: int
+    """Intervals before it."""
+    cycle: int = 0
+    """Intervals of a periodic motion's cycle."""
+
+
+def settling(run: TangentRun, scales: Floats) -> Settling:
+    """Find the final motion of a run and its beginning; ``scales`` measure a state, shape (6,)."""
+    if run.is_quiet:
+        struck = np.flatnonzero(run.impacts)
+        return Settling(FinalMotion.QUIET, int(struck[-1]) + 1 if len(struck) else 0)
+    cycle = (
+        smallest_period(run.section, scales, SAME_STATE, LONGEST_CYCLE) if run.interval.periods > 0 else None
+    )
+    if cycle is not None:
+        points = run.section / scales
+        moved = np.abs(points[cycle:] - points[:-cycle]).max(axis=1)
+        changing = np.flatnonzero(~(moved < NEARLY_SAME))
+        return Settling(FinalMotion.PERIODIC, int(changing[-1]) + 1 if len(changing) else 0, cycle)
+    change = _change_of_sign(run.growth[:, 0])
+    if change is not None:
+        return Settling(FinalMotion.SETTLED, change)
+    return Settling(FinalMotion.THROUGHOUT, 0)
+
+
+def _change_of_sign(growth: Floats) -> int | None:
+    """Find where the mean growth falls from surely positive to not positive."""
+    count = len(growth)
+    if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
+        return None
+    places = np.arange(FEWEST_INTERVALS, count - FEWEST_INTERVALS + 1)
+    sums = np.cumsum(growth)
+    before, after = sums[places - 1] / places, (sums[-1] - sums[places - 1]) / (count - places)
+    # The split that leaves the least scatter about the two means.
+    place = int(places[np.argmax((before - after) * np.sqrt(places * (count - places)))])
+    head, tail = blocked_mean(growth[:place]), blocked_mean(growth[place:])
+    is_falling = head.mean > SURE * head.standard_error and tail.mean <= SURE * tail.standard_error
+    apart = CHANGED * math.hypot(head.standard_error, tail.standard_error)
+    return place if is_falling and head.mean - tail.mean > apart else None

@@ -4,11 +4,9 @@ from ._basins import (
     kick_stability as kick_stability,
     uncertainty_exponent as uncertainty_exponent,
 )
-from ._estimate import (
+from ._expansion import (
     MapEstimate as MapEstimate,
     estimate_map as estimate_map,
-)
-from ._expansion import (
     map_solver as map_solver,
 )
 from ._map import (

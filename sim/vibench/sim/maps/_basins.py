@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ..model.arrays import Floats
 from ..model.outcome import Outcome
+from ..model.state import Floats
 from ..motion.poincare import state_scales
 from ..scene.prediction import MotionKind, ScenePrediction
 from ..scene.scene import Given, Scene

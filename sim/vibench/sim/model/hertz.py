@@ -1,5 +1,6 @@
 """An elastic sphere on a plane: the paper's stops. SI units."""
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -35,3 +36,44 @@ def _made(detail: str, reference: Reference) -> Hertz:
 
 
 HERTZ = LawWord("hertz", "an elastic sphere on a plane, force as d^1.5", "hertz", _made)
+
+
+@dataclass(frozen=True)
+class Elasticity:
+    """How stiff a body is: what its contact with another body needs."""
+
+    youngs_modulus: float
+    """E [Pa]."""
+    poissons_ratio: float
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.youngs_modulus < math.inf:
+            msg = f"Young's modulus {self.youngs_modulus} Pa is not allowed: it must be positive and finite."
+            raise ValueError(msg)
+        if not -1.0 < self.poissons_ratio <= 0.5:
+            msg = f"Poisson's ratio {self.poissons_ratio} is not allowed: it must lie in (-1, 0.5]."
+            raise ValueError(msg)
+
+    @property
+    def plane_strain_compliance(self) -> float:
+        """(1 - nu^2) / E [1/Pa]: what each body adds to a contact's compliance."""
+        return (1.0 - self.poissons_ratio**2) / self.youngs_modulus
+
+
+def hertz_stiffness(sphere: Elasticity, plane: Elasticity, radius_m: float) -> float:
+    """Stiffness k of a sphere pressed on a plane, F = k d^(3/2) [N/m^1.5].
+
+    k = 4/3 E* sqrt(R), 1/E* = (1 - nu1^2)/E1 + (1 - nu2^2)/E2; Johnson, Contact Mechanics (1985),
+    eq. 4.23. Holds for frictionless, elastic contact much smaller than the radius.
+
+    Raises
+    ------
+    ValueError
+        When the radius is not positive.
+
+    """
+    if not 0.0 < radius_m < math.inf:
+        msg = f"Sphere radius {radius_m} m is not allowed: it must be positive and finite."
+        raise ValueError(msg)
+    modulus = 1.0 / (sphere.plane_strain_compliance + plane.plane_strain_compliance)
+    return 4.0 / 3.0 * modulus * math.sqrt(radius_m)

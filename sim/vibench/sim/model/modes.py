@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arrays import Complex, Table, Vector
 from .specimen import JOIN, Specimen, bound_matrices
-from .state import VX, VZ, X, Z
+from .state import VX, VZ, Complex, Table, Vector, X, Z
 
 
 def state_matrix(specimen: Specimen) -> tuple[Table, Vector]:

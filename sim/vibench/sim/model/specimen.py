@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict
 
 from .contact_law import ContactLaw, model_named
-from .elasticity import Elasticity, hertz_stiffness
+from .hertz import Elasticity, hertz_stiffness
 
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]

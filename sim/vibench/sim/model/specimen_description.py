@@ -32,10 +32,9 @@ from pydantic import (
 )
 
 from .contact_law import model_named
-from .elasticity import Elasticity, hertz_stiffness
-from .frozen_model import FrozenModel
+from .frozen_model import FrozenModel, fault_in_words, toml_table
+from .hertz import Elasticity, hertz_stiffness
 from .specimen import Gaps, Specimen, Triple
-from .toml_table import fault_in_words, toml_table
 
 BASE = "model"
 """Key of the described specimen that a table starts from."""

@@ -1,4 +1,13 @@
 """The order of a state vector. SI units."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 X, Y, Z, VX, VY, VZ = range(6)
 """Absolute displacements and velocities: always valid, in flight and in contact."""
+
+
+Vector = NDArray[np.float64]
+Table = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Floats = NDArray[np.float64]

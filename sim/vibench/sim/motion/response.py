@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike
 
 from ..engine.run import NativeRun, RunRecord, Watch, most_impacts
 from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.arrays import Floats
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
+from ..model.state import Floats
 from ..model.stops import chosen
 from .integrate import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
 

@@ -9,11 +9,20 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from ..model.arrays import Vector
 from ..model.drive import Harmonic
-from .branch import POINTWISE, BifurcationKind, Branch, BranchEvent, Parameter
+from ..model.state import Vector
+from .branch import (
+    POINTWISE,
+    BifurcationKind,
+    Branch,
+    BranchEvent,
+    OrbitSigns,
+    Parameter,
+    bifurcations_between,
+    is_joined,
+    sign_of,
+)
 from .continuation import ArcEnd, ArcPoint, ArcSteps, Curve, correct, locate, trace
-from .orbit_events import OrbitSigns, bifurcations_between, is_joined, sign_of
 
 
 class DrivePath(Protocol):

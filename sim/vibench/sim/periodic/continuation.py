@@ -14,7 +14,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..model.arrays import Table, Vector
+from ..model.state import Table, Vector
 
 
 class Curve(Protocol):

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..model.arrays import Complex, Floats
-from .condensation import LinearStructure, condense
+from ..model.state import Complex, Floats
+from .harmonic_balance import LinearStructure, condense
 from .restoring_force import PowerSpring
 
 TOUCHING = 1e-14
@@ -129,7 +129,7 @@ def first_order_states(
     Parameters
     ----------
     structure, spring
-        What is shaken: `vibench.sim.periodic.condensation.structure_of` a specimen, and its power law.
+        What is shaken: `vibench.sim.periodic.harmonic_balance.structure_of` a specimen, and its power law.
     frequency_hz, amplitude_m
         Of the drive U = amplitude sin(2 pi frequency t); positive, and zero or positive.
 

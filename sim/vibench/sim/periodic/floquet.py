@@ -16,9 +16,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..model.arrays import Complex, Floats
-from .condensation import Harmonics, LinearStructure
-from .frequency_time import grid_size, motion_on_grid, waveform
+from ..model.state import Complex, Floats
+from .harmonic_balance import Harmonics, LinearStructure, grid_size, motion_on_grid, waveform
 from .restoring_force import RestoringForce
 
 CONTACT_STEPS = 96

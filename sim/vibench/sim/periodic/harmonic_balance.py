@@ -10,13 +10,217 @@ says so.
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..model.arrays import Complex, Table, Vector
-from .condensation import Condensed, Harmonics, LinearStructure, condense
-from .frequency_time import ForceHarmonics, force_harmonics, grid_size, waveform
+from ..model.specimen import Specimen
+from ..model.state import Complex, Floats, Table, Vector
 from .restoring_force import RestoringForce
+
+# A linear structure seen from its one nonlinear spring. SI units.
+#
+# M q'' + C q' + K q + b F(p) = e_k U + e_c dU/dt with p = b.q. In harmonic k of the frequency omega the
+# structure answers linearly, so that only the scalar p is unknown (Krack and Gross, Harmonic Balance for
+# Nonlinear Vibration Problems, Springer 2019, section 2.5):
+#
+#     P_k = linear_k U - compliance_k F_k,   compliance_k = b.Z_k^-1 b,   Z_k = K - (k w)^2 M + i k w C
+
+Matrix = NDArray[np.float64]
+Harmonics = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class LinearStructure:
+    """Masses, springs and dampers without the nonlinear spring, and where that and the drive act."""
+
+    mass: Matrix
+    """M, shape (n, n), regular [kg]."""
+    damping: Matrix
+    """C, shape (n, n) [N s/m]."""
+    stiffness: Matrix
+    """K, shape (n, n), regular [N/m]."""
+    direction: Vector
+    """b, shape (n,): p = b.q, and the spring pulls with -b F."""
+    entry_stiffness: Vector
+    """e_k, shape (n,) [N/m]: force per displacement of the drive."""
+    entry_damping: Vector
+    """e_c, shape (n,) [N s/m]: force per velocity of the drive."""
+
+    def __post_init__(self) -> None:
+        size = len(self.direction)
+        square = all(table.shape == (size, size) for table in (self.mass, self.damping, self.stiffness))
+        if not square or self.entry_stiffness.shape != (size,) or self.entry_damping.shape != (size,):
+            msg = f"The matrices and entries of this structure do not fit its direction of {size} places."
+            raise ValueError(msg)
+
+    @property
+    def size(self) -> int:
+        """Degrees of freedom."""
+        return len(self.direction)
+
+
+def structure_of(specimen: Specimen) -> LinearStructure:
+    """Take the stops away: displacements (x, y, z), p = y - z, driven at m0 through k0 and c0."""
+    return LinearStructure(
+        mass=specimen.mass_matrix,
+        damping=specimen.damping_matrix,
+        stiffness=specimen.stiffness_matrix,
+        direction=np.array([0.0, 1.0, -1.0]),
+        entry_stiffness=np.array([specimen.stiffnesses[0], 0.0, 0.0]),
+        entry_damping=np.array([specimen.dampings[0], 0.0, 0.0]),
+    )
+
+
+class Condensed(NamedTuple):
+    """A structure at one frequency, per harmonic; slopes are derivatives by omega."""
+
+    compliance: Complex
+    """b.Z_k^-1 b, shape (m,) [m/N]."""
+    compliance_slope: Complex
+    linear: complex
+    """P_1 / U without the spring."""
+    linear_slope: complex
+    reach: Complex
+    """Z_k^-1 b, shape (m, n): every displacement per force in the spring [m/N]."""
+    carried: Complex
+    """Z_1^-1 e, shape (n,): every displacement over U without the spring."""
+
+
+def condense(structure: LinearStructure, omega: float, harmonics: Harmonics) -> Condensed:
+    """Solve the linear part of the structure at the given multiples of ``omega``.
+
+    Parameters
+    ----------
+    structure
+        Its stiffness must be regular if harmonic 0 is asked for.
+    omega
+        Angular frequency of the drive, positive [rad/s].
+    harmonics
+        Shape (m,), zero and above.
+
+    """
+    turn = harmonics.astype(np.float64)[:, None, None]
+    dynamic = _dynamic(structure, omega * turn)
+    slope = -2.0 * omega * turn**2 * structure.mass + 1j * turn * structure.damping
+    spring = np.broadcast_to(structure.direction[:, None], (len(harmonics), structure.size, 1))
+    reach: Complex = np.linalg.solve(dynamic, spring).astype(np.complex128)
+    # Z is symmetric (no gyroscopic terms), so that the slope of b.Z^-1 b is -(Z^-1 b).Z' (Z^-1 b).
+    bent = (slope @ reach)[:, :, 0]
+    first = _dynamic(structure, np.array(omega))
+    first_slope = -2.0 * omega * structure.mass + 1j * structure.damping
+    entry = structure.entry_stiffness + 1j * omega * structure.entry_damping
+    carried: Complex = np.linalg.solve(first, entry).astype(np.complex128)
+    moved = np.linalg.solve(first, 1j * structure.entry_damping - first_slope @ carried)
+    return Condensed(
+        compliance=reach[:, :, 0] @ structure.direction,
+        compliance_slope=-np.sum(reach[:, :, 0] * bent, axis=1),
+        linear=complex(structure.direction @ carried),
+        linear_slope=complex(structure.direction @ moved),
+        reach=reach[:, :, 0],
+        carried=carried,
+    )
+
+
+def _dynamic(structure: LinearStructure, omega: NDArray[np.float64]) -> Complex:
+    return structure.stiffness - omega**2 * structure.mass + 1j * omega * structure.damping
+
+
+# Between harmonics and time: the alternating frequency-time scheme for one spring. SI units.
+#
+# p(theta) = Re sum P_k exp(i k theta) over the harmonics kept, theta = omega t in [0, 2 pi). The force is
+# evaluated on a grid in time and brought back by FFT, and so are its slopes: their Fourier coefficients
+# S_m and E_m make the exact Jacobian,
+# dF_k = sum_l (S_{k-l} + i l w E_{k-l}) dP_l + (S_{k+l} - i l w E_{k+l}) dP_l*
+# (Cameron and Griffin, J. Appl. Mech. 56 (1989) 149; Krack and Gross 2019, section 2.4).
+
+SAMPLES_PER_HARMONIC = 16
+"""Grid points over the highest harmonic: what aliases back lies 15 times above it."""
+FEWEST_SAMPLES = 1024
+
+
+class ForceHarmonics(NamedTuple):
+    """The spring's force, in harmonics, and how it answers a change of the motion's harmonics."""
+
+    force: Complex
+    """F_k of the harmonics kept, shape (m,) [N]."""
+    holomorphic: Complex
+    """dF_k / dP_l, shape (m, m) [N/m]."""
+    conjugate: Complex
+    """dF_k / dP_l*, shape (m, m) [N/m]."""
+    frequency_slope: Complex
+    """dF_k / domega at fixed P, shape (m,) [N s]: the rate-dependent part."""
+
+
+def grid_size(highest: int) -> int:
+    """Count the samples of a period that resolve harmonics up to ``highest``: a power of two."""
+    return max(FEWEST_SAMPLES, 1 << (SAMPLES_PER_HARMONIC * highest - 1).bit_length())
+
+
+def waveform(phasors: Complex, harmonics: Harmonics, samples: int) -> Floats:
+    """One period of Re sum P_k exp(i k theta) on an even grid, shape (samples,)."""
+    spectrum = np.zeros(samples // 2 + 1, dtype=np.complex128)
+    spectrum[harmonics] = 0.5 * samples * phasors
+    if harmonics[0] == 0:
+        spectrum[0] = samples * phasors[0].real
+    return np.fft.irfft(spectrum, samples)
+
+
+def phasors_of(wave: Floats) -> Complex:
+    """All harmonics of one period on an even grid, shape (samples/2 + 1,): the inverse of `waveform`."""
+    spectrum = 2.0 / len(wave) * np.fft.rfft(wave)
+    spectrum[0] *= 0.5
+    return spectrum
+
+
+def motion_on_grid(
+    phasors: Complex, harmonics: Harmonics, omega: float, samples: int
+) -> tuple[Floats, Floats]:
+    """Displacement p and dp/dt over one period, shape (samples,) each [m, m/s]."""
+    return waveform(phasors, harmonics, samples), waveform(
+        1j * harmonics * omega * phasors, harmonics, samples
+    )
+
+
+def force_harmonics(
+    spring: RestoringForce, phasors: Complex, harmonics: Harmonics, omega: float
+) -> ForceHarmonics:
+    """Evaluate the spring in time along a motion given in harmonics; not finite where it overflows."""
+    samples = grid_size(int(harmonics[-1]))
+    p, rate = motion_on_grid(phasors, harmonics, omega, samples)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _brought_back(spring, p, rate, harmonics, omega)
+
+
+def _brought_back(
+    spring: RestoringForce, p: Floats, rate: Floats, harmonics: Harmonics, omega: float
+) -> ForceHarmonics:
+    samples = len(p)
+    damping = spring.damping(p, rate)
+    stiffness_lines = np.fft.fft(spring.stiffness(p, rate)) / samples
+    damping_lines = np.fft.fft(damping) / samples
+    difference = (harmonics[:, None] - harmonics[None, :]) % samples
+    total = (harmonics[:, None] + harmonics[None, :]) % samples
+    turning = 1j * omega * harmonics[None, :]
+    holomorphic = stiffness_lines[difference] + turning * damping_lines[difference]
+    conjugate = stiffness_lines[total] - turning * damping_lines[total]
+    # A mean has no conjugate partner: it counts once, not as half of a pair.
+    once = np.where(harmonics == 0, 0.5, 1.0)[:, None]
+    return ForceHarmonics(
+        force=phasors_of(spring.force(p, rate))[harmonics],
+        holomorphic=once * holomorphic,
+        conjugate=once * conjugate,
+        frequency_slope=phasors_of(damping * rate)[harmonics] / omega,
+    )
+
+
+def force_tail(spring: RestoringForce, phasors: Complex, harmonics: Harmonics, omega: float) -> Complex:
+    """All force harmonics that the grid resolves, shape (samples/2 + 1,): to judge what was left out."""
+    samples = grid_size(int(harmonics[-1]))
+    p, rate = motion_on_grid(phasors, harmonics, omega, samples)
+    return phasors_of(spring.force(p, rate))
+
 
 NEWTON_ITERATIONS = 80
 MOST_HALVINGS = 12

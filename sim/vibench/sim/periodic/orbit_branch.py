@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.arrays import Table, Vector
 from ..model.drive import Harmonic
+from ..model.state import Table, Vector
 from ..model.stops import chosen
 from ..motion.poincare import state_scales
 from .branch import Branch, Parameter, ParameterWord
@@ -22,8 +22,7 @@ from .branch_following import (
     range_scale,
 )
 from .continuation import ArcSteps
-from .period_map import PeriodMap
-from .shooting import PeriodicOrbit, ShootingEnd, described_orbit
+from .shooting import PeriodicOrbit, PeriodMap, ShootingEnd, described_orbit
 
 ORBIT_STEPS = ArcSteps(first=0.01, longest=0.1, shortest=1e-7, tolerance=1e-9, most_points=500)
 """A residual below 1e-9 of the gap: what the flow at reference accuracy allows."""

@@ -13,19 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from ..model.arrays import Table, Vector
 from ..model.drive import Harmonic
 from ..model.modes import base_transmissibility
 from ..model.specimen import Specimen
+from ..model.state import Table, Vector
 from ..model.stops import chosen
 from ..motion.poincare import state_scales
 from .branch import Branch
 from .branch_following import AmplitudePath, DrivePath, Family, OrbitReport, follow
 from .continuation import ArcSteps, correct
-from .frequency_time import phasors_of
+from .harmonic_balance import phasors_of
 from .orbit_branch import OrbitFamily
-from .period_map import OrbitShape, PeriodMap
-from .phase_reference import PhaseReference, PhaseReferenceWord
+from .shooting import OrbitShape, PeriodMap, PhaseReference, PhaseReferenceWord
 
 QUARTER_BEHIND = -0.5 * math.pi
 STEPS = ArcSteps(first=0.05, longest=0.3, shortest=1e-6, tolerance=1e-9, most_points=600)

@@ -11,13 +11,12 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model.arrays import Complex, Floats
 from ..model.drive import Harmonic
 from ..model.modes import harmonic_motion, modal_form
 from ..model.no_contact import NoContact
 from ..model.power_law import PowerLaw
 from ..model.specimen import Specimen
-from ..model.state import X, Y, Z
+from ..model.state import Complex, Floats, X, Y, Z
 
 
 @dataclass(frozen=True, eq=False)

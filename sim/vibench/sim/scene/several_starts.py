@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..engine.run import Watch
-from ..model.arrays import Floats
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
-from ..model.state import Y, Z
+from ..model.state import Floats, Y, Z
 from .course import SceneRun
 from .followed_run import FollowedRun, ObservedWindow, Stretch, follow_strobed, observe_window, window_of
 from .linear_motion import LinearMotion, never_touches

@@ -11,8 +11,8 @@ import numpy as np
 
 from ..exponents.lyapunov import LyapunovEstimate, Precision, lyapunov_exponent
 from ..model.accuracy import Accuracy
-from ..model.arrays import Floats
 from ..model.outcome import Outcome
+from ..model.state import Floats
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
 from .linear_motion import LinearMotion, linear_motion

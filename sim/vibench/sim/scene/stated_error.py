@@ -15,8 +15,8 @@ import numpy as np
 
 from ..engine.run import Watch
 from ..model.accuracy import Accuracy
-from ..model.arrays import Floats
 from ..model.outcome import Outcome
+from ..model.state import Floats
 from .course import Lead, SceneRun
 from .followed_run import FollowedRun, ObservedWindow, observe_window
 from .prediction import MotionKind, ScenePrediction

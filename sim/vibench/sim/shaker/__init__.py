@@ -8,7 +8,7 @@ under sines in closed form, impacts to first order. SI units.
 
 >>> import numpy as np
 >>> from vibench.sim import gong2025
->>> from vibench.sim.shaker.parts import Amplifier, Shaker
+>>> from vibench.sim.shaker.loaded_shaker import Amplifier, Shaker
 >>> from vibench.sim.shaker.loaded_shaker import LoadedShaker
 >>> table = Shaker(
 ...     moving_mass_kg=0.127, suspension_stiffness_n_per_m=9932.0, suspension_damping_ns_per_m=21.51,

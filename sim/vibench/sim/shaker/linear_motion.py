@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..model.specimen import Specimen
-from .parts import Amplifier, FloatArray, Shaker
+from .loaded_shaker import Amplifier, FloatArray, Shaker
 
 ComplexArray = NDArray[np.complex128]
 SINE_COLUMNS = ("voltage", "current", "base", "m0", "p")

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
 from ..model.specimen import Specimen
-from .loaded_shaker import LoadedShaker
-from .parts import Amplifier, FloatArray, Shaker
+from .loaded_shaker import Amplifier, FloatArray, LoadedShaker, Shaker
 
 ComplexArray = NDArray[np.complex128]
 Gain = Callable[[FloatArray], ComplexArray]

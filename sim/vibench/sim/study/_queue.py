@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..background import Cancelled, Observer, Progress
-from ..model.arrays import Floats
+from ..model.state import Floats
 from ..scene.scene import Scene
 from ..scene.solve import Solved
 from ._columns import TAKEN, PointState

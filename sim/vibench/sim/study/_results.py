@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from ..model.arrays import Floats
+from ..model.state import Floats
 from ..scene.prediction import ScenePrediction
 from . import _columns as layout
 from ._columns import CONTINUES, ENDED, MESSAGE, PointState

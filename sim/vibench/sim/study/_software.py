@@ -5,7 +5,7 @@ import platform
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
-from ..engine.sources import physics_digest
+from ..engine.library import physics_digest
 
 PACKAGES = ("vibench", "numpy", "scipy")
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
 from ..background import Cancelled, Observer
-from ..model.arrays import Floats
 from ..model.outcome import Outcome
+from ..model.state import Floats
 from ..model.stops import chosen
 from ..scene.measured_cost import expected_cost_s
 from ..scene.scene import Given, Rest, Scene

@@ -9,8 +9,8 @@ from math import ceil, floor
 import numpy as np
 from numpy.typing import NDArray
 
+from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
-from vibench.sim.engine.structures import Structure
 
 from ..analogue import Coupling, Input
 from .sensors import IEPE_BIAS_V, NoiseStream

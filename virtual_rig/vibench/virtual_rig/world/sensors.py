@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vibench.acquisition import ConfigurationError
 from vibench.acquisition.rig import AccelerometerConfig, VibrometerConfig
+from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
-from vibench.sim.engine.structures import Structure
 
 from .time_grid import USUAL_GRID, FloatArray, RecursiveFilter, TimeGrid
 

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vibench.acquisition.rig import USUAL_GRID_RATE_HZ
+from vibench.sim.engine.library import Structure
 from vibench.sim.engine.run import native_engine
-from vibench.sim.engine.structures import Structure
 
 FULL_BAND_HZ = 25_600.0
 """The band in which the rig's configuration gives the noise of instruments: half the fastest usual rate."""
