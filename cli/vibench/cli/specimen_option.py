@@ -1,13 +1,12 @@
 """Which specimen a command is about, and what of it is replaced: options that several commands share."""
 
 import re
-from typing import Annotated, Any, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 from pydantic import ValidationError
 
 from vibench.analysis import InvalidRequest
-from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import (
     CONTACT_LAWS,
     SpecimenTable,
@@ -19,6 +18,9 @@ from vibench.sim import (
 from vibench.sim.study import plausibility_warnings
 
 from .output import print_warnings
+
+if TYPE_CHECKING:
+    from vibench.analysis.dynamics import SpecimenChoice
 
 SPECIMENS_HELP = "A specimen's file, or one of these: " + "; ".join(
     f"{name} ({each.about})" for name, each in shipped_specimens().items()
@@ -34,7 +36,7 @@ DampingTime = Annotated[
     float | None, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
 ]
 Gap = Annotated[float | None, typer.Option("--gap", metavar="M", help="Clearance at both stops.")]
-Asked = TypeVar("Asked", bound=SpecimenChoice)
+Asked = TypeVar("Asked", bound="SpecimenChoice")
 _UNIT = re.compile("_(s|m|hz)$")
 _OTHER_NAMES = {"lengths": "cells", "described": "specimen"}
 """Options that are not called as their field."""

@@ -9,8 +9,7 @@ from vibench.sim import FrequencyPath, integrate, periodic_orbit
 from vibench.sim.branches import MotionSearch, growth_time_s, least_growth_time_s, shot_branches
 from vibench.sim.model.drive import Harmonic
 from vibench.sim.model.power_law import PowerLaw
-from vibench.sim.model.specimen import gong2025
-from vibench.sim.motion.poincare import state_scales
+from vibench.sim.model.specimen import gong2025, state_scales
 
 PERIODS = 12
 

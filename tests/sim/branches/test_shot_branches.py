@@ -19,7 +19,7 @@ from vibench.sim import (
     steady_response,
 )
 from vibench.sim.branches import BranchOrigin, MotionSearch, shot_branches
-from vibench.sim.motion.poincare import state_scales
+from vibench.sim.model.specimen import state_scales
 from vibench.sim.periodic.shooting import OrbitShape, PeriodMap
 
 pytestmark = pytest.mark.timeout(300)

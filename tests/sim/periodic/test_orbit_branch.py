@@ -11,7 +11,7 @@ from vibench.sim import (
     periodic_branch,
     periodic_orbit,
 )
-from vibench.sim.motion.poincare import state_scales
+from vibench.sim.model.specimen import state_scales
 from vibench.sim.periodic.branch import BifurcationKind, Parameter
 from vibench.sim.periodic.continuation import ArcEnd, ArcSteps
 from vibench.sim.periodic.orbit_branch import periodic_branch_within

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, base_transmissibility, gong2025, integrate
-from vibench.sim.motion.poincare import state_scales
+from vibench.sim.model.specimen import state_scales
 from vibench.sim.periodic.shooting import OrbitShape, PeriodMap
 
 DRIVE = Harmonic(130.0, 20e-6)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from vibench.sim import Accuracy, Harmonic, base_transmissibility, gong2025, integrate
-from vibench.sim.scene.linear_motion import linear_motion, never_touches
+from vibench.sim.scene.plan import linear_motion, never_touches
 
 DRIVE = Harmonic(137.0, 3e-6, phase_rad=0.7)
 START = (2e-6, -1e-6, 3e-6, 1e-3, -2e-3, 5e-4)

@@ -9,10 +9,10 @@ from ..model.accuracy import Accuracy
 from ..model.drive import Harmonic
 from ..model.modes import base_transmissibility
 from ..model.outcome import Outcome
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, state_scales
 from ..model.state import Floats, Vector
 from ..motion.integrate import integrate
-from ..motion.poincare import smallest_period, state_scales
+from ..motion.poincare import smallest_period
 from ..periodic.shooting import OrbitShape, PeriodicOrbit, PeriodMap, ShootingEnd, periodic_orbit
 
 SETTLED = 1e-3

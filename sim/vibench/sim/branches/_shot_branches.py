@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..model.drive import Harmonic
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, state_scales
 from ..model.state import Floats, Vector
-from ..motion.poincare import state_scales
 from ..periodic.branch import NEUTRAL, BifurcationKind, Branch, BranchEvent
 from ..periodic.branch_following import DrivePath, parameter_value
 from ..periodic.continuation import ArcEnd, ArcSteps

@@ -6,22 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import MOST_IMPACTS, SPARE_IMPACTS, Watch, native_engine
+from ..engine.run import MAX_IMPACT_RATE_HZ, MOST_IMPACTS, SPARE_IMPACTS, Watch, native_engine
 from ..engine.scene import collision_structure, fill_drive, power_structure
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Drive, Harmonic
 from ..model.outcome import Outcome
 from ..model.state import Complex, Floats
 from ..model.stops import chosen
-from ..motion.integrate import (
-    MAX_IMPACT_RATE_HZ,
-    ROUNDING,
-    Trajectory,
-    check_impact_rate,
-    check_times,
-    check_within,
-    integrate,
-)
+from ..motion.integrate import ROUNDING, Trajectory, check_impact_rate, check_times, check_within, integrate
 from ._chain import Chain
 from ._tables import ChainTables, Pieces, chain_tables, longest_window_s, pieces_between
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..engine.run import MAX_IMPACT_RATE_HZ
 from ..exponents.tangent_run import BlockedMean, blocked_mean
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.state import Floats, Table
 from ..model.stops import chosen
-from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import ChainRun, check_work, integrate_chain, most_chain_impacts
 from ._tables import chain_tables, longest_window_s

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import Watch
+from ..engine.run import MAX_IMPACT_RATE_HZ, Watch
 from ..exponents.tangent_run import blocked_mean
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
@@ -17,7 +17,6 @@ from ..model.power_law import PowerLaw
 from ..model.specimen import Specimen
 from ..model.state import Complex, Floats
 from ..model.stops import chosen
-from ..motion.integrate import MAX_IMPACT_RATE_HZ
 from ..motion.response import Response, steady_response, whole_periods
 from ._chain import MASSES_PER_CELL, Chain
 from ._integrate import ChainRun, check_work, most_chain_impacts, start_motion

@@ -13,15 +13,15 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..engine.run import MAX_IMPACT_RATE_HZ
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.modes import modal_form
 from ..model.outcome import Outcome
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, state_scales
 from ..model.state import Floats
 from ..model.stops import chosen
-from ..motion.integrate import MAX_IMPACT_RATE_HZ
-from ..motion.poincare import flow_derivative, state_scales
+from ..motion.poincare import flow_derivative
 from .tangent_run import (
     ALIGNING,
     ALMOST,

@@ -14,16 +14,14 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import DIRECTIONS
+from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Harmonic
 from ..model.modes import state_matrix
 from ..model.outcome import Outcome
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, state_scales
 from ..model.state import Floats
 from ..model.stops import chosen
-from ..motion.integrate import MAX_IMPACT_RATE_HZ
-from ..motion.poincare import state_scales
 from .lyapunov import ExponentVerdict, Source, intervals_to_skip, verdict_of
 from .tangent_run import (
     BlockedMean,

@@ -15,14 +15,14 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import GrowthReadings, NativeRun, RunRecord, most_impacts
+from ..engine.run import MAX_IMPACT_RATE_HZ, GrowthReadings, NativeRun, RunRecord, most_impacts, start_motion
 from ..model.accuracy import Accuracy
 from ..model.drive import Harmonic
 from ..model.modes import modal_form
 from ..model.outcome import Outcome
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, energy_metric
 from ..model.state import Floats, Table
-from ..motion.integrate import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
+from ..motion.integrate import check_impact_rate
 from ..motion.poincare import smallest_period
 
 # How well the mean of a correlated series is known: its standard error, by blocks as long as they must be.
@@ -224,13 +224,6 @@ def _parts(specimen: Specimen, interval_s: float) -> int:
     modes = modal_form(specimen).rates
     turns, decays = float(np.max(np.abs(modes))), float(np.max(-modes.real))
     return max(1, math.ceil(interval_s * max(turns / LONGEST_TURN, decays / LONGEST_DECAY)))
-
-
-def energy_metric(specimen: Specimen) -> Table:
-    """Give the matrix of twice the energy without stops, shape (6, 6)."""
-    metric = np.zeros((6, 6))
-    metric[:3, :3], metric[3:, 3:] = specimen.stiffness_matrix, specimen.mass_matrix
-    return metric
 
 
 def starting_changes(metric: Table, changes: int) -> Table:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from ..model.outcome import Outcome
+from ..model.specimen import state_scales
 from ..model.state import Floats
-from ..motion.poincare import state_scales
 from ..scene.prediction import MotionKind, ScenePrediction
 from ..scene.scene import Given, Scene
 from ..scene.shares import Share, wilson_share

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..engine.batch import batches_pay
 from ..model.outcome import Outcome
 from ..model.state import Floats
-from ..scene.measured_cost import expected_cost_s, longest_cost_s
+from ..scene.cost import expected_cost_s, longest_cost_s
 from ..scene.prediction import MotionKind
 from ..scene.scene import Given, Scene
 from ..scene.solve import Question, Solved, settle_scene

@@ -158,3 +158,7 @@ def _require_sweep(start_hz: float, stop_hz: float, duration_s: float, amplitude
     if start_hz == stop_hz:
         msg = f"A sweep from {start_hz} to {stop_hz} Hz is not allowed: for one frequency use Harmonic."
         raise ValueError(msg)
+
+
+WHOLE = 1e-9
+"""A window this close to a whole number of periods is taken for it."""

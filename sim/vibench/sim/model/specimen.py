@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict
 
 from .contact_law import ContactLaw, model_named
+from .drive import Harmonic
 from .hertz import Elasticity, hertz_stiffness
+from .state import Floats
 
 Triple = tuple[float, float, float]
 Gaps = tuple[float, float]
@@ -220,3 +222,16 @@ def _natural_frequencies(mass: Matrix, stiffness: Matrix) -> NDArray[np.float64]
     root = np.sqrt(np.diag(mass))
     values = np.linalg.eigvalsh(stiffness / np.outer(root, root))
     return np.asarray(np.sqrt(values) / (2.0 * np.pi), dtype=np.float64)
+
+
+def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
+    """Measure of a state, shape (6,): the gap for displacements, gap times 2 pi f for velocities."""
+    speed = 2.0 * np.pi * drive.frequency_hz
+    return min(specimen.gaps_m) * np.repeat([1.0, speed], 3)
+
+
+def energy_metric(specimen: Specimen) -> Floats:
+    """Give the matrix of twice the energy without stops, shape (6, 6)."""
+    metric = np.zeros((6, 6))
+    metric[:3, :3], metric[3:, 3:] = specimen.stiffness_matrix, specimen.mass_matrix
+    return metric

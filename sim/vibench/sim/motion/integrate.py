@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..engine.run import CubicRun, NativeRun, RunRecord, most_impacts
+from ..engine.run import MAX_IMPACT_RATE_HZ, CubicRun, NativeRun, RunRecord, most_impacts, start_motion
 from ..model.accuracy import Accuracy, AccuracyWord
 from ..model.drive import Drive, Harmonic, Sampled, Sweep
 from ..model.outcome import Outcome
@@ -71,9 +71,6 @@ def sweep_motion(drive: Sweep, interval_s: float, first: int, count: int) -> Bas
     return BaseMotion(interval_s, np.ascontiguousarray(scaled / interval_s ** np.arange(4)))
 
 
-MAX_IMPACT_RATE_HZ = 200_000.0
-"""Several times the busiest motions known of the paper's specimen: at 50 um 4300 impacts a second on Hertz's
-stops, 23000 in the chatter on rigid ones of restitution 0.8; chatter of 0.95 may need more."""
 LATEST_START_S = 1e8
 """Three years: the end of a run is one number, whose last digit there is 1e-8 s."""
 MOST_SAMPLES = 1e9
@@ -179,15 +176,6 @@ def integrate(
         outcome=outcome,
         accuracy=accuracy,
     )
-
-
-def start_motion(initial_state: ArrayLike | None) -> Vector:
-    """Check where a run starts; at rest when None."""
-    motion = np.zeros(6) if initial_state is None else np.asarray(initial_state, dtype=np.float64)
-    if motion.shape != (6,) or not bool(np.all(np.isfinite(motion))):
-        msg = f"Initial state {motion} is not allowed: give six finite numbers x, y, z, vx, vy, vz."
-        raise ValueError(msg)
-    return motion
 
 
 def check_impact_rate(max_impact_rate_hz: float) -> None:

@@ -3,19 +3,13 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..engine.run import DIRECTIONS, NativeRun, RunRecord, most_impacts
+from ..engine.run import DIRECTIONS, MAX_IMPACT_RATE_HZ, NativeRun, RunRecord, most_impacts, start_motion
 from ..model.accuracy import Accuracy
 from ..model.drive import Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import Floats
-from .integrate import MAX_IMPACT_RATE_HZ, integrate, start_motion
-
-
-def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
-    """Measure of a state, shape (6,): the gap for displacements, gap times 2 pi f for velocities."""
-    speed = 2.0 * np.pi * drive.frequency_hz
-    return min(specimen.gaps_m) * np.repeat([1.0, speed], 3)
+from .integrate import integrate
 
 
 def stroboscopic_section(

@@ -5,17 +5,14 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from ..engine.run import NativeRun, RunRecord, Watch, most_impacts
+from ..engine.run import MAX_IMPACT_RATE_HZ, NativeRun, RunRecord, Watch, most_impacts, start_motion
 from ..model.accuracy import Accuracy, AccuracyWord
-from ..model.drive import Harmonic
+from ..model.drive import WHOLE, Harmonic
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import Floats
 from ..model.stops import chosen
-from .integrate import MAX_IMPACT_RATE_HZ, check_impact_rate, start_motion
-
-WHOLE = 1e-9
-"""A window this close to a whole number of periods is taken for it."""
+from .integrate import check_impact_rate
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model.drive import Harmonic
+from ..model.specimen import state_scales
 from ..model.state import Table, Vector
 from ..model.stops import chosen
-from ..motion.poincare import state_scales
 from .branch import Branch, Parameter, ParameterWord
 from .branch_following import (
     DrivePath,

@@ -15,10 +15,9 @@ import scipy
 
 from ..model.drive import Harmonic
 from ..model.modes import base_transmissibility
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, state_scales
 from ..model.state import Table, Vector
 from ..model.stops import chosen
-from ..motion.poincare import state_scales
 from .branch import Branch
 from .branch_following import AmplitudePath, DrivePath, Family, OrbitReport, follow
 from .continuation import ArcSteps, correct

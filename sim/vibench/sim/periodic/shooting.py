@@ -12,17 +12,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..engine.run import start_motion
 from ..model.accuracy import Accuracy
 from ..model.drive import Harmonic
 from ..model.no_contact import NoContact
 from ..model.outcome import Outcome
 from ..model.power_law import PowerLaw
 from ..model.rigid_stops import RigidStops
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, state_scales
 from ..model.state import Complex, Floats, Table, Vector, Y, Z
 from ..model.stops import chosen
-from ..motion.integrate import Trajectory, integrate, start_motion
-from ..motion.poincare import flow_derivative, state_scales
+from ..motion.integrate import Trajectory, integrate
+from ..motion.poincare import flow_derivative
 from .branch import NEUTRAL, BifurcationKind, OrbitSigns, Symmetry
 from .floquet import multipliers
 from .harmonic_balance import phasors_of

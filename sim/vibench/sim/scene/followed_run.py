@@ -11,18 +11,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..engine.batch import BatchedMotion, follow_batch
-from ..engine.run import DIRECTIONS, MOST_STEPS, NativeRun, RunRecord, Watch, most_impacts
-from ..exponents.tangent_run import energy_metric
+from ..engine.run import (
+    DIRECTIONS,
+    MAX_IMPACT_RATE_HZ,
+    MOST_STEPS,
+    NativeRun,
+    RunRecord,
+    Watch,
+    most_impacts,
+    start_motion,
+)
 from ..model.contact_law import ContactLaw
-from ..model.drive import Harmonic
+from ..model.drive import WHOLE, Harmonic
 from ..model.linear_gap import LinearGap
 from ..model.outcome import Outcome
 from ..model.power_law import PowerLaw
-from ..model.specimen import Specimen
+from ..model.specimen import Specimen, energy_metric, state_scales
 from ..model.state import Floats
-from ..motion.integrate import MAX_IMPACT_RATE_HZ, start_motion
-from ..motion.poincare import state_scales
-from ..motion.response import WHOLE
 
 # What it costs to follow a motion on the machine of docs/accuracy.md: the measure of a budget. SI units.
 #

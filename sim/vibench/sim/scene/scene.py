@@ -8,10 +8,9 @@ from typing import ClassVar, Literal
 from pydantic import ConfigDict
 
 from ..model.accuracy import Accuracy
-from ..model.drive import Harmonic
+from ..model.drive import WHOLE, Harmonic
 from ..model.specimen import Specimen
 from ..model.stops import chosen
-from ..motion.response import WHOLE
 from .prediction import State
 
 _STRICT = ConfigDict(extra="forbid")
@@ -19,6 +18,9 @@ PAPER_DURATION_S, PAPER_WINDOW_S = 30.0, 5.0
 """Gong et al. 2025, section 2: 30 s from rest, the last 5 s observed."""
 BUDGET_S = 1.0
 """What a scene may cost on top of its own run."""
+CLEAR, FEWEST, MOST = 8, 16, 64
+"""Starts that are followed, that which was asked for among them: the first where all of them settled on one
+motion, or chaos surely lasts; the last where they came to more than one motion, and the budget allows."""
 
 
 class Observable(StrEnum):

@@ -18,11 +18,11 @@ from ..model.specimen import Specimen
 from ..model.state import Floats, Y, Z
 from .course import SceneRun
 from .followed_run import FollowedRun, ObservedWindow, Stretch, follow_strobed, observe_window, window_of
-from .linear_motion import LinearMotion, never_touches
+from .plan import LinearMotion, never_touches
 from .prediction import Ensemble, FoundMotion, MotionKind, StartMemory
 from .repetition import FEWEST_NEUTRAL, NEUTRAL, Growth, Pace, kind_of
 from .scatter import COVERED, WindowScatter, window_scatter
-from .scene import AutomaticDuration, FixedDuration, Observable, Scene
+from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene
 from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile, wilson_share
 from .states_alone import Follow, StatesAlone
 
@@ -36,9 +36,6 @@ TOUCHING = 0.999
 """Of a gap: m1 that is so far out may be in contact."""
 LEAST_SIZE = 1e-3
 """Of a gap: what a motion counts for at least, when starts are said to have parted."""
-CLEAR, FEWEST, MOST = 8, 16, 64
-"""Starts that are followed, that which was asked for among them: the first where all of them settled on one
-motion, or chaos surely lasts; the last where they came to more than one motion, and the budget allows."""
 LEAST_S = 1e-3
 """Following and observing a start costs this at least."""
 TOO_FEW = 4

@@ -6,24 +6,22 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..exponents.lyapunov import LyapunovEstimate, Precision, lyapunov_exponent
 from ..model.accuracy import Accuracy
 from ..model.outcome import Outcome
 from ..model.state import Floats
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
-from .linear_motion import LinearMotion, linear_motion
-from .plan import plan_of, transient_decay_s
+from .plan import LinearMotion, linear_motion, plan_of, transient_decay_s
 from .prediction import Ensemble, Method, MotionKind, ScenePrediction, StartMemory, State
 from .repetition import FEWEST_TIMES, MOST_STATES, Pace, growth_of, pace_of
 from .scatter import WindowScatter, window_scatter
-from .scene import AutomaticDuration, FixedDuration, Observable, Scene
+from .scene import FEWEST, AutomaticDuration, FixedDuration, Observable, Scene
 from .several_starts import (
     ALONE,
-    FEWEST,
     SEED,
     TOO_FEW,
     Draw,
@@ -46,9 +44,13 @@ from .stated_error import (
 )
 from .states_alone import REMEMBERED, Follow, batches_are_worth_it, in_batches, one_by_one
 
+if TYPE_CHECKING:
+    from ..exponents.lyapunov import LyapunovEstimate
+
 EXPONENT_S = 25.0
 """An exponent is averaged for so long, if it is not known well enough before [s]."""
-EXPONENT_PRECISION = Precision(absolute_per_s=0.2, relative=0.01)
+EXPONENT_PRECISION = 0.2, 0.01
+"""Absolute [1/s] and relative."""
 
 
 class Question(StrEnum):
@@ -446,8 +448,10 @@ def _ended(seen: SceneRun, ensemble: Ensemble | None) -> str:
     return seen.ended
 
 
-def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
+def _exponent(scene: Scene, run: FollowedRun) -> "LyapunovEstimate":
     """Find the largest exponent of the motion that a run has come to."""
+    from ..exponents.lyapunov import Precision, lyapunov_exponent  # noqa: PLC0415 - most scenes ask for none
+
     drive = scene.drive
     phase = math.fmod(
         2.0 * math.pi * math.fmod(drive.frequency_hz * run.time_s, 1.0) + drive.phase_rad, 2.0 * math.pi
@@ -459,7 +463,7 @@ def _exponent(scene: Scene, run: FollowedRun) -> LyapunovEstimate:
         EXPONENT_S,
         0.0,
         run.state,
-        precision=EXPONENT_PRECISION,
+        precision=Precision(*EXPONENT_PRECISION),
     )
 
 

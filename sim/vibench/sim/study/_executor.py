@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Protocol, TypeAlias, TypeVar
 
-from ..scene.measured_cost import learn_cost
+from ..scene.cost import learn_cost
 from ..scene.prediction import Method, ScenePrediction
 from ..scene.scene import Scene
 from ..scene.solve import Question, Solved, Solver as SceneSolver, solve_scene, solve_scenes

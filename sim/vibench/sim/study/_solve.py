@@ -18,7 +18,7 @@ from ..background import Cancelled, Observer
 from ..model.outcome import Outcome
 from ..model.state import Floats
 from ..model.stops import chosen
-from ..scene.measured_cost import expected_cost_s
+from ..scene.cost import expected_cost_s
 from ..scene.scene import Given, Rest, Scene
 from ..scene.solve import Solved, solve_scene
 from ._columns import (

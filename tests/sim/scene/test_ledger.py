@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from vibench.sim.costs.ledger import FEWEST, CostLedger
+from vibench.sim.scene.cost import FEWEST, CostLedger
 
 KIND = "event driven/hertz/standard"
 

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from vibench.sim import Harmonic, Observable, Scene, gong2025, plan_scene, solve_scene
-from vibench.sim.costs.ledger import FEWEST, CostLedger
-from vibench.sim.scene.measured_cost import learn_cost, measure_cost
+from vibench.sim.scene.cost import FEWEST, CostLedger, learn_cost, measure_cost
 from vibench.sim.scene.scene import AutomaticDuration, FixedDuration
 
 SCENES = 12
@@ -17,8 +16,7 @@ SCENES = 12
 @pytest.fixture
 def ledger(tmp_path, monkeypatch):
     new = CostLedger(tmp_path / "costs.json")
-    for module in ("plan", "measured_cost"):
-        monkeypatch.setattr(f"vibench.sim.scene.{module}.cost_ledger", lambda: new)
+    monkeypatch.setattr("vibench.sim.scene.cost.cost_ledger", lambda: new)
     return new
 
 
