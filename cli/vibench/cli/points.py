@@ -21,25 +21,21 @@ Cluster = Annotated[
     str | None,
     typer.Option("--cluster", metavar="ADDRESS", help="Let the workers of this Dask scheduler compute."),
 ]
-Failure = tuple[Mapping[str, float | str], str]
-"""Values of the axes at a point without an answer, and why there is none."""
+Failures = Sequence[tuple[Mapping[str, float | str], str]]
+"""Values of the axes at each point without an answer, and why there is none."""
 
 
-def complain_about_points(plan: "GridPlan", failures: Sequence[Failure], kept: int) -> None:
-    """End with a sentence for each of the first points without an answer, or as a study that was stopped.
-
-    Returns where every point is answered; ``kept`` are those with an answer, good or bad.
-    """
-    say_failures(plan, failures)
-    if failures:
+def complain_about_points(plan: "GridPlan", failures: Failures, kept: int) -> None:
+    """End with sentences for points without an answer, or as a study of which only ``kept`` were answered."""
+    if say_failures(plan, failures) > 0:
         raise typer.Exit(ExitCode.FAILED)
     if kept < plan.grid.size:
         errors.print(f"stopped after {kept} of {plan.grid.size} points; a file goes on with --resume")
         raise typer.Exit(ExitCode.STOPPED)
 
 
-def say_failures(plan: "GridPlan", failures: Sequence[Failure]) -> None:
-    """Say on standard error which points have no answer, and why."""
+def say_failures(plan: "GridPlan", failures: Failures) -> int:
+    """Say on standard error which points have no answer, and why; returns how many."""
     for where, why in failures[:SHOWN_FAILURES]:
         # An axis of one value tells no point from another.
         told = [axis for axis in plan.axes if len(axis.values) > 1] or [plan.axes[-1]]
@@ -48,3 +44,4 @@ def say_failures(plan: "GridPlan", failures: Sequence[Failure]) -> None:
     if len(failures) > SHOWN_FAILURES:
         more = len(failures) - SHOWN_FAILURES
         errors.print(f"error: {more} more points have no answer: see `failures` with --json")
+    return len(failures)

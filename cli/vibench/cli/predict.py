@@ -3,10 +3,10 @@
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import typer
 from pydantic import ValidationError
@@ -14,17 +14,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
-from vibench.sim import (
-    BUDGET_S,
-    Accuracy,
-    Observable,
-    Outcome,
-    Rest,
-    ScenePlan,
-    ScenePrediction,
-    plan_scene,
-    solve_scene,
-)
+from vibench.sim import BUDGET_S, Accuracy, Observable, Outcome, Rest, ScenePlan, ScenePrediction, solve_scene
 from vibench.sim.background import Progress
 from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
@@ -33,12 +23,9 @@ from .frequency_option import frequencies
 from .interruption import told_to_stop
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
-from .points import Cluster, Failure, Workers, complain_about_points
+from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
 from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, described, given_options
-
-if TYPE_CHECKING:
-    from vibench.sim.study import StudyResults
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
@@ -122,58 +109,42 @@ def predict(
         plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
     )
     began = time.monotonic()
+    points: Sequence[ScenePrediction] = []
     with told_to_stop() as is_stopped, study_bar(asked.grid.size) as observer:
         if asked.grid.size == 1 and out is None and cluster is None and study_solver(asked) is solve_scene:
             # One point needs neither a queue nor a file.
+            taken_s, kept, where = [math.nan], 1, asked.coordinates(0)
             try:
-                found = _Found.one(asked, solve_scene(asked.scene((0,) * len(asked.axes), Rest())))
+                points = [solve_scene(asked.scene((0,) * len(asked.axes), Rest()))]
+                failures = [(where, each.ended) for each in points if each.outcome != Outcome.REACHED_END]
             except (ValueError, RuntimeError) as error:
-                found = _Found.none(asked, error)
-            observer(Progress(1, 1, 0.0, "1 failed" if found.failures else ""))
+                said = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+                failures = [(where, f"{said}{error}")]
+            observer(Progress(1, 1, 0.0, "1 failed" if failures else ""))
         else:
-            from vibench.sim.study import solve_study
+            from vibench.sim.study import ExistingStudy, solve_study
 
-            existing: Literal["resume", "refuse"] = "resume" if resume else "refuse"
-            found = _Found.of(solve_study(asked, out, existing, workers, cluster, observer, is_stopped))
+            existing = ExistingStudy.RESUME if resume else ExistingStudy.REFUSE
+            found = solve_study(asked, out, existing, workers, cluster, observer, is_stopped)
+            points, failures, kept = list(found.predictions()), list(found.failures()), found.kept
+            taken_s = found.values("taken").ravel().tolist()
     if as_json:
-        print_json(_document(found, time.monotonic() - began))
+        from vibench.sim.study import software
+
+        document = {
+            "points": [each.to_dict() for each in points],
+            "failures": [{**where, "message": why} for where, why in failures],
+            "is_complete": kept == asked.grid.size,
+            "options": asked.model_dump(mode="json"),
+            "software": software(),
+            "elapsed_s": time.monotonic() - began,
+        }
+        print_json(document)
     else:
-        _tell(found)
+        _tell(points, Observable.LYAPUNOV in asked.observe)
     if explain:
-        (errors if as_json else console).print(paragraph(_explanation(found)))
-    complain_about_points(asked, found.failures, found.kept)
-
-
-@dataclass(frozen=True, eq=False)
-class _Found:
-    """What is known of the points that were asked for."""
-
-    study: Study
-    points: Sequence[ScenePrediction]
-    failures: Sequence[Failure]
-    taken_s: Sequence[float]
-    """Processor time of each point; NaN where it includes what a process pays once."""
-    kept: int
-    """Points with an answer, good or bad."""
-
-    @classmethod
-    def one(cls, study: Study, point: ScenePrediction) -> Self:
-        """Make it of the only point of a study."""
-        is_whole = point.outcome is Outcome.REACHED_END
-        return cls(study, [point], [] if is_whole else [(study.coordinates(0), point.ended)], [math.nan], 1)
-
-    @classmethod
-    def none(cls, study: Study, error: Exception) -> Self:
-        """Make it of the error that the only point of a study ended in; a refusal is a sentence by itself."""
-        why = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
-        return cls(study, [], [(study.coordinates(0), why)], [math.nan], 1)
-
-    @classmethod
-    def of(cls, results: "StudyResults") -> Self:
-        """Make it of a study's results."""
-        taken_s = results.values("taken").ravel().tolist()
-        failures = list(results.failures())
-        return cls(results.study, list(results.predictions()), failures, taken_s, results.kept)
+        (errors if as_json else console).print(paragraph(_explanation(asked, points, taken_s)))
+    complain_about_points(asked, failures, kept)
 
 
 def _study(options: dict[str, object]) -> Study:
@@ -212,98 +183,54 @@ def _budget(text: str) -> float:
         raise InvalidRequest(f"a budget of {text!r} was given; give seconds, as in 1s or 0.5") from error
 
 
-def _document(found: _Found, elapsed_s: float) -> dict[str, object]:
-    """Say every point with its options, for other programs; what is not known is null."""
-    from vibench.sim.study import software
-
-    return {
-        "points": [each.to_dict() for each in found.points],
-        "failures": [{**where, "message": why} for where, why in found.failures],
-        "is_complete": found.kept == found.study.grid.size,
-        "options": found.study.model_dump(mode="json"),
-        "software": software(),
-        "elapsed_s": elapsed_s,
-    }
-
-
-@dataclass(frozen=True)
-class _Planned:
-    """A point, how it was to be answered, and what that took."""
-
-    frequency_hz: float
-    plan: ScenePlan
-    taken_s: float
-    """NaN where it includes what a process pays once."""
-
-
-def _explanation(found: _Found) -> str:
+def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
     """Say how the points are answered: one passage for each run of points that are answered alike."""
-    from vibench.sim import measure_cost
+    from vibench.sim import measure_cost, plan_scene
 
-    study = found.study
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]
-    plans = [
-        _Planned(scene.drive.frequency_hz, plan_scene(scene), taken_s)
-        for scene, taken_s in zip(scenes, found.taken_s, strict=True)
-    ]
+    plans = [plan_scene(scene) for scene in scenes]
     passages = []
-    for _, run in groupby(zip(plans, scenes, strict=True), lambda each: each[0].plan.alike):
+    for _, run in groupby(range(len(plans)), lambda number: plans[number].alike):
         alike = list(run)
-        measure_cost(alike[len(alike) // 2][1])
-        passages.append(_passage([planned for planned, _ in alike]))
-    forgotten = forgetting_text(found.points)
-    return "\n".join([*passages, forgotten] if forgotten else passages)
+        measure_cost(scenes[alike[len(alike) // 2]])
+        passages.append(_passage([(study.frequencies_hz[k], plans[k], taken_s[k]) for k in alike]))
+    return "\n".join(filter(None, [*passages, forgetting_text(points)]))
 
 
-def _passage(points: Sequence[_Planned]) -> str:
-    """Explain points that follow one another and are answered alike, by the one nearest to its stops."""
-    worst = max(points, key=lambda each: each.plan.largest_p_m)
-    said = f"{' '.join(worst.plan.sentences)} {_cost(points)}"
-    method = worst.plan.method.value
+def _passage(points: Sequence[tuple[float, ScenePlan, float]]) -> str:
+    """Explain points in a row that are answered alike, by the one nearest to its stops.
+
+    Each is a frequency [Hz], a plan and the time it took [s]: NaN where a process paid once for something.
+    """
+    worst_hz, plan, _ = max(points, key=lambda each: each[1].largest_p_m)
+    method, cost = plan.method.value, points[0][1].cost
+    said = f"{' '.join(plan.sentences)} {replace(cost, time_s=sum(each.cost_s for _, each, _ in points))}"
+    known_s = [taken_s for *_, taken_s in points if math.isfinite(taken_s)]
+    if known_s:
+        said += f" {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."
     if len(points) == 1:
-        return f"{worst.frequency_hz:g} Hz: {method}. {said}"
-    return (
-        f"{len(points)} points, {points[0].frequency_hz:g} to {points[-1].frequency_hz:g} Hz: {method}. "
-        f"At {worst.frequency_hz:g} Hz: {said}"
-    )
+        return f"{worst_hz:g} Hz: {method}. {said}"
+    span = f"{len(points)} points, {points[0][0]:g} to {points[-1][0]:g} Hz"
+    return f"{span}: {method}. At {worst_hz:g} Hz: {said}"
 
 
-def _cost(points: Sequence[_Planned]) -> str:
-    """Say what points are estimated to take, and what those took that came after others of their kind."""
-    known_s = [each.taken_s for each in points if math.isfinite(each.taken_s)]
-    expected = points[0].plan.cost
-    whole = replace(expected, time_s=sum(each.plan.cost_s for each in points))
-    if not known_s:
-        return f"{whole}"
-    return f"{whole} {len(known_s)} of {len(points)} took {sum(known_s):.2g} s."
-
-
-def _tell(found: _Found) -> None:
+def _tell(points: Sequence[ScenePrediction], has_exponents: bool) -> None:
     rows = Table(
         title="Responses I and II of m0 and of p = y - z, over the base amplitude [-]",
         box=SIMPLE_HEAD,
         padding=0,
         show_edge=False,
     )
-    has_exponents = Observable.LYAPUNOV in found.study.observe
     headings = ["f [Hz]", "I", "II", "I of p", "II of p", "impacts", "motion", "error", "starts"]
     for heading in headings + ["exponent [1/s]"] * has_exponents:
         rows.add_column(heading, justify="right")
-    points = found.points
     step = max(1, -(-len(points) // _SHOWN))
     for each in points[::step]:
-        rows.add_row(
-            f"{each.frequency_hz:g}",
-            *(
-                _number(value)
-                for value in (each.response_i, each.response_ii, each.relative_i, each.relative_ii)
-            ),
-            str(each.impacts),
-            str(each.motion),
-            "" if each.error_estimate is None else f"{each.error_estimate:.1g}",
-            share_text(each),
-            *([_number(each.lyapunov_per_s)] if has_exponents else []),
-        )
+        numbers = (each.response_i, each.response_ii, each.relative_i, each.relative_ii, each.lyapunov_per_s)
+        *responses, exponent = ("" if value is None else f"{value:.4g}" for value in numbers)
+        error = "" if each.error_estimate is None else f"{each.error_estimate:.1g}"
+        cells = (f"{each.frequency_hz:g}", *responses, str(each.impacts), str(each.motion), error)
+        rows.add_row(*cells, share_text(each), *[exponent] * has_exponents)
     if points:
         print_table(rows)
     if step > 1:
@@ -311,7 +238,3 @@ def _tell(found: _Found) -> None:
     motions = motions_table(points)
     if motions is not None:
         print_table(motions)
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"

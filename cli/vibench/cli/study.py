@@ -117,9 +117,7 @@ class KeptStudies:
                 observer=observer,
                 cancelled=is_stopped,
             )
-        failures = list(results.failures())
-        say_failures(study, failures)
-        self._failed += len(failures)
+        self._failed += say_failures(study, list(results.failures()))
         if not results.is_complete:
             errors.print(
                 f"stopped after {results.kept} of {study.grid.size} points; the same command continues"

@@ -18,12 +18,7 @@ from .model.drive import (
     LogarithmicSweep as LogarithmicSweep,
     Sampled as Sampled,
 )
-from .model.frozen_model import (
-    FrozenModel as FrozenModel,
-    UnreadableTomlError as UnreadableTomlError,
-    fault_in_words as fault_in_words,
-    toml_table as toml_table,
-)
+from .model.frozen_model import FrozenModel as FrozenModel
 from .model.hertz import Elasticity as Elasticity, Hertz as Hertz, hertz_stiffness as hertz_stiffness
 from .model.hunt_crossley import HuntCrossley as HuntCrossley
 from .model.linear_gap import LinearGap as LinearGap
@@ -47,6 +42,11 @@ from .model.specimen_description import (
     load_specimen as load_specimen,
     shipped_specimens as shipped_specimens,
     usual_specimen as usual_specimen,
+)
+from .model.toml_table import (
+    UnreadableTomlError as UnreadableTomlError,
+    fault_in_words as fault_in_words,
+    toml_table as toml_table,
 )
 from .motion.integrate import (
     FollowedMotion as FollowedMotion,

@@ -32,9 +32,10 @@ from pydantic import (
 )
 
 from .contact_law import model_named
-from .frozen_model import FrozenModel, fault_in_words, toml_table
+from .frozen_model import FrozenModel
 from .hertz import Elasticity, hertz_stiffness
 from .specimen import Gaps, Specimen, Triple
+from .toml_table import fault_in_words, toml_table
 
 BASE = "model"
 """Key of the described specimen that a table starts from."""

@@ -17,12 +17,12 @@ from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import Floats, Y, Z
 from .course import SceneRun
-from .followed_run import FollowedRun, ObservedWindow, Stretch, follow_strobed, observe_window, window_of
+from .followed_run import FollowedRun, Stretch, follow_strobed, observe_window, window_of
 from .plan import LinearMotion, never_touches
 from .prediction import Ensemble, FoundMotion, MotionKind, StartMemory
 from .repetition import FEWEST_NEUTRAL, NEUTRAL, Growth, Pace, kind_of
 from .scatter import COVERED, WindowScatter, window_scatter
-from .scene import CLEAR, FEWEST, MOST, AutomaticDuration, FixedDuration, Observable, Scene
+from .scene import CLEAR, FEWEST, MOST, FixedDuration, Observable, Scene
 from .shares import Count, EscapeRate, escape_rate, shares_of, student_quantile, wilson_share
 from .states_alone import Follow, StatesAlone
 
@@ -100,20 +100,6 @@ def _pressed(specimen: Specimen, states: Floats) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True)
-class Horizon:
-    """How far other starts are followed."""
-
-    first_s: float
-    """In the first round; in each one after it, twice as far."""
-    last_s: float
-    """At most."""
-    judging_s: float
-    """What does not repeat then is followed so much longer with a small change, to tell what it is."""
-    window_s: float
-    """And observed for so long."""
-
-
-@dataclass(frozen=True)
 class Draw:
     """How many starts are followed, and at what cost."""
 
@@ -134,21 +120,28 @@ MORE_S = 1.0
 
 
 class SeveralStarts:
-    """Starts beside the one that was asked for, and what they came to."""
+    """Starts beside the one that was asked for, and what they came to.
+
+    They are followed as far as that one was asked to be.
+    """
 
     def __init__(
         self,
+        scene: Scene,
         begin: FollowedRun,
         asked: ReachedMotion,
         pace: Pace,
-        horizon: Horizon,
         draw: Draw,
         follow: Follow,
     ) -> None:
-        self._pace = pace
-        self._follow_all = follow
-        self._horizon = horizon
-        self._draw = draw
+        self._pace, self._draw, self._follow_all = pace, draw, follow
+        self._window_s, longest_s = scene.duration.window_s, scene.duration.longest_s
+        # What does not repeat is followed so much longer with a small change, to tell what it is.
+        self._judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - self._window_s))
+        self._last_s = max(0.0, longest_s - self._window_s - self._judging_s)
+        first_s = longest_s if isinstance(scene.duration, FixedDuration) else pace.settling_s
+        # In the first round; in each one after it, twice as far.
+        self._first_s = min(first_s, self._last_s)
         changes = pushes(begin.specimen, begin.drive.frequency_hz, draw.most - 1, draw.seed)
         self._waiting = [begin.pushed(change) for change in changes]
         self._under_way: list[StatesAlone] = []
@@ -190,7 +183,7 @@ class SeveralStarts:
     def follow(self) -> None:
         """Follow as many starts as the budget allows, as far as it takes, and observe them."""
         asked, budget_s = self._reached[0].run, self._draw.budget_s
-        each_s = asked.cost_s * min(1.0, self._horizon.first_s / asked.time_s)
+        each_s = asked.cost_s * min(1.0, self._first_s / asked.time_s)
         if budget_s < (TOO_FEW - 1) * each_s:
             return
         spent_s = self._follow_some(self._draw.clear - 1, budget_s, each_s)
@@ -211,7 +204,7 @@ class SeveralStarts:
 
     def _follow_some(self, wanted: int, budget_s: float, each_s: float) -> float:
         """Follow more starts, as many as a budget allows, and observe them; gives what it cost."""
-        count = _as_many(wanted, budget_s, each_s)
+        count = math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
         self._under_way = [StatesAlone(run, self._pace) for run in self._waiting[:count]]
         self._waiting = self._waiting[count:]
         self._follow_rounds(budget_s)
@@ -237,7 +230,7 @@ class SeveralStarts:
         return reached or any(each.repeats is not None for each in self._under_way)
 
     def _follow_rounds(self, budget_s: float) -> None:
-        reach_s = min(self._horizon.first_s, self._horizon.last_s)
+        reach_s = self._first_s
         while True:
             left = [each for each in self._under_way if not each.is_over]
             allowed_s = max(0.0, budget_s - self._cost_s) / max(1, len(left))
@@ -247,10 +240,10 @@ class SeveralStarts:
                 return
             if any(each.run.time_s < reach_s for each in left):
                 continue  # On what the others have not used of their parts.
-            if reach_s >= self._horizon.last_s:
+            if reach_s >= self._last_s:
                 return
             lasting_s = reach_s + self._lasting_after_s / len(left)
-            reach_s = min(2.0 * reach_s, lasting_s, self._horizon.last_s)
+            reach_s = min(2.0 * reach_s, lasting_s, self._last_s)
 
     @property
     def _lasting_after_s(self) -> float:
@@ -267,31 +260,14 @@ class SeveralStarts:
             begins, end_s = run.apart(), run.time_s + other.repeats.period / self._pace.frequency_hz
             one = follow_strobed(run, end_s, Watch.PEAKS_AND_LINES)
             window = window_of(begins, [one])
-            return reached_motion(run, kind, period, window, None, other.wandered_until_s, NOT_CARRIED)
+            until_s = other.wandered_until_s
+            return ReachedMotion(run, kind, period, window.responses_m, None, until_s, NOT_CARRIED)
         until_s = other.wandered_until_s
-        growth = other.growth_over(self._horizon.judging_s)
-        window = observe_window(run, self._horizon.window_s)
+        growth = other.growth_over(self._judging_s)
+        window = observe_window(run, self._window_s)
         scatter = window_scatter([block.peak_x_m for block in window.blocks], len(window.blocks))
         kind = kind_of(None, growth, self._pace.fading_s)
-        return reached_motion(run, kind, None, window, scatter, until_s, growth)
-
-
-def reached_motion(
-    run: FollowedRun,
-    motion: MotionKind,
-    period: int | None,
-    window: ObservedWindow,
-    scatter: WindowScatter | None,
-    wandered_until_s: float,
-    growth: Growth,
-) -> ReachedMotion:
-    """Describe what a run came to by the window at its end."""
-    return ReachedMotion(run, motion, period, window.responses_m, scatter, wandered_until_s, growth)
-
-
-def _as_many(wanted: int, budget_s: float, each_s: float) -> int:
-    """How many starts a budget allows."""
-    return math.floor(min(float(wanted), max(0.0, budget_s) / max(each_s, LEAST_S)))
+        return ReachedMotion(run, kind, None, window.responses_m, scatter, until_s, growth)
 
 
 SAME = 1e-3
@@ -307,7 +283,8 @@ CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
 def motions_among(reached: Sequence[ReachedMotion]) -> list[list[ReachedMotion]]:
     """Sort what starts came to into motions, each with the start first that shows it best."""
     groups: list[list[ReachedMotion]] = []
-    for each in sorted(reached, key=_clearness):
+    order = {kind: place for place, kind in enumerate(CLEAREST)}
+    for each in sorted(reached, key=lambda one: order.get(one.motion, len(order))):
         same = next((group for group in groups if is_same(group[0], each)), None)
         if same is None:
             groups.append([each])
@@ -331,10 +308,6 @@ def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKin
     if group[0].period is not None or not kinds:
         return group[0].motion
     return max(CLEAREST, key=kinds.count)
-
-
-def _clearness(one: ReachedMotion) -> int:
-    return CLEAREST.index(one.motion) if one.motion in CLEAREST else len(CLEAREST)
 
 
 def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
@@ -505,27 +478,12 @@ def ensemble_beside(
 
     None where the budget allows too few.
     """
-    several = SeveralStarts(begin, asked, pace, _horizon(scene, pace), draw or _draw(scene, asked), follow)
+    if draw is None and Observable.SCATTER in scene.observe:
+        draw = Draw(clear=FEWEST)
+    elif draw is None:
+        draw = Draw(budget_s=max(scene.budget_s - asked.run.cost_s, ALONE * scene.budget_s))
+    several = SeveralStarts(scene, begin, asked, pace, draw, follow)
     several.follow()
     if len(several.reached) == 1:
         return None
     return ensemble_of(several, scene.drive.amplitude_m, pace.forgetting_s, error_of)
-
-
-def _draw(scene: Scene, asked: ReachedMotion) -> Draw:
-    """Say how many starts are followed at what cost: enough of them, where their scatter was asked for."""
-    if Observable.SCATTER in scene.observe:
-        return Draw(clear=FEWEST)
-    return Draw(budget_s=max(scene.budget_s - asked.run.cost_s, ALONE * scene.budget_s))
-
-
-def _horizon(scene: Scene, pace: Pace) -> Horizon:
-    """Say how far other starts are followed: as far as the one that was asked for."""
-    match scene.duration:
-        case FixedDuration(duration_s=longest_s, window_s=window_s):
-            first_s = longest_s
-        case AutomaticDuration(longest_s=longest_s, window_s=window_s):
-            first_s = pace.settling_s
-    judging_s = min(FEWEST_NEUTRAL * pace.forgetting_s, max(0.0, longest_s - window_s))
-    last_s = max(0.0, longest_s - window_s - judging_s)
-    return Horizon(min(first_s, last_s), last_s, judging_s, window_s)

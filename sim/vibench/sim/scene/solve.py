@@ -30,7 +30,6 @@ from .several_starts import (
     ensemble_beside,
     lasting,
     memory_of,
-    reached_motion,
 )
 from .stated_error import (
     ROUNDING,
@@ -352,11 +351,11 @@ class _Begun:
         self, seen: SceneRun, errors: StatedErrors, follow: Follow, draw: Draw | None = None
     ) -> Ensemble | None:
         """Follow other starts, as the budget of the scene allows or as ``draw`` says."""
-        asked = reached_motion(
+        asked = ReachedMotion(
             self.run,
             seen.motion,
             None if seen.repeats is None else seen.repeats.period,
-            seen.window,
+            seen.window.responses_m,
             _between_windows(seen),
             seen.wandered_until_s,
             growth_of(seen.path),

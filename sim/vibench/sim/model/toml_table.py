@@ -1,0 +1,80 @@
+"""A TOML file as a table, or one sentence that says why it is none, or what a value of it should be."""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+
+class UnreadableTomlError(ValueError):
+    """A file that cannot be read, or is no TOML; the sentence begins with its path."""
+
+
+def toml_table(path: Path) -> dict[str, Any]:
+    """Read a TOML file.
+
+    Raises
+    ------
+    UnreadableTomlError
+        In one sentence, when the file is missing, is no text, or is not TOML.
+
+    """
+    try:
+        # Editors on Windows begin a file with a byte-order mark.
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise UnreadableTomlError(
+            f"{path}: cannot be read ({error.strerror}); give the path of a TOML file"
+        ) from error
+    except UnicodeDecodeError as error:
+        raise UnreadableTomlError(f"{path}: is not UTF-8 text; save it as UTF-8") from error
+    except tomllib.TOMLDecodeError as error:
+        raise UnreadableTomlError(f"{path}: is not valid TOML: {error}; correct that line") from error
+    except RecursionError as error:
+        raise UnreadableTomlError(
+            f"{path}: holds lists or tables within each other, too many to be read; write them side by side"
+        ) from error
+
+
+_ENUM_MEMBER = re.compile(r"<\w+\.\w+: ('[^']*')>")
+"""A word as Python shows it, ``<Start.UP: 'up'>``."""
+_LIST, _TABLE = "give a list, in square brackets", "give a table"
+_TIME = "give a date, time and time zone, such as 2026-03-01T12:00:00Z"
+_IN_WORDS_OF_TOML: Mapping[str, str] = {
+    "list_type": _LIST,
+    "tuple_type": _LIST,
+    "dict_type": _TABLE,
+    "model_type": _TABLE,
+    "model_attributes_type": _TABLE,
+    "too_short": "give {min_length} or more of them, not {actual_length}",
+    "too_long": "give {max_length} of them or fewer, not {actual_length}",
+    "string_type": "give text, in quotes",
+    "string_too_short": "give text of {min_length} or more letters",
+    "string_too_long": "give {max_length} letters or fewer",
+    "float_parsing": "give a number",
+    "int_parsing": "give a whole number",
+    "int_from_float": "give a whole number",
+    "datetime_type": _TIME,
+    "datetime_parsing": _TIME,
+    "datetime_from_date_parsing": _TIME,
+    "timezone_aware": _TIME,
+    "bool_type": "give true or false",
+    "union_tag_not_found": "{discriminator} is missing: it says what this is",
+    "union_tag_invalid": "{discriminator} = '{tag}' is not known; allowed are {expected_tags}",
+}
+"""What pydantic says in words of Python, by its type of fault."""
+
+
+def fault_in_words(fault: Mapping[str, Any]) -> str:
+    """Say what a value of a TOML file should be, in words of TOML and not of Python.
+
+    Parameters
+    ----------
+    fault
+        One of the ``errors()`` of a pydantic ``ValidationError``.
+
+    """
+    plain = _IN_WORDS_OF_TOML.get(fault["type"])
+    said = str(fault["msg"]) if plain is None else plain.format(**fault.get("ctx", {}))
+    return _ENUM_MEMBER.sub(r"\1", said.removeprefix("Value error, "))
