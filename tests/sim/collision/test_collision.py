@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vibench.sim import Accuracy, Harmonic, gong2025
-from vibench.sim.engine.collision_shapes import (
+from vibench.sim.engine.run import Watch
+from vibench.sim.engine.shapes import (
     DEPTHS,
     DURATION,
     HALF_FORCE,
@@ -14,7 +15,6 @@ from vibench.sim.engine.collision_shapes import (
     SPACING,
     collision_shapes,
 )
-from vibench.sim.engine.run import Watch
 from vibench.sim.scene.followed_run import FollowedRun, Samples
 
 DRIVE, STILL = Harmonic(130.0, 20e-6), Harmonic(130.0, 0.0)

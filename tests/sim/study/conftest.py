@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.sim.study import Study
-from vibench.sim.study._columns import SESSION, TAKEN
+from vibench.sim.study._grid import SESSION, TAKEN
 
 OF_THE_OCCASION = (TAKEN, SESSION)
 """What may differ between two computations of the same study."""

@@ -23,9 +23,9 @@ from vibench.sim.study import (
     run_study,
     solve_study,
 )
-from vibench.sim.study._columns import SESSION, STATE
 from vibench.sim.study._errors import ClusterLost
 from vibench.sim.study._file_store import FileStore
+from vibench.sim.study._grid import SESSION, STATE
 from vibench.sim.study._queue import StudyEnd
 from vibench.sim.study._results import results_of
 

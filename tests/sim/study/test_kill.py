@@ -12,8 +12,8 @@ import pytest
 
 from vibench.sim import solve_scene
 from vibench.sim.study import PointState, ThreadExecutor, open_study, run_study, solve_study
-from vibench.sim.study._columns import SESSION, STATE
 from vibench.sim.study._file_store import FileStore
+from vibench.sim.study._grid import SESSION, STATE
 from vibench.sim.study._queue import StudyEnd
 
 CHILD = Path(__file__).with_name("study_child.py")

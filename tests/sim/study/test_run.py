@@ -10,9 +10,9 @@ from hypothesis import given, settings, strategies as st
 from vibench.sim import Harmonic, Outcome, Rest, Scene, gong2025, solve_scene
 from vibench.sim.scene.scene import FixedDuration, Given
 from vibench.sim.study import MemoryStore, PointState, Study, ThreadExecutor, run_study, solve_study
-from vibench.sim.study._columns import CONTINUES, PHASE
 from vibench.sim.study._errors import InvalidStudy
 from vibench.sim.study._executor import Reply, solve_timed
+from vibench.sim.study._grid import CONTINUES, PHASE
 from vibench.sim.study._queue import StudyEnd
 from vibench.sim.study._results import results_of
 from vibench.sim.study._study import GivenStart

@@ -21,8 +21,8 @@ from vibench.sim.study import (
     run_study,
     solve_study,
 )
-from vibench.sim.study._columns import COLUMNS, IDENTITY, NUMBERS, SESSION, STATE
 from vibench.sim.study._file_store import FileStore, make_file, sole_writer
+from vibench.sim.study._grid import COLUMNS, IDENTITY, NUMBERS, SESSION, STATE
 from vibench.sim.study._queue import StudyEnd
 from vibench.sim.study._results import results_of
 from vibench.sim.study._solve import scene_identity

@@ -18,7 +18,9 @@ from ..model.modes import modal_form
 from ..model.outcome import Outcome
 from ..model.specimen import Specimen
 from ..model.state import VY, VZ, Y, Z
-from .collision_shapes import (
+from .library import Engine, Structure
+from .run import DIRECTIONS, Floats, NativeRun, native_engine
+from .shapes import (
     DEPTHS,
     DURATION,
     HALF_FORCE,
@@ -33,8 +35,6 @@ from .collision_shapes import (
     Vector,
     collision_shapes,
 )
-from .library import Engine, Structure
-from .run import DIRECTIONS, Floats, NativeRun, native_engine
 
 # Fit of the polynomials by which a batch resolves Hertz collisions (native/collision_fit.hpp). SI units.
 #

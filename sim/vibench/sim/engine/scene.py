@@ -18,20 +18,24 @@ from ..model.power_law import PowerLaw
 from ..model.rigid_stops import RigidStops
 from ..model.specimen import Specimen
 from ..model.state import Y, Z
-from .collision_shapes import ABOUT_MIDDLE, HEIGHTS, POINTS, SHARES, collision_shapes
 from .library import Engine, Structure
-from .power_shapes import (
+from .shapes import (
+    ABOUT_MIDDLE,
     AT_END,
     AT_START,
     COURSE,
     GAUSS_POINTS,
     GAUSS_WEIGHTS,
+    HEIGHTS,
     INSTANT_SLOPES,
     INSTANT_WEIGHTS,
     INSTANTS,
     POINT_WEIGHTS,
+    POINTS,
     POINTS_AT,
     POWER_SHARES,
+    SHARES,
+    collision_shapes,
 )
 
 NO_STOPS, HERTZ, YIELDING, SPRINGS, RIGID, POWERS = range(6)

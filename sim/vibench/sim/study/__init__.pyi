@@ -1,11 +1,3 @@
-from ._columns import (
-    COLUMNS as COLUMNS,
-    MESSAGE as MESSAGE,
-    NUMBERS as NUMBERS,
-    Cell as Cell,
-    Column as Column,
-    PointState as PointState,
-)
 from ._errors import (
     InvalidStudy as InvalidStudy,
     StudyError as StudyError,
@@ -16,8 +8,14 @@ from ._executor import (
     ThreadExecutor as ThreadExecutor,
 )
 from ._grid import (
+    COLUMNS as COLUMNS,
+    MESSAGE as MESSAGE,
+    NUMBERS as NUMBERS,
+    Cell as Cell,
+    Column as Column,
     Grid as Grid,
     GridPlan as GridPlan,
+    PointState as PointState,
     StudyAxis as StudyAxis,
 )
 from ._queue import (

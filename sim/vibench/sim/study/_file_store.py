@@ -22,17 +22,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
-from . import _columns as layout
-from ._columns import (
+from . import _grid as layout
+from ._errors import StudyError
+from ._grid import (
     COORDINATE,
     COORDINATES,
     FOUND_MOTION,
     MOST_FOUND,
     SESSION,
     Column,
+    GridPlan,
+    StudyAxis,
 )
-from ._errors import StudyError
-from ._grid import GridPlan, StudyAxis
 from ._results import places_of, read_arrays, read_plan
 from ._software import software
 from ._store import Arrays, PointAnswer, put

@@ -1,16 +1,215 @@
-"""What varies in a study: named axes with their values, units and labels, in the order of the file.
+"""What a study's file holds: a grid of points over named axes, columns with their units, and its layout.
 
-The points of a study as places in a grid, and which of them lie side by side.
+``docs/studies.md`` says the same for a stranger with h5py, xarray or MATLAB.
 """
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from enum import Enum, IntEnum
 from typing import ClassVar, Self
 
 from ..model.frozen_model import FrozenModel
-from ._columns import Column
+from ..model.outcome import Outcome
+from ..scene.prediction import Method, MotionKind, StartMemory
+
+FORMAT = "vibench-study"
+FORMAT_VERSION = 2
+"""Raised whenever an older reader would misunderstand the file."""
+CONVENTIONS = "CF-1.11"
+LIBVER = ("earliest", "v110")
+"""Superblock 0: what every HDF5 reader since 1.8 understands, MATLAB's included."""
+
+STUDY = "study_json"
+STATE = "state"
+SESSIONS = "sessions"
+N_SESSIONS = "n_sessions"
+STATE_DTYPE = "u1"
+COUNTER_DTYPE = "<i8"
+
+
+class PointState(IntEnum):
+    """What is known of a point; the last thing that is written of it."""
+
+    MISSING = 0
+    """Not computed yet."""
+    DONE = 1
+    """The run reached its end."""
+    STOPPED = 2
+    """The run did not reach its end; ``outcome`` says why. Its numbers may be NaN."""
+    FAILED = 3
+    """The scene could not be computed; ``message`` says why. Its numbers are NaN."""
+    FILLED = 4
+    """Of a map: not computed, because its neighbours agree; its numbers lie between theirs."""
+
+
+@dataclass(frozen=True)
+class TextColumn:
+    """One column of the table of sessions: text of fixed length."""
+
+    name: str
+    width: int
+
+
+SESSION_COLUMNS = (
+    TextColumn("started_utc", 32),
+    TextColumn("software_json", 512),
+    TextColumn("executor", 160),
+)
+"""A session is one go at a study: the first, and every resumption."""
+MOST_SESSIONS = 1024
+"""What is resumed more often notes its further sessions in the last row."""
+
+
+Cell = float | int | bytes | tuple[float, ...]
+
+REAL, WHOLE = "<f8", "<i4"
+MISSING_WHOLE = -1
+"""Stands for a missing whole number or flag; CF's ``_FillValue``."""
+COORDINATE = "coordinate"
+COORDINATES = ("x", "y", "z", "vx", "vy", "vz")
+FOUND_MOTION = "found_motion"
+MOST_FOUND = 8
+"""Motions of an ensemble that have a place; of more, those with the largest shares."""
+IDENTITY_DIGITS = 32
+TEXT_BYTES = 200
+"""Kept of a text; longer ones are cut."""
+
+TAKEN, SESSION, MESSAGE, IDENTITY = "taken", "session", "message", "scene"
+CONTINUES, PHASE, FINAL_STATE, OUTCOME = "continues", "drive_phase", "final_state", "outcome"
+DURATION, MOTION, METHOD, ENDED = "duration", "motion", "method", "ended"
+MEMORY, STARTS = "start_memory", "starts_followed"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One quantity over all points."""
+
+    name: str
+    dtype: str
+    units: str
+    """UDUNITS text; 1 for ratios and counts."""
+    long_name: str
+    meanings: tuple[str, ...] = ()
+    """Of the values 0, 1, 2, ... of a flag."""
+    components: int = 1
+    """More than one: with another axis at the end."""
+    along: str = COORDINATE
+    """Name of that axis."""
+
+    @property
+    def missing(self) -> float | int | bytes:
+        """What stands for nothing."""
+        match self.dtype[:2]:
+            case "<f":
+                return math.nan
+            case "<i":
+                return MISSING_WHOLE
+            case "u1":
+                return int(PointState.MISSING)
+            case _:
+                return b""
+
+
+def _meanings(kind: type[Enum]) -> tuple[str, ...]:
+    """One word for each member, as CF wants flags to be named."""
+    return tuple(member.name.lower() for member in kind)
+
+
+NUMBERS = {
+    "response_i": Column("response_i", REAL, "1", "largest displacement of m0 over the drive amplitude"),
+    "response_ii": Column(
+        "response_ii", REAL, "1", "displacement of m0 at the drive frequency over the drive amplitude"
+    ),
+    "relative_i": Column(
+        "relative_i", REAL, "1", "largest displacement of m1 against m2 over the drive amplitude"
+    ),
+    "relative_ii": Column(
+        "relative_ii", REAL, "1", "displacement of m1 against m2 at the drive frequency over its amplitude"
+    ),
+    "impacts": Column("impacts", WHOLE, "1", "impacts within the window"),
+    "impact_rate_hz": Column("impact_rate", REAL, "Hz", "impacts a second within the window"),
+    "period": Column("period", WHOLE, "1", "drive periods after which the motion repeats"),
+    "duration_s": Column(DURATION, REAL, "s", "how long the specimen was followed"),
+    "window_s": Column("window", REAL, "s", "the last part of it, which was observed"),
+    "settled_s": Column("settled", REAL, "s", "when the motion was found to be settled"),
+    "response_i_error": Column("response_i_error", REAL, "1", "relative error of Response I, estimated"),
+    "response_ii_error": Column("response_ii_error", REAL, "1", "relative error of Response II, estimated"),
+    "relative_i_error": Column("relative_i_error", REAL, "1", "relative error of relative_i, estimated"),
+    "relative_ii_error": Column("relative_ii_error", REAL, "1", "relative error of relative_ii, estimated"),
+    "error_estimate": Column("error_estimate", REAL, "1", "the largest of the four errors"),
+    "integration_error": Column(
+        "integration_error", REAL, "1", "part of it that a stricter accuracy would lessen"
+    ),
+    "scatter": Column("scatter", REAL, "1", "relative standard deviation of Response I between windows"),
+    "lyapunov_per_s": Column("lyapunov", REAL, "s-1", "largest Lyapunov exponent"),
+    "lyapunov_error_per_s": Column("lyapunov_error", REAL, "s-1", "standard error of the largest exponent"),
+}
+"""By the field of `ScenePrediction` that they keep."""
+
+
+def _of_motion(name: str, dtype: str, long_name: str, meanings: tuple[str, ...] = ()) -> Column:
+    return Column(name, dtype, "1" if not meanings else "", long_name, meanings, MOST_FOUND, FOUND_MOTION)
+
+
+FOUND_KIND = _of_motion("found_kind", WHOLE, "what this motion of an ensemble is", _meanings(MotionKind))
+FOUND_NUMBERS = {
+    "period": _of_motion("found_period", WHOLE, "drive periods after which this motion repeats"),
+    "response_i": _of_motion("found_response_i", REAL, "Response I of this motion"),
+    "response_ii": _of_motion("found_response_ii", REAL, "Response II of this motion"),
+    "relative_i": _of_motion("found_relative_i", REAL, "largest y - z of this motion"),
+    "relative_ii": _of_motion("found_relative_ii", REAL, "y - z of this motion at the drive frequency"),
+    "error_estimate": _of_motion("found_error", REAL, "relative error of its responses, estimated"),
+    "starts": _of_motion("found_starts", WHOLE, "starts that came to this motion"),
+}
+"""By the field of `FoundMotion` that they keep."""
+FOUND_SHARE = {
+    "share": _of_motion("found_share", REAL, "share of starts that come to this motion"),
+    "low": _of_motion("found_share_low", REAL, "lower end of its interval"),
+    "high": _of_motion("found_share_high", REAL, "upper end of its interval"),
+}
+"""By the field of `Share` that they keep."""
+ENSEMBLE_NUMBERS = {
+    "starts": Column(STARTS, WHOLE, "1", "starts followed where the start is forgotten"),
+    "asked": Column("found_asked", WHOLE, "1", "place of the motion that the start asked for came to"),
+    "unseen_share": Column("unseen_share", REAL, "1", "share that a motion not found has at most"),
+    "scatter": Column("scatter_of_starts", REAL, "1", "relative deviation of Response I over starts"),
+    "followed_s": Column("followed_in_all", REAL, "s", "time that all starts together were followed"),
+}
+"""By the field of `Ensemble` that they keep."""
+ESCAPE_NUMBERS = {
+    "rate_per_s": Column("escape_rate", REAL, "s-1", "rate at which chaos dies out"),
+    "low_per_s": Column("escape_rate_low", REAL, "s-1", "lower end of its interval"),
+    "high_per_s": Column("escape_rate_high", REAL, "s-1", "upper end of its interval"),
+    "escapes": Column("escapes", WHOLE, "1", "starts whose chaos died out"),
+    "chaotic_s": Column("chaotic_time", REAL, "s", "time that all starts together were in chaos"),
+}
+"""By the field of `EscapeRate` that they keep."""
+OTHERS = (
+    Column(MOTION, WHOLE, "", "what the motion has come to", _meanings(MotionKind)),
+    Column(MEMORY, WHOLE, "", "whether the start decides which motion is reached", _meanings(StartMemory)),
+    Column(METHOD, WHOLE, "", "how the scene was answered", _meanings(Method)),
+    Column(OUTCOME, WHOLE, "", "how the run ended", _meanings(Outcome)),
+    Column(ENDED, f"S{TEXT_BYTES}", "", "why it was followed no longer"),
+    Column(FINAL_STATE, REAL, "m and m/s", "state at the end of the run", components=len(COORDINATES)),
+    Column(PHASE, REAL, "rad", "phase of the drive when the run began"),
+    Column(CONTINUES, WHOLE, "1", "number of the point, from 0, whose end is this one's start"),
+    Column(TAKEN, REAL, "s", "processor time; missing where modules and tables were loaded in it"),
+    Column(SESSION, WHOLE, "1", "row of sessions in which it was computed"),
+    Column(IDENTITY, f"S{IDENTITY_DIGITS}", "", "digest of everything that the scene says"),
+    Column(MESSAGE, f"S{TEXT_BYTES}", "", "why the scene could not be computed"),
+    Column(STATE, STATE_DTYPE, "", "what is known of the point", _meanings(PointState)),
+)
+COLUMNS = (
+    *NUMBERS.values(),
+    *ENSEMBLE_NUMBERS.values(),
+    *ESCAPE_NUMBERS.values(),
+    FOUND_KIND,
+    *FOUND_NUMBERS.values(),
+    *FOUND_SHARE.values(),
+    *OTHERS,
+)
 
 
 @dataclass(frozen=True)

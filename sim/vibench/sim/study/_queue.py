@@ -14,9 +14,8 @@ from ..background import Cancelled, Observer, Progress
 from ..model.state import Floats
 from ..scene.scene import Scene
 from ..scene.solve import Solved
-from ._columns import TAKEN, PointState
 from ._executor import Bundle, Executor, Reply
-from ._grid import Grid
+from ._grid import TAKEN, Grid, PointState
 from ._store import Arrays, PointAnswer, Store, is_failed, states
 
 # Which points of a study may be computed now: those whose predecessor is done, longest first.

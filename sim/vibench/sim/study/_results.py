@@ -12,10 +12,9 @@ from pydantic import ValidationError
 
 from ..model.state import Floats
 from ..scene.prediction import ScenePrediction
-from . import _columns as layout
-from ._columns import CONTINUES, ENDED, MESSAGE, PointState
+from . import _grid as layout
 from ._errors import InvalidStudy, StudyError
-from ._grid import GridPlan, StudyAxis
+from ._grid import CONTINUES, ENDED, MESSAGE, GridPlan, PointState, StudyAxis
 from ._store import Arrays, prediction_at, states
 from ._study import GivenStart, Start, Study, continued_from
 

@@ -21,7 +21,9 @@ from ..model.stops import chosen
 from ..scene.cost import expected_cost_s
 from ..scene.scene import Given, Rest, Scene
 from ..scene.solve import Solved, solve_scene
-from ._columns import (
+from ._errors import ClusterLost
+from ._executor import Executor, Solver, ThreadExecutor
+from ._grid import (
     CONTINUES,
     DURATION,
     FINAL_STATE,
@@ -31,11 +33,10 @@ from ._columns import (
     PHASE,
     TAKEN,
     Cell,
+    Grid,
+    GridPlan,
     PointState,
 )
-from ._errors import ClusterLost
-from ._executor import Executor, Solver, ThreadExecutor
-from ._grid import Grid, GridPlan
 from ._queue import NOBODY, StudyEnd, run_points
 from ._results import StudyResults, open_study, results_of
 from ._store import Arrays, MemoryStore, PointAnswer, Store, cells_of, cut_text

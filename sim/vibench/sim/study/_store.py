@@ -13,8 +13,8 @@ from ..model.outcome import Outcome
 from ..model.stops import chosen
 from ..scene.prediction import Ensemble, FoundMotion, Method, MotionKind, ScenePrediction, StartMemory
 from ..scene.shares import EscapeRate, Share
-from . import _columns as layout
-from ._columns import (
+from . import _grid as layout
+from ._grid import (
     ENDED,
     ENSEMBLE_NUMBERS,
     ESCAPE_NUMBERS,
@@ -32,9 +32,10 @@ from ._columns import (
     TEXT_BYTES,
     Cell,
     Column,
+    Grid,
+    GridPlan,
     PointState,
 )
-from ._grid import Grid, GridPlan
 
 Arrays = dict[str, NDArray[np.generic]]
 

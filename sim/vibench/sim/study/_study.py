@@ -23,8 +23,7 @@ from ..model.specimen_description import ContactWord, SpecimenTable, usual_speci
 from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
 from ..scene.solve import Question, Solver, solve_scene
 from ..scene.states_alone import batches_are_worth_it
-from ._columns import COLUMNS, FORMAT, Column
-from ._grid import FREQUENCY, MODEL, START, GridPlan, StudyAxis
+from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
 LONGEST = 1_000_000
 """Values of all ranges together; more is a slip of the pen."""
