@@ -18,7 +18,7 @@ from typing import Annotated, Any, TextIO
 
 import typer
 from rich.text import Text
-from typer.core import TyperCommand, TyperGroup
+from typer.core import TyperCommand
 
 from vibench.acquisition import (
     AcquisitionError,
@@ -36,6 +36,7 @@ from vibench.stop_files import SWITCH_OFF
 
 from . import blas_threads  # noqa: F401 - numpy reads its setting, so it comes first
 from .exit_code import ExitCode
+from .options import SectionedCommand, SectionedGroup, with_options
 from .output import errors
 
 
@@ -71,8 +72,8 @@ class Place:
         found = getattr(importlib.import_module(f".{self.module}", __package__), self.function)
         if isinstance(found, typer.Typer):
             return found
-        application = typer.Typer(add_completion=False)
-        application.command()(found)
+        application = typer.Typer(add_completion=False, rich_markup_mode=None)
+        application.command(cls=SectionedCommand)(with_options(found))
         return application
 
 
@@ -117,7 +118,8 @@ def told_in_full(args: Sequence[str]) -> Iterator[None]:
     except _USAGE_ERROR as error:
         if isinstance(error, typer.BadParameter):
             _name_what_was_given(error, words)
-        error.message = printable(error.message)
+        if args:  # without any, the message is the help
+            error.message = printable(error.message)
         raise
 
 
@@ -142,10 +144,10 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def late_commands(places: Mapping[str, Place]) -> type[TyperGroup]:
+def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
     """Make the class of a group of commands, in this order."""
 
-    class LateCommands(TyperGroup):
+    class LateCommands(SectionedGroup):
         def __init__(self, **settings: Any) -> None:
             super().__init__(**settings)
             self.commands = {name: LateCommand(name, place) for name, place in places.items()}
@@ -383,6 +385,7 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
 )
 
 

@@ -78,7 +78,11 @@ def analyse(
         typer.Option("--out", metavar="DIR", help="Folder for the report; beside the recording if absent."),
     ] = None,
     simulate: Annotated[
-        bool, typer.Option(help="Lay the simulation over the measurement; takes seconds to minutes more.")
+        bool,
+        typer.Option(
+            "--simulate/--no-simulate",
+            help="Lay the simulation over the measurement; takes seconds to minutes more.",
+        ),
     ] = True,
     driven_by: Annotated[
         DrivenBy,

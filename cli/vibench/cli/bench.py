@@ -24,13 +24,20 @@ from vibench.acquisition.rig import Rig, load_rig, save_knob_sheet
 
 from .bench_new import new_bench
 from .exit_code import ExitCode
+from .options import SectionedCommand, SectionedGroup
 from .output import bold, console, paragraph, print_json
 from .paths import AsJson, BenchPath, bench_path
 
-bench = typer.Typer(help="Check and list instruments.", no_args_is_help=True, add_completion=False)
+bench = typer.Typer(
+    help="Check and list instruments.",
+    cls=SectionedGroup,
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+)
 
 
-@bench.command("list")
+@bench.command("list", cls=SectionedCommand)
 def list_bench(
     bench: Annotated[
         Path | None,
@@ -54,7 +61,7 @@ def list_bench(
             console.print(f"  {line}")
 
 
-@bench.command("check")
+@bench.command("check", cls=SectionedCommand)
 def check(
     bench: BenchPath = None,
     out: Annotated[
@@ -95,7 +102,7 @@ def check(
         raise typer.Exit(ExitCode.FAILED)
 
 
-@bench.command("new")
+@bench.command("new", cls=SectionedCommand)
 def new(
     target: Annotated[Path, typer.Argument(metavar="BENCH.toml", help="Where the configuration goes.")],
     template: Annotated[
