@@ -39,6 +39,7 @@ from vibench.sim.maps import MapResults, open_map
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
+from .options import option
 from .output import bold, console, errors, print_json
 from .paths import AsJson, room_for_folder, unused
 from .progress_bars import reading_bar
@@ -74,126 +75,92 @@ def analyse(
         Path, typer.Argument(metavar="RECORDING.h5", help="A recording, or a folder of recordings.")
     ],
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder for the report; beside the recording if absent."),
+        Path | None, option("Folder for the report; beside the recording if absent.", "DIR")
     ] = None,
     simulate: Annotated[
         bool,
-        typer.Option(
-            "--simulate/--no-simulate",
-            help="Lay the simulation over the measurement; takes seconds to minutes more.",
+        option(
+            "Lay the simulation over the measurement; takes seconds to minutes more.",
+            name="--simulate/--no-simulate",
         ),
     ] = True,
     driven_by: Annotated[
         DrivenBy,
-        typer.Option(
-            help="voltage: rig and specimen together, as an ensemble that holds in chaos; base: the specimen "
+        option(
+            "voltage: rig and specimen together, as an ensemble that holds in chaos; base: the specimen "
             "alone under the recorded base motion."
         ),
     ] = DrivenBy.VOLTAGE,
     draws: Annotated[
-        int,
-        typer.Option(metavar="N", min=FEWEST_DRAWS, help="Runs of a colliding motion under the voltage."),
+        int, option("Runs of a colliding motion under the voltage.", "N", min=FEWEST_DRAWS)
     ] = DRAWS,
     fit: Annotated[
         bool,
-        typer.Option(
-            "--fit",
-            help="Fit damping, frequencies and gaps to the recordings first, and lay that specimen over "
-            "them; where no specimen fits, say which assumption would mend it.",
+        option(
+            "Fit damping, frequencies and gaps to the recordings first, and lay that specimen over "
+            "them; where no specimen fits, say which assumption would mend it."
         ),
     ] = False,
     free: Annotated[
         list[Parameter] | None,
-        typer.Option(
-            "--free", help="With --fit: fit this to noise too; several times for several, one mass at a time."
-        ),
+        option("With --fit: fit this to noise too; several times for several, one mass at a time."),
     ] = None,
     hidden: Annotated[
         bool,
-        typer.Option(
-            "--hidden",
-            help="Tell the hidden motion of m1 too: p between its stops, impacts, gaps, m1 and contact law.",
-        ),
+        option("Tell the hidden motion of m1 too: p between its stops, impacts, gaps, m1 and contact law."),
     ] = False,
     keep: Annotated[
-        bool,
-        typer.Option(
-            "--keep",
-            help="With --hidden: save that motion in the recording, for vibench export --results.",
-        ),
+        bool, option("With --hidden: save that motion in the recording, for vibench export --results.")
     ] = False,
     specimen: SpecimenOption = None,
     branches: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--branches",
-            metavar="BRANCHES.h5",
-            help="Lay what vibench branches found over stepped sines and sweeps; several times for several.",
+        option(
+            "Lay what vibench branches found over stepped sines and sweeps; several times for several.",
+            "BRANCHES.h5",
         ),
     ] = None,
     maps: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--map",
-            metavar="MAP.h5",
-            help="Lay levels of stepped sines and sweeps over what vibench map made.",
-        ),
+        option("Lay levels of stepped sines and sweeps over what vibench map made.", "MAP.h5", name="--map"),
     ] = None,
     estimator: Annotated[
-        Estimator,
-        typer.Option(
-            help="drive: referenced to the drive voltage, free of any channel's noise.", rich_help_panel=NOISE
-        ),
+        Estimator, option("drive: referenced to the drive voltage, free of any channel's noise.", panel=NOISE)
     ] = FrequencyResponseRequest.estimator,
     noise_ratio: Annotated[
         float | None,
-        typer.Option(
-            metavar="R",
-            help="For hv: noise density of m0's velocity over that of the base's acceleration, in s2.",
-            rich_help_panel=NOISE,
+        option(
+            "For hv: noise density of m0's velocity over that of the base's acceleration, in s2.",
+            "R",
+            panel=NOISE,
         ),
     ] = None,
     quantity: Annotated[
         str,
-        typer.Option(
-            metavar="Q[/Q]",
-            help="Motion of m0 over motion of the base, such as velocity/acceleration; one word for both.",
-            rich_help_panel=NOISE,
+        option(
+            "Motion of m0 over motion of the base, such as velocity/acceleration; one word for both.",
+            "Q[/Q]",
+            panel=NOISE,
         ),
     ] = "displacement",
     scale: Annotated[
-        MagnitudeScale, typer.Option(help="Of the magnitudes in figures.", rich_help_panel=NOISE)
+        MagnitudeScale, option("Of the magnitudes in figures.", panel=NOISE)
     ] = MagnitudeScale.LOG,
     resolution: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ",
-            help="Width of a line; streamed noise only, like the next four.",
-            rich_help_panel=NOISE,
-        ),
+        float | None, option("Width of a line; streamed noise only, like the next four.", "HZ", panel=NOISE)
     ] = None,
     segment: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", help="Length of a segment, instead of a resolution.", rich_help_panel=NOISE
-        ),
+        float | None, option("Length of a segment, instead of a resolution.", "S", panel=NOISE)
     ] = None,
     averages: Annotated[
-        float | None,
-        typer.Option(
-            metavar="N", help="Independent averages, instead of a resolution.", rich_help_panel=NOISE
-        ),
+        float | None, option("Independent averages, instead of a resolution.", "N", panel=NOISE)
     ] = None,
-    window: Annotated[
-        Window, typer.Option(help="Taper of a segment.", rich_help_panel=NOISE)
-    ] = FrequencyResponseRequest.window,
+    window: Annotated[Window, option("Taper of a segment.", panel=NOISE)] = FrequencyResponseRequest.window,
     overlap: Annotated[
-        float, typer.Option(metavar="SHARE", help="Of neighbouring segments, 0 to 1.", rich_help_panel=NOISE)
+        float, option("Of neighbouring segments, 0 to 1.", "SHARE", panel=NOISE)
     ] = FrequencyResponseRequest.overlap,
     confidence: Annotated[
-        float,
-        typer.Option(metavar="P", help="That the bounds of a line hold the truth.", rich_help_panel=NOISE),
+        float, option("That the bounds of a line hold the truth.", "P", panel=NOISE)
     ] = FrequencyResponseRequest.confidence,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

@@ -24,7 +24,7 @@ from vibench.acquisition.rig import Rig, load_rig, save_knob_sheet
 
 from .bench_new import new_bench
 from .exit_code import ExitCode
-from .options import SectionedCommand, SectionedGroup
+from .options import SectionedCommand, SectionedGroup, option, with_options
 from .output import bold, console, paragraph, print_json
 from .paths import AsJson, BenchPath, bench_path
 
@@ -38,12 +38,10 @@ bench = typer.Typer(
 
 
 @bench.command("list", cls=SectionedCommand)
+@with_options
 def list_bench(
     bench: Annotated[
-        Path | None,
-        typer.Option(
-            "--bench", metavar="BENCH", help="Search where this rig's are; this computer if absent."
-        ),
+        Path | None, option("Search where this rig's are; this computer if absent.", "BENCH")
     ] = None,
     as_json: AsJson = False,
 ) -> None:
@@ -62,23 +60,16 @@ def list_bench(
 
 
 @bench.command("check", cls=SectionedCommand)
+@with_options
 def check(
     bench: BenchPath = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder that recordings would go to.")
-    ] = Path(),
+    out: Annotated[Path, option("Folder that recordings would go to.", "DIR")] = Path(),
     knobs: Annotated[
-        Path | None,
-        typer.Option(
-            "--knobs", metavar="SHEET.toml", help="Keep what is confirmed, for `vibench measure --knobs`."
-        ),
+        Path | None, option("Keep what is confirmed, for `vibench measure --knobs`.", "SHEET.toml")
     ] = None,
-    last: Annotated[
-        bool, typer.Option("--last", help="Show what the last check found; touch nothing.")
-    ] = False,
+    last: Annotated[bool, option("Show what the last check found; touch nothing.")] = False,
     new_reference: Annotated[
-        bool,
-        typer.Option("--new-reference", help="Compare with no earlier check: what has changed was meant."),
+        bool, option("Compare with no earlier check: what has changed was meant.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -103,15 +94,13 @@ def check(
 
 
 @bench.command("new", cls=SectionedCommand)
+@with_options
 def new(
     target: Annotated[Path, typer.Argument(metavar="BENCH.toml", help="Where the configuration goes.")],
     template: Annotated[
-        str, typer.Option("--from", metavar="NAME|FILE", help="Configuration whose values are proposed.")
+        str, option("Configuration whose values are proposed.", "NAME|FILE", name="--from")
     ] = "lab_rig",
-    answers: Annotated[
-        Path | None,
-        typer.Option("--answers", metavar="FILE.toml", help="Answers, where nobody is to be asked."),
-    ] = None,
+    answers: Annotated[Path | None, option("Answers, where nobody is to be asked.", "FILE.toml")] = None,
 ) -> None:
     """Set up a bench: ask and look, write its file, check wires, noise floor, a first 5 mV, gains and signs.
 

@@ -4,8 +4,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from vibench.acquisition.plan import loop_time_s
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import (
@@ -28,6 +26,7 @@ from vibench.analysis.dynamics import (
 from vibench.sim import Parameter, PhaseReference
 
 from .dynamics_answer import computed, keep, leave, print_answer, room_for
+from .options import option
 from .output import console
 from .paths import AsJson
 from .range_option import Range, range_of
@@ -38,69 +37,46 @@ FILE = "branches.h5"
 
 def branches(
     amplitude: Annotated[
-        str | None,
-        typer.Option(
-            "--amplitude", metavar="M|START:STOP", help="Of the base displacement; a range to go along it."
-        ),
+        str | None, option("Of the base displacement; a range to go along it.", "M|START:STOP")
     ] = None,
     frequency: Annotated[
-        str | None,
-        typer.Option(
-            "--frequency", metavar="F|START:STOP", help="Of the drive [Hz]; a range to go along it."
-        ),
+        str | None, option("Of the drive [Hz]; a range to go along it.", "F|START:STOP")
     ] = None,
     like: Annotated[
         Path | None,
-        typer.Option(
-            "--like",
-            metavar="RECORDING.h5",
-            help="Take range and level from a stepped sine or sweep, and lay the branches over it.",
+        option(
+            "Take range and level from a stepped sine or sweep, and lay the branches over it.", "RECORDING.h5"
         ),
     ] = None,
     resonance: Annotated[
         str | None,
-        typer.Option(
-            "--resonance",
-            metavar="LOW:HIGH",
-            help="Follow the phase resonance of the mode between these frequencies [Hz] over the level.",
+        option(
+            "Follow the phase resonance of the mode between these frequencies [Hz] over the level.",
+            "LOW:HIGH",
         ),
     ] = None,
     phase_of: Annotated[
-        PhaseReference,
-        typer.Option("--phase-of", help="Motion of m0 that is a quarter of a period behind at a resonance."),
+        PhaseReference, option("Motion of m0 that is a quarter of a period behind at a resonance.")
     ] = PhaseReference.RELATIVE,
     method: Annotated[
-        BranchMethod,
-        typer.Option("--method", help="Exact; harmonic balance; or with one harmonic, the paper's eq. 5."),
+        BranchMethod, option("Exact; harmonic balance; or with one harmonic, the paper's eq. 5.")
     ] = BranchMethod.SHOOTING,
     specimen: SpecimenOption = None,
     model: LawOption = None,
     damping_time: DampingTime = None,
     gap: Gap = None,
-    harmonics: Annotated[
-        int, typer.Option("--harmonics", metavar="N", help="Highest that a balance may use.")
-    ] = 511,
-    places: Annotated[
-        int, typer.Option("--places", metavar="N", help="Values in the range where motions are looked for.")
-    ] = 8,
-    starts: Annotated[
-        int, typer.Option("--starts", metavar="N", help="Random states at each: isolated branches need them.")
-    ] = 12,
-    most_periods: Annotated[
-        int, typer.Option("--most-periods", metavar="N", help="Longest motion looked for, in drive periods.")
-    ] = 4,
-    seed: Annotated[int, typer.Option("--seed", help="Of the random states.")] = 1,
+    harmonics: Annotated[int, option("Highest that a balance may use.", "N")] = 511,
+    places: Annotated[int, option("Values in the range where motions are looked for.", "N")] = 8,
+    starts: Annotated[int, option("Random states at each: isolated branches need them.", "N")] = 12,
+    most_periods: Annotated[int, option("Longest motion looked for, in drive periods.", "N")] = 4,
+    seed: Annotated[int, option("Of the random states.")] = 1,
     holdable: Annotated[
         Path | None,
-        typer.Option(
-            "--holdable",
-            metavar="BENCH.toml",
-            help="Tell which unstable motions the feedback of this bench is fast enough to hold.",
+        option(
+            "Tell which unstable motions the feedback of this bench is fast enough to hold.", "BENCH.toml"
         ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for branches.h5, figure and tables.")
-    ] = None,
+    out: Annotated[Path | None, option("Folder for branches.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations."""

@@ -11,6 +11,7 @@ from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recording
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
+from .options import option
 from .output import console, errors, print_json
 from .paths import AsJson
 
@@ -19,9 +20,7 @@ COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "le
 
 def show_catalogue(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of recordings.")],
-    rebuild: Annotated[
-        bool, typer.Option("--rebuild", help="Read every file again, not only what has changed.")
-    ] = False,
+    rebuild: Annotated[bool, option("Read every file again, not only what has changed.")] = False,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:

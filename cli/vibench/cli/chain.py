@@ -4,8 +4,6 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import (
     ChainAnswer,
@@ -19,6 +17,7 @@ from vibench.sim import USUAL_SPECIMEN, Accuracy, Parameter
 from vibench.sim.chain import MOST_CELLS
 
 from .dynamics_answer import computed, keep, leave, print_answer, room_for
+from .options import option
 from .output import console
 from .paths import AsJson
 from .range_option import range_of
@@ -29,51 +28,27 @@ _SWEEP_ENDS = 2
 
 
 def chain(
-    cells: Annotated[
-        str, typer.Option("--cells", metavar="N|N,N,...", help="How many; several for a study over them.")
-    ] = "8",
-    amplitude: Annotated[
-        str | None, typer.Option("--amplitude", metavar="M", help="Of the base displacement.")
-    ] = None,
+    cells: Annotated[str, option("How many; several for a study over them.", "N|N,N,...")] = "8",
+    amplitude: Annotated[str | None, option("Of the base displacement.", "M")] = None,
     frequency: Annotated[
         str | None,
-        typer.Option(
-            "--frequency",
-            metavar="F|START:STOP:STEP|START:STOP",
-            help="Steady at one or several [Hz]; START:STOP is a sweep, up or down.",
+        option(
+            "Steady at one or several [Hz]; START:STOP is a sweep, up or down.",
+            "F|START:STOP:STEP|START:STOP",
         ),
     ] = None,
-    recording: Annotated[
-        Path | None,
-        typer.Option("--recording", metavar="RECORDING.h5", help="Drive the chain by its base motion."),
-    ] = None,
+    recording: Annotated[Path | None, option("Drive the chain by its base motion.", "RECORDING.h5")] = None,
     specimen: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--specimen",
-            metavar="NAME|FILE.toml",
-            help=f"Given again, cells take turns. {SPECIMENS_HELP}",
-        ),
+        list[str] | None, option(f"Given again, cells take turns. {SPECIMENS_HELP}", "NAME|FILE.toml")
     ] = None,
     model: LawOption = None,
     damping_time: DampingTime = None,
     gap: Gap = None,
-    duration: Annotated[
-        float, typer.Option("--duration", metavar="S", help="Observed if steady; of a sweep; of a recording.")
-    ] = 2.0,
-    settle: Annotated[
-        float, typer.Option("--settle", metavar="S", help="Left out before if steady, from rest.")
-    ] = 2.0,
-    exponent: Annotated[
-        float,
-        typer.Option("--exponent", metavar="S", help="Average the largest exponent so long; steady only."),
-    ] = 0.0,
-    accuracy: Annotated[
-        Accuracy, typer.Option("--accuracy", help="Of contacts; flight is exact.")
-    ] = Accuracy.STANDARD,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for chain.h5, figure and tables.")
-    ] = None,
+    duration: Annotated[float, option("Observed if steady; of a sweep; of a recording.", "S")] = 2.0,
+    settle: Annotated[float, option("Left out before if steady, from rest.", "S")] = 2.0,
+    exponent: Annotated[float, option("Average the largest exponent so long; steady only.", "S")] = 0.0,
+    accuracy: Annotated[Accuracy, option("Of contacts; flight is exact.")] = Accuracy.STANDARD,
+    out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell."""

@@ -16,19 +16,16 @@ from .analyse import complain_about
 from .analyst import second_process
 from .exit_code import ExitCode
 from .measure import the_bench
+from .options import option
 from .output import bold, console, leave_output_to_json, print_json, write_json
 from .paths import AsJson, unused
 from .progress_bars import analysis_bar
 
 
 def demo(
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", help="New folder for everything; vibench_demo if absent."),
-    ] = None,
+    out: Annotated[Path | None, option("New folder for everything; vibench_demo if absent.", "DIR")] = None,
     draws: Annotated[
-        int,
-        typer.Option(metavar="N", min=FEWEST_DRAWS, help="Runs of each test's simulation, from near starts."),
+        int, option("Runs of each test's simulation, from near starts.", "N", min=FEWEST_DRAWS)
     ] = DRAWS,
     as_json: AsJson = False,
 ) -> None:

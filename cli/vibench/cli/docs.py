@@ -15,6 +15,7 @@ import typer
 from vibench.acquisition import MissingLibrary, built_site, documentation_page, shipped_folder
 
 from .exit_code import ExitCode
+from .options import option
 from .output import console, print_json
 from .paths import AsJson, room_for_folder
 
@@ -22,15 +23,12 @@ NOT_A_SOURCE = shutil.ignore_patterns("_build", "reference", "jupyter_execute")
 
 
 def docs(
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", help="Build it there; the user's own folder if absent."),
-    ] = None,
-    rebuild: Annotated[bool, typer.Option("--rebuild", help="Build it although it is there.")] = False,
+    out: Annotated[Path | None, option("Build it there; the user's own folder if absent.", "DIR")] = None,
+    rebuild: Annotated[bool, option("Build it although it is there.")] = False,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Leave out the tutorials' results, which take about five minutes.")
+        bool, option("Leave out the tutorials' results, which take about five minutes.")
     ] = False,
-    show: Annotated[bool, typer.Option("--open", help="Open its first page in the browser.")] = False,
+    show: Annotated[bool, option("Open its first page in the browser.", name="--open")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Build the documentation site of this version unless it exists; print the path of its first page."""

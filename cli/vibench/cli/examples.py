@@ -5,10 +5,9 @@ from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from vibench.acquisition import ConfigurationError, shipped_folder
 
+from .options import option
 from .output import console, print_json
 from .paths import AsJson, room_for_folder
 
@@ -16,10 +15,7 @@ FOLDERS = ("campaigns", "hardware_configs", "studies", "schemas", "examples")
 
 
 def examples(
-    copy: Annotated[
-        Path | None,
-        typer.Option("--copy", metavar="DIR", help="Copy all of them there; nothing is overwritten."),
-    ] = None,
+    copy: Annotated[Path | None, option("Copy all of them there; nothing is overwritten.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
     """List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them."""

@@ -17,6 +17,7 @@ from vibench.analysis import (
 from vibench.analysis.exchange import Format, Results, excerpt, export_functions, export_samples
 
 from .external_data import AllowExternal, external_data
+from .options import option
 from .output import console, leave_output_to_json, print_json, print_warnings
 from .paths import AsJson, file_at
 from .progress_bars import transfer_bar
@@ -24,40 +25,23 @@ from .progress_bars import transfer_bar
 
 def export(
     recording: Annotated[Path, typer.Argument(metavar="RECORDING.h5", help="Finished or still growing.")],
-    to: Annotated[Format, typer.Option("--to", help="What to make of it.")],
+    to: Annotated[Format, option("What to make of it.")],
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="PATH", help="The new file, or a folder for it; beside the recording if absent."
-        ),
+        Path | None, option("The new file, or a folder for it; beside the recording if absent.", "PATH")
     ] = None,
-    channels: Annotated[
-        str,
-        typer.Option("--channels", metavar="NAMES", help="Some of its channels, with commas; all if absent."),
-    ] = "",
-    from_s: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Seconds since the first sample.")
-    ] = None,
-    to_s: Annotated[
-        float | None, typer.Option("--until", metavar="S", help="Seconds since the first sample.")
-    ] = None,
-    results: Annotated[
-        bool, typer.Option("--results", help="Results that were saved in the recording, too.")
-    ] = False,
+    channels: Annotated[str, option("Some of its channels, with commas; all if absent.", "NAMES")] = "",
+    from_s: Annotated[float | None, option("Seconds since the first sample.", "S", name="--from")] = None,
+    to_s: Annotated[float | None, option("Seconds since the first sample.", "S", name="--until")] = None,
+    results: Annotated[bool, option("Results that were saved in the recording, too.")] = False,
     spectra: Annotated[
         bool,
-        typer.Option(
-            "--spectra",
-            help="Densities of the channels over what was played, and of noise the frequency response, in "
-            "place of samples (uff).",
+        option(
+            "Densities of the channels over what was played, and of noise the frequency response, in "
+            "place of samples (uff)."
         ),
     ] = False,
     quantity: Annotated[
-        str | None,
-        typer.Option(
-            "--quantity",
-            help="Of m0 over base, for --spectra: as in 'vibench analyse'; displacement if absent.",
-        ),
+        str | None, option("Of m0 over base, for --spectra: as in 'vibench analyse'; displacement if absent.")
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

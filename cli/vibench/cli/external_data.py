@@ -3,13 +3,13 @@
 from contextlib import AbstractContextManager, nullcontext
 from typing import Annotated
 
-import typer
+from .options import option
 
 AllowExternal = Annotated[
     bool,
-    typer.Option(
-        "--allow-external",
-        help="Follow an HDF5 file into other files: external storage and links, virtual datasets.",
+    option(
+        "Follow an HDF5 file into other files: external storage and links, virtual datasets.",
+        name="--allow-external",
     ),
 ]
 

@@ -11,6 +11,7 @@ from vibench.analysis.report import ImageKind
 from vibench.sim import Accuracy
 
 from .analyse import complain_about
+from .options import option
 from .output import bold, console, leave_output_to_json, print_json
 from .paper.figures import FILES, paper_figure
 from .paper.options import FigureOptions, FrequencyGrid
@@ -28,28 +29,17 @@ EXPERIMENT = (12, 13, 14)
 
 def figure(
     number: Annotated[str, typer.Argument(metavar="N", help="1 to 14, or all.")],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the figures.")],
+    out: Annotated[Path, option("Folder for the figures.", "DIR")],
     recordings: Annotated[
-        Path | None,
-        typer.Option(
-            "--recordings", metavar="DIR", help="Recordings for figures 12 to 14; see vibench demo."
-        ),
+        Path | None, option("Recordings for figures 12 to 14; see vibench demo.", "DIR")
     ] = None,
-    damping_time: Annotated[
-        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
-    ] = FigureOptions.damping_time_s,
-    gap: Annotated[
-        float, typer.Option("--gap", metavar="M", help="Clearance at both stops.")
-    ] = FigureOptions.gap_m,
-    accuracy: Annotated[
-        Accuracy, typer.Option("--accuracy", help="Of every point.")
-    ] = FigureOptions.accuracy,
-    grid: Annotated[
-        FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
-    ] = FigureOptions.grid,
+    damping_time: Annotated[float, option("c_i = damping time * k_i.", "S")] = FigureOptions.damping_time_s,
+    gap: Annotated[float, option("Clearance at both stops.", "M")] = FigureOptions.gap_m,
+    accuracy: Annotated[Accuracy, option("Of every point.")] = FigureOptions.accuracy,
+    grid: Annotated[FrequencyGrid, option("Every 5 Hz (coarse) or every 1 Hz (fine).")] = FigureOptions.grid,
     workers: Workers = None,
     kinds: Annotated[
-        list[ImageKind], typer.Option("--format", help="Image formats; give it several times for several.")
+        list[ImageKind], option("Image formats; give it several times for several.", name="--format")
     ] = [ImageKind.PNG, ImageKind.SVG],  # noqa: B006 - typer copies it
     as_json: AsJson = False,
 ) -> None:

@@ -9,6 +9,7 @@ import typer
 
 from vibench.acquisition import named
 
+from .options import option
 from .paths import BenchPath
 
 WINDOW = "vibench.gui"
@@ -17,10 +18,7 @@ WINDOW = "vibench.gui"
 
 def gui(
     bench: BenchPath = None,
-    screenshots: Annotated[
-        Path | None,
-        typer.Option("--screenshots", metavar="DIR", help="Make a picture of every page there, and end."),
-    ] = None,
+    screenshots: Annotated[Path | None, option("Make a picture of every page there, and end.", "DIR")] = None,
 ) -> None:
     """Open the window: connect, check, choose, preview, run, watch, compare."""
     command = [sys.executable, "-m", WINDOW]

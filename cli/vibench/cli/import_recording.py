@@ -13,6 +13,7 @@ from vibench.analysis import InvalidRequest
 from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, opened_source
 
 from .external_data import AllowExternal, external_data
+from .options import option
 from .output import console, print_json
 from .paths import AsJson, file_at
 from .progress_bars import transfer_bar
@@ -21,14 +22,10 @@ from .progress_bars import transfer_bar
 def import_file(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="UFF, HDF5, MATLAB, TDMS, WAV or CSV.")],
     mapping: Annotated[
-        Path | None,
-        typer.Option("--mapping", metavar="MAP.toml", help="What its channels are; lists them if absent."),
+        Path | None, option("What its channels are; lists them if absent.", "MAP.toml")
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="NAME.h5", help="The new recording, or a folder for it; beside FILE if absent."
-        ),
+        Path | None, option("The new recording, or a folder for it; beside FILE if absent.", "NAME.h5")
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

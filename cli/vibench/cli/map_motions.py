@@ -25,6 +25,7 @@ from vibench.sim.study import ExistingStudy, plausibility_warnings
 
 from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
+from .options import option
 from .output import bold, console, print_json, print_warnings
 from .paths import AsJson, room_for_folder
 from .points import Cluster, Workers, complain_about_points
@@ -41,36 +42,24 @@ def map_motions(
             metavar="MAP", help="TOML file of what varies, or a shipped name: map, basin, diagram."
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for map.h5, figure and table.")],
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what DIR/map.h5 does not hold yet.")
-    ] = False,
+    out: Annotated[Path, option("Folder for map.h5, figure and table.", "DIR")],
+    resume: Annotated[bool, option("Go on with what DIR/map.h5 does not hold yet.")] = False,
     workers: Workers = None,
     cluster: Cluster = None,
     only_estimate: Annotated[
-        bool, typer.Option("--estimate", help="Say how many points, how long and how large; compute nothing.")
+        bool, option("Say how many points, how long and how large; compute nothing.", name="--estimate")
     ] = False,
     show: Annotated[
-        str | None,
-        typer.Option("--show", metavar="QUANTITY", help=f"Beside the kinds of motion: {', '.join(SHOWN)}."),
+        str | None, option(f"Beside the kinds of motion: {', '.join(SHOWN)}.", "QUANTITY")
     ] = None,
     branches: Annotated[
-        Path | None,
-        typer.Option(
-            "--branches", metavar="BRANCHES.h5", help="Lay branches over a map along one parameter."
-        ),
+        Path | None, option("Lay branches over a map along one parameter.", "BRANCHES.h5")
     ] = None,
     like: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--like", metavar="RECORDING.h5", help="Lay a recording's level and responses over the map."
-        ),
+        list[Path] | None, option("Lay a recording's level and responses over the map.", "RECORDING.h5")
     ] = None,
     kicks: Annotated[
-        int,
-        typer.Option(
-            "--kicks", metavar="N", min=0, help="Of a basin map: kick each motion so often, at three sizes."
-        ),
+        int, option("Of a basin map: kick each motion so often, at three sizes.", "N", min=0)
     ] = 0,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

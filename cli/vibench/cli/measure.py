@@ -45,6 +45,7 @@ from vibench.acquisition.rig import Confirm, Rig, confirm_by_sheet
 
 from .engine_bars import Watching
 from .exit_code import ExitCode
+from .options import option
 from .output import console, errors, leave_output_to_json, paragraph, print_json
 from .paths import AsJson, BenchPath, FaultsPath, rig_at
 
@@ -101,14 +102,14 @@ def estimate_text(expected: CampaignEstimate) -> str:
 
 NotifyCommand = Annotated[
     str | None,
-    typer.Option(
-        "--notify",
-        metavar="COMMAND",
-        help="Run at every fault and at the end, the reason as JSON on its standard input; no shell.",
+    option(
+        "Run at every fault and at the end, the reason as JSON on its standard input; no shell.",
+        "COMMAND",
+        name="--notify",
     ),
 ]
 MailPath = Annotated[
-    Path | None, typer.Option("--mail", metavar="MAIL.toml", help="Send mail at every fault and at the end.")
+    Path | None, option("Send mail at every fault and at the end.", "MAIL.toml", name="--mail")
 ]
 
 
@@ -127,40 +128,28 @@ def measure(
         Path,
         typer.Argument(metavar="CAMPAIGN", help="TOML file of what to measure, or a shipped name: quick."),
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the recordings.")],
+    out: Annotated[Path, option("Folder for the recordings.", "DIR")],
     bench: BenchPath = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Keep complete recordings in DIR and make the missing ones.")
-    ] = False,
-    after_failure: Annotated[
-        AfterFailure, typer.Option("--after-failure", help="When a point has failed for good.")
-    ] = AfterFailure.STOP,
-    accept_changed_bench: Annotated[
-        bool, typer.Option("--accept-changed-bench", help="Resume on another bench than it was begun on.")
-    ] = False,
+    resume: Annotated[bool, option("Keep complete recordings in DIR and make the missing ones.")] = False,
+    after_failure: Annotated[AfterFailure, option("When a point has failed for good.")] = AfterFailure.STOP,
+    accept_changed_bench: Annotated[bool, option("Resume on another bench than it was begun on.")] = False,
     faults: FaultsPath = None,
     knobs: Annotated[
-        Path | None,
-        typer.Option(
-            "--knobs",
-            metavar="SHEET.toml",
-            help="Settings confirmed before, by `vibench bench check --knobs`.",
-        ),
+        Path | None, option("Settings confirmed before, by `vibench bench check --knobs`.", "SHEET.toml")
     ] = None,
     check: Annotated[
-        CheckRule, typer.Option(help="A passed check of the bench, of today: ask for it, make it, or not.")
+        CheckRule, option("A passed check of the bench, of today: ask for it, make it, or not.")
     ] = CheckRule.FRESH,
     only_estimate: Annotated[
         bool,
-        typer.Option(
-            "--estimate",
-            help="Say how long it takes, how large it becomes, and how well results will be known.",
+        option(
+            "Say how long it takes, how large it becomes, and how well results will be known.",
+            name="--estimate",
         ),
     ] = False,
     as_json: AsJson = False,
     twin: Annotated[
-        bool,
-        typer.Option("--twin", help="Follow the hidden motion beside it; note when the specimen changes."),
+        bool, option("Follow the hidden motion beside it; note when the specimen changes.")
     ] = False,
     notify: NotifyCommand = None,
     mail: MailPath = None,

@@ -94,6 +94,20 @@ def option_name(field: str) -> str:
     return _OTHER_NAMES.get(field, _UNIT.sub("", field).replace("_", "-"))
 
 
+def option(
+    text: str,
+    metavar: str | None = None,
+    *,
+    name: str = "",
+    panel: str | None = None,
+    min: int | None = None,  # noqa: A002
+) -> OptionInfo:
+    """Declare an option of the command line alone: its help, and its name where the parameter has another."""
+    names = (name,) if name else ()
+    made: OptionInfo = typer.Option(*names, metavar=metavar, help=text, rich_help_panel=panel, min=min)
+    return made
+
+
 def field_option(model: "type[BaseModel]", name: str, panel: str | None = None) -> OptionInfo:
     """Make the option of a field. The help names its default; the model alone has it."""
     field = model.model_fields[name]

@@ -10,6 +10,7 @@ from vibench.acquisition.recording import SealState, seal_key
 from vibench.analysis.exchange import CrateFacts, pack_folder
 
 from .exit_code import ExitCode
+from .options import option
 from .output import console, errors, leave_output_to_json, print_json
 from .paths import AsJson, file_at
 from .progress_bars import transfer_bar
@@ -17,25 +18,15 @@ from .progress_bars import transfer_bar
 
 def pack(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Recordings, and what lies beside them.")],
-    licence: Annotated[
-        str, typer.Option("--license", metavar="URL", help="https://creativecommons.org/licenses/by/4.0/")
-    ],
+    licence: Annotated[str, option("https://creativecommons.org/licenses/by/4.0/", "URL", name="--license")],
     out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="CRATE.zip", help="Or a folder for it; DIR.zip beside it if absent."),
+        Path | None, option("Or a folder for it; DIR.zip beside it if absent.", "CRATE.zip")
     ] = None,
-    author: Annotated[
-        list[str] | None, typer.Option("--author", metavar="NAME", help="May be given several times.")
-    ] = None,
-    title: Annotated[str, typer.Option("--title", help="The folder's name if absent.")] = "",
-    description: Annotated[str, typer.Option("--description", help="A sentence or two.")] = "",
-    organisation: Annotated[
-        str, typer.Option("--organisation", metavar="NAME", help="Publishes it; the authors belong to it.")
-    ] = "",
-    organisation_url: Annotated[
-        str,
-        typer.Option("--organisation-url", metavar="URL", help="Of its home page, or https://ror.org/..."),
-    ] = "",
+    author: Annotated[list[str] | None, option("May be given several times.", "NAME")] = None,
+    title: Annotated[str, option("The folder's name if absent.")] = "",
+    description: Annotated[str, option("A sentence or two.")] = "",
+    organisation: Annotated[str, option("Publishes it; the authors belong to it.", "NAME")] = "",
+    organisation_url: Annotated[str, option("Of its home page, or https://ror.org/...", "URL")] = "",
     as_json: AsJson = False,
 ) -> None:
     """Pack a folder of recordings as a Research Object Crate, described for a repository."""

@@ -4,30 +4,24 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vibench.acquisition import ConfigurationError, named
+
+from .options import option
 
 if TYPE_CHECKING:
     from vibench.acquisition.rig import Rig
 
 BenchPath = Annotated[
     Path | None,
-    typer.Option(
-        "--bench",
-        metavar="BENCH",
-        help="Hardware configuration, a file or a shipped name; virtual_rig if absent.",
+    option(
+        "Hardware configuration, a file or a shipped name; virtual_rig if absent.", "BENCH", name="--bench"
     ),
 ]
 FaultsPath = Annotated[
     Path | None,
-    typer.Option(
-        "--faults",
-        metavar="FAULTS",
-        help="What goes wrong with a virtual rig, and when; a file or night.",
-    ),
+    option("What goes wrong with a virtual rig, and when; a file or night.", "FAULTS", name="--faults"),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else.")]
+AsJson = Annotated[bool, option("Print one JSON document and nothing else.", name="--json")]
 
 
 def bench_path(given: Path | None) -> Path:

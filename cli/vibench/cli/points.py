@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .exit_code import ExitCode
+from .options import option
 from .output import errors
 
 if TYPE_CHECKING:
@@ -14,12 +15,10 @@ if TYPE_CHECKING:
 SHOWN_FAILURES = 5
 
 Workers = Annotated[
-    int | None,
-    typer.Option("--workers", min=1, metavar="N", help="Threads; one for each processor if absent."),
+    int | None, option("Threads; one for each processor if absent.", "N", name="--workers", min=1)
 ]
 Cluster = Annotated[
-    str | None,
-    typer.Option("--cluster", metavar="ADDRESS", help="Let the workers of this Dask scheduler compute."),
+    str | None, option("Let the workers of this Dask scheduler compute.", "ADDRESS", name="--cluster")
 ]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
 """Values of the axes at each point without an answer, and why there is none."""

@@ -8,7 +8,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Literal
 
-import typer
 from pydantic import ValidationError
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
@@ -21,6 +20,7 @@ from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 from .found_motions import forgetting_text, motions_table, share_text
 from .frequency_option import frequencies
 from .interruption import told_to_stop
+from .options import option
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points
@@ -49,43 +49,39 @@ _ALLOWED = {
 
 
 def predict(
-    amplitude: Annotated[float, typer.Option("--amplitude", metavar="M", help="Of the base displacement.")],
+    amplitude: Annotated[float, option("Of the base displacement.", "M", name="--amplitude")],
     frequency: Annotated[
-        str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
+        str, option("One frequency or a range [Hz].", "F|START:STOP:STEP", name="--frequency")
     ],
     specimen: SpecimenOption = None,
     model: LawOption = None,
     damping_time: DampingTime = None,
     gap: Gap = None,
     duration: Annotated[
-        str, typer.Option("--duration", metavar="S|auto", help="Length of each run, or until it settles.")
+        str, option("Length of each run, or until it settles.", "S|auto", name="--duration")
     ] = "30",
-    window: Annotated[float, typer.Option("--window", metavar="S", help="Observed at its end.")] = 5.0,
-    accuracy: Annotated[
-        Accuracy, typer.Option("--accuracy", help="See docs/accuracy.md.")
-    ] = Accuracy.STANDARD,
+    window: Annotated[float, option("Observed at its end.", "S", name="--window")] = 5.0,
+    accuracy: Annotated[Accuracy, option("See docs/accuracy.md.", name="--accuracy")] = Accuracy.STANDARD,
     observe: Annotated[
-        str, typer.Option("--observe", help="response; with it lyapunov, scatter.")
+        str, option("response; with it lyapunov, scatter.", name="--observe")
     ] = Observable.RESPONSE.value,
     start: Annotated[
-        Start, typer.Option("--start", help="rest, or continued from the next lower (up) or higher (down).")
+        Start, option("rest, or continued from the next lower (up) or higher (down).", name="--start")
     ] = Start.REST,
     budget: Annotated[
         str,
-        typer.Option(
-            "--budget",
-            metavar="S",
-            help="Processor time a point for other starts, where the start is forgotten, and to see whether "
+        option(
+            "Processor time a point for other starts, where the start is forgotten, and to see whether "
             "chaos lasts; 0 looks for neither.",
+            "S",
+            name="--budget",
         ),
     ] = f"{BUDGET_S:g}s",
     workers: Workers = None,
     cluster: Cluster = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE.h5", help="Keep the answers in a file.")
-    ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with what FILE.h5 lacks.")] = False,
-    explain: Annotated[bool, typer.Option("--explain", help="Say what is computed and why.")] = False,
+    out: Annotated[Path | None, option("Keep the answers in a file.", "FILE.h5", name="--out")] = None,
+    resume: Annotated[bool, option("Go on with what FILE.h5 lacks.", name="--resume")] = False,
+    explain: Annotated[bool, option("Say what is computed and why.", name="--explain")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Predict the responses of m0 and of p over frequency."""

@@ -4,12 +4,12 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
 from rich.table import Table
 
 from vibench.analysis.report import ImageKind
 from vibench.sim import Accuracy
 
+from .options import option
 from .output import bold, console, leave_output_to_json, print_json, print_table
 from .paper.case import OPTIONS, case_with
 from .paper.options import FigureOptions, FrequencyGrid
@@ -26,23 +26,13 @@ IMAGES = "images"
 
 
 def reproduce(
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", help="Folder for the page and the studies it rests on.")
-    ],
-    markdown: Annotated[
-        Path | None,
-        typer.Option("--markdown", metavar="FILE.md", help="Write the page here; in DIR if absent."),
-    ] = None,
-    damping_time: Annotated[
-        float, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
-    ] = FigureOptions.damping_time_s,
-    accuracy: Annotated[Accuracy, typer.Option("--accuracy", help="Of every point.")] = Accuracy.QUICK,
-    grid: Annotated[
-        FrequencyGrid, typer.Option("--grid", help="Every 5 Hz (coarse) or every 1 Hz (fine).")
-    ] = FigureOptions.grid,
+    out: Annotated[Path, option("Folder for the page and the studies it rests on.", "DIR")],
+    markdown: Annotated[Path | None, option("Write the page here; in DIR if absent.", "FILE.md")] = None,
+    damping_time: Annotated[float, option("c_i = damping time * k_i.", "S")] = FigureOptions.damping_time_s,
+    accuracy: Annotated[Accuracy, option("Of every point.")] = Accuracy.QUICK,
+    grid: Annotated[FrequencyGrid, option("Every 5 Hz (coarse) or every 1 Hz (fine).")] = FigureOptions.grid,
     said: Annotated[
-        list[str] | None,
-        typer.Option("--with", metavar="NAME=VALUE", help=f"What else the paper leaves open: {_FORMS}."),
+        list[str] | None, option(f"What else the paper leaves open: {_FORMS}.", "NAME=VALUE", name="--with")
     ] = None,
     workers: Workers = None,
     as_json: AsJson = False,

@@ -6,10 +6,9 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vibench.acquisition.rig import TOKEN_KEY, TOKEN_VARIABLE
 
+from .options import option
 from .output import bold, console
 from .paths import FaultsPath, rig_at
 
@@ -25,22 +24,13 @@ class ServedPace(StrEnum):
 
 
 def serve_rig(
-    bench: Annotated[
-        Path | None, typer.Option("--bench", metavar="BENCH", help="A rig with a table 'virtual'.")
-    ] = None,
+    bench: Annotated[Path | None, option("A rig with a table 'virtual'.", "BENCH")] = None,
     address: Annotated[
-        str,
-        typer.Option(
-            "--address", metavar="HOST:PORT", help="Where to listen; beyond this computer, with a token."
-        ),
+        str, option("Where to listen; beyond this computer, with a token.", "HOST:PORT")
     ] = "127.0.0.1:31763",
-    scpi_port: Annotated[
-        int,
-        typer.Option("--scpi-port", metavar="N", help="Of the generator as a socket; 0 takes a free one."),
-    ] = 0,
+    scpi_port: Annotated[int, option("Of the generator as a socket; 0 takes a free one.", "N")] = 0,
     pace: Annotated[
-        ServedPace,
-        typer.Option("--pace", help="Rig time by the clock, or as fast as somebody samples."),
+        ServedPace, option("Rig time by the clock, or as fast as somebody samples.")
     ] = ServedPace.WALL,
     faults: FaultsPath = None,
 ) -> None:

@@ -11,6 +11,7 @@ from vibench.acquisition import schema_line, shipped_folder, toml_text
 from vibench.analysis import InvalidRequest
 from vibench.sim import CONTACT_LAWS, Specimen, shipped_specimens
 
+from .options import option
 from .output import bold, console, paragraph, print_json
 from .paths import AsJson, room_for_folder
 from .specimen_option import described
@@ -24,15 +25,10 @@ def show_specimen(
         ),
     ] = None,
     forces: Annotated[
-        Path | None,
-        typer.Option(
-            "--forces",
-            metavar="DIR",
-            help="Draw the force of its stops over p = y - z, or of every contact law.",
-        ),
+        Path | None, option("Draw the force of its stops over p = y - z, or of every contact law.", "DIR")
     ] = None,
     as_toml: Annotated[
-        bool, typer.Option("--toml", help="Print it whole, as a file of its own to start from.")
+        bool, option("Print it whole, as a file of its own to start from.", name="--toml")
     ] = False,
     as_json: AsJson = False,
 ) -> None:

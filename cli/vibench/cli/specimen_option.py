@@ -3,7 +3,6 @@
 import re
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
-import typer
 from pydantic import ValidationError
 
 from vibench.analysis import InvalidRequest
@@ -17,6 +16,7 @@ from vibench.sim import (
 )
 from vibench.sim.study import plausibility_warnings
 
+from .options import option
 from .output import print_warnings
 
 if TYPE_CHECKING:
@@ -28,14 +28,10 @@ SPECIMENS_HELP = "A specimen's file, or one of these: " + "; ".join(
 LAWS_HELP = "Contact law instead of the specimen's own: " + "; ".join(
     f"{law.form} ({law.about})" for law in CONTACT_LAWS.values()
 )
-SpecimenOption = Annotated[
-    str | None, typer.Option("--specimen", metavar="NAME|FILE.toml", help=SPECIMENS_HELP)
-]
-LawOption = Annotated[str | None, typer.Option("--model", help=LAWS_HELP)]
-DampingTime = Annotated[
-    float | None, typer.Option("--damping-time", metavar="S", help="c_i = damping time * k_i.")
-]
-Gap = Annotated[float | None, typer.Option("--gap", metavar="M", help="Clearance at both stops.")]
+SpecimenOption = Annotated[str | None, option(SPECIMENS_HELP, "NAME|FILE.toml", name="--specimen")]
+LawOption = Annotated[str | None, option(LAWS_HELP, name="--model")]
+DampingTime = Annotated[float | None, option("c_i = damping time * k_i.", "S", name="--damping-time")]
+Gap = Annotated[float | None, option("Clearance at both stops.", "M", name="--gap")]
 Asked = TypeVar("Asked", bound="SpecimenChoice")
 _UNIT = re.compile("_(s|m|hz)$")
 _OTHER_NAMES = {"lengths": "cells", "described": "specimen"}

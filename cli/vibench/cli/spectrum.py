@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from vibench.analysis import InvalidRequest
 from vibench.analysis.dynamics import (
     ExponentSpectrum,
@@ -15,6 +13,7 @@ from vibench.analysis.dynamics import (
 from vibench.sim import Accuracy, Parameter
 
 from .dynamics_answer import SHOWN, computed, keep, leave, print_answer, room_for
+from .options import option
 from .output import console
 from .paths import AsJson
 from .range_option import Range, range_of
@@ -24,28 +23,19 @@ FILE = "spectrum.h5"
 
 
 def spectrum(
-    amplitude: Annotated[
-        str,
-        typer.Option("--amplitude", metavar="M|START:STOP:STEP", help="Of the base displacement."),
-    ],
-    frequency: Annotated[
-        str, typer.Option("--frequency", metavar="F|START:STOP:STEP", help="One frequency or a range [Hz].")
-    ],
+    amplitude: Annotated[str, option("Of the base displacement.", "M|START:STOP:STEP")],
+    frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
     specimen: SpecimenOption = None,
     model: LawOption = None,
     damping_time: DampingTime = None,
     gap: Gap = None,
-    duration: Annotated[
-        float, typer.Option("--duration", metavar="S", help="Over which exponents are averaged.")
-    ] = 25.0,
-    settle: Annotated[float, typer.Option("--settle", metavar="S", help="Left out before, from rest.")] = 5.0,
+    duration: Annotated[float, option("Over which exponents are averaged.", "S")] = 25.0,
+    settle: Annotated[float, option("Left out before, from rest.", "S")] = 5.0,
     accuracy: Annotated[
-        Accuracy, typer.Option("--accuracy", help="Of contacts; the sum of the exponents is as exact.")
+        Accuracy, option("Of contacts; the sum of the exponents is as exact.")
     ] = Accuracy.REFERENCE,
-    confidence: Annotated[float, typer.Option("--confidence", metavar="P", help="Of the intervals.")] = 0.95,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for spectrum.h5, figure and table.")
-    ] = None,
+    confidence: Annotated[float, option("Of the intervals.", "P")] = 0.95,
+    out: Annotated[Path | None, option("Folder for spectrum.h5, figure and table.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension."""

@@ -19,6 +19,7 @@ from vibench.sim.study import (
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
+from .options import option
 from .output import console, errors, print_json, print_warnings
 from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points, say_failures
@@ -27,17 +28,14 @@ from .progress_bars import study_bar
 
 def study(
     plan: Annotated[
-        Path,
-        typer.Argument(metavar="STUDY", help="TOML file of what to predict, or a shipped name: paper."),
+        Path, typer.Argument(metavar="STUDY", help="TOML file of what to predict, or a shipped name: paper.")
     ],
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.h5", help="File for the answers.")],
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with what FILE.h5 does not hold yet.")
-    ] = False,
+    out: Annotated[Path, option("File for the answers.", "FILE.h5")],
+    resume: Annotated[bool, option("Go on with what FILE.h5 does not hold yet.")] = False,
     workers: Workers = None,
     cluster: Cluster = None,
     only_estimate: Annotated[
-        bool, typer.Option("--estimate", help="Say how many points and how much work; compute nothing.")
+        bool, option("Say how many points and how much work; compute nothing.", name="--estimate")
     ] = False,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

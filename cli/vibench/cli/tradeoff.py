@@ -5,7 +5,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 
@@ -21,6 +20,7 @@ from vibench.sim.accuracy_benchmark.figures import (
 )
 from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
 
+from .options import option
 from .output import console, errors, print_json, print_table, words
 from .paths import AsJson, room_for_folder, room_for_page
 from .progress_bars import shown
@@ -31,16 +31,9 @@ _STEPS = len(MOTIONS) + len(LOTTERIES) + len(TRANSIENTS)
 
 
 def tradeoff(
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the figure and its numbers.")
-    ] = None,
-    markdown: Annotated[
-        Path | None, typer.Option("--markdown", metavar="FILE.md", help="Write the page of docs/accuracy.md.")
-    ] = None,
-    span: Annotated[
-        float,
-        typer.Option("--span", metavar="S", help="Length of the motion compared; the paper's test is 2."),
-    ] = 2.0,
+    out: Annotated[Path | None, option("Folder for the figure and its numbers.", "DIR")] = None,
+    markdown: Annotated[Path | None, option("Write the page of docs/accuracy.md.", "FILE.md")] = None,
+    span: Annotated[float, option("Length of the motion compared; the paper's test is 2.", "S")] = 2.0,
     as_json: AsJson = False,
 ) -> None:
     """Measure what each accuracy costs and what error it makes, with and without impacts and in chaos."""

@@ -8,7 +8,6 @@ from datetime import UTC, datetime
 from typing import Annotated
 
 import numpy as np
-import typer
 
 from vibench.acquisition import AcquisitionError
 from vibench.acquisition.engine import (
@@ -34,6 +33,7 @@ from vibench.analysis.hidden_motion import (
 from vibench.sim import Specimen
 from vibench.sim.operating_system.this import lower_priority
 
+from .options import option
 from .output import console
 from .specimen_option import SpecimenOption, described
 from .watch import Pid
@@ -166,10 +166,7 @@ def _worth(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[floa
 def twin(
     pid: Pid = None,
     specimen: SpecimenOption = None,
-    new_baseline: Annotated[
-        bool,
-        typer.Option("--new-baseline", help="Forget what the specimen was: it was changed on purpose."),
-    ] = False,
+    new_baseline: Annotated[bool, option("Forget what the specimen was: it was changed on purpose.")] = False,
 ) -> None:
     """Follow the hidden motion of what an engine measures, and note when the specimen changes."""
     lower_priority(NICE)  # a window, and the measurement, come first

@@ -12,6 +12,7 @@ from vibench.acquisition.recording import SealDepth, seal_key
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
+from .options import option
 from .output import console, errors, print_json
 from .paths import AsJson
 
@@ -23,16 +24,10 @@ def verify(
     place: Annotated[
         Path, typer.Argument(metavar="DIR", help="Folder of recordings, or one recording, NAME.h5.")
     ],
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Attributes, texts and tables only, not every sample.")
-    ] = False,
+    quick: Annotated[bool, option("Attributes, texts and tables only, not every sample.")] = False,
     key: Annotated[
         Path | None,
-        typer.Option(
-            "--key",
-            metavar="FILE",
-            help="What they should be signed with; if absent, what VIBENCH_SEAL_KEY names.",
-        ),
+        option("What they should be signed with; if absent, what VIBENCH_SEAL_KEY names.", "FILE"),
     ] = None,
     allow_external: AllowExternal = False,
     as_json: AsJson = False,

@@ -4,8 +4,6 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import Annotated
 
-import typer
-
 from vibench.acquisition import AcquisitionError, StopLevel
 from vibench.acquisition.engine import (
     DRIVING,
@@ -25,13 +23,12 @@ from vibench.acquisition.engine import (
 from vibench.stop_files import SWITCH_OFF
 
 from .engine_bars import INTERVAL_S, EngineBars
+from .options import option
 from .output import console, print_json
 from .paths import AsJson
 
 NAME = {"pid", "what", "started_utc"}
-Pid = Annotated[
-    int | None, typer.Option("--pid", metavar="N", help="Process that is meant; the only one if absent.")
-]
+Pid = Annotated[int | None, option("Process that is meant; the only one if absent.", "N", name="--pid")]
 
 
 def watch(pid: Pid = None, as_json: AsJson = False) -> None:
@@ -65,19 +62,13 @@ def watch(pid: Pid = None, as_json: AsJson = False) -> None:
 
 def stop(
     pid: Annotated[
-        int | None,
-        typer.Option(
-            "--pid", metavar="N", help="Process that is meant; all if absent, and held: the only one."
-        ),
+        int | None, option("Process that is meant; all if absent, and held: the only one.", "N")
     ] = None,
     level: Annotated[
         StopLevel,
-        typer.Option(
-            "--level",
-            help="How hard: held until vibench release, the plan's ramp, the shortest ramp, or off at once.",
-        ),
+        option("How hard: held until vibench release, the plan's ramp, the shortest ramp, or off at once."),
     ] = StopLevel.RAMP,
-    reason: Annotated[str, typer.Option("--reason", help="Stands in the recording.")] = "vibench stop",
+    reason: Annotated[str, option("Stands in the recording.")] = "vibench stop",
 ) -> None:
     """Stop all that engines, scripts and checks drive on this computer, campaigns and all."""
     programs = programs_to_stop(pid)
