@@ -18,21 +18,21 @@ from vibench.analysis import (
 from vibench.analysis.dynamics import (
     BranchDiagram,
     BranchLine,
-    BranchMethod,
     BranchRequest,
     branch_lines,
     write_diagram,
 )
-from vibench.sim import Parameter, PhaseReference
+from vibench.sim import Parameter
 
 from .dynamics_answer import computed, keep, leave, print_answer, room_for
-from .options import option
+from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
 from .range_option import Range, range_of
-from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, asked_of_specimen
+from .specimen_option import SPECIMEN, specimen_request
 
 FILE = "branches.h5"
+OPTIONS = ("method", *SPECIMEN, "harmonics", "places", "starts", "most_periods", "seed", "phase_of")
 
 
 def branches(
@@ -55,21 +55,8 @@ def branches(
             "LOW:HIGH",
         ),
     ] = None,
-    phase_of: Annotated[
-        PhaseReference, option("Motion of m0 that is a quarter of a period behind at a resonance.")
-    ] = PhaseReference.RELATIVE,
-    method: Annotated[
-        BranchMethod, option("Exact; harmonic balance; or with one harmonic, the paper's eq. 5.")
-    ] = BranchMethod.SHOOTING,
-    specimen: SpecimenOption = None,
-    model: LawOption = None,
-    damping_time: DampingTime = None,
-    gap: Gap = None,
-    harmonics: Annotated[int, option("Highest that a balance may use.", "N")] = 511,
-    places: Annotated[int, option("Values in the range where motions are looked for.", "N")] = 8,
-    starts: Annotated[int, option("Random states at each: isolated branches need them.", "N")] = 12,
-    most_periods: Annotated[int, option("Longest motion looked for, in drive periods.", "N")] = 4,
-    seed: Annotated[int, option("Of the random states.")] = 1,
+    *,
+    options: Annotated[RequestOptions[BranchRequest], Fields(OPTIONS)],
     holdable: Annotated[
         Path | None,
         option(
@@ -85,22 +72,7 @@ def branches(
         if resonance is None
         else _resonance(amplitude, frequency, like, resonance)
     )
-    asked = asked_of_specimen(
-        BranchRequest,
-        specimen,
-        model,
-        damping_time,
-        gap,
-        amplitude,
-        method=method,
-        harmonics=harmonics,
-        places=places,
-        starts=starts,
-        most_periods=most_periods,
-        seed=seed,
-        phase_of=phase_of,
-        **drive,
-    )
+    asked = specimen_request(options, options.typed.get("specimen"), amplitude, **drive)
     if holdable is not None:
         lowest_hz = asked.start if asked.along is Parameter.FREQUENCY else asked.frequency_hz
         if asked.resonance_band_hz is not None:

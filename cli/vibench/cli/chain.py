@@ -13,17 +13,18 @@ from vibench.analysis.dynamics import (
     chain_runs,
     write_chain,
 )
-from vibench.sim import USUAL_SPECIMEN, Accuracy, Parameter
+from vibench.sim import USUAL_SPECIMEN, Parameter
 from vibench.sim.chain import MOST_CELLS
 
 from .dynamics_answer import computed, keep, leave, print_answer, room_for
-from .options import option
+from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
 from .range_option import range_of
-from .specimen_option import SPECIMENS_HELP, DampingTime, Gap, LawOption, asked_of_specimen, described
+from .specimen_option import SPECIMEN, described, specimen_request
 
 FILE = "chain.h5"
+OPTIONS = (*SPECIMEN[1:], "duration_s", "settle_s", "exponent_s", "accuracy")
 _SWEEP_ENDS = 2
 
 
@@ -39,34 +40,26 @@ def chain(
     ] = None,
     recording: Annotated[Path | None, option("Drive the chain by its base motion.", "RECORDING.h5")] = None,
     specimen: Annotated[
-        list[str] | None, option(f"Given again, cells take turns. {SPECIMENS_HELP}", "NAME|FILE.toml")
+        list[str] | None,
+        option(
+            f"Given again, cells take turns: {ChainRequest.model_fields['specimen'].description}",
+            "NAME|FILE.toml",
+        ),
     ] = None,
-    model: LawOption = None,
-    damping_time: DampingTime = None,
-    gap: Gap = None,
-    duration: Annotated[float, option("Observed if steady; of a sweep; of a recording.", "S")] = 2.0,
-    settle: Annotated[float, option("Left out before if steady, from rest.", "S")] = 2.0,
-    exponent: Annotated[float, option("Average the largest exponent so long; steady only.", "S")] = 0.0,
-    accuracy: Annotated[Accuracy, option("Of contacts; flight is exact.")] = Accuracy.STANDARD,
+    *,
+    options: Annotated[RequestOptions[ChainRequest], Fields(OPTIONS)],
     out: Annotated[Path | None, option("Folder for chain.h5, figure and tables.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell."""
     first, *others = specimen or (USUAL_SPECIMEN,)
-    asked = asked_of_specimen(
-        ChainRequest,
+    asked = specimen_request(
+        options,
         first,
-        model,
-        damping_time,
-        gap,
         amplitude,
         others=tuple(described(each) for each in others),
         lengths=_lengths(cells),
         **_drive(amplitude, frequency, recording),
-        duration_s=duration,
-        settle_s=settle,
-        exponent_s=exponent,
-        accuracy=accuracy,
     )
     from vibench.analysis.report import chain_figure
 

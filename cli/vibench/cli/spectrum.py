@@ -10,49 +10,29 @@ from vibench.analysis.dynamics import (
     spectrum_points,
     write_spectrum,
 )
-from vibench.sim import Accuracy, Parameter
+from vibench.sim import Parameter
 
 from .dynamics_answer import SHOWN, computed, keep, leave, print_answer, room_for
-from .options import option
+from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
 from .range_option import Range, range_of
-from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, asked_of_specimen
+from .specimen_option import SPECIMEN, specimen_request
 
 FILE = "spectrum.h5"
+OPTIONS = (*SPECIMEN, "duration_s", "settle_s", "accuracy", "confidence")
 
 
 def spectrum(
     amplitude: Annotated[str, option("Of the base displacement.", "M|START:STOP:STEP")],
     frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
-    specimen: SpecimenOption = None,
-    model: LawOption = None,
-    damping_time: DampingTime = None,
-    gap: Gap = None,
-    duration: Annotated[float, option("Over which exponents are averaged.", "S")] = 25.0,
-    settle: Annotated[float, option("Left out before, from rest.", "S")] = 5.0,
-    accuracy: Annotated[
-        Accuracy, option("Of contacts; the sum of the exponents is as exact.")
-    ] = Accuracy.REFERENCE,
-    confidence: Annotated[float, option("Of the intervals.", "P")] = 0.95,
+    options: Annotated[RequestOptions[SpectrumRequest], Fields(OPTIONS)],
     out: Annotated[Path | None, option("Folder for spectrum.h5, figure and table.", "DIR")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension."""
     a, f = range_of(amplitude, Parameter.AMPLITUDE, (1, 3)), range_of(frequency, Parameter.FREQUENCY, (1, 3))
-    asked = asked_of_specimen(
-        SpectrumRequest,
-        specimen,
-        model,
-        damping_time,
-        gap,
-        amplitude,
-        **_drive(a, f),
-        accuracy=accuracy,
-        duration_s=duration,
-        settle_s=settle,
-        confidence=confidence,
-    )
+    asked = specimen_request(options, options.typed.get("specimen"), amplitude, **_drive(a, f))
     from vibench.analysis.report import exponent_spectrum_figure
 
     room_for(FILE, out)

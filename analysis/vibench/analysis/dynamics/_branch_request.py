@@ -43,7 +43,7 @@ class BranchRequest(SpecimenChoice):
     """All periodic motions that are found over a range."""
 
     method: BranchMethod = BranchMethod.SHOOTING
-    """Exact, or balanced with many harmonics, or with one."""
+    """Exact; harmonic balance; or with one harmonic, the paper's eq. 5."""
     along: Parameter = Parameter.FREQUENCY
     """What changes: the drive's frequency, or its amplitude."""
     amplitude_m: PositiveFloat = 5e-6

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import PositiveFloat, ValidationError, model_validator
+from pydantic import ConfigDict, PositiveFloat, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from vibench.acquisition import ChosenFrom
@@ -29,18 +29,23 @@ def _at(field: str, error: ValueError) -> ValidationError:
 
 
 class SpecimenChoice(FrozenModel):
-    """A described specimen, with another contact, damping or gap where one is given."""
+    """A described specimen, with another contact, damping or gap where one is given.
+
+    Docstrings of fields are the help of options on the command line, and the explanations of a form.
+    """
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
 
     specimen: SpecimenName = USUAL_SPECIMEN
-    """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, two_masses, or the path of a
-    specimen's file."""
+    """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, two_masses (`vibench specimen`
+    describes each), or the path of a specimen's file."""
     model: ContactWord = ""
-    """Contact: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...; empty for
-    the specimen's own."""
+    """Contact law: hertz, linear, linear_gap, hunt_crossley:0.1, rigid:0.8, power:5, power:3+5+7, ...
+    (`vibench specimen` describes each); the specimen's own if not given."""
     damping_time_s: DampingTime | None = None
-    """Damping over stiffness of every link: c = damping time times k; empty for the specimen's own."""
+    """Damping over stiffness of every link, c_i = damping time * k_i; the specimen's own if not given."""
     gap_m: PositiveFloat | None = None
-    """Clearance at both stops; empty for the specimen's own."""
+    """Clearance at both stops; the specimen's own if not given."""
     described: SpecimenTable | None = None
     """What the specimen is, number by number: read from its file when absent, so that an answer holds it."""
 

@@ -44,7 +44,7 @@ class SpectrumRequest(SpecimenChoice):
     settle_s: Annotated[float, Field(ge=0.0, le=LONGEST_S)] = 5.0
     """Left out before, from rest."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.95
-    """Of the intervals."""
+    """Probability that an interval holds the exponent."""
 
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
