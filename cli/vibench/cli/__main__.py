@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
+from pathlib import Path
 from typing import Annotated, Any, TextIO
 
 import typer
@@ -53,36 +54,49 @@ class Panel(StrEnum):
 
 @dataclass(frozen=True)
 class Place:
-    """Where a command is written, and its line in the list of commands."""
+    """Where a command is written, and what it needs."""
 
-    module: str
-    function: str
-    summary: str
-    """First line of the function's docstring."""
     panel: Panel
+    function: str
+    """``module:name``."""
     extras: tuple[str, ...] = ()
     """Extras that it needs before it does anything, the one that brings the others first."""
     space_mb: int = 300
     """Address space that its libraries and their threads take [MB]."""
     advice: str = ""
     """What to do where it cannot run."""
+    help: str = ""
+    """Of a group of commands, which has no function with a docstring."""
 
     def load(self) -> typer.Typer:
         """Import the command, alone in an application of its own."""
-        found = getattr(importlib.import_module(f".{self.module}", __package__), self.function)
+        module, name = self.function.split(":")
+        found = getattr(importlib.import_module(f".{module}", __package__), name)
         if isinstance(found, typer.Typer):
             return found
         application = typer.Typer(add_completion=False, rich_markup_mode=None)
         application.command(cls=SectionedCommand)(with_options(found))
         return application
 
+    @property
+    def summary(self) -> str:
+        """First line of the function's docstring, read from its source: importing it could take seconds."""
+        module, name = self.function.split(":")
+        source = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
+        docstring = source.partition(f"\ndef {name}(")[2].partition('"""')[2]
+        return self.help or docstring.partition("\n")[0].removesuffix('"""')
+
 
 class LateCommand(TyperCommand):
     """Stands in the list for a command, and hands over to it once it is called."""
 
     def __init__(self, name: str, place: Place) -> None:
-        super().__init__(name, help=place.summary, rich_help_panel=place.panel)
+        super().__init__(name, rich_help_panel=place.panel)
         self._place = place
+
+    def get_short_help_str(self, limit: int = 45) -> str:  # noqa: ARG002 - the whole line, as it is
+        """Give the line of the list of commands."""
+        return self._place.summary
 
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
         """Read the arguments as the command itself does."""
@@ -162,220 +176,37 @@ def late_commands(places: Mapping[str, Place]) -> type[SectionedGroup]:
 SIMULATION_MB, BENCH_MB = 1000, 2000
 """Address space of commands that simulate or analyse (measured: 775), and that open a bench (1807) [MB]."""
 COMMANDS = {
-    "demo": Place(
-        "demo",
-        "demo",
-        "Run the paper's experiment on the virtual rig: measure, analyse, simulate, and write a report.",
-        Panel.MEASURE,
-        ("bench", "figures"),
-        space_mb=BENCH_MB,
-    ),
-    "measure": Place(
-        "measure",
-        "measure",
-        "Measure: check the bench, ramp up, record and ramp down, for each measurement of a campaign.",
-        Panel.MEASURE,
-        space_mb=BENCH_MB,
-    ),
-    "watch": Place(
-        "watch",
-        "watch",
-        "Watch what an engine carries out, from any terminal of the same user; Ctrl-C leaves it be.",
-        Panel.MEASURE,
-    ),
-    "twin": Place(
-        "twin",
-        "twin",
-        "Follow the hidden motion of what an engine measures, and note when the specimen changes.",
-        Panel.MEASURE,
-        space_mb=SIMULATION_MB,
-    ),
-    "stop": Place(
-        "watch",
-        "stop",
-        "Stop all that engines, scripts and checks drive on this computer, campaigns and all.",
-        Panel.MEASURE,
-        advice=f"{SWITCH_OFF}.",
-    ),
-    "release": Place(
-        "watch",
-        "release",
-        "Continue a run that was held with vibench stop --level hold, or in the window.",
-        Panel.MEASURE,
-    ),
-    "gui": Place(
-        "gui",
-        "gui",
-        "Open the window: connect, check, choose, preview, run, watch, compare.",
-        Panel.MEASURE,
-        ("gui",),
-        space_mb=BENCH_MB,
-    ),
-    "analyse": Place(
-        "analyse",
-        "analyse",
-        "Analyse recordings, complete, interrupted or still growing, and write one HTML report.",
-        Panel.ANALYSE,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "catalogue": Place(
-        "catalogue",
-        "show_catalogue",
-        "List the recordings of a folder and the folders in it: what, when, how they ended, how large.",
-        Panel.ANALYSE,
-    ),
-    "figure": Place(
-        "figure",
-        "figure",
-        "Draw a figure of the paper; studies are kept in DIR/studies and go on where they were stopped.",
-        Panel.ANALYSE,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "reproduce": Place(
-        "reproduce",
-        "reproduce",
-        "Measure what of the paper holds. Studies are kept in DIR/studies and go on where they were stopped.",
-        Panel.ANALYSE,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "specimen": Place(
-        "specimen",
-        "show_specimen",
-        "List the specimens and contact laws that there are, or say what one specimen amounts to.",
-        Panel.PREDICT,
-    ),
-    "predict": Place(
-        "predict",
-        "predict",
-        "Predict the responses of m0 and of p over frequency.",
-        Panel.PREDICT,
-        space_mb=SIMULATION_MB,
-    ),
-    "branches": Place(
-        "branches",
-        "branches",
-        "Find and follow periodic motions over frequency or level, stable and unstable; name bifurcations.",
-        Panel.PREDICT,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "spectrum": Place(
-        "spectrum",
-        "spectrum",
-        "Compute all Lyapunov exponents over frequency or level, their sum, and the Kaplan-Yorke dimension.",
-        Panel.PREDICT,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "chain": Place(
-        "chain",
-        "chain",
-        "Follow cells in a row: bands and gaps, transmission, energy, impacts and exponents, cell by cell.",
-        Panel.PREDICT,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "study": Place(
-        "study",
-        "study",
-        "Predict responses for every combination listed in a file, longest first.",
-        Panel.PREDICT,
-        space_mb=SIMULATION_MB,
-    ),
-    "map": Place(
-        "map_motions",
-        "map_motions",
-        "Map the motions over two parameters or two coordinates of the start, or along one parameter.",
-        Panel.PREDICT,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "tradeoff": Place(
-        "tradeoff",
-        "tradeoff",
-        "Measure what each accuracy costs and what error it makes, with and without impacts and in chaos.",
-        Panel.PREDICT,
-        ("figures",),
-        space_mb=SIMULATION_MB,
-    ),
-    "bench": Place(
-        "bench",
-        "bench",
-        "Check and list instruments.",
-        Panel.BENCH,
-        space_mb=BENCH_MB,
-    ),
-    "serve-rig": Place(
-        "serve_rig",
-        "serve_rig",
-        "Serve the virtual rig to any pyvisa and nidaqmx program until Ctrl-C.",
-        Panel.BENCH,
-        ("bench",),
-        space_mb=BENCH_MB,
-    ),
-    "export": Place(
-        "export",
-        "export",
-        "Write a recording's samples or spectra, with units, as a file that other programs read.",
-        Panel.FILES,
-    ),
-    "import": Place(
-        "import_recording",
-        "import_file",
-        "Convert another program's file to a recording, or list its contents.",
-        Panel.FILES,
-    ),
-    "pack": Place(
-        "pack",
-        "pack",
-        "Pack a folder of recordings as a Research Object Crate, described for a repository.",
-        Panel.FILES,
-    ),
-    "recover": Place(
-        "recover",
-        "recover_recording",
-        "Finish a recording that was cut off: all that was committed becomes NAME.h5.",
-        Panel.FILES,
-    ),
-    "verify": Place(
-        "verify",
-        "verify",
-        "Hold every recording of a folder against its seal, samples and all, and against journals.",
-        Panel.FILES,
-    ),
-    "examples": Place(
-        "examples",
-        "examples",
-        "List the campaigns, rigs, studies and scripts that come with vibench, or copy them to change them.",
-        Panel.INSTALLATION,
-    ),
-    "docs": Place(
-        "docs",
-        "docs",
-        "Build the documentation site of this version unless it exists; print the path of its first page.",
-        Panel.INSTALLATION,
-    ),
-    "schema": Place(
-        "schema",
-        "schema",
-        "Print the JSON Schema (draft 4) of a kind of TOML file, for an editor that checks as one types.",
-        Panel.INSTALLATION,
-    ),
-    "warm": Place(
-        "warm",
-        "warm",
-        "Say that nothing needs compiling: the simulation was compiled when vibench was built.",
-        Panel.INSTALLATION,
-    ),
-    "doctor": Place(
-        "doctor",
-        "doctor",
-        "Say what this installation consists of, for a question to others: data only, nothing is changed.",
-        Panel.INSTALLATION,
-    ),
+    "demo": Place(Panel.MEASURE, "demo:demo", ("bench", "figures"), space_mb=BENCH_MB),
+    "measure": Place(Panel.MEASURE, "measure:measure", space_mb=BENCH_MB),
+    "watch": Place(Panel.MEASURE, "watch:watch"),
+    "twin": Place(Panel.MEASURE, "twin:twin", space_mb=SIMULATION_MB),
+    "stop": Place(Panel.MEASURE, "watch:stop", advice=f"{SWITCH_OFF}."),
+    "release": Place(Panel.MEASURE, "watch:release"),
+    "gui": Place(Panel.MEASURE, "gui:gui", ("gui",), space_mb=BENCH_MB),
+    "analyse": Place(Panel.ANALYSE, "analyse:analyse", ("figures",), space_mb=SIMULATION_MB),
+    "catalogue": Place(Panel.ANALYSE, "catalogue:show_catalogue"),
+    "figure": Place(Panel.ANALYSE, "figure:figure", ("figures",), space_mb=SIMULATION_MB),
+    "reproduce": Place(Panel.ANALYSE, "reproduce:reproduce", ("figures",), space_mb=SIMULATION_MB),
+    "specimen": Place(Panel.PREDICT, "specimen:show_specimen"),
+    "predict": Place(Panel.PREDICT, "predict:predict", space_mb=SIMULATION_MB),
+    "branches": Place(Panel.PREDICT, "branches:branches", ("figures",), space_mb=SIMULATION_MB),
+    "spectrum": Place(Panel.PREDICT, "spectrum:spectrum", ("figures",), space_mb=SIMULATION_MB),
+    "chain": Place(Panel.PREDICT, "chain:chain", ("figures",), space_mb=SIMULATION_MB),
+    "study": Place(Panel.PREDICT, "study:study", space_mb=SIMULATION_MB),
+    "map": Place(Panel.PREDICT, "map_motions:map_motions", ("figures",), space_mb=SIMULATION_MB),
+    "tradeoff": Place(Panel.PREDICT, "tradeoff:tradeoff", ("figures",), space_mb=SIMULATION_MB),
+    "bench": Place(Panel.BENCH, "bench:bench", space_mb=BENCH_MB, help="Check and list instruments."),
+    "serve-rig": Place(Panel.BENCH, "serve_rig:serve_rig", ("bench",), space_mb=BENCH_MB),
+    "export": Place(Panel.FILES, "export:export"),
+    "import": Place(Panel.FILES, "import_recording:import_file"),
+    "pack": Place(Panel.FILES, "pack:pack"),
+    "recover": Place(Panel.FILES, "recover:recover_recording"),
+    "verify": Place(Panel.FILES, "verify:verify"),
+    "examples": Place(Panel.INSTALLATION, "examples:examples"),
+    "docs": Place(Panel.INSTALLATION, "docs:docs"),
+    "schema": Place(Panel.INSTALLATION, "schema:schema"),
+    "warm": Place(Panel.INSTALLATION, "warm:warm"),
+    "doctor": Place(Panel.INSTALLATION, "doctor:doctor"),
 }
 
 app = typer.Typer(

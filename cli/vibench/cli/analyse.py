@@ -14,8 +14,8 @@ from vibench.analysis import (
     FEWEST_DRAWS,
     AnalysisError,
     AnalysisFailure,
+    AnalysisOptions,
     CampaignResults,
-    Estimator,
     FailedStep,
     FrequencyResponseRequest,
     InvalidRequest,
@@ -23,7 +23,6 @@ from vibench.analysis import (
     Parameter,
     Simulation,
     UpdatedSpecimen,
-    Window,
     analyse_files,
     budget_sentences,
     campaign_summary,
@@ -39,7 +38,7 @@ from vibench.sim.maps import MapResults, open_map
 
 from .exit_code import ExitCode
 from .external_data import AllowExternal, external_data
-from .options import option
+from .options import Fields, RequestOptions, option
 from .output import bold, console, errors, print_json
 from .paths import AsJson, room_for_folder, unused
 from .progress_bars import reading_bar
@@ -60,6 +59,7 @@ class DrivenBy(StrEnum):
 
 NOISE = "Transmission of noise"
 """Heading of the options that no other excitation takes notice of."""
+OPTIONS = ("estimator", "noise_ratio", "resolution_hz", "averages", "window", "overlap", "confidence")
 
 
 class _Hidden(StrEnum):
@@ -124,17 +124,6 @@ def analyse(
         list[Path] | None,
         option("Lay levels of stepped sines and sweeps over what vibench map made.", "MAP.h5", name="--map"),
     ] = None,
-    estimator: Annotated[
-        Estimator, option("drive: referenced to the drive voltage, free of any channel's noise.", panel=NOISE)
-    ] = FrequencyResponseRequest.estimator,
-    noise_ratio: Annotated[
-        float | None,
-        option(
-            "For hv: noise density of m0's velocity over that of the base's acceleration, in s2.",
-            "R",
-            panel=NOISE,
-        ),
-    ] = None,
     quantity: Annotated[
         str,
         option(
@@ -146,37 +135,17 @@ def analyse(
     scale: Annotated[
         MagnitudeScale, option("Of the magnitudes in figures.", panel=NOISE)
     ] = MagnitudeScale.LOG,
-    resolution: Annotated[
-        float | None, option("Width of a line; streamed noise only, like the next four.", "HZ", panel=NOISE)
-    ] = None,
     segment: Annotated[
         float | None, option("Length of a segment, instead of a resolution.", "S", panel=NOISE)
     ] = None,
-    averages: Annotated[
-        float | None, option("Independent averages, instead of a resolution.", "N", panel=NOISE)
-    ] = None,
-    window: Annotated[Window, option("Taper of a segment.", panel=NOISE)] = FrequencyResponseRequest.window,
-    overlap: Annotated[
-        float, option("Of neighbouring segments, 0 to 1.", "SHARE", panel=NOISE)
-    ] = FrequencyResponseRequest.overlap,
-    confidence: Annotated[
-        float, option("That the bounds of a line hold the truth.", "P", panel=NOISE)
-    ] = FrequencyResponseRequest.confidence,
+    *,
+    options: Annotated[RequestOptions[AnalysisOptions], Fields(OPTIONS, NOISE)],
     allow_external: AllowExternal = False,
     as_json: AsJson = False,
 ) -> None:
     """Analyse recordings, complete, interrupted or still growing, and write one HTML report."""
-    request = FrequencyResponseRequest(
-        estimator=estimator,
-        noise_ratio=noise_ratio,
-        resolution_hz=resolution,
-        segment_s=segment,
-        averages=averages,
-        window=window,
-        overlap=overlap,
-        confidence=confidence,
-        view=quantities_named(quantity, scale),
-    )
+    request = options.request().request
+    request = replace(request, segment_s=segment, view=quantities_named(quantity, scale))
     if fit and specimen is not None:
         raise InvalidRequest(
             "--fit and --specimen were given; one of the two says which specimen is laid over"

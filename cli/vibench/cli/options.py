@@ -201,6 +201,10 @@ class SectionedCommand(TyperCommand):
                 formatter.write_dl(rows)
 
 
+_WHOLE = 1000
+"""Letters of a command's line in a list."""
+
+
 class SectionedGroup(TyperGroup):
     """Lists commands below their headings, each with the whole first line of its help."""
 
@@ -209,7 +213,7 @@ class SectionedGroup(TyperGroup):
         sections: dict[str, list[tuple[str, str]]] = {}
         for name, each in self.commands.items():
             heading = getattr(each, "rich_help_panel", None) or "Commands"
-            sections.setdefault(heading, []).append((name, (each.help or "").partition("\n")[0]))
+            sections.setdefault(heading, []).append((name, each.get_short_help_str(_WHOLE)))
         for title, rows in sections.items():
             with formatter.section(title):
                 formatter.write_dl(rows)

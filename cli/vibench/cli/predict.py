@@ -8,7 +8,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import ValidationError
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
@@ -20,7 +19,7 @@ from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 from .found_motions import forgetting_text, motions_table, share_text
 from .frequency_option import frequencies
 from .interruption import told_to_stop
-from .options import option
+from .options import option, validated
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points
@@ -30,22 +29,6 @@ from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, descri
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
 """Rows of a table on the terminal; all of them are in the JSON and in the file."""
-_OPTIONS = {
-    "models": "--model",
-    "amplitudes_m": "--amplitude",
-    "gaps_m": "--gap",
-    "damping_times_s": "--damping-time",
-    "duration_s": "--duration",
-    "window_s": "--window",
-    "budget_s": "--budget",
-}
-"""What the user typed, by the name that the study has for it."""
-_ALLOWED = {
-    "greater_than": "it must be above 0",
-    "greater_than_equal": "it must not be negative",
-    "finite_number": "it must be a finite number",
-}
-"""What an option must be, by the name that the validator has for what it is not."""
 
 
 def predict(
@@ -87,7 +70,8 @@ def predict(
     """Predict the responses of m0 and of p over frequency."""
     if resume and out is None:
         raise InvalidRequest("--resume was given without --out, and only a file is gone on with; give both")
-    asked = _study(
+    asked = validated(
+        Study,
         {
             "specimen": described(specimen),
             **given_options(models=model, gaps_m=gap, damping_times_s=damping_time),
@@ -99,7 +83,7 @@ def predict(
             "duration_s": _duration(duration),
             "window_s": window,
             "budget_s": _budget(budget),
-        }
+        },
     )
     print_warnings(
         plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)
@@ -141,17 +125,6 @@ def predict(
     if explain:
         (errors if as_json else console).print(paragraph(_explanation(asked, points, taken_s)))
     complain_about_points(asked, failures, kept)
-
-
-def _study(options: dict[str, object]) -> Study:
-    try:
-        return Study.model_validate(options)
-    except ValidationError as error:
-        first = error.errors()[0]
-        said = _ALLOWED.get(first["type"], first["msg"].removeprefix("Value error, "))
-        place = str(first["loc"][0]) if first["loc"] else ""
-        given = f"{_OPTIONS.get(place, place)} was given as {first['input']!r}: " if place else ""
-        raise InvalidRequest(given + said) from error
 
 
 def _observables(text: str) -> tuple[Observable, ...]:

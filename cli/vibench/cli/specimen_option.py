@@ -7,12 +7,13 @@ from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import SpecimenTable, UnknownSpecimenError, load_specimen, usual_specimen
 from vibench.sim.study import plausibility_warnings
 
-from .options import RequestOptions, field_option
+from .options import RequestOptions, field_option, option
 from .output import print_warnings
 
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
 """Fields of a request about a specimen that every command has as options."""
-SpecimenOption = Annotated[str | None, field_option(SpecimenChoice, "specimen")]
+SPECIMEN_HELP = SpecimenChoice.model_fields["specimen"].description or ""
+SpecimenOption = Annotated[str | None, option(SPECIMEN_HELP, "NAME|FILE.toml", name="--specimen")]
 LawOption = Annotated[str | None, field_option(SpecimenChoice, "model")]
 DampingTime = Annotated[float | None, field_option(SpecimenChoice, "damping_time_s")]
 Gap = Annotated[float | None, field_option(SpecimenChoice, "gap_m")]

@@ -5,7 +5,7 @@ from enum import StrEnum
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import ConfigDict, Field, PositiveFloat, model_validator
 
 from vibench.sim import FrozenModel
 
@@ -111,7 +111,12 @@ _SIMULATIONS = {
 
 
 class AnalysisOptions(FrozenModel):
-    """What an analyst may choose; estimator to confidence concern noise only."""
+    """What an analyst may choose; estimator to confidence concern noise only.
+
+    Docstrings of fields are the help of options on the command line, and the explanations of a form.
+    """
+
+    model_config = ConfigDict(use_attribute_docstrings=True)
 
     model: Model = Model.LEFT_OUT
     """The simulated specimen, with its rig under the recorded voltage (the twin) or alone under the recorded
@@ -123,9 +128,9 @@ class AnalysisOptions(FrozenModel):
     window: Window = Window.HANN
     """Taper of the segments of streamed noise."""
     resolution_hz: PositiveFloat | None = None
-    """Width of a line of streamed noise; empty chooses it. At most one of resolution and averages."""
+    """Width of a line of streamed noise; chosen if not given. At most one of resolution and averages."""
     averages: Annotated[float, Field(gt=1.0)] | None = None
-    """Independent averages of streamed noise; empty chooses them."""
+    """Independent averages of streamed noise; chosen if not given."""
     overlap: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.5
     """Part that neighbouring segments share."""
     confidence: Annotated[float, Field(gt=0.0, lt=1.0)] = DEFAULT_CONFIDENCE
@@ -140,15 +145,7 @@ class AnalysisOptions(FrozenModel):
     @property
     def request(self) -> FrequencyResponseRequest:
         """The same for the analysis."""
-        return FrequencyResponseRequest(
-            estimator=self.estimator,
-            noise_ratio=self.noise_ratio,
-            resolution_hz=self.resolution_hz,
-            averages=self.averages,
-            window=self.window,
-            overlap=self.overlap,
-            confidence=self.confidence,
-        )
+        return FrequencyResponseRequest(**self.model_dump(exclude={"model"}))
 
     @property
     def simulation(self) -> Simulation:
