@@ -21,7 +21,7 @@ from .options import Fields, RequestOptions, option
 from .output import console
 from .paths import AsJson
 from .range_option import range_of
-from .specimen_option import SPECIMEN, SPECIMEN_HELP, described, specimen_request
+from .specimen_option import SPECIMEN, described, specimen_request
 
 FILE = "chain.h5"
 OPTIONS = (*SPECIMEN[1:], "duration_s", "settle_s", "exponent_s", "accuracy")
@@ -42,7 +42,7 @@ def chain(
     specimen: Annotated[
         list[str] | None,
         option(
-            f"Given again, cells take turns: {SPECIMEN_HELP}",
+            "A specimen's file, or a name that `vibench specimen` lists; given again, cells take turns.",
             "NAME|FILE.toml",
         ),
     ] = None,

@@ -108,24 +108,25 @@ def option(
     return made
 
 
-def field_option(model: "type[BaseModel]", name: str, panel: str | None = None) -> OptionInfo:
-    """Make the option of a field. The help names its default; the model alone has it."""
+def _option(model: "type[BaseModel]", name: str, panel: str | None) -> OptionInfo:
     field = model.model_fields[name]
-    assert field.description, f"{model.__name__}.{name} needs a docstring, which is its option's help"
-    unit, default = (
-        _UNIT.search(name),
-        field.default.value if isinstance(field.default, Enum) else field.default,
-    )
+    unit = _UNIT.search(name)
     plain = {int: "N", float: "NUMBER", str: "TEXT"}.get(_plain(field.annotation))
-    shown = "" if field.is_required() or default in (None, "") else f"  [default: {default}]"
-    option: OptionInfo = typer.Option(
-        f"--{option_name(name)}",
-        metavar=unit[1].upper() if unit else plain,
-        help=" ".join(field.description.split()) + shown,
-        show_default=False,
-        rich_help_panel=panel,
+    return option("", unit[1].upper() if unit else plain, name=f"--{option_name(name)}", panel=panel)
+
+
+def _help(model: "type[BaseModel]", name: str) -> str:
+    """Read the help of a field's option: its docstring, and its default, which the model alone has."""
+    from vibench.analysis.field_docstrings import field_docstring
+
+    default = model.model_fields[name].default
+    shown = default.value if isinstance(default, Enum) else default
+    said = " ".join(field_docstring(model, name).split())
+    return (
+        said
+        if model.model_fields[name].is_required() or shown in (None, "")
+        else f"{said}  [default: {shown}]"
     )
-    return option
 
 
 def _plain(annotation: Any) -> Any:
@@ -168,6 +169,7 @@ def with_options(function: Callable[..., None]) -> Callable[..., None]:
             typed[name] = RequestOptions(model, given)
         function(**typed)
 
+    run.fields = {name: model for model, names in requests.values() for name in names}  # type: ignore[attr-defined]
     run.__annotations__ = {each.name: each.annotation for each in parameters}
     run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return run
@@ -175,7 +177,7 @@ def with_options(function: Callable[..., None]) -> Callable[..., None]:
 
 def _parameter(model: "type[BaseModel]", name: str, panel: str | None) -> inspect.Parameter:
     field = model.model_fields[name]
-    option, plain = field_option(model, name, panel), _plain(field.annotation)
+    option, plain = _option(model, name, panel), _plain(field.annotation)
     if field.is_required():
         return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[plain, option])
     annotation = Annotated[plain | None, option]
@@ -191,7 +193,10 @@ class SectionedCommand(TyperCommand):
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Write a section for arguments, for options and for every other heading."""
         sections: dict[str, list[tuple[str, str]]] = {}
+        models = getattr(self.callback, "fields", {})
         for each in self.get_params(ctx):
+            if each.name in models:
+                each.help = _help(models[each.name], each.name)
             record = each.get_help_record(ctx)
             usual = "Arguments" if isinstance(each, TyperArgument) else "Options"
             if record is not None:

@@ -14,12 +14,8 @@ if TYPE_CHECKING:
 
 SHOWN_FAILURES = 5
 
-Workers = Annotated[
-    int | None, option("Threads; one for each processor if absent.", "N", name="--workers", min=1)
-]
-Cluster = Annotated[
-    str | None, option("Let the workers of this Dask scheduler compute.", "ADDRESS", name="--cluster")
-]
+Workers = Annotated[int | None, option("Threads; one for each processor if absent.", "N", min=1)]
+Cluster = Annotated[str | None, option("Let the workers of this Dask scheduler compute.", "ADDRESS")]
 Failures = Sequence[tuple[Mapping[str, float | str], str]]
 """Values of the axes at each point without an answer, and why there is none."""
 

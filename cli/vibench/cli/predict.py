@@ -12,44 +12,35 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from vibench.analysis import InvalidRequest
-from vibench.sim import BUDGET_S, Accuracy, Observable, Outcome, Rest, ScenePlan, ScenePrediction, solve_scene
+from vibench.analysis.dynamics import SpecimenChoice
+from vibench.sim import BUDGET_S, Observable, Outcome, Rest, ScenePlan, ScenePrediction, solve_scene
 from vibench.sim.background import Progress
 from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
 from .found_motions import forgetting_text, motions_table, share_text
 from .frequency_option import frequencies
 from .interruption import told_to_stop
-from .options import option, validated
+from .options import Fields, RequestOptions, option
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
-from .specimen_option import DampingTime, Gap, LawOption, SpecimenOption, described, given_options
+from .specimen_option import SPECIMEN, described
 
 AUTO: Literal["auto"] = "auto"
 _SHOWN = 24
 """Rows of a table on the terminal; all of them are in the JSON and in the file."""
+_AXES = {"models": "model", "gaps_m": "gap_m", "damping_times_s": "damping_time_s"}
+"""Axes of one value that a study has in place of what replaces a part of the specimen."""
 
 
 def predict(
-    amplitude: Annotated[float, option("Of the base displacement.", "M", name="--amplitude")],
-    frequency: Annotated[
-        str, option("One frequency or a range [Hz].", "F|START:STOP:STEP", name="--frequency")
-    ],
-    specimen: SpecimenOption = None,
-    model: LawOption = None,
-    damping_time: DampingTime = None,
-    gap: Gap = None,
-    duration: Annotated[
-        str, option("Length of each run, or until it settles.", "S|auto", name="--duration")
-    ] = "30",
-    window: Annotated[float, option("Observed at its end.", "S", name="--window")] = 5.0,
-    accuracy: Annotated[Accuracy, option("See docs/accuracy.md.", name="--accuracy")] = Accuracy.STANDARD,
-    observe: Annotated[
-        str, option("response; with it lyapunov, scatter.", name="--observe")
-    ] = Observable.RESPONSE.value,
+    amplitude: Annotated[float, option("Of the base displacement.", "M")],
+    frequency: Annotated[str, option("One frequency or a range [Hz].", "F|START:STOP:STEP")],
+    duration: Annotated[str, option("Length of each run, or until it settles.", "S|auto")] = "30",
+    observe: Annotated[str, option("response; with it lyapunov, scatter.")] = Observable.RESPONSE.value,
     start: Annotated[
-        Start, option("rest, or continued from the next lower (up) or higher (down).", name="--start")
+        Start, option("rest, or continued from the next lower (up) or higher (down).")
     ] = Start.REST,
     budget: Annotated[
         str,
@@ -57,33 +48,30 @@ def predict(
             "Processor time a point for other starts, where the start is forgotten, and to see whether "
             "chaos lasts; 0 looks for neither.",
             "S",
-            name="--budget",
         ),
     ] = f"{BUDGET_S:g}s",
     workers: Workers = None,
     cluster: Cluster = None,
-    out: Annotated[Path | None, option("Keep the answers in a file.", "FILE.h5", name="--out")] = None,
-    resume: Annotated[bool, option("Go on with what FILE.h5 lacks.", name="--resume")] = False,
-    explain: Annotated[bool, option("Say what is computed and why.", name="--explain")] = False,
+    out: Annotated[Path | None, option("Keep the answers in a file.", "FILE.h5")] = None,
+    resume: Annotated[bool, option("Go on with what FILE.h5 lacks.")] = False,
+    explain: Annotated[bool, option("Say what is computed and why.")] = False,
     as_json: AsJson = False,
+    *,
+    choice: Annotated[RequestOptions[SpecimenChoice], Fields(SPECIMEN)],
+    options: Annotated[RequestOptions[Study], Fields(("window_s", "accuracy"))],
 ) -> None:
     """Predict the responses of m0 and of p over frequency."""
     if resume and out is None:
         raise InvalidRequest("--resume was given without --out, and only a file is gone on with; give both")
-    asked = validated(
-        Study,
-        {
-            "specimen": described(specimen),
-            **given_options(models=model, gaps_m=gap, damping_times_s=damping_time),
-            "amplitudes_m": (amplitude,),
-            "frequencies_hz": frequencies(frequency),
-            "observe": _observables(observe),
-            "starts": (start,),
-            "accuracy": accuracy,
-            "duration_s": _duration(duration),
-            "window_s": window,
-            "budget_s": _budget(budget),
-        },
+    asked = options.request(
+        specimen=described(choice.typed.get("specimen")),
+        **{axis: (choice.typed[name],) for axis, name in _AXES.items() if name in choice.typed},
+        amplitudes_m=(amplitude,),
+        frequencies_hz=frequencies(frequency),
+        observe=_observables(observe),
+        starts=(start,),
+        duration_s=_duration(duration),
+        budget_s=_budget(budget),
     )
     print_warnings(
         plausibility_warnings(asked.amplitudes_m, asked.gaps_m or asked.specimen.specimen().gaps_m)

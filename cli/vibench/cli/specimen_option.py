@@ -7,16 +7,14 @@ from vibench.analysis.dynamics import SpecimenChoice
 from vibench.sim import SpecimenTable, UnknownSpecimenError, load_specimen, usual_specimen
 from vibench.sim.study import plausibility_warnings
 
-from .options import RequestOptions, field_option, option
+from .options import RequestOptions, option
 from .output import print_warnings
 
 SPECIMEN = ("specimen", "model", "damping_time_s", "gap_m")
 """Fields of a request about a specimen that every command has as options."""
-SPECIMEN_HELP = SpecimenChoice.model_fields["specimen"].description or ""
-SpecimenOption = Annotated[str | None, option(SPECIMEN_HELP, "NAME|FILE.toml", name="--specimen")]
-LawOption = Annotated[str | None, field_option(SpecimenChoice, "model")]
-DampingTime = Annotated[float | None, field_option(SpecimenChoice, "damping_time_s")]
-Gap = Annotated[float | None, field_option(SpecimenChoice, "gap_m")]
+SpecimenOption = Annotated[
+    str | None, option("A specimen's file, or a name that `vibench specimen` lists.", "NAME|FILE.toml")
+]
 Choice = TypeVar("Choice", bound=SpecimenChoice)
 
 
@@ -31,11 +29,6 @@ def described(specimen: str | None) -> SpecimenTable:
         return SpecimenTable.model_validate(load_specimen(specimen).model_dump())
     except UnknownSpecimenError as error:
         raise InvalidRequest(str(error)) from error
-
-
-def given_options(**options: object) -> dict[str, object]:
-    """Keep what was typed, each as an axis of one value; what was not is left to the specimen."""
-    return {name: (value,) for name, value in options.items() if value is not None}
 
 
 def specimen_request(

@@ -5,7 +5,7 @@ from enum import StrEnum
 from typing import Annotated, Self
 
 import numpy as np
-from pydantic import ConfigDict, Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, model_validator
 
 from vibench.sim import FrozenModel
 
@@ -111,12 +111,7 @@ _SIMULATIONS = {
 
 
 class AnalysisOptions(FrozenModel):
-    """What an analyst may choose; estimator to confidence concern noise only.
-
-    Docstrings of fields are the help of options on the command line, and the explanations of a form.
-    """
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
+    """What an analyst may choose; estimator to confidence concern noise only."""
 
     model: Model = Model.LEFT_OUT
     """The simulated specimen, with its rig under the recorded voltage (the twin) or alone under the recorded

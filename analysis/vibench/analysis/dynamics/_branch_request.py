@@ -109,21 +109,16 @@ class BranchRequest(SpecimenChoice):
 
     def _refuse_other_laws(self) -> None:
         law = self.shaken.contact
-        match self.method, law:
-            case BranchMethod.FIRST_ORDER, PowerLaw():
-                pass
-            case BranchMethod.FIRST_ORDER, _:
-                raise ValueError(
-                    f"one harmonic cannot describe {self.law}: take a power law such as power:5, or the "
-                    "method balance or shooting"
-                )
-            case BranchMethod.BALANCE, RigidStops():
-                raise ValueError(
-                    "rigid stops push with no finite force, so that they have no harmonic balance; take the "
-                    "method shooting"
-                )
-            case _:
-                pass
+        if self.method is BranchMethod.FIRST_ORDER and not isinstance(law, PowerLaw):
+            raise ValueError(
+                f"one harmonic cannot describe {self.law}: take a power law such as power:5, or the method "
+                "balance or shooting"
+            )
+        if self.method is BranchMethod.BALANCE and isinstance(law, RigidStops):
+            raise ValueError(
+                "rigid stops push with no finite force, so that they have no harmonic balance; take the "
+                "method shooting"
+            )
 
     @property
     def path(self) -> DrivePath:

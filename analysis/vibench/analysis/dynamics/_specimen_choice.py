@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import ConfigDict, PositiveFloat, ValidationError, model_validator
+from pydantic import PositiveFloat, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from vibench.acquisition import ChosenFrom
@@ -29,12 +29,7 @@ def _at(field: str, error: ValueError) -> ValidationError:
 
 
 class SpecimenChoice(FrozenModel):
-    """A described specimen, with another contact, damping or gap where one is given.
-
-    Docstrings of fields are the help of options on the command line, and the explanations of a form.
-    """
-
-    model_config = ConfigDict(use_attribute_docstrings=True)
+    """A described specimen, with another contact, damping or gap where one is given."""
 
     specimen: SpecimenName = USUAL_SPECIMEN
     """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, two_masses (`vibench specimen`

@@ -75,11 +75,8 @@ class SpectrumRequest(SpecimenChoice):
     @property
     def is_elastic(self) -> bool:
         """The contact takes no energy, whatever it does."""
-        match self.shaken.contact:
-            case PowerLaw():
-                return True
-            case law:
-                return law.kind in ELASTIC
+        law = self.shaken.contact
+        return isinstance(law, PowerLaw) or law.kind in ELASTIC
 
     @property
     def title(self) -> str:

@@ -1,13 +1,7 @@
 """What a form says of a field, taken from the plan model: label, unit, limits, explanation."""
 
-import ast
-import inspect
-import re
-import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
-from itertools import pairwise
 from typing import Any, get_args
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -15,6 +9,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from vibench.acquisition import ChosenFrom
+from vibench.analysis.field_docstrings import field_docstring
 
 from ..widgets.units import CHOICES, UNITS
 
@@ -86,44 +81,11 @@ def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFac
         label=words[:1].upper() + words[1:],
         unit=unit,
         allowed=_limits(field, unit),
-        explanation=_plain(_explanation(model, name)),
+        explanation=field_docstring(model, name),
         examples=tuple(
             each for mark in field.metadata if isinstance(mark, ChosenFrom) for each in mark.texts()
         ),
     )
-
-
-def _explanation(model: type[BaseModel], name: str) -> str:
-    """Find the docstring under a field, in the class or the nearest of its bases that declares it."""
-    texts = (
-        _explanations(each.__module__).get((each.__name__, name), "")
-        for each in model.__mro__
-        if name in inspect.get_annotations(each)
-    )
-    return next(texts, "")
-
-
-@cache
-def _explanations(module: str) -> Mapping[tuple[str, str], str]:
-    """Read the docstrings of all fields of a module's classes, when a form first needs one.
-
-    Pydantic's ``use_attribute_docstrings`` reads them for every model when it is made, a tenth of a start.
-    """
-    try:
-        tree = ast.parse(inspect.getsource(sys.modules[module]))
-    except OSError:  # installed without sources: a form has no explanations then
-        return {}
-    return {
-        (each.name, field.target.id): inspect.cleandoc(text.value.value)
-        for each in ast.walk(tree)
-        if isinstance(each, ast.ClassDef)
-        for field, text in pairwise(each.body)
-        if isinstance(field, ast.AnnAssign)
-        and isinstance(field.target, ast.Name)
-        and isinstance(text, ast.Expr)
-        and isinstance(text.value, ast.Constant)
-        and isinstance(text.value.value, str)
-    }
 
 
 def _limits(field: FieldInfo, unit: str) -> str:
@@ -153,8 +115,3 @@ def _inner(annotation: Any) -> Iterator[object]:
     for part in get_args(annotation):
         yield from getattr(part, "__metadata__", ())
         yield from _inner(part)
-
-
-def _plain(text: str) -> str:
-    """Take the marks of documentation out of a sentence."""
-    return re.sub(r"\s*\[[^\]]*\]", "", re.sub(r"`+([^`]*)`+", r"\1", text)).strip()
