@@ -3,7 +3,7 @@
 import pytest
 
 from vibench.analysis import InvalidRequest
-from vibench.cli.frequency_option import frequencies
+from vibench.cli.range_option import frequencies
 
 
 def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
@@ -19,8 +19,8 @@ def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
         ("10:600:0", "a step of 0 Hz is not above 0", "START:STOP:STEP"),
         ("10:600:-1", "a step of -1 Hz is not above 0", "START:STOP:STEP"),
         ("600:10:-1", "a step of -1 Hz is not above 0", "START:STOP:STEP"),
-        ("abc", "'abc' is not a number", "one frequency above 0 Hz"),
-        ("10:abc:1", "'abc' is not a number", "START:STOP:STEP"),
+        ("abc", "'abc' is no number", "one frequency above 0 Hz"),
+        ("10:abc:1", "'abc' is no number", "START:STOP:STEP"),
         ("10:600", "2 numbers are neither", "START:STOP:STEP"),
         ("10:600:1:2", "4 numbers are neither", "START:STOP:STEP"),
         ("0:600:1", "0 Hz is not above 0", "one frequency above 0 Hz"),
@@ -28,7 +28,7 @@ def test_a_number_is_one_frequency_and_a_range_holds_both_its_ends():
         ("inf", "'inf' is not finite", "one frequency above 0 Hz"),
         ("10:nan:1", "'nan' is not finite", "START:STOP:STEP"),
         ("1:1e9:1e-3", "1e+12 values is too long: at most 1000000", "give a larger step"),
-        ("", "'' is not a number", "one frequency above 0 Hz"),
+        ("", "'' is no number", "one frequency above 0 Hz"),
     ],
 )
 def test_what_lists_no_frequency_is_refused_with_what_was_typed_why_and_a_way_out(typed, why, way):

@@ -18,13 +18,13 @@ from vibench.sim.background import Progress
 from vibench.sim.study import Start, Study, plausibility_warnings, study_solver
 
 from .found_motions import forgetting_text, motions_table, share_text
-from .frequency_option import frequencies
 from .interruption import told_to_stop
 from .options import Fields, RequestOptions, option
 from .output import console, errors, paragraph, print_json, print_table, print_warnings
 from .paths import AsJson
 from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
+from .range_option import frequencies
 from .specimen_option import SPECIMEN, described
 
 AUTO: Literal["auto"] = "auto"

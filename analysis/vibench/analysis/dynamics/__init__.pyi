@@ -41,7 +41,6 @@ from ._map_words import (
 from ._specimen_choice import (
     ContactWord as ContactWord,
     SpecimenChoice as SpecimenChoice,
-    SpecimenName as SpecimenName,
 )
 from ._spectrum_request import (
     ExponentSpectrum as ExponentSpectrum,

@@ -93,15 +93,10 @@ class BranchRequest(SpecimenChoice):
             return
         low_hz, high_hz = self.resonance_band_hz
         if not low_hz < high_hz:
-            raise ValueError(
-                f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; give the lower end first"
-            )
+            raise ValueError(f"the band {low_hz:g} to {high_hz:g} Hz does not ascend; give the lower first")
         lower, upper = self.shaken.gaps_m
-        if (
-            self.along is not Parameter.AMPLITUDE
-            or self.method is not BranchMethod.SHOOTING
-            or lower != upper
-        ):
+        followed = self.along, self.method
+        if followed != (Parameter.AMPLITUDE, BranchMethod.SHOOTING) or lower != upper:
             raise ValueError(
                 "a phase resonance is followed along amplitude, by shooting, between two equal stops; give a "
                 "range of amplitudes, and a specimen with one gap"
@@ -142,11 +137,8 @@ class BranchRequest(SpecimenChoice):
         """Harmonics, for the two methods that balance them."""
         lower, upper = self.shaken.gaps_m
         kept = HarmonicSet.ODD if lower == upper else HarmonicSet.ALL
-        if self.method is BranchMethod.FIRST_ORDER:
-            return BalanceOptions(kept, fewest=1, most=1, tolerance=EXACT_ENOUGH)
-        return BalanceOptions(
-            kept, fewest=min(15, self.harmonics), most=self.harmonics, tolerance=EXACT_ENOUGH
-        )
+        most = 1 if self.method is BranchMethod.FIRST_ORDER else self.harmonics
+        return BalanceOptions(kept, fewest=min(15, most), most=most, tolerance=EXACT_ENOUGH)
 
     @property
     def title(self) -> str:
@@ -164,12 +156,12 @@ class BranchRequest(SpecimenChoice):
     @property
     def sentence(self) -> str:
         """Say the options under a figure."""
+        said = f"{self.title}; {self.specimen_text}"
         if self.resonance_band_hz is not None:
-            return f"{self.title}; {self.specimen_text}."
+            return f"{said}."
         return (
-            f"{self.title}; {self.specimen_text}; motions looked for "
-            f"at {self.places} places from {self.starts} random states each, seed {self.seed}, up to "
-            f"{self.most_periods} drive periods long."
+            f"{said}; motions looked for at {self.places} places from {self.starts} random states each, seed "
+            f"{self.seed}, up to {self.most_periods} drive periods long."
         )
 
 
@@ -200,9 +192,8 @@ def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple
     bins = min(MOST_BINS, place.size)
     edges = np.linspace(place.min(), place.max(), bins + 1)
     owner = np.clip(np.searchsorted(edges, place, side="right") - 1, 0, bins - 1)
-    pairs = [
+    return tuple(
         (float(np.median(place[owner == k])), float(np.median(level[owner == k])))
         for k in range(bins)
         if bool(np.any(owner == k))
-    ]
-    return tuple(pairs)
+    )

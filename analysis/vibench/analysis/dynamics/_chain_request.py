@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from enum import StrEnum
 from functools import cached_property
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Annotated, Self
 
@@ -61,45 +62,37 @@ class ChainRequest(SpecimenChoice):
     @model_validator(mode="after")
     def _is_possible(self) -> Self:
         self.chain(max(self.lengths))
-        match self.drive:
-            case ChainDrive.STEADY:
-                if self.start_hz > self.stop_hz:
-                    raise ValueError(
-                        f"the range {self.start_hz:g} to {self.stop_hz:g} Hz does not ascend; give the lower "
-                        "first, or take a swept drive"
-                    )
-                if len(self.frequencies_hz) * len(self.lengths) > MOST_RUNS:
-                    raise ValueError(f"more than {MOST_RUNS} runs are asked for; take a larger step")
-            case ChainDrive.SWEPT if self.start_hz == self.stop_hz:
-                raise ValueError(
-                    f"a sweep from {self.start_hz:g} to {self.stop_hz:g} Hz goes nowhere; give two different "
-                    "frequencies, or take a steady drive"
-                )
-            case ChainDrive.RECORDED if not self.recording:
-                raise ValueError("no recording was given whose base motion drives the chain; give its path")
-            case _:
-                pass
+        if self.drive is ChainDrive.STEADY and self.start_hz > self.stop_hz:
+            raise ValueError(
+                f"the range {self.start_hz:g} to {self.stop_hz:g} Hz does not ascend; give the lower first, "
+                "or take a swept drive"
+            )
+        if self.drive is ChainDrive.STEADY and len(self.frequencies_hz) * len(self.lengths) > MOST_RUNS:
+            raise ValueError(f"more than {MOST_RUNS} runs are asked for; take a larger step")
+        if self.drive is ChainDrive.SWEPT and self.start_hz == self.stop_hz:
+            raise ValueError(
+                f"a sweep from {self.start_hz:g} to {self.stop_hz:g} Hz goes nowhere; give two different "
+                "frequencies, or take a steady drive"
+            )
+        if self.drive is ChainDrive.RECORDED and not self.recording:
+            raise ValueError("no recording was given whose base motion drives the chain; give its path")
         return self
 
     @cached_property
     def unit(self) -> Chain:
         """The cells that come again."""
-        tables = [
-            each.specimen(self.model.strip() or None, self.damping_time_s, self.gap_m) for each in self.others
-        ]
-        return Chain((self.shaken, *tables))
+        changed = self.model.strip() or None, self.damping_time_s, self.gap_m
+        return Chain((self.shaken, *(each.specimen(*changed) for each in self.others)))
 
     def chain(self, cells: int) -> Chain:
         """Build a chain of so many cells."""
-        unit = self.unit.cells
-        return Chain(tuple(unit[place % len(unit)] for place in range(cells)))
+        return Chain(tuple(islice(cycle(self.unit.cells), cells)))
 
     @property
     def frequencies_hz(self) -> Sequence[float]:
         """Of a steady sine, ascending."""
-        if self.start_hz == self.stop_hz:
-            return (self.start_hz,)
-        return frequency_range(self.start_hz, self.stop_hz, self.step_hz)
+        is_one = self.start_hz == self.stop_hz
+        return (self.start_hz,) if is_one else frequency_range(self.start_hz, self.stop_hz, self.step_hz)
 
     @property
     def title(self) -> str:

@@ -13,16 +13,14 @@ from ._spectrum_request import ExponentSpectrum, SpectrumPoint, SpectrumRequest,
 
 def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
     """Give each branch as soon as it has been followed; stop asking, and no more is computed."""
-    return (line_of(found) for found in _found(request))
-
-
-def _found(request: BranchRequest) -> Iterator[FoundBranch]:
-    if request.resonance_band_hz is not None:
-        return _resonance(request, request.resonance_band_hz)
     where = request.shaken, request.path, request.start, request.stop
-    if request.method is BranchMethod.SHOOTING:
-        return shot_branches(*where, request.search)
-    return balanced_branches(*where, request.balance_options, request.search)
+    if request.resonance_band_hz is not None:
+        found = _resonance(request, request.resonance_band_hz)
+    elif request.method is BranchMethod.SHOOTING:
+        found = shot_branches(*where, request.search)
+    else:
+        found = balanced_branches(*where, request.balance_options, request.search)
+    return (line_of(each) for each in found)
 
 
 def _resonance(request: BranchRequest, band_hz: tuple[float, float]) -> Iterator[FoundBranch]:

@@ -18,7 +18,6 @@ from vibench.sim import (
     shipped_specimens,
 )
 
-SpecimenName = Annotated[str, ChosenFrom(shipped_specimens)]
 ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CONTACT_LAWS.values())])]
 
 
@@ -31,7 +30,7 @@ def _at(field: str, error: ValueError) -> ValidationError:
 class SpecimenChoice(FrozenModel):
     """A described specimen, with another contact, damping or gap where one is given."""
 
-    specimen: SpecimenName = USUAL_SPECIMEN
+    specimen: Annotated[str, ChosenFrom(shipped_specimens)] = USUAL_SPECIMEN
     """gong2025, heavy, asymmetric, hardening, rigid_stops, linear_gap, two_masses (`vibench specimen`
     describes each), or the path of a specimen's file."""
     model: ContactWord = ""

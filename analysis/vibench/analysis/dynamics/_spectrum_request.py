@@ -81,10 +81,10 @@ class SpectrumRequest(SpecimenChoice):
     @property
     def title(self) -> str:
         """Name figures by it."""
-        held = f"{1e6 * self.amplitude_m:g} µm"
-        if self.along is Parameter.AMPLITUDE:
-            held = f"{self.frequency_hz:g} Hz"
-        return f"{self.law}, {held}"
+        is_level = self.along is Parameter.AMPLITUDE
+        return f"{self.law}, " + (
+            f"{self.frequency_hz:g} Hz" if is_level else f"{1e6 * self.amplitude_m:g} µm"
+        )
 
 
 @dataclass(frozen=True)

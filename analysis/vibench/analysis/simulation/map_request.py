@@ -148,11 +148,10 @@ def picture_of(results: MapResults) -> MapPicture:
     frequency, amplitude = (results.plan.range_of(each).edges for each in results.plan.varied)
     classes = motion_classes(results)
     is_known = np.isfinite(classes)
+    nearest = np.indices(classes.shape)
     if is_known.any():
         _, nearest = distance_transform_edt(~is_known, return_indices=True)
-        there = tuple(nearest)
-    else:
-        there = tuple(np.indices(classes.shape))
+    there = tuple(nearest)
     said = map_caption(results) if results.is_complete else f"{results.computed} points computed so far."
     return MapPicture(
         frequency_hz=(frequency[0], frequency[-1]),
@@ -174,9 +173,7 @@ def settled_motion(request: MotionRequest) -> SettledMotion:
 
     """
     plan = MapRequest(
-        **request.model_dump(
-            include={"specimen", "model", "damping_time_s", "gap_m", "described", "periods"}
-        ),
+        **request.model_dump(exclude={"frequency_hz", "amplitude_m"}),
         start_hz=request.frequency_hz,
         stop_hz=2.0 * request.frequency_hz,
         lowest_m=request.amplitude_m,

@@ -1,0 +1,79 @@
+"""Options of commands come from the fields of requests: names, help, defaults, and what a fault says."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+import typer
+
+from vibench.analysis import AnalysisOptions, InvalidRequest
+from vibench.analysis.dynamics import BranchRequest, ChainRequest, SpecimenChoice, SpectrumRequest
+from vibench.analysis.field_docstrings import field_docstring
+from vibench.cli.__main__ import COMMANDS
+from vibench.cli.options import RequestOptions, option_name
+
+MODELS = {
+    "branches": BranchRequest,
+    "spectrum": SpectrumRequest,
+    "chain": ChainRequest,
+    "predict": SpecimenChoice,
+    "analyse": AnalysisOptions,
+}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_an_option_of_a_field_has_the_docstring_and_the_default_of_the_field(vibench_here, tmp_path, name):
+    shown = " ".join(vibench_here(name, "--help", cwd=tmp_path).stdout.split())
+    command = typer.main.get_command(COMMANDS[name].load())
+    fields = {field for field, model in command.callback.fields.items() if model is MODELS[name]}
+    assert fields
+    for field in fields:
+        said, declared = (
+            " ".join(field_docstring(MODELS[name], field).split()),
+            MODELS[name].model_fields[field],
+        )
+        assert said in shown
+        (option,) = (each for each in command.params if each.name == field)
+        assert option.opts == [f"--{option_name(field)}"]
+        assert option.default is None, "the model alone has the default"
+        if isinstance(declared.default, int | float):
+            assert f"{said} [default: {declared.default}]" in shown
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_has_a_help(vibench_here, tmp_path, name):
+    shown = vibench_here(name, "--help", cwd=tmp_path)
+    assert shown.returncode == 0
+    assert re.findall(r"^  --\S+( \S+)?$\n(?=  --|\n|$)", shown.stdout, flags=re.MULTILINE) == []
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("duration_s", -1.0, "--duration was given as -1.0: it must be above 0"),
+        ("settle_s", -1.0, "--settle was given as -1.0: it must be 0 or more"),
+        ("confidence", 1.0, "--confidence was given as 1.0: it must be below 1"),
+        ("duration_s", 1e6, "--duration was given as 1000000.0: it must be 100000 or less"),
+        ("settle_s", float("nan"), "--settle was given as nan: it must be a finite number"),
+        ("model", "jelly", "--model was given as 'jelly': "),
+    ],
+)
+def test_a_fault_is_one_sentence_with_the_option_what_was_given_and_what_is_allowed(field, value, said):
+    with pytest.raises(InvalidRequest) as refused:
+        RequestOptions(SpectrumRequest, {field: value}).request()
+    assert str(refused.value).startswith(said)
+    assert "\n" not in str(refused.value)
+
+
+def test_the_list_of_commands_is_written_without_richs_boxes():
+    """Drawing them took a third of the time from the prompt to the list."""
+    program = (
+        "import atexit, sys; from vibench.command import main\n"
+        "atexit.register(lambda: print('loaded', *sys.modules, file=sys.stderr)); main()"
+    )
+    process = subprocess.run(
+        [sys.executable, "-c", program, "--help"], capture_output=True, text=True, check=True
+    )
+    assert {"rich.markdown", "typer.rich_utils"}.isdisjoint(process.stderr.split())
+    assert process.stdout.index("Measure:") < process.stdout.index("Predict:")
