@@ -37,10 +37,9 @@ from vibench.sim.background import Observer
 from vibench.sim.maps import MapResults, open_map
 
 from .exit_code import ExitCode
-from .external_data import AllowExternal, external_data
 from .options import Fields, RequestOptions, option
 from .output import bold, console, errors, print_json
-from .paths import AsJson, room_for_folder, unused
+from .paths import AllowExternal, AsJson, external_data, room_for_folder, unused
 from .progress_bars import reading_bar
 from .specimen_option import SpecimenOption, described
 
@@ -103,7 +102,7 @@ def analyse(
     ] = False,
     free: Annotated[
         list[Parameter] | None,
-        option("With --fit: fit this to noise too; several times for several, one mass at a time."),
+        option("With --fit: fit this to noise too; several times for several, one mass at a time.", "NAME"),
     ] = None,
     hidden: Annotated[
         bool,

@@ -10,10 +10,9 @@ import typer
 from vibench.acquisition.campaign import CatalogueEntry, Refresh, list_recordings
 
 from .exit_code import ExitCode
-from .external_data import AllowExternal, external_data
 from .options import option
 from .output import console, errors, print_json
-from .paths import AsJson
+from .paths import AllowExternal, AsJson, external_data
 
 COLUMNS = ("recording", "started (UTC)", "excitation", "level", "frequency", "length", "size", "verdict")
 

@@ -16,10 +16,9 @@ from vibench.analysis import (
 )
 from vibench.analysis.exchange import Format, Results, excerpt, export_functions, export_samples
 
-from .external_data import AllowExternal, external_data
 from .options import option
 from .output import console, leave_output_to_json, print_json, print_warnings
-from .paths import AsJson, file_at
+from .paths import AllowExternal, AsJson, external_data, file_at
 from .progress_bars import transfer_bar
 
 

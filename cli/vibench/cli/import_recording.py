@@ -12,10 +12,9 @@ from vibench.acquisition import load_toml
 from vibench.analysis import InvalidRequest
 from vibench.analysis.exchange import ImportMapping, SourceChannel, import_recording, opened_source
 
-from .external_data import AllowExternal, external_data
 from .options import option
 from .output import console, print_json
-from .paths import AsJson, file_at
+from .paths import AllowExternal, AsJson, external_data, file_at
 from .progress_bars import transfer_bar
 
 

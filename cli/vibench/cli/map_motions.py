@@ -23,11 +23,10 @@ from vibench.sim.maps import (
 )
 from vibench.sim.study import ExistingStudy, plausibility_warnings
 
-from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
 from .options import option
 from .output import bold, console, print_json, print_warnings
-from .paths import AsJson, room_for_folder
+from .paths import AllowExternal, AsJson, external_data, room_for_folder
 from .points import Cluster, Workers, complain_about_points
 from .progress_bars import study_bar
 

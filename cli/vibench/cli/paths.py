@@ -1,6 +1,7 @@
 """Options that several commands share."""
 
 import tempfile
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -22,6 +23,22 @@ FaultsPath = Annotated[
     option("What goes wrong with a virtual rig, and when; a file or night.", "FAULTS", name="--faults"),
 ]
 AsJson = Annotated[bool, option("Print one JSON document and nothing else.", name="--json")]
+AllowExternal = Annotated[
+    bool,
+    option(
+        "Follow an HDF5 file into other files: external storage and links, virtual datasets.",
+        name="--allow-external",
+    ),
+]
+
+
+def external_data(allowed: bool) -> AbstractContextManager[None]:
+    """Allow it while inside, if the user said so."""
+    if not allowed:
+        return nullcontext()
+    from vibench.sim.hdf5_files.door import external_data_allowed
+
+    return external_data_allowed()
 
 
 def bench_path(given: Path | None) -> Path:

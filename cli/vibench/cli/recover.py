@@ -7,9 +7,8 @@ import typer
 
 from vibench.acquisition.recording import recover
 
-from .external_data import AllowExternal, external_data
 from .output import console, print_json
-from .paths import AsJson
+from .paths import AllowExternal, AsJson, external_data
 
 
 def recover_recording(

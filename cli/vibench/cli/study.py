@@ -17,11 +17,10 @@ from vibench.sim.study import (
 )
 
 from .exit_code import ExitCode
-from .external_data import AllowExternal, external_data
 from .interruption import told_to_stop
 from .options import option
 from .output import console, errors, print_json, print_warnings
-from .paths import AsJson
+from .paths import AllowExternal, AsJson, external_data
 from .points import Cluster, Workers, complain_about_points, say_failures
 from .progress_bars import study_bar
 

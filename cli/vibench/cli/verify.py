@@ -11,10 +11,9 @@ from vibench.acquisition.campaign import verify_recordings
 from vibench.acquisition.recording import SealDepth, seal_key
 
 from .exit_code import ExitCode
-from .external_data import AllowExternal, external_data
 from .options import option
 from .output import console, errors, print_json
-from .paths import AsJson
+from .paths import AllowExternal, AsJson, external_data
 
 MOST_NAMED = 10
 """Recordings that the sentence at the end names."""
