@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import BaseModel
 
 from .errors import InvalidRequest
 
@@ -60,26 +61,55 @@ def table(name: str, **columns: ArrayLike) -> Table:
     return Table(name, tuple((heading, _cells(values)) for heading, values in columns.items()))
 
 
-def named(source: object, *fields: str) -> dict[str, Any]:
-    """Give some fields of a value under their own names: columns of a table, keys of a document."""
-    return {field: getattr(source, field) for field in fields}
+def columns(source: object, keys: str) -> dict[str, Any]:
+    """Give values of a result by the keys of a document, or the headings of a table.
+
+    ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"``: a field or property by its own name, one of a
+    part (None where the part is None), one item of an array, and the keys of a part's document.
+    """
+    found: dict[str, Any] = {}
+    for each in keys.split():
+        if each.startswith("*"):
+            found |= plain(getattr(source, each[1:]))
+            continue
+        key, _, path = each.partition("=")
+        value: Any = source
+        for step in (path or key).split("."):
+            if value is not None:
+                value = value[int(step)] if step.lstrip("-").isdigit() else getattr(value, step)
+        found[key] = value
+    return found
 
 
 def plain(value: Any) -> Any:
-    """Turn numpy's numbers into Python's, and what is not finite into None: JSON has neither."""
+    """Return a value as JSON can hold it: numbers that are not finite are None.
+
+    A dataclass becomes its ``DOCUMENT``, as `columns` reads it; without one, all its fields.
+    """
     match value:
+        case np.ndarray() | np.generic():
+            return plain(value.tolist())
         case bool() | str() | int() | None:
             return value
         case float():
-            return float(value) if math.isfinite(value) else None
-        case np.ndarray():
-            return plain(value.tolist())
-        case np.generic():
-            return plain(value.item())
+            return value if math.isfinite(value) else None
         case Mapping():
             return {str(key): plain(each) for key, each in value.items()}
         case Sequence():
             return [plain(each) for each in value]
+        case _:
+            return _document(value)
+
+
+def _document(value: Any) -> Any:
+    match value:
+        case Path():
+            return str(value)
+        case BaseModel():
+            return value.model_dump(mode="json")
+        case _ if is_dataclass(value):
+            keys = getattr(value, "DOCUMENT", "") or " ".join(each.name for each in fields(value))
+            return plain(columns(value, keys))
         case _:
             raise TypeError(f"{type(value).__name__} has no place in a document; turn it into numbers first")
 
@@ -144,8 +174,14 @@ class Labelled:
     OWN_UNITS: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Units of values whose name says none, and of parts what ``{unit}`` is in theirs; ``{0.name}``: a field.
 
-    Any class that is a part of a result may have it.
+    Any class that is a part of a result may have it, and the next one.
     """
+    DOCUMENT: ClassVar[str] = ""
+    """Keys of its JSON document, as `columns` reads them; all fields when empty."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON document; numbers that are not finite are None."""
+        return dict(plain(self))
 
     def to_xarray(self) -> "xarray.Dataset":
         """Give all numbers of the result as an `xarray.Dataset`.

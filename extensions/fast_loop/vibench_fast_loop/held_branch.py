@@ -29,7 +29,7 @@ from vibench.analysis.recordings.facts import specimen_of
 from vibench.analysis.report import STEPPED
 from vibench.analysis.signals.arrays import Reals
 from vibench.analysis.sine.stepped_response import SteppedSineAnalysis
-from vibench.analysis.tables import Labelled, named, table
+from vibench.analysis.tables import Labelled, table
 from vibench.sim import (
     Branch,
     FrequencyPath,
@@ -146,7 +146,7 @@ def held_branch_figure(analysis: SteppedSineAnalysis) -> DrawnFigure:
         title=f"Branch held by a fast loop, {analysis.excitation.level_text}",
         caption=" ".join(branch_sentences(analysis.facts.feedback)),
         figure=figure,
-        tables=(table(name, **named(found, *(each.name for each in fields(found)))),),
+        tables=(table(name, **{each.name: getattr(found, each.name) for each in fields(found)}),),
     )
 
 

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -174,6 +175,13 @@ class Evidence:
 @dataclass(frozen=True, eq=False)
 class MotionVerdict(Labelled):
     """What a motion is, and why one may say so."""
+
+    DOCUMENT: ClassVar = (
+        "kind why period periods_judged=evidence.periods is_settled=evidence.is_settled "
+        "scatter_over_orbit=evidence.spread noise_over_orbit=evidence.noise zero_one_k=evidence.zero_one.k "
+        "surrogates_p=evidence.surrogates.p turns_per_period=evidence.rotation.turns_per_period "
+        "least_lyapunov_per_s=least_exponent_per_s"
+    )
 
     kind: MotionKind
     why: str

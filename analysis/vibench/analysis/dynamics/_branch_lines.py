@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,15 @@ from vibench.sim.branches import FoundBranch, growth_time_s, least_growth_time_s
 
 from ..comparison.curve import Curve, CurveKind, CurveOrigin
 from ..signals.arrays import Reals
-from ..tables import Labelled, named, plain
+from ..tables import Labelled, columns
 from ._branch_request import BranchMethod, BranchRequest
 
 
 @dataclass(frozen=True)
 class LineEvent:
     """A special point of a branch."""
+
+    DOCUMENT: ClassVar = "kind frequency_hz amplitude_m"
 
     kind: str
     """fold, period doubling, Neimark-Sacker, symmetry breaking or grazing."""
@@ -36,6 +38,7 @@ class BranchLine(Labelled):
     """One branch; n points in the order in which it runs."""
 
     OWN_UNITS: ClassVar = {"states": "m, m, m, m s-1, m s-1, m s-1"}
+    DOCUMENT: ClassVar = "periods shape has_twin is_isolated origin begin end elapsed_s events points=motions"
 
     frequency_hz: Reals
     amplitude_m: Reals
@@ -73,6 +76,17 @@ class BranchLine(Labelled):
     def points(self) -> int:
         """How many."""
         return len(self.frequency_hz)
+
+    @property
+    def motions(self) -> list[dict[str, Any]]:
+        """Each point with its numbers of m0, and of p = y - z."""
+        found = columns(
+            self,
+            "frequency_hz amplitude_m is_stable largest_multiplier growth_time_s impacts "
+            "response_i=response_i.T.0 response_ii=response_ii.T.0 relative_i=response_i.T.3 "
+            "relative_ii=response_ii.T.3 error_estimate state=states",
+        )
+        return [dict(zip(found, values, strict=True)) for values in zip(*found.values(), strict=True)]
 
     @property
     def largest_multiplier(self) -> Reals:
@@ -151,6 +165,8 @@ def _response_at(found: FoundBranch, index: int, value: float) -> float:
 class BranchDiagram(Labelled):
     """Everything that was found for one request."""
 
+    DOCUMENT: ClassVar = "options=request branches=lines least_growth_time_s elapsed_s"
+
     request: BranchRequest
     lines: tuple[BranchLine, ...]
     elapsed_s: float
@@ -192,36 +208,30 @@ class BranchDiagram(Labelled):
     @property
     def holdable(self) -> tuple[NDArray[np.bool_], ...] | None:
         """Of each branch, which motions the bench's loop is fast enough to hold; None where none is named."""
-        if self.request.loop_time_s is None:
-            return None
-        least_s = least_growth_time_s(self.request.loop_time_s)
-        return tuple(line.growth_time_s >= least_s for line in self.lines)
+        least_s = self.least_growth_time_s
+        return None if least_s is None else tuple(line.growth_time_s >= least_s for line in self.lines)
 
     @property
     def holding_sentence(self) -> str:
         """Say how many unstable motions the bench can hold; nothing where no bench is named."""
-        loop_s, holdable = self.request.loop_time_s, self.holdable
-        if loop_s is None or not holdable:
+        holdable = self.holdable
+        if not holdable:
             return ""
         is_unstable = [~line.is_stable for line in self.lines]
         count = sum(int(each.sum()) for each in is_unstable)
         held = sum(int((a & b).sum()) for a, b in zip(is_unstable, holdable, strict=True))
         quickest = min(float(line.growth_time_s.min()) for line in self.lines)
         told = (
-            f"A loop of {loop_s:.3g} s holds what takes {least_growth_time_s(loop_s):.3g} s or more to grow "
-            f"by e: {held} of {count} unstable motions"
+            f"A loop of {self.request.loop_time_s:.3g} s holds what takes {self.least_growth_time_s:.3g} s "
+            f"or more to grow by e: {held} of {count} unstable motions"
         )
         return told + (f"; the quickest takes {quickest:.2g} s." if count else ".")
 
-    def to_dict(self) -> dict[str, object]:
-        """Say everything, for other programs; numbers that are not finite are null."""
+    @property
+    def least_growth_time_s(self) -> float | None:
+        """What an unstable motion takes to grow by e that the bench can hold; None where none is named."""
         loop_s = self.request.loop_time_s
-        return {
-            "options": self.request.model_dump(mode="json"),
-            "branches": [_document(line) for line in self.lines],
-            "least_growth_time_s": None if loop_s is None else least_growth_time_s(loop_s),
-            "elapsed_s": self.elapsed_s,
-        }
+        return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
         """Give Responses I and II of m0 over frequency, stable and unstable apart; none along amplitude."""
@@ -250,23 +260,3 @@ class BranchDiagram(Labelled):
         if not places:
             return np.zeros(0), np.zeros(0)
         return np.concatenate(places)[:-1], np.concatenate(sizes)[:-1]
-
-
-def _document(line: BranchLine) -> dict[str, object]:
-    points = {
-        **named(
-            line, "frequency_hz", "amplitude_m", "is_stable", "largest_multiplier", "growth_time_s", "impacts"
-        ),
-        "response_i": line.response_i[:, 0],
-        "response_ii": line.response_ii[:, 0],
-        "relative_i": line.response_i[:, 3],
-        "relative_ii": line.response_ii[:, 3],
-        "error_estimate": line.error_estimate,
-        "state": line.states,
-    }
-    document = {
-        **named(line, "periods", "shape", "has_twin", "is_isolated", "origin", "begin", "end", "elapsed_s"),
-        "events": [named(each, "kind", "frequency_hz", "amplitude_m") for each in line.events],
-        "points": [dict(zip(points, values, strict=True)) for values in zip(*points.values(), strict=True)],
-    }
-    return dict(plain(document))

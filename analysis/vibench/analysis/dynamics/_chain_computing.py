@@ -32,7 +32,7 @@ from ..frequency_response.transmissibility import transmissibility
 from ..model.simulated_channels import recorded_base_motion
 from ..recordings.facts import plan_of, require_intact, require_measured_size
 from ..signals.arrays import Reals
-from ..tables import Labelled, named, plain
+from ..tables import Labelled
 from ._chain_request import ChainDrive, ChainRequest
 
 WAVES = 61
@@ -50,6 +50,12 @@ DECIBELS = 20.0 / math.log(10.0)
 @dataclass(frozen=True, eq=False)
 class ChainRun(Labelled):
     """One chain under one drive; arrays by cell, counted from the base."""
+
+    DOCUMENT: ClassVar = (
+        "cells frequency_hz over_hz transmission impacts observed_s energy_j energy_error_j outcome "
+        "elapsed_s largest_p_m=largest_m lyapunov_per_s=exponent_per_s "
+        "lyapunov_error_per_s=exponent_error_per_s"
+    )
 
     cells: int
     frequency_hz: float
@@ -81,23 +87,16 @@ class ChainRun(Labelled):
     outcome: str
     elapsed_s: float
 
-    def to_dict(self) -> dict[str, object]:
-        """Say everything but the picture; numbers that are not finite are null."""
-        document = {
-            **named(self, "cells", "frequency_hz", "over_hz", "transmission", "impacts", "observed_s"),
-            **named(self, "energy_j", "energy_error_j", "outcome", "elapsed_s"),
-            "largest_p_m": self.largest_m,
-            "lyapunov_per_s": self.exponent_per_s,
-            "lyapunov_error_per_s": self.exponent_error_per_s,
-        }
-        return dict(plain(document))
-
 
 @dataclass(frozen=True, eq=False)
 class ChainAnswer(Labelled):
     """Everything that was computed for one request."""
 
     OWN_UNITS: ClassVar = {"wave_numbers": "rad"}
+    DOCUMENT: ClassVar = (
+        "options=request gaps_hz wave_numbers_rad=wave_numbers bands_hz=bands_hz.T linear_hz "
+        "attenuation_db_per_unit=attenuation_db linear_transmission=linear_transmissions runs elapsed_s"
+    )
 
     request: ChainRequest
     runs: tuple[ChainRun, ...]
@@ -107,6 +106,11 @@ class ChainAnswer(Labelled):
     def gaps(self) -> tuple[BandGap, ...]:
         """Of the endless chain without damping and contact."""
         return band_gaps(self.request.unit)
+
+    @property
+    def gaps_hz(self) -> list[tuple[float, float]]:
+        """Lower and upper end of each gap."""
+        return [(gap.lower_hz, gap.upper_hz) for gap in self.gaps]
 
     @cached_property
     def bands_hz(self) -> Reals:
@@ -127,6 +131,11 @@ class ChainAnswer(Labelled):
     def linear_transmission(self, cells: int) -> Reals:
         """|x of m0 over U| without contact, at `linear_hz`, shape (LINES, cells)."""
         return np.asarray(np.abs(chain_transmissibility(self.request.chain(cells), self.linear_hz)[:, :, 0]))
+
+    @property
+    def linear_transmissions(self) -> dict[int, list[list[float]]]:
+        """The same of every length, cell by cell."""
+        return {cells: self.linear_transmission(cells).T.tolist() for cells in self.request.lengths}
 
     @cached_property
     def attenuation_db(self) -> Reals:
@@ -175,22 +184,6 @@ class ChainAnswer(Labelled):
             f"{said} {len(self.runs)} runs in {self.elapsed_s:.1f} s, {impacts} impacts observed; contacts "
             f"to {self.request.accuracy.promise:g} of 100 µm and 0.1 m/s{complaint}."
         )
-
-    def to_dict(self) -> dict[str, object]:
-        """Say everything, for other programs."""
-        return {
-            "options": self.request.model_dump(mode="json"),
-            "gaps_hz": [[gap.lower_hz, plain(gap.upper_hz)] for gap in self.gaps],
-            "wave_numbers_rad": self.wave_numbers.tolist(),
-            "bands_hz": self.bands_hz.T.tolist(),
-            "linear_hz": self.linear_hz.tolist(),
-            "attenuation_db_per_unit": self.attenuation_db.tolist(),
-            "linear_transmission": {
-                str(cells): self.linear_transmission(cells).T.tolist() for cells in self.request.lengths
-            },
-            "runs": [run.to_dict() for run in self.runs],
-            "elapsed_s": self.elapsed_s,
-        }
 
 
 SAMPLES_PER_PERIOD = 8

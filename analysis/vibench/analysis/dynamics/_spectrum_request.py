@@ -1,8 +1,8 @@
 """What is asked of exponents, and the answer at one drive."""
 
 import math
-from dataclasses import asdict, dataclass
-from typing import Annotated, Self
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, PositiveFloat, model_validator
@@ -10,7 +10,7 @@ from pydantic import Field, PositiveFloat, model_validator
 from vibench.sim import Accuracy, LyapunovSpectrum, Parameter, PowerLaw
 
 from ..signals.arrays import Reals
-from ..tables import Labelled, plain
+from ..tables import Labelled
 from ._specimen_choice import SpecimenChoice
 
 MOST_POINTS = 20_000
@@ -91,6 +91,12 @@ class SpectrumRequest(SpecimenChoice):
 class SpectrumPoint:
     """All exponents of the motion in which a run from rest ended."""
 
+    DOCUMENT: ClassVar = (
+        "frequency_hz amplitude_m exponents_per_s low_per_s high_per_s sum_per_s dampers_per_s dimension "
+        "dimension_low dimension_high verdict motion source blocks impact_rate_hz outcome elapsed_s "
+        "sum_difference"
+    )
+
     frequency_hz: float
     amplitude_m: float
     exponents_per_s: tuple[float, ...]
@@ -118,10 +124,6 @@ class SpectrumPoint:
     def sum_difference(self) -> float:
         """Sum of the exponents over what the dampers take, less one."""
         return self.sum_per_s / self.dampers_per_s - 1.0 if self.dampers_per_s else math.nan
-
-    def to_dict(self) -> dict[str, object]:
-        """Say everything; numbers that are not finite are null."""
-        return dict(plain({**asdict(self), "sum_difference": self.sum_difference}))
 
 
 def point_of(
@@ -156,6 +158,8 @@ def point_of(
 class ExponentSpectrum(Labelled):
     """Everything that was computed for one request."""
 
+    DOCUMENT: ClassVar = "options=request points largest_sum_difference elapsed_s"
+
     request: SpectrumRequest
     points: tuple[SpectrumPoint, ...]
     elapsed_s: float
@@ -184,12 +188,3 @@ class ExponentSpectrum(Labelled):
             check = f"sums differ from the dampers' {self.points[0].dampers_per_s:.6g} 1/s by "
             check += f"{self.largest_sum_difference:.1g} at most"
         return f"{len(self.points)} points in {self.elapsed_s:.1f} s, {chaotic} chaotic; {check}."
-
-    def to_dict(self) -> dict[str, object]:
-        """Say everything, for other programs."""
-        return {
-            "options": self.request.model_dump(mode="json"),
-            "points": [each.to_dict() for each in self.points],
-            "largest_sum_difference": plain(self.largest_sum_difference),
-            "elapsed_s": self.elapsed_s,
-        }

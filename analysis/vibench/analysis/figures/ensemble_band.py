@@ -10,7 +10,7 @@ from ..model.draws import SimulatedRun
 from ..model.overlay import AbstractOverlay
 from ..model.prediction import ResponsePrediction
 from ..signals.arrays import Reals
-from ..tables import Table, named, table
+from ..tables import Table, columns, table
 from .style import SIMULATED
 
 
@@ -83,8 +83,8 @@ def agreement_text(laid: AbstractOverlay[Any]) -> str:
 
 def sines_table(name: str, sines: ResponsePrediction) -> Table:
     """Give the responses to steady sines that a figure shows beside a measurement."""
-    wanted = ("frequency_hz", "amplitude_m", "response_i", "response_ii", "linear", "impacts")
-    return table(f"{name}_sines", **named(sines, *wanted))
+    keys = "frequency_hz amplitude_m response_i response_ii linear impacts"
+    return table(f"{name}_sines", **columns(sines, keys))
 
 
 def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:

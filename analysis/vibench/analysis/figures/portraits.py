@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from ..chaos.verdict import MotionKind, MotionVerdict
 from ..sine.dwell_analysis import DwellAnalysis
-from ..tables import Table, named, table
+from ..tables import columns, table
 from .style import BOUNDS, SIMULATED, DrawnFigure, legend_above, new_figure, prefixed, styled
 
 _PANEL_IN = 2.9
@@ -34,7 +34,13 @@ def portraits_figure(analyses: Sequence[DwellAnalysis]) -> DrawnFigure:
         title=f"Phase portraits at {rising[0].excitation.frequency_hz:g} Hz",
         caption=_caption(rising),
         figure=figure,
-        tables=tuple(_table(each) for each in rising),
+        tables=tuple(
+            table(
+                f"section_{each.facts.name}",
+                **columns(each.motion.section, "time_s displacement_m velocity_m_per_s"),
+            )
+            for each in rising
+        ),
     )
 
 
@@ -85,12 +91,4 @@ def _caption(rising: Sequence[DwellAnalysis]) -> str:
     return (
         "Velocity over displacement of m0 (grey) and one point at the same phase of every recorded drive "
         f"period (colour). {'. '.join(said)}."
-    )
-
-
-def _table(analysis: DwellAnalysis) -> Table:
-    section = analysis.motion.section
-    return table(
-        f"section_{analysis.facts.name}",
-        **named(section, "time_s", "displacement_m", "velocity_m_per_s"),
     )

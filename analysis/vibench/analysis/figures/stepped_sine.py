@@ -20,7 +20,7 @@ from ..signals.arrays import Flags, Reals
 from ..sine.jumps import hysteresis_vpp, level_jumps
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.tracked_resonance import feedback_sentences, noted_jumps
-from ..tables import named, plus_minus, table
+from ..tables import columns, plus_minus, table
 from .ensemble_band import band_columns, run_text, simulated_label
 from .style import (
     LINEAR,
@@ -68,24 +68,22 @@ def stepped_sine_figure(
         second.set_xlabel(look.axis)
         legend_above(figure, [first], columns=2)
     found = analysis.response
-    columns = {
-        "frequency_hz": found.frequency_hz,
-        "direction": np.asarray(found.direction),
-        **named(found, "amplitude_vpp", "drive_amplitude_m", "response_i"),
-        **named(found, "response_ii", "sd_response_ii", "phase_rad"),
-    }
+    content = columns(
+        found,
+        "frequency_hz direction amplitude_vpp drive_amplitude_m response_i response_ii sd_response_ii "
+        "phase_rad",
+    )
     if laid is not None:
-        columns["response_i_simulated"] = laid.response.response_i
-        columns["response_ii_simulated"] = laid.response.response_ii
-        columns |= band_columns(laid, RESPONSE_I, "response_i")
-        columns |= band_columns(laid, RESPONSE_II, "response_ii")
+        content |= columns(laid.response, "response_i_simulated=response_i response_ii_simulated=response_ii")
+        content |= band_columns(laid, RESPONSE_I, "response_i")
+        content |= band_columns(laid, RESPONSE_II, "response_ii")
     name = f"stepped_sine_{analysis.facts.name}"
     return DrawnFigure(
         name=name,
         title=look.title(analysis.excitation, found),
         caption=_caption(analysis, laid, look),
         figure=figure,
-        tables=(table(name, **columns),),
+        tables=(table(name, **content),),
     )
 
 

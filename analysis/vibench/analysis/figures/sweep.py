@@ -9,7 +9,7 @@ from ..signals.arrays import Reals
 from ..sine.collision_region import Collisions
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
-from ..tables import Table, named, plus_minus, table
+from ..tables import Table, columns, plus_minus, table
 from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from .hysteresis import jumps_text
 from .style import (
@@ -192,18 +192,18 @@ def regions_text(found: Collisions) -> str:
 def _tables(analysis: SweepAnalysis, laid: SweepOverlay | None) -> tuple[Table, ...]:
     name = f"sweep_{analysis.facts.name}"
     found = analysis.response
-    columns = {
-        **named(found, "time_s", "frequency_hz", "drive_amplitude_m"),
-        "velocity_upper_m_per_s": found.upper,
-        "velocity_lower_m_per_s": found.lower,
-        **named(found, "response_i", "response_ii", "sd_response_ii", "phase_rad"),
-        "is_colliding": analysis.collisions.is_colliding.astype(np.int64),
-    }
+    content = columns(
+        found,
+        "time_s frequency_hz drive_amplitude_m velocity_upper_m_per_s=upper velocity_lower_m_per_s=lower "
+        "response_i response_ii sd_response_ii phase_rad",
+    )
+    content["is_colliding"] = analysis.collisions.is_colliding.astype(np.int64)
     if laid is None:
-        return (table(name, **columns),)
-    columns["velocity_upper_simulated_m_per_s"] = laid.response.upper
-    columns["velocity_lower_simulated_m_per_s"] = laid.response.lower
-    columns["response_i_simulated"] = laid.response.response_i
-    columns["response_ii_simulated"] = laid.response.response_ii
-    columns |= band_columns(laid, RESPONSE_I, "response_i") | band_columns(laid, RESPONSE_II, "response_ii")
-    return table(name, **columns), sines_table(name, laid.prediction)
+        return (table(name, **content),)
+    content |= columns(
+        laid.response,
+        "velocity_upper_simulated_m_per_s=upper velocity_lower_simulated_m_per_s=lower "
+        "response_i_simulated=response_i response_ii_simulated=response_ii",
+    )
+    content |= band_columns(laid, RESPONSE_I, "response_i") | band_columns(laid, RESPONSE_II, "response_ii")
+    return table(name, **content), sines_table(name, laid.prediction)

@@ -9,7 +9,7 @@ from ..model.overlay import TRANSMISSION, NoiseOverlay
 from ..model.prediction import linear_transmissibility
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
-from ..tables import Table, named, plus_minus, table
+from ..tables import Table, columns, plus_minus, table
 from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
 from .marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
 from .style import (
@@ -192,7 +192,6 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
         f"{each.peak_magnitude * float(view.factor(np.array([each.peak_frequency_hz]))[0]):.3g}{unit})"
         for each in response.resonances
     )
-    median = float(np.median(response.frequency_response.coherence))
     said = [
         (
             f"Noise at {analysis.excitation.amplitude_vpp:g} Vpp, base acceleration "
@@ -202,7 +201,10 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
         ),
         estimate_sentence(response),
         f"Resonances found: {found}." if found else "No resonance stands above its uncertainty.",
-        f"Median coherence {median:.4f}; the dash-dotted line is what independent noises would show.",
+        (
+            f"Median coherence {response.median_coherence:.4f}; the dash-dotted line is what independent "
+            "noises would show."
+        ),
     ]
     if laid is not None:
         said.append(
@@ -239,20 +241,16 @@ def _tables(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> tuple[Table, 
     view = analysis.request.view
     measured = view.shown(analysis.response.frequency_response)
     name = f"transmission_{analysis.facts.name}"
-    columns = {
-        **named(measured, "frequency_hz", "magnitude", "magnitude_lower", "magnitude_upper"),
-        "magnitude_db": measured.decibel,
-        "phase_rad": measured.phase_rad,
-        "phase_lower_rad": measured.phase_lower_rad,
-        "phase_upper_rad": measured.phase_upper_rad,
-        "coherence": measured.coherence,
-        "magnitude_h1": view.shown(analysis.response.h1).magnitude,
-        "magnitude_h2": view.shown(analysis.response.h2).magnitude,
-    }
+    found = columns(
+        measured,
+        "frequency_hz magnitude magnitude_lower magnitude_upper magnitude_db=decibel phase_rad "
+        "phase_lower_rad phase_upper_rad coherence",
+    )
+    found["magnitude_h1"] = view.shown(analysis.response.h1).magnitude
+    found["magnitude_h2"] = view.shown(analysis.response.h2).magnitude
     if laid is None:
-        return (table(name, **columns),)
-    columns |= band_columns(laid, TRANSMISSION, "transmission")
-    columns["magnitude_simulated"] = view.shown(laid.response.frequency_response).magnitude
-    columns["difference_db"] = laid.difference.decibel
-    columns["difference_standard_errors"] = laid.difference.standard_errors
-    return table(name, **columns), sines_table(name, laid.prediction)
+        return (table(name, **found),)
+    found |= band_columns(laid, TRANSMISSION, "transmission")
+    found["magnitude_simulated"] = view.shown(laid.response.frequency_response).magnitude
+    found |= columns(laid.difference, "difference_db=decibel difference_standard_errors=standard_errors")
+    return table(name, **found), sines_table(name, laid.prediction)

@@ -1,19 +1,29 @@
 """How nonlinear the specimen was under noise that repeats: what its scatter and its quiet lines say."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from scipy.special import digamma, polygamma
 
 from ..signals.arrays import Flags, Reals
 from ..tables import Labelled
-from .periodic import DetectionLines, PeriodicFrequencyResponse
+from .periodic import DetectionLines, Drift, PeriodicFrequencyResponse
 
 
 @dataclass(frozen=True)
 class Distortion(Labelled):
     """Noise and nonlinear distortion of a transmission, each in parts of it; medians over the lines."""
 
+    DOCUMENT: ClassVar = (
+        "realisations median_not_repeating_over_magnitude=noise_share "
+        "median_distortion_over_magnitude=distortion_share gain_drift=drift.gain_share "
+        "frequency_drift=drift.frequency_share odd_detection_lines_m_per_s=odd_m_per_s "
+        "even_detection_lines_m_per_s=even_m_per_s noise_on_detection_lines_m_per_s=detection_noise_m_per_s"
+    )
+
+    realisations: int
+    drift: Drift | None
     noise_share: float
     """Standard deviation that what does not repeat from period to period (noise of the channels, or chaos of
     the specimen) gives one realisation, over the transmission's magnitude."""
@@ -38,6 +48,8 @@ def distortion(periodic: PeriodicFrequencyResponse) -> Distortion:
     quiet = periodic.detection
     is_even = is_even_line(quiet)
     return Distortion(
+        realisations=periodic.realisations,
+        drift=periodic.drift,
         noise_share=float(np.median(np.sqrt(periodic.noise_variance) / magnitude)),
         distortion_share=None if varied is None else float(np.median(np.sqrt(varied) / magnitude)),
         odd_m_per_s=_rms_without_noise(quiet, ~is_even),

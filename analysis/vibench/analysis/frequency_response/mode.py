@@ -1,6 +1,7 @@
 """One mode of a transmission, and what a fit of it may give."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 SMALLEST_RELATIVE_SD = 1e-6
 """Keeps the weights finite where a noise-free simulation states no spread at all."""
@@ -14,6 +15,11 @@ WELL_FITTED = 1.2
 @dataclass(frozen=True)
 class Resonance:
     """One resonance, from the fit of all modes of a band, or of this one on a smooth background."""
+
+    DOCUMENT: ClassVar = (
+        "frequency_hz sd_frequency_hz damping_ratio sd_damping_ratio peak_frequency_hz peak_magnitude "
+        "sd_peak_magnitude reduced_chi_square chi_square_limit remark is_resolved"
+    )
 
     frequency_hz: float
     """Undamped natural frequency of the mode."""

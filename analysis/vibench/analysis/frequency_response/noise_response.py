@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -16,9 +16,9 @@ from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import relative_sd, student_half_width
 from ..signals.quantity import Quantity
 from ..spectra.spectra import DensitySums
-from ..tables import Labelled
+from ..tables import Labelled, columns
 from ..tones.drive_level import NoiseDriveLevel, noise_drive_level
-from .distortion import scatters_beyond_noise
+from .distortion import Distortion, distortion, scatters_beyond_noise
 from .mode import Resonance
 from .periodic import PeriodicFrequencyResponse, PeriodicSums, Repetition
 from .request import FrequencyResponseRequest
@@ -43,6 +43,11 @@ class NoiseResponse(Labelled):
     """Transmission of base displacement to m0's displacement, and what was found in it."""
 
     OWN_UNITS: ClassVar = {"frequency_response": "1", "h1": "1", "h2": "1", "periodic": "s"}
+    DOCUMENT: ClassVar = (
+        "independent_averages=frequency_response.n_eff used_s left_out lost_samples overloaded_samples "
+        "median_coherence base_rms_acceleration_m_per_s2=base_level.rms_acceleration "
+        "base_rms_displacement_m=base_level.rms_displacement_m relative_sd_base_rms=base_level.relative_sd"
+    )
 
     frequency_response: FrequencyResponse
     """The estimate to use: by default referenced to the drive voltage, so that noise biases it nowhere."""
@@ -62,6 +67,11 @@ class NoiseResponse(Labelled):
     """Samples inside the noise that were lost."""
     overloaded_samples: int
     """Samples inside the noise at which a channel was near its full scale."""
+
+    @property
+    def median_coherence(self) -> float:
+        """Over all lines."""
+        return float(np.median(self.frequency_response.coherence))
 
 
 def repeated_response(
@@ -310,5 +320,25 @@ def _resonances(frequency_response: FrequencyResponse) -> tuple[Resonance, ...]:
 class NoiseAnalysis(AbstractAnalysis[Noise, NoiseResponse]):
     """A noise measurement: transmission base to m0."""
 
+    DOCUMENT: ClassVar = "resonances=response.resonances transmission distortion *response"
+
     request: FrequencyResponseRequest
     """What was asked for."""
+
+    @property
+    def transmission(self) -> dict[str, Any]:
+        """The transmission in the quantities asked for, as a document has it."""
+        view = self.request.view
+        return columns(view, "quantity=name unit") | columns(
+            view.shown(self.response.frequency_response),
+            "estimator=settings.estimator noise_ratio=settings.noise_ratio window=settings.window "
+            "segment_s=settings.segment_s overlap=settings.overlap resolution_hz segments_used "
+            "segments_excluded delay_removed_s=settings.delay_s confidence=settings.confidence "
+            "coherence_significance frequency_hz magnitude magnitude_lower magnitude_upper phase_rad "
+            "phase_lower_rad phase_upper_rad coherence is_significant",
+        )
+
+    @property
+    def distortion(self) -> Distortion | None:
+        """What noise that repeats tells of the specimen; None for streamed noise."""
+        return None if self.response.periodic is None else distortion(self.response.periodic)

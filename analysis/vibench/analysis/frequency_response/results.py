@@ -46,6 +46,11 @@ class FrequencyResponseSettings:
     delay_s: float = 0.0
     """Delay of the response channel behind the drive channel that was removed from the phase."""
 
+    @property
+    def segment_s(self) -> float:
+        """Length of a segment, or of a period."""
+        return self.segment_samples / self.sample_rate_hz
+
 
 @dataclass(frozen=True)
 class FrequencyResponse(Labelled):

@@ -61,9 +61,6 @@ class AnalysisKind(Generic[P, A, L]):
     """Compare with all draws."""
     curves: Callable[[str, CurveOrigin, Any], Iterator[Curve]]
     """Of the response, measured or simulated, of the recording with that name."""
-    measured: Callable[[A], Json]
-    """The numbers of a result."""
-    simulated: Callable[[L], Json]
     budgets: Callable[[A, L | None], tuple[Budget, ...]]
     """Of the numbers that a reader takes away."""
     place: Callable[[P], tuple[float, ...]] = lambda _: ()

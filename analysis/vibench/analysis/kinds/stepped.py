@@ -1,4 +1,4 @@
-"""Stepped sines: responses frequency by frequency or level by level, and what JSON says of them."""
+"""Stepped sines: responses frequency by frequency or level by level."""
 
 from collections.abc import Callable
 from math import nan
@@ -16,7 +16,7 @@ from ..model.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts
-from ..sine.jumps import level_summary
+from ..sine.jumps import SteppedLevelAnalysis
 from ..sine.stepped_response import (
     SteppedResponse,
     SteppedSineAnalysis,
@@ -25,28 +25,10 @@ from ..sine.stepped_response import (
     stepped_response,
 )
 from ..sine.sweep_analysis import frequency_check
-from ..tables import named
 from ..uncertainty.quantities import stepped_budgets
-from .analysis_kind import AnalysisKind, Json
+from .analysis_kind import AnalysisKind
 
 Setting = Callable[[Steps, Stretch], float]
-
-
-def _measured(analysis: SteppedSineAnalysis) -> Json:
-    found = analysis.response
-    return {
-        **named(found, "frequency_hz", "direction", "drive_amplitude_m", "response_i"),
-        **named(found, "noise_bias_i", "noise_error_i", "response_ii", "sd_response_ii"),
-        **named(found, "slow_change", "left_out"),
-    }
-
-
-def _measured_levels(analysis: SteppedSineAnalysis) -> Json:
-    return {**_measured(analysis), **level_summary(analysis.response)}
-
-
-def _simulated(laid: SteppedSineOverlay) -> Json:
-    return {"response_i": laid.response.response_i, "response_ii": laid.response.response_ii}
 
 
 def _compared(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
@@ -56,7 +38,7 @@ def _compared(analysis: SteppedSineAnalysis) -> tuple[Quantity, ...]:
 def stepped(
     setting_vpp: Setting,
     label: SegmentLabel = SegmentLabel.STEP,
-    measured: Callable[[SteppedSineAnalysis], Json] = _measured,
+    result: type[SteppedSineAnalysis] = SteppedSineAnalysis,
 ) -> AnalysisKind[Steps, SteppedSineAnalysis, SteppedSineOverlay]:
     """Return the analysis of a kind that records step after step, under a label of its own."""
 
@@ -69,7 +51,7 @@ def stepped(
         )
         frequency = frequency_check(response.frequency_hz, planned_hz)
         checks = (*measurement_checks(facts), frequency, settled_check(response))
-        return SteppedSineAnalysis(facts, checks, plan, response)
+        return result(facts, checks, plan, response)
 
     def draw(analysis: SteppedSineAnalysis, channels: SimulatedChannels) -> Draw[SteppedResponse]:
         response = stepped_response(channels, analysis.excitation, label, setting_vpp)
@@ -82,14 +64,14 @@ def stepped(
         compared=_compared,
         lay=stepped_overlay,
         curves=stepped_traces,
-        measured=measured,
-        simulated=_simulated,
         budgets=stepped_budgets,
     )
 
 
 STEPPED_SINE = stepped(lambda plan, _: plan.amplitude_vpp)
-STEPPED_LEVEL = stepped(lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), measured=_measured_levels)
+STEPPED_LEVEL = stepped(
+    lambda _, stretch: float(stretch.numbers["amplitude_vpp"]), result=SteppedLevelAnalysis
+)
 # With feedback the setting is not the plan's, and is known of no step.
 SETTLED_SINE = stepped(lambda *_: nan)
 RESONANCE_TRACKING = stepped(lambda *_: nan, SegmentLabel.RESONANCE)

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import islice
-from typing import Generic, TypeVar
+from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
 import scipy
@@ -164,6 +164,12 @@ _BYTES_PER_SAMPLE = 120
 class SimulatedRun:
     """What was simulated beside a recording, in numbers."""
 
+    DOCUMENT: ClassVar = (
+        "drive=driven why draws base_band_hz accuracy masses_kg=specimen.masses "
+        "stiffnesses_n_per_m=specimen.stiffnesses dampings_ns_per_m=specimen.dampings "
+        "gap_m=smaller_gap_m gaps_m=specimen.gaps_m impacts impact_rate_hz"
+    )
+
     specimen: Specimen
     driven: Driven
     accuracy: Accuracy
@@ -176,6 +182,11 @@ class SimulatedRun:
     played_s: float
     why: str = ""
     """Why the recorded voltage did not drive, where it could not; else what is to be known of the rig."""
+
+    @property
+    def smaller_gap_m(self) -> float:
+        """Of both sides."""
+        return min(self.specimen.gaps_m)
 
     @property
     def impact_rate_hz(self) -> float:

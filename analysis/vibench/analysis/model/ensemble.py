@@ -7,6 +7,7 @@ the measured value could be one more draw.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -50,6 +51,11 @@ class EnsembleCurve(Labelled):
     by Student's t, tails that are longer than normal ones by setting each draw into the others: a limit is
     exceeded in one per cent of all agreeing twins.
     """
+
+    DOCUMENT: ClassVar = (
+        "quantity=name agrees=verdict compared outside largest_z limit_z=limit share_in_band frequency_hz "
+        "measured median lower upper z rank draws=count"
+    )
 
     name: str
     frequency_hz: Reals
@@ -136,6 +142,11 @@ class EnsembleCurve(Labelled):
     def agrees(self) -> bool:
         """Whether the measured values could be one more draw."""
         return self.outside == 0
+
+    @property
+    def verdict(self) -> bool | None:
+        """Whether they agree; None where nothing is compared."""
+        return self.agrees if self.compared else None
 
     @property
     def share_in_band(self) -> float:
@@ -257,6 +268,8 @@ _PER_NEPER_DB = 20 / np.log(10)
 @dataclass(frozen=True)
 class CurveDifference(Labelled):
     """Measured over simulated magnitude; arrays of shape (points,)."""
+
+    DOCUMENT: ClassVar = "median_abs_db rms_db share_within_two_standard_errors=share_within_two"
 
     frequency_hz: Reals
     decibel: Reals

@@ -6,6 +6,7 @@ follow a rate of escape (Tel and Lai, Phys. Rep. 460 (2008), ch. 1), and one end
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import scipy
@@ -29,6 +30,11 @@ class Ending:
 @dataclass(frozen=True)
 class EscapeRate:
     """How often a motion ends, per second that it lasts."""
+
+    DOCUMENT: ClassVar = (
+        "what runs ends measured_ended=measured.ended measured_end_s=measured.stop_s counted_from_s=from_s "
+        "events exposure_s per_s per_s_lower=bounds_per_s.0 per_s_upper=bounds_per_s.1"
+    )
 
     what: str
     runs: int

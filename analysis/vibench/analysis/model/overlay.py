@@ -43,6 +43,8 @@ R = TypeVar("R")
 class AbstractOverlay(Labelled, Generic[R]):
     """A measurement, and what the model says of it."""
 
+    DOCUMENT: ClassVar = "*run difference ensemble escape"
+
     run: SimulatedRun
     response: R
     """Of the first draw: under a voltage, one run as good as any other."""
@@ -78,6 +80,8 @@ class AbstractOverlay(Labelled, Generic[R]):
 class NoiseOverlay(AbstractOverlay[NoiseResponse]):
     """A transmission, and what the model says of it."""
 
+    DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} resonances=response.resonances"
+
     amplitude_basis: str
     """Where the sines' A0 comes from."""
 
@@ -85,6 +89,8 @@ class NoiseOverlay(AbstractOverlay[NoiseResponse]):
 @dataclass(frozen=True, eq=False)
 class SweepOverlay(AbstractOverlay[SweepResponse]):
     """A sweep, and what the model says of it."""
+
+    DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} collision_regions=collisions.regions"
 
     collisions: Collisions
     """Of the first draw."""
@@ -95,6 +101,10 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
     """A dwell, and what the model says of it."""
 
     OWN_UNITS: ClassVar = {"displacement": "m"}
+    DOCUMENT: ClassVar = (
+        f"{AbstractOverlay.DOCUMENT} response_i=response.response_i response_ii=response.response_ii "
+        "sd_response_ii=response.sd_response_ii terminal_bands=terminal"
+    )
 
     displacement: Envelope
     terminal: tuple[TerminalLevel, ...]
@@ -111,6 +121,10 @@ class DwellOverlay(AbstractOverlay[DwellResponse]):
 @dataclass(frozen=True, eq=False)
 class SteppedSineOverlay(AbstractOverlay[SteppedResponse]):
     """A stepped sine, and what the model says of it."""
+
+    DOCUMENT: ClassVar = (
+        f"{AbstractOverlay.DOCUMENT} response_i=response.response_i response_ii=response.response_ii"
+    )
 
 
 TRANSMISSION, RESPONSE_I, RESPONSE_II, SPECTRUM = "transmission", "Response I", "Response II", "spectrum"

@@ -65,6 +65,7 @@ class FittedValue:
         "sd": "{0.unit}",
         "nominal": "{0.unit}",
     }
+    DOCUMENT: ClassVar = "value low high sd bench=nominal"
 
     parameter: Parameter
     value: float

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,6 +42,10 @@ class Assumption(StrEnum):
 @dataclass(frozen=True)
 class Suspect:
     """An assumption that was dropped, and how well the model then fits."""
+
+    DOCUMENT: ClassVar = (
+        "assumption would_mend_it=sentence reduced_chi_square mends behind_the_likeliest=behind"
+    )
 
     assumption: Assumption
     sentence: str

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from ..model.driven_rig import described_shaker
 from ..model.shaker_fit import fitted_shaker
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
-from ..tables import Labelled, named, plain, plus_minus
+from ..tables import Labelled, columns, plain, plus_minus
 from ..uncertainty.stated import stated_of
 from .bracketed_gap import bracketed_gap
 from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
@@ -160,46 +161,33 @@ class UpdatedSpecimen(Labelled):
         """Say every value with its interval, what does not fit, and what is to be known of it."""
         return tuple(_sentences(self))
 
-    def to_dict(self) -> dict[str, object]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain values for JSON."""
-        linear, table = self.linear, self.table
-        return {
+        values = {each.parameter: each for each in self.values}
+        told = {key: value for way in Way for key, value in self._told(way).items()}
+        linear = columns(
+            self,
+            "lines=linear.lines reduced_chi_square=linear.reduced_chi_square chi_square_limit=linear.limit "
+            "table_mass_kg=table.mass_kg sd_table_mass_kg=table.sd_kg suspects not_told",
+        )
+        document = {
             "fits": self.fits,
-            "values": {
-                each.parameter.value: {
-                    **named(each, "value", "low", "high"),
-                    "sd": plain(each.sd),
-                    "bench": each.nominal,
-                }
-                for each in self.values
-            },
-            **{key: value for way in Way for key, value in self._told(way).items()},
+            "values": values,
+            **told,
             "linear_from": self.linear_from or None,
-            "lines": 0 if linear is None else linear.lines,
-            "reduced_chi_square": None if linear is None else linear.reduced_chi_square,
-            "chi_square_limit": None if linear is None else linear.limit,
-            "table_mass_kg": None if table is None else table.mass_kg,
-            "sd_table_mass_kg": None if table is None else table.sd_kg,
-            "suspects": [
-                {
-                    "assumption": each.assumption.value,
-                    "would_mend_it": each.sentence,
-                    **named(each, "reduced_chi_square", "mends"),
-                    "behind_the_likeliest": each.behind,
-                }
-                for each in self.suspects
-            ],
-            "not_told": list(self.not_told),
+            **linear,
+            "lines": linear["lines"] or 0,
             "specimen": self.description.model_dump(mode="json", exclude_none=True),
         }
+        return dict(plain(document))
 
     def _told(self, way: Way) -> dict[str, object]:
-        """Plain values of what collisions tell in one way."""
+        """Return what collisions tell in one way."""
         found = self.collisions if self.collisions is not None and self.collisions.way is way else None
         return {
             f"{way}_from": None if found is None else found.recording,
             f"{way}": {
-                each.what.value: {**named(each, "value", "low", "high"), "bench": each.described}
+                each.what: columns(each, "value low high bench=described")
                 for each in (() if found is None else found.told)
             },
         }

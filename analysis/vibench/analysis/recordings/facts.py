@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
@@ -23,7 +23,6 @@ from vibench.acquisition.recording import (
 from vibench.sim import Specimen, SpecimenTable, fault_in_words
 
 from ..errors import UnusableData
-from ..tables import named
 from .channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
 from .channels import RESPONSE
 
@@ -73,6 +72,12 @@ def require_intact(recording: Recording) -> SealCheck:
 class RecordingFacts(RecordingDescription):
     """Everything but the result."""
 
+    DOCUMENT: ClassVar = (
+        "name path state reason origin started_utc bench_check recording_id duration_s sample_rate_hz "
+        "requested_sample_rate_hz excitation=measurement.excitation overload_s dropouts dropout_s "
+        "lost_samples feedback=feedback_noted"
+    )
+
     name: str
     duration_s: float
     planned_s: float | None
@@ -95,6 +100,14 @@ class RecordingFacts(RecordingDescription):
     """What a measurement with feedback found while it ran; empty for any other."""
     feedback_s: tuple[float, ...] = ()
     """When each of it was noted, from the beginning of the recording [s]."""
+
+    @property
+    def feedback_noted(self) -> list[dict[str, Any]]:
+        """Kind, time and numbers of each note."""
+        return [
+            {"kind": each.kind, "time_s": time_s, **each.numbers}
+            for time_s, each in zip(self.feedback_s, self.feedback, strict=True)
+        ]
 
     @property
     def is_simulated(self) -> bool:
@@ -131,7 +144,7 @@ def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> R
     played = [each for each in recording.segments if each.label in labels]
     noted = [(each.sample / rate, note) for each in recording.events if (note := feedback_note(each))]
     return RecordingFacts(
-        **named(recording, *(each.name for each in fields(RecordingDescription))),
+        **{each.name: getattr(recording, each.name) for each in fields(RecordingDescription)},
         name=recording.path.name.removesuffix(".part").removesuffix(".h5"),
         duration_s=recording.duration_s,
         planned_s=None if recording.expected_samples is None else recording.expected_samples / rate,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from vibench.acquisition import RecordingError, open_recording
 from vibench.acquisition.plan import present_word
@@ -112,6 +112,8 @@ class FailedStep(StrEnum):
 @dataclass(frozen=True)
 class AnalysisFailure:
     """A recording without a result, or a result without its simulation, and why."""
+
+    DOCUMENT: ClassVar = "recording=name what error=sentence"
 
     name: str
     what: FailedStep

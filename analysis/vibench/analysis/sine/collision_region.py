@@ -50,6 +50,8 @@ class Edge:
 class CollisionRegion:
     """A stretch of the sweep in which the masses collide."""
 
+    DOCUMENT: ClassVar = "start stop reaches_start_of_sweep=reaches_start reaches_stop_of_sweep=reaches_stop"
+
     start: Edge
     """In the order of time; its frequency is the higher one in a sweep downwards."""
     stop: Edge

@@ -110,6 +110,8 @@ _NONE: Flags = np.zeros(0, dtype=np.bool_)
 class Line:
     """One line of a displacement spectrum."""
 
+    DOCUMENT: ClassVar = "label frequency_hz amplitude_m sd_amplitude_m decibel_re_drive_line=decibel"
+
     label: str
     """``"order 1"``, ``"order 3/2"``, ``"peak towards 201 Hz"``."""
     frequency_hz: float
@@ -130,6 +132,12 @@ class DwellResponse(Labelled):
         "displacement": "m",
         "spectrum": "m",
     }
+    DOCUMENT: ClassVar = (
+        "frequency_hz=drive.frequency_hz sd_frequency_hz=drive.sd_frequency_hz "
+        "drive_amplitude_m=drive.amplitude_m sd_drive_amplitude_m=drive.sd_amplitude_m "
+        "drive_distortion=drive.distortion window_s response_i noise_bias_i noise_error_i noise_source "
+        "response_ii sd_response_ii slow_change phase_rad sd_phase_rad lines"
+    )
 
     drive: DriveLevel
     window_s: float

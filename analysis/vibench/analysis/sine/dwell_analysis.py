@@ -29,6 +29,8 @@ _REACH = 0.1
 class TerminalLevel:
     """Displacement within a band around a frequency."""
 
+    DOCUMENT: ClassVar = "towards_hz low_hz high_hz peak_hz rms_m relative_sd decibel_re_drive_line=decibel"
+
     towards_hz: float
     low_hz: float
     high_hz: float
@@ -84,6 +86,7 @@ class DwellAnalysis(AbstractAnalysis[DwellPlan, DwellResponse]):
     """A dwell: time signal, spectrum, responses and lines."""
 
     OWN_UNITS: ClassVar = {"displacement": "m"}
+    DOCUMENT: ClassVar = "*response terminal_bands=terminal motion=motion.verdict"
 
     displacement: Envelope
     """x over the dwell [m], without the ends that integration disturbs."""

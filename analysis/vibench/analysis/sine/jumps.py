@@ -1,7 +1,8 @@
 """Where a response jumps along a sweep, up or down, and how well its frequency is known."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -9,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 from ..errors import InvalidRequest
 from ..signals.arrays import Flags, Reals
 from ..tables import Labelled
-from .stepped_response import SteppedResponse
+from .stepped_response import SteppedResponse, SteppedSineAnalysis
 from .sweep import SweepResponse
 
 _SIDE = 12
@@ -27,6 +28,8 @@ _PER_NEPER_DB = 20 / np.log(10)
 @dataclass(frozen=True)
 class Jump:
     """One jump of a response."""
+
+    DOCUMENT: ClassVar = "frequency_hz lower_hz upper_hz time_s before after decibel"
 
     frequency_hz: float
     lower_hz: float
@@ -217,14 +220,23 @@ def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
     return rise.before_vpp - fall.before_vpp, rise.after_vpp - fall.after_vpp
 
 
-def level_summary(response: SteppedResponse) -> dict[str, object]:
-    """Give levels and jumps as JSON can hold them."""
-    jumps = level_jumps(response)
-    return {
-        "amplitude_vpp": response.amplitude_vpp,
-        "jumps": [asdict(each) for each in jumps],
-        "hysteresis_vpp": hysteresis_vpp(jumps),
-    }
+@dataclass(frozen=True, eq=False)
+class SteppedLevelAnalysis(SteppedSineAnalysis):
+    """A stepped level, and where its response jumps."""
+
+    DOCUMENT: ClassVar = (
+        f"{SteppedSineAnalysis.DOCUMENT} amplitude_vpp=response.amplitude_vpp jumps hysteresis_vpp"
+    )
+
+    @property
+    def jumps(self) -> tuple[LevelJump, ...]:
+        """In the order of time."""
+        return level_jumps(self.response)
+
+    @property
+    def hysteresis_vpp(self) -> tuple[float, float] | None:
+        """How far the jump up lies above the fall back [V]."""
+        return hysteresis_vpp(self.jumps)
 
 
 _POINTS = 1000

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -31,6 +32,11 @@ _EDGE_PERIODS = 60.0
 @dataclass(frozen=True)
 class SteppedResponse(Labelled):
     """One value for each step, in the order played; arrays of shape (steps,)."""
+
+    DOCUMENT: ClassVar = (
+        "frequency_hz direction drive_amplitude_m response_i noise_bias_i noise_error_i response_ii "
+        "sd_response_ii slow_change left_out"
+    )
 
     frequency_hz: Reals
     """As measured on the drive."""
@@ -158,3 +164,5 @@ def settled_check(response: SteppedResponse) -> Check:
 @dataclass(frozen=True, eq=False)
 class SteppedSineAnalysis(AbstractAnalysis[Steps, SteppedResponse]):
     """A stepped sine: responses at every frequency, or at every level."""
+
+    DOCUMENT: ClassVar = "*response"

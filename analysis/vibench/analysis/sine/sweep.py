@@ -128,6 +128,12 @@ class SweepResponse(Labelled):
         "harmonics": "m",
         "noise_rms": "m s-1",
     }
+    DOCUMENT: ClassVar = (
+        "start_hz=frequency_hz.0 stop_hz=frequency_hz.-1 sweep_rate_hz_per_s "
+        "drive_amplitude_start_m=drive_amplitude_m.0 drive_amplitude_stop_m=drive_amplitude_m.-1 "
+        "largest_response_i=largest_i largest_response_ii=largest_ii.0 "
+        "largest_response_ii_at_hz=largest_ii.1 steady_over_swept_linear=steady_over_swept"
+    )
 
     time_s: Reals
     """Middle of each interval, from the first sample of the sweep."""
@@ -170,6 +176,17 @@ class SweepResponse(Labelled):
     def largest(self, response: Reals) -> int:
         """Return the place of the largest value among the intervals without a drop-out."""
         return int(np.nanargmax(np.where(self.is_clear, response, np.nan)))
+
+    @property
+    def largest_i(self) -> float:
+        """Largest Response I."""
+        return float(self.response_i[self.largest(self.response_i)])
+
+    @property
+    def largest_ii(self) -> tuple[float, float]:
+        """Largest Response II, and its frequency [Hz]."""
+        top = self.largest(self.response_ii)
+        return float(self.response_ii[top]), float(self.frequency_hz[top])
 
     @property
     def sweep_rate_hz_per_s(self) -> float:

@@ -32,6 +32,10 @@ class SweepAnalysis(AbstractAnalysis[Sweep, SweepResponse]):
     """A sweep: envelope, responses and where the masses collide."""
 
     OWN_UNITS: ClassVar = {"spectrogram": "m s-1"}
+    DOCUMENT: ClassVar = (
+        "*response collision_regions=collisions.regions "
+        "collisions_not_determined_hz=collisions.too_fast_hz jumps"
+    )
 
     collisions: Collisions
     jumps: tuple[Jump, ...]

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..tables import Labelled, plain, plus_minus
+from ..tables import Labelled, plus_minus
 
 COVERAGE = 2.0
 """Coverage factor of expanded uncertainties: about 95 %."""
@@ -56,6 +56,10 @@ class Budget(Labelled):
     """One quantity of one measurement."""
 
     OWN_UNITS: ClassVar = {"value": "{0.unit}"}
+    DOCUMENT: ClassVar = (
+        "quantity value unit standard expanded coverage_factor contributions=parts not_stated"
+    )
+    coverage_factor: ClassVar = COVERAGE
 
     quantity: str
     value: float
@@ -101,22 +105,14 @@ class Budget(Labelled):
         left = f"; not stated: {missing}" if missing else ""
         return f"{self.quantity} {self.text} (k = {COVERAGE:g}; {said}{left})"
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values for JSON."""
-        return {
-            "quantity": self.quantity,
-            "value": plain(self.value),
-            "unit": self.unit,
-            "standard": plain(self.standard),
-            "expanded": plain(self.expanded),
-            "coverage_factor": COVERAGE,
-            "contributions": [
-                {
-                    "cause": each.cause.value,
-                    "standard": None if each.relative is None else plain(each.relative * abs(self.value)),
-                    "source": each.source,
-                }
-                for each in self.contributions
-            ],
-            "not_stated": list(self.not_stated),
-        }
+    @property
+    def parts(self) -> list[dict[str, object]]:
+        """Cause, standard uncertainty [unit] and source of each contribution."""
+        return [
+            {
+                "cause": each.cause,
+                "standard": None if each.relative is None else each.relative * abs(self.value),
+                "source": each.source,
+            }
+            for each in self.contributions
+        ]

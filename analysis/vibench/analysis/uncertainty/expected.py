@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from ..errors import AnalysisError
 from ..model.overlay import RESPONSE_I, RESPONSE_II
 from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse, dwell_response
+from ..tables import Labelled
 from .budget import COVERAGE, Cause, Contribution
 from .quantities import of_one_draw
 from .stated import Stated, stated_of
@@ -118,8 +120,14 @@ _HALF_BAND_HZ = 25_600.0
 
 
 @dataclass(frozen=True)
-class Expected:
+class Expected(Labelled):
     """One quantity that a plan wants to know, and how well it will."""
+
+    DOCUMENT: ClassVar = (
+        "quantity cause planned_s=time_s relative_expanded_over_s=curve coverage_factor not_stated"
+    )
+    OWN_UNITS: ClassVar = {"scatter": "1", "lasting": "1"}
+    coverage_factor: ClassVar = COVERAGE
 
     quantity: str
     time_s: float
@@ -172,17 +180,6 @@ class Expected:
                 return "this drive has several motions, and how it is begun decides which one is measured"
             case _:
                 return "the masses may collide under this noise"
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values for JSON."""
-        return {
-            "quantity": self.quantity,
-            "cause": self.cause.value,
-            "planned_s": self.time_s,
-            "relative_expanded_over_s": [list(each) for each in self.curve],
-            "coverage_factor": COVERAGE,
-            "not_stated": [each.value for each in self.not_stated],
-        }
 
 
 def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
