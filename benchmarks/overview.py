@@ -25,7 +25,7 @@ from vibench.acquisition.recording import (
     create_recording,
 )
 from vibench.analysis.live import envelope
-from vibench.analysis.live._overview import overview_of
+from vibench.analysis.live._outline import overview_of
 
 RATE_HZ = 51_200
 COLUMNS = 1000

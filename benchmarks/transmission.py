@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from scipy import signal
 
-from vibench.analysis.spectra.segment_spectra import SegmentSpectra
+from vibench.analysis.spectra.spectra import SegmentSpectra
 
 RATE_HZ = 51_200
 CHANNELS = 4

@@ -22,7 +22,7 @@ from vibench.analysis.model_updating.specimen_fit import SpecimenFit
 from vibench.analysis.model_updating.updated_specimen import UpdatedSpecimen
 from vibench.analysis.recordings.checks import AbstractAnalysis
 from vibench.analysis.results.compared_recording import ComparedRecording
-from vibench.analysis.sine.dwell_motion import DwellMotion
+from vibench.analysis.sine.dwell_analysis import DwellMotion
 from vibench.analysis.tables import Labelled, holds_array, unit_of
 from vibench.analysis.uncertainty.budget import Budget
 

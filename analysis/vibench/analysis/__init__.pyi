@@ -14,7 +14,7 @@ from .errors import (
     InvalidRequest as InvalidRequest,
     NotEnoughData as NotEnoughData,
 )
-from .frequency_response.mode import Resonance as Resonance
+from .frequency_response.modal_fit import Resonance as Resonance
 from .frequency_response.request import (
     FrequencyResponseRequest as FrequencyResponseRequest,
     MagnitudeScale as MagnitudeScale,

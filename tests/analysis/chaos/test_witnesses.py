@@ -5,9 +5,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vibench.analysis import InvalidRequest, NotEnoughData
-from vibench.analysis.chaos.divergence import divergence, embedded, nearest_neighbours
-from vibench.analysis.chaos.surrogates import surrogate, surrogate_test
-from vibench.analysis.chaos.zero_one import zero_one
+from vibench.analysis.chaos.witnesses import (
+    divergence,
+    embedded,
+    nearest_neighbours,
+    surrogate,
+    surrogate_test,
+    zero_one,
+)
 
 
 def logistic(growth, count):

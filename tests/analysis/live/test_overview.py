@@ -6,7 +6,7 @@ from vibench.acquisition.plan import Dwell
 from vibench.acquisition.recording import BIN_SAMPLES
 from vibench.analysis import InvalidRequest
 from vibench.analysis.live import has_overview
-from vibench.analysis.live._overview import overview_of
+from vibench.analysis.live._outline import overview_of
 
 RATE = 6400.0
 SAMPLES = 200_000

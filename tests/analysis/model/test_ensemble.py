@@ -4,8 +4,14 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from vibench.analysis.model.ensemble import EnsembleCurve, Quantity, ensemble_curves, z_limit
-from vibench.analysis.model.escape import Ending, escape_rate
+from vibench.analysis.model.ensemble import (
+    Ending,
+    EnsembleCurve,
+    Quantity,
+    ensemble_curves,
+    escape_rate,
+    z_limit,
+)
 
 FREQUENCY_HZ = np.arange(40.0) + 100.0
 

@@ -7,7 +7,7 @@ import pytest
 
 from vibench.analysis.chaos.verdict import MotionKind
 from vibench.analysis.report import Agreement
-from vibench.analysis.report._summary import MOST_WORDS, summary
+from vibench.analysis.report._report import MOST_WORDS, summary
 from vibench.analysis.results.campaign_results import AnalysisFailure, FailedStep
 
 YES, NO, OPEN = Agreement

@@ -9,9 +9,9 @@ from vibench.analysis import InvalidRequest, NotEnoughData
 from vibench.analysis.errors import UnusableData
 from vibench.analysis.signals.confidence import standard_uncertainty
 from vibench.analysis.sine.dwell import dwell_response
-from vibench.analysis.sine.dwell_motion import stroboscope
+from vibench.analysis.sine.dwell_analysis import stroboscope
 from vibench.analysis.spectra.spectra import spectral_density
-from vibench.analysis.tones.drive_level import drive_level, noise_drive_level
+from vibench.analysis.tones.sine_fit import drive_level, noise_drive_level
 from vibench.sim import Harmonic, gong2025, integrate
 
 RATE = 12_800.0

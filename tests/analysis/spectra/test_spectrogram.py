@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vibench.analysis import InvalidRequest, NotEnoughData
-from vibench.analysis.spectra.spectrogram import MOST_COLUMNS, SpectrogramSums
+from vibench.analysis.spectra.spectra import MOST_COLUMNS, SpectrogramSums
 
 RATE = 4000.0
 

@@ -15,9 +15,8 @@ from vibench.analysis.model.ensemble import EnsembleCurve
 from vibench.analysis.model.overlay import RESPONSE_I, RESPONSE_II
 from vibench.analysis.report._result_tables import uncertainty_table
 from vibench.analysis.sine.dwell import dwell_response
-from vibench.analysis.uncertainty.budget import Cause, Contribution
+from vibench.analysis.uncertainty.budget import Cause, Contribution, stated_of
 from vibench.analysis.uncertainty.quantities import dwell_budgets, sd_of_largest, sweep_budgets
-from vibench.analysis.uncertainty.stated import stated_of
 
 DRAWS = 150
 STATED = {

@@ -15,10 +15,19 @@ from scipy.optimize import minimize_scalar
 from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Reals
 from ..tables import Labelled
-from .divergence import Divergence, divergence, embedded
 from .period import Points, is_settled, shortest_period, slow_share
-from .surrogates import SurrogateTest, gaussianised, surrogate_test, time_symmetry
-from .zero_one import FEWEST, ZeroOne, zero_one
+from .witnesses import (
+    FEWEST,
+    Divergence,
+    SurrogateTest,
+    ZeroOne,
+    divergence,
+    embedded,
+    gaussianised,
+    surrogate_test,
+    time_symmetry,
+    zero_one,
+)
 
 _HARMONICS = 8
 _EXPLAINED = 0.02

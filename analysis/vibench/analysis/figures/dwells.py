@@ -12,8 +12,16 @@ from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import COLUMN_HZ, DwellAnalysis, spectrum_columns
 from ..tables import Table, plus_minus, table
-from .ensemble_band import band_columns, draw_band, run_text, simulated_label
-from .marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
+from .ensemble_band import (
+    ModelResonances,
+    band_columns,
+    draw_band,
+    label_resonances,
+    mark_resonances,
+    model_resonances,
+    run_text,
+    simulated_label,
+)
 from .style import (
     COLLIDING,
     MEASURED,

@@ -10,8 +10,17 @@ from ..model.prediction import linear_transmissibility
 from ..recordings.facts import specimen_of
 from ..signals.arrays import Reals
 from ..tables import Table, columns, plus_minus, table
-from .ensemble_band import band_columns, draw_band, run_text, simulated_label, sines_table
-from .marked_resonances import ModelResonances, label_resonances, mark_resonances, model_resonances
+from .ensemble_band import (
+    ModelResonances,
+    band_columns,
+    draw_band,
+    label_resonances,
+    mark_resonances,
+    model_resonances,
+    run_text,
+    simulated_label,
+    sines_table,
+)
 from .style import (
     BOUNDS,
     LINEAR,

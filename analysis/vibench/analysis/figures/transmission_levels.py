@@ -6,7 +6,7 @@ from ..frequency_response.noise_response import NoiseAnalysis
 from ..frequency_response.request import MagnitudeScale
 from ..recordings.facts import specimen_of
 from ..tables import table
-from .marked_resonances import label_resonances, mark_resonances, model_resonances
+from .ensemble_band import label_resonances, mark_resonances, model_resonances
 from .style import (
     LEVEL_STYLES,
     LEVELS,

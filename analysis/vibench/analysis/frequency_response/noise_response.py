@@ -17,9 +17,9 @@ from ..signals.confidence import relative_sd, student_half_width
 from ..signals.quantity import Quantity
 from ..spectra.spectra import DensitySums
 from ..tables import Labelled, columns
-from ..tones.drive_level import NoiseDriveLevel, noise_drive_level
+from ..tones.sine_fit import NoiseDriveLevel, noise_drive_level
 from .distortion import Distortion, distortion, scatters_beyond_noise
-from .mode import Resonance
+from .modal_fit import Resonance
 from .periodic import PeriodicFrequencyResponse, PeriodicSums, Repetition
 from .request import FrequencyResponseRequest
 from .resonance import resonances, scattered_resonances

@@ -9,8 +9,15 @@ import scipy
 from ..errors import InvalidRequest
 from ..signals.arrays import Complexes, Reals
 from ..signals.confidence import standard_uncertainty
-from .modal_fit import Background, Lines, ModalFit, modal_fit
-from .mode import LARGEST_DAMPING, SMALLEST_RELATIVE_SD, Resonance
+from .modal_fit import (
+    LARGEST_DAMPING,
+    SMALLEST_RELATIVE_SD,
+    Background,
+    Lines,
+    ModalFit,
+    Resonance,
+    modal_fit,
+)
 from .results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0

@@ -9,7 +9,7 @@ from ..errors import InvalidRequest, NotEnoughData
 from ..signals.arrays import Complexes, Flags, Reals
 from ..signals.confidence import DEFAULT_CONFIDENCE, coherence_significance, relative_sd, student_half_width
 from ..signals.window import Window
-from ..spectra.segment_spectra import SegmentSpectra, SpectralAverages, pieces
+from ..spectra.spectra import SegmentSpectra, SpectralAverages, pieces
 from .results import Estimator, FrequencyResponse, FrequencyResponseSettings
 
 _ENOUGH_FREEDOM = 24.0

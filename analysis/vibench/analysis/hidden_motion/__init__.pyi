@@ -9,10 +9,8 @@ from ._change_watch import (
     keep_baseline as keep_baseline,
     kept_baseline as kept_baseline,
 )
-from ._collisions import (
-    Collisions as Collisions,
-)
 from ._contact_free import (
+    Collisions as Collisions,
     FreeGap as FreeGap,
     FreeImpacts as FreeImpacts,
     FreeMotion as FreeMotion,

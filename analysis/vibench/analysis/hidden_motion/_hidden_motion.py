@@ -16,8 +16,15 @@ from ..recordings.channels import BASE, RESPONSE
 from ..recordings.facts import require_checked, specimen_of
 from ..signals.arrays import Reals, Samples
 from ..tables import Labelled
-from ._collisions import Collisions, collisions_of, joined_collisions
-from ._contact_free import FreeGap, FreeMotion, free_gaps, free_motion
+from ._contact_free import (
+    Collisions,
+    FreeGap,
+    FreeMotion,
+    collisions_of,
+    free_gaps,
+    free_motion,
+    joined_collisions,
+)
 from ._filtering import motion_model
 from ._found_parameters import FoundParameter, FoundSpecimen, found_specimen, not_believed, with_unit
 from ._parameters import Hidden, Numbers

@@ -8,8 +8,7 @@ from ..chaos.verdict import MotionKind
 from ..comparison.recording_curves import dwell_traces
 from ..frequency_response.request import FrequencyResponseRequest
 from ..model.draws import Draw, Drawn
-from ..model.ensemble import Quantity
-from ..model.escape import Ending
+from ..model.ensemble import Ending, Quantity
 from ..model.overlay import DwellOverlay, dwell_overlay, dwell_quantities
 from ..model.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels
@@ -19,12 +18,14 @@ from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import (
     DwellAnalysis,
     DwellPlan,
+    IrregularMotion,
     bound_frequencies_hz,
+    dwell_motion,
+    irregular_motion,
     measured_dwell,
     settled_envelope,
     terminal_levels,
 )
-from ..sine.dwell_motion import IrregularMotion, dwell_motion, irregular_motion
 from ..sine.sweep_analysis import frequency_check
 from ..uncertainty.quantities import dwell_budgets
 from .analysis_kind import AnalysisKind

@@ -25,25 +25,23 @@ from ._levels import (
     LevelVerdict,
 )
 from ._outline import (
-    column_starts,
-    envelope,
-    outline,
-    zigzag,
-)
-from ._overview import (
     THUMBNAIL_COLUMNS,
     OverviewLevel,
     RecordingOverview,
     Thumbnail,
+    column_starts,
+    envelope,
     has_overview,
     kept_levels,
+    outline,
     overview_levels,
     thumbnail,
+    zigzag,
 )
 from ._portrait import (
     Portrait,
 )
-from ._recording_spectrogram import (
+from ._spectra import (
     DensityPicture,
     RowSpacing,
     SpectrogramRequest,

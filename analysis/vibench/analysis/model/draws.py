@@ -21,8 +21,7 @@ from ..errors import UnusableData
 from ..recordings.channels import BASE, DRIVE, RESPONSE, RecordedChannels
 from ..signals.arrays import Complexes, Reals
 from .driven_rig import Driven, DrivenRig, driven_rig, recorded_voltage
-from .ensemble import FEWEST_DRAWS, Quantity, ensemble_curves
-from .escape import Ending
+from .ensemble import FEWEST_DRAWS, Ending, Quantity, ensemble_curves
 from .shaker_fit import FittedShaker
 from .simulated_channels import (
     HIGHEST_PART,

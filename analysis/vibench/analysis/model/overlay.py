@@ -27,8 +27,17 @@ from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import Labelled
 from .draws import Drawn, SimulatedRun
-from .ensemble import MIXED, CurveDifference, EnsembleCurve, Quantity, ensemble_curves, logarithmic_difference
-from .escape import Ending, EscapeRate, escape_rate
+from .ensemble import (
+    MIXED,
+    CurveDifference,
+    Ending,
+    EnsembleCurve,
+    EscapeRate,
+    Quantity,
+    ensemble_curves,
+    escape_rate,
+    logarithmic_difference,
+)
 from .prediction import ResponsePrediction, paper_amplitude_m, predicted
 
 PREDICTION_STEP_HZ = 2.0

@@ -20,7 +20,7 @@ from ..model.shaker_fit import fitted_shaker
 from ..recordings.facts import described_specimen
 from ..results.campaign_results import CampaignResults
 from ..tables import Labelled, columns, plain, plus_minus
-from ..uncertainty.stated import stated_of
+from ..uncertainty.budget import stated_of
 from .bracketed_gap import bracketed_gap
 from .collision_numbers import CollisionNumbers, Way, numbers_from_statistics, tracked_numbers
 from .gap_fit import fit_gap

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..figures.portraits import verdict_text
-from ..frequency_response.mode import Resonance
+from ..frequency_response.modal_fit import Resonance
 from ..kinds.analysis_kind import AnyResult, DwellResult, NoiseResult, SweepResult
 from ..model.overlay import RESPONSE_I, RESPONSE_II, DwellOverlay
 from ..model.prediction import PAPER_RESONANCES_HZ, PAPER_TERMINAL_RESONANCES_HZ

@@ -20,8 +20,7 @@ from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..signals.arrays import Integers, Reals
 from ..tables import Labelled
-from .background import silence_before
-from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response
+from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
 """What is recorded frequency by frequency, or level by level."""

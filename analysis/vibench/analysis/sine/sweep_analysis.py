@@ -13,7 +13,7 @@ from ..errors import NotEnoughData, UnusableData
 from ..recordings.channels import Channels, only_stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..signals.arrays import Reals
-from ..spectra.spectrogram import Spectrogram, SpectrogramSums
+from ..spectra.spectra import Spectrogram, SpectrogramSums
 from .collision_region import Collisions
 from .dwell import LEAST_CLEAR
 from .jumps import Jump, jumps

@@ -24,9 +24,8 @@ from ..model.overlay import RESPONSE_I, RESPONSE_II
 from ..signals.arrays import Reals
 from ..sine.dwell import DwellResponse, dwell_response
 from ..tables import Labelled
-from .budget import COVERAGE, Cause, Contribution
+from .budget import COVERAGE, Cause, Contribution, Stated, stated_of
 from .quantities import of_one_draw
-from .stated import Stated, stated_of
 
 STEADY = 1e-4
 """Scatter over size below which a simulated motion repeats."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..chaos.verdict import MotionKind
-from ..frequency_response.mode import Resonance
+from ..frequency_response.modal_fit import Resonance
 from ..frequency_response.noise_response import NoiseAnalysis, NoiseResponse
 from ..model.overlay import RESPONSE_I, RESPONSE_II, AbstractOverlay, DwellOverlay
 from ..recordings.facts import RecordingFacts
@@ -17,8 +17,7 @@ from ..sine.dwell_analysis import DwellAnalysis
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 from ..sine.sweep import SweepResponse
 from ..sine.sweep_analysis import SweepAnalysis
-from .budget import Budget, Cause, Contribution, scattered
-from .stated import Stated, stated_of
+from .budget import Budget, Cause, Contribution, Stated, scattered, stated_of
 
 _BLOCKS, _FEWEST_BLOCKS = 50, 10
 """Parts of a window whose maxima tell how that of a whole one scatters."""

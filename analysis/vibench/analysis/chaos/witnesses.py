@@ -1,0 +1,417 @@
+"""Witnesses of chaos in a recorded motion: parting neighbours, the 0-1 test, and surrogates."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.special import ndtri
+
+from ..errors import InvalidRequest, NotEnoughData
+from ..signals.arrays import Flags, Integers, Reals
+
+_MOST_TRIED = 64
+"""Neighbours looked at before a point is given up: those in its own time window do not count."""
+
+
+def embedded(series: Reals, delays: int) -> Reals:
+    """Put each value beside those before it.
+
+    Parameters
+    ----------
+    series
+        Shape (n,) or (n, channels).
+    delays
+        How many successive values make one point.
+
+    Returns
+    -------
+    Shape (n - delays + 1, delays * channels), oldest value first.
+
+    """
+    columns = series.reshape(series.shape[0], -1)
+    if delays < 1:
+        raise InvalidRequest(f"an embedding of {delays} delays is not allowed; give one or more")
+    points = columns.shape[0] - delays + 1
+    if points < 2:
+        raise NotEnoughData(f"{columns.shape[0]} values do not make an embedding of {delays}; measure longer")
+    return np.hstack([columns[first : first + points] for first in range(delays)])
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """The nearest other point of each point that has one."""
+
+    point: Integers
+    neighbour: Integers
+    distance: Reals
+    """Shape (pairs,)."""
+
+
+def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0) -> Neighbours:
+    """Find the nearest point that is not near in time.
+
+    Parameters
+    ----------
+    points
+        Shape (n, dimensions).
+    apart
+        Theiler's window: points less than so many steps apart in time are no neighbours, since one
+        is merely the other a little later (Theiler, Phys. Rev. A 34 (1986) 2427).
+    last
+        Only points before this index take part, so that both can be followed beyond it.
+    floor
+        Neighbours at this distance or nearer do not count: noise decides about them.
+
+    """
+    tree = cKDTree(points[:last])
+    wanted = np.arange(last)
+    found = np.full(last, -1, dtype=np.int64)
+    distance = np.full(last, np.nan)
+    tried = 4
+    while wanted.size and tried <= min(4 * _MOST_TRIED, 4 * last):
+        # A list of ranks keeps the answer two-dimensional, whatever its length.
+        ranks = list(range(1, min(tried, last) + 1))
+        reach, index = (np.asarray(each) for each in tree.query(points[wanted], k=ranks))
+        allowed = (np.abs(index - wanted[:, np.newaxis]) >= apart) & (reach > floor)
+        has = allowed.any(axis=1)
+        first = np.argmax(allowed, axis=1)
+        rows = np.flatnonzero(has)
+        found[wanted[rows]] = index[rows, first[rows]]
+        distance[wanted[rows]] = reach[rows, first[rows]]
+        wanted = wanted[~has]
+        tried *= 4
+    point = np.flatnonzero(found >= 0)
+    return Neighbours(point, found[point], distance[point])
+
+
+def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, Flags]:
+    """Find several neighbours of each point that are ``apart`` steps from it in time or more.
+
+    Returns
+    -------
+    The nearest points of each, and which of them are its neighbours, at most ``count``; shapes (n, tried).
+
+    """
+    tried = min(count + 2 * apart - 1, len(points))
+    index = np.asarray(cKDTree(points).query(points, k=list(range(1, tried + 1)))[1])
+    allowed = np.abs(index - np.arange(len(points))[:, np.newaxis]) >= apart
+    return index, allowed & (np.cumsum(allowed, axis=1) <= count)
+
+
+_SATURATION = 0.25
+"""Distances beyond this part of the typical one feel the size of the attractor, not its stretching."""
+_ABOVE_NOISE = 3.0
+"""Distances below so many times the noise are made by it."""
+_SHORTEST_FIT = 3
+"""Steps a line needs to be a statement."""
+_BLOCKS = 10
+FEWEST_PAIRS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Divergence:
+    """The mean logarithm of the distance of former neighbours, step by step."""
+
+    logarithm: Reals
+    """Mean ln(distance), shape (steps + 1,)."""
+    size: float
+    """ln of the typical distance of two points of the motion."""
+    first: int
+    last: int
+    """Steps between which the line was fitted; last - first is 0 where there was no room for one."""
+    exponent: float
+    """Slope [1/step]; NaN where no line could be fitted."""
+    sd_exponent: float
+    """Scatter of the slope over tenths of the record."""
+    pairs: int
+
+    @property
+    def is_resolved(self) -> bool:
+        """Whether there was room for a line between noise and saturation."""
+        return self.last - self.first >= _SHORTEST_FIT
+
+
+def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float = 0.0) -> Divergence:
+    """Follow neighbouring points until they part.
+
+    Rosenstein, Collins and De Luca, Physica D 65 (1993) 117. The fit begins where distances stand above
+    the noise and ends before they feel the size of the attractor; a slope fitted across either end is a
+    property of the noise or of the size. Where nothing is left between, there is no exponent.
+
+    Raises NotEnoughData when fewer than 50 points have a neighbour.
+
+    Parameters
+    ----------
+    points
+        The motion, shape (n, dimensions): one point a step.
+    steps
+        How long pairs are followed.
+    apart
+        Neighbours are at least so many steps apart in time.
+    noise
+        Standard deviation of the noise on one coordinate, in the coordinates' unit.
+
+    """
+    count, dimensions = points.shape
+    last = count - steps
+    floor = noise * np.sqrt(2 * dimensions)
+    found = nearest_neighbours(points, apart, last, floor=floor) if last > 1 else None
+    if found is None or found.point.size < FEWEST_PAIRS:
+        have = 0 if found is None else found.point.size
+        raise NotEnoughData(
+            f"of {count} points {have} have a neighbour that can be followed for {steps} steps, and "
+            f"{FEWEST_PAIRS} are needed; measure longer"
+        )
+    logarithms = np.empty((steps + 1, found.point.size))
+    for step in range(steps + 1):
+        distance = np.linalg.norm(points[found.point + step] - points[found.neighbour + step], axis=1)
+        logarithms[step] = np.log(np.maximum(distance, np.finfo(np.float64).tiny))
+    mean = logarithms.mean(axis=1)
+    size = _typical(points)
+    first, final = _fit_range(mean, size, floor, apart)
+    return Divergence(mean, size, first, final, *_slope(logarithms, first, final), int(found.point.size))
+
+
+def _typical(points: Reals) -> float:
+    """Mean ln distance of points that have nothing to do with each other: half the record apart."""
+    half = points.shape[0] // 2
+    distance = np.linalg.norm(points[half : 2 * half] - points[:half], axis=1)
+    return float(np.mean(np.log(np.maximum(distance, np.finfo(np.float64).tiny))))
+
+
+def _fit_range(mean: Reals, size: float, floor: float, apart: int) -> tuple[int, int]:
+    top = size + np.log(_SATURATION)
+    above = np.flatnonzero(mean > np.log(_ABOVE_NOISE * floor)) if floor > 0.0 else np.arange(mean.size)
+    beyond = np.flatnonzero(mean > top)
+    first = int(above[0]) if above.size else mean.size - 1
+    # Within its own memory a difference turns into the stretching direction: no part of the line.
+    first = max(first, apart)
+    last = int(beyond[0]) - 1 if beyond.size else mean.size - 1
+    return (first, last) if last - first >= _SHORTEST_FIT else (first, first)
+
+
+def _slope(logarithms: Reals, first: int, last: int) -> tuple[float, float]:
+    if last == first:
+        return float("nan"), float("nan")
+    steps = np.arange(first, last + 1)
+    parts = np.array_split(logarithms[first : last + 1], _BLOCKS, axis=1)
+    slopes = [float(np.polyfit(steps, part.mean(axis=1), 1)[0]) for part in parts]
+    whole = float(np.polyfit(steps, logarithms[first : last + 1].mean(axis=1), 1)[0])
+    return whole, float(np.std(slopes, ddof=1)) / np.sqrt(_BLOCKS)
+
+
+_LOWEST, _HIGHEST = np.pi / 5, 4 * np.pi / 5
+"""Frequencies c outside are prone to resonances (section 3.1 of the source)."""
+_FREQUENCIES = 100
+_CUT = 10
+"""The mean square displacement is followed over this part of the series."""
+FEWEST = 200
+OVERSAMPLED = 0.8
+"""Correlation of neighbours above which a series is a flow sampled too finely for this test."""
+
+
+@dataclass(frozen=True)
+class ZeroOne:
+    """What the 0-1 test says."""
+
+    k: float
+    """Median of the correlations K_c: near 0 regular, near 1 chaotic *or noisy*."""
+    spread: float
+    """Half the distance between their quartiles."""
+    neighbour_correlation: float
+    """Of each value with the next."""
+
+    @property
+    def is_oversampled(self) -> bool:
+        """Whether neighbours resemble each other so much that K says nothing."""
+        return self.neighbour_correlation > OVERSAMPLED
+
+
+def zero_one(series: Reals, *, seed: int = 0) -> ZeroOne:
+    """Test a series that was taken once per drive period.
+
+    Gottwald and Melbourne, SIAM J. Appl. Dyn. Syst. 8 (2009) 129, the correlation method with the
+    oscillatory term removed (eqs. 3.1 to 3.6). Noise passes for chaos in it, and an oversampled chaotic
+    flow for regular motion: it is one witness, never the judge.
+
+    Raises NotEnoughData when the series is too short.
+
+    Parameters
+    ----------
+    series
+        Shape (n,), at least 200 values.
+    seed
+        Of the frequencies c.
+
+    """
+    count = series.size
+    if count < FEWEST:
+        raise NotEnoughData(f"the 0-1 test needs {FEWEST} values and was given {count}; measure longer")
+    centred = series - series.mean()
+    power = float(np.mean(centred**2))
+    if power == 0.0:
+        return ZeroOne(0.0, 0.0, 0.0)
+    neighbours = float(np.mean(centred[1:] * centred[:-1])) / power
+    frequencies = np.random.default_rng(seed).uniform(_LOWEST, _HIGHEST, _FREQUENCIES)
+    correlations = [_correlation(series, each) for each in frequencies]
+    lower, middle, upper = np.quantile(correlations, (0.25, 0.5, 0.75))
+    return ZeroOne(float(middle), float(0.5 * (upper - lower)), neighbours)
+
+
+def _correlation(series: Reals, frequency: float) -> float:
+    """K_c: how straight the mean square displacement of the translated motion grows."""
+    count = series.size
+    cut = count // _CUT
+    walk = np.cumsum(series * np.exp(1j * frequency * np.arange(1, count + 1)))
+    lags = np.arange(1, cut + 1)
+    displacement = np.array(
+        [np.mean(np.abs(walk[lag : count - cut + lag] - walk[: count - cut]) ** 2) for lag in lags]
+    )
+    oscillation = series.mean() ** 2 * (1 - np.cos(frequency * lags)) / (1 - np.cos(frequency))
+    return float(np.corrcoef(lags, displacement - oscillation)[0, 1])
+
+
+SURROGATES = 39
+"""The smallest statistic of 40 then has a chance of 1/40 = 0.025 if the series is linear noise."""
+_DELAYS, _NEIGHBOURS = 4, 10
+"""Values that make a past, and similar pasts that foretell the next value."""
+_ITERATIONS = 200
+_SETTLED = 1e-8
+_LAGS = (1, 2, 3, 4)
+_SPECTRUM_KEPT = 0.05
+"""Relative error of a surrogate's spectrum up to which it stands for the series."""
+
+
+@dataclass(frozen=True)
+class SurrogateTest:
+    """A series against linear noise with the same spectrum and the same values."""
+
+    statistic: float
+    surrogates: tuple[float, ...]
+    spectrum_error: float
+    """Largest relative error of a surrogate's spectrum."""
+    least_margin: float = 0.0
+    """Margin below which the statistic is due to chance."""
+
+    @property
+    def margin(self) -> float:
+        """How far the statistic lies below the surrogates' mean, in their standard deviations."""
+        away = float(np.mean(self.surrogates)) - self.statistic
+        return away / max(float(np.std(self.surrogates, ddof=1)), np.finfo(np.float64).tiny)
+
+    @property
+    def p(self) -> float:
+        """Chance of a statistic as small as this if the series were linear noise (one-sided rank)."""
+        smaller = sum(each <= self.statistic for each in self.surrogates)
+        return (smaller + 1) / (len(self.surrogates) + 1)
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether the surrogates took over the spectrum; if not, their test says nothing."""
+        return self.spectrum_error <= _SPECTRUM_KEPT
+
+    @property
+    def rejects_linear_noise(self) -> bool:
+        """Whether the series is more than linear noise."""
+        is_lowest = self.p <= 1 / (len(self.surrogates) + 1)
+        return self.is_valid and is_lowest and self.margin >= self.least_margin
+
+
+def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
+    """Make one surrogate: the series' values in an order that has its spectrum, else at random.
+
+    Schreiber and Schmitz, Phys. Rev. Lett. 77 (1996) 635 (iterated amplitude-adjusted Fourier transform).
+
+    Returns
+    -------
+    The surrogate, shape of ``series``, and the relative error of its spectrum (root mean square).
+
+    """
+    values = np.sort(series)
+    wanted = np.abs(np.fft.rfft(series - series.mean()))
+    scale = float(np.sqrt(np.mean(wanted**2)))
+    shuffled = rng.permutation(series)
+    error = np.inf
+    for _ in range(_ITERATIONS):
+        spectrum = np.fft.rfft(shuffled - shuffled.mean())
+        before = error
+        error = float(np.sqrt(np.mean((np.abs(spectrum) - wanted) ** 2))) / scale
+        if before - error < _SETTLED:
+            break
+        turned = np.fft.irfft(wanted * np.exp(1j * np.angle(spectrum)), series.size)
+        shuffled = values[np.argsort(np.argsort(turned))]
+    return shuffled, error
+
+
+def prediction_error(series: Reals) -> float:
+    """Say how badly each value is foretold by what followed the most similar pasts, over the scatter.
+
+    Zeroth-order nonlinear prediction (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section
+    4.2), the mean over neighbours: far below 1 where the past decides the future, near 1 where it does not.
+    One neighbour, and fewer delays, left more of the chaos among impacts undecided.
+    """
+    pasts, next_values = embedded(series, _DELAYS)[:-1], series[_DELAYS:]
+    # Pasts that share values with the one in question are no neighbours of it.
+    index, nearest = neighbours_apart(pasts, _DELAYS, _NEIGHBOURS)
+    has = nearest.any(axis=1)
+    foretold = np.sum(next_values[index[has]] * nearest[has], axis=1) / np.sum(nearest[has], axis=1)
+    miss = next_values[has] - foretold
+    return float(np.sqrt(np.mean(miss**2)) / np.std(series))
+
+
+def time_symmetry(series: Reals) -> float:
+    """Return the skewness of a series' increments, root mean square over lags of 1 to 4, with a minus sign.
+
+    Linear noise is symmetric in time, also behind any static nonlinearity; dissipative chaos seldom is
+    (Schreiber and Schmitz, Physica D 142 (2000) 346, section 5).
+    """
+    rises = [series[lag:] - series[:-lag] for lag in _LAGS]
+    skewness = [np.mean(each**3) / np.mean(each**2) ** 1.5 for each in rises]
+    return -float(np.sqrt(np.mean(np.square(skewness))))
+
+
+def surrogate_test(
+    series: Reals, statistic: Callable[[Reals], float] = prediction_error, *, seed: int = 0
+) -> SurrogateTest:
+    """Compare a statistic, which is small for determinism, with that of surrogates.
+
+    Parameters
+    ----------
+    series
+        Shape (n,), taken once per drive period.
+    statistic
+        `prediction_error` or `time_symmetry`.
+    seed
+        Of the surrogates.
+
+    """
+    matched = _with_matching_ends(series)
+    rng = np.random.default_rng(seed)
+    made = [surrogate(matched, rng) for _ in range(SURROGATES)]
+    return SurrogateTest(
+        statistic=statistic(matched),
+        surrogates=tuple(statistic(each) for each, _ in made),
+        spectrum_error=max(error for _, error in made),
+    )
+
+
+def gaussianised(series: Reals) -> Reals:
+    """Replace values by normal ones of the same rank: this undoes a static, monotone nonlinearity of noise.
+
+    Surrogates with the distorted values themselves match the spectrum only after iterations.
+    """
+    rank = np.argsort(np.argsort(series))
+    return np.asarray(ndtri((rank + 0.5) / series.size))
+
+
+def _with_matching_ends(series: Reals) -> Reals:
+    """Cut a few values off so that the end joins the beginning: a jump there would pass for noise."""
+    most = max(1, series.size // 10)
+    heads = series[:most]
+    tails = series[series.size - most :]
+    slopes_head = series[1 : most + 1] - heads
+    slopes_tail = np.diff(series[series.size - most - 1 :])
+    gap = np.abs(heads[:, np.newaxis] - tails) + np.abs(slopes_head[:, np.newaxis] - slopes_tail)
+    head, tail = np.unravel_index(int(np.argmin(gap)), gap.shape)
+    return series[int(head) : series.size - most + int(tail) + 1]
