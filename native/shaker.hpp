@@ -31,10 +31,11 @@ inline int64_t shake(LoadedShaker &s, Run &run, const Motion<double> &specimen, 
   for (int64_t n = begin; n < stop; n++) {
     double u0 = s.base_displacement, v0 = s.base_velocity, x0 = specimen.at[X];
     double reaction = of.k0 * (x0 - u0) + of.c0 * (specimen.at[VX] - v0);
-    // At the middle of the step, by extrapolation: a force held from the step's start would lag by half a step and feed
-    // energy into the table.
-    double force = 1.5 * reaction - 0.5 * s.reaction_before, rubber = rubber_force(s);
-    s.reaction_before = reaction;
+    // Mean over the step of the parabola through the last three (Adams and Bashforth): a force held from the step's start
+    // would lag by half a step and feed energy into the table.
+    double (&before)[2] = s.reactions_before;
+    double force = (23.0 * reaction - 16.0 * before[0] + 5.0 * before[1]) / 12.0, rubber = rubber_force(s);
+    before[1] = before[0], before[0] = reaction;
     s.bumps += rubber != 0.0;
     force += rubber;
     double asked = amplified(s.drive.at[n], s), clipped = smaller(larger(asked, -s.clip), s.clip);

@@ -313,7 +313,7 @@ STRUCTURE(LoadedShaker,
   double base_displacement, base_velocity;  // [m] [m/s]
   double current;              // of the coil [A]
   double low_cut, high_cut;    // state of the amplifier's band edges [V]
-  double reaction_before;      // the specimen's force on the base one step earlier [N]
+  double reactions_before[2];  // the specimen's force on the base one and two steps earlier [N]
   State specimen;
   Numbers tables;              // of the specimen on bases that are cubics over a step
   double tolerance;            // of its contacts

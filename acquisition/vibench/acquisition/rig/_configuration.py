@@ -148,7 +148,7 @@ def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
     """By what part the base moves too little in a sine, at most.
 
     The drive is averaged over a step and held, (pi f h)^2 / 3; the rest is the specimen's force on the
-    table, which is extrapolated to the middle of the step. How the specimen answers to the base is exact.
+    table, which is extrapolated over the step. How the specimen answers to the base is exact.
     """
     return _MEASURED * (pi * frequency_hz / grid_rate_hz) ** 2
 

@@ -155,8 +155,8 @@ class LoadedShaker:
 
     Coil and table are solved exactly for a voltage and a force that are held over a step; the specimen
     exactly between its impacts, which are resolved inside a step (native/cubic.hpp). The specimen's
-    force on the table is extrapolated to the middle of the step, at a cost of about (5/12)(omega h)^2 of it
-    (docs/decisions/0006-virtual-rig.md). One thread at a time.
+    force on the table is extrapolated over the step; that it is held misplaces the table by about
+    (omega h)^2 / 12 of its share (docs/decisions/0006-virtual-rig.md). One thread at a time.
     """
 
     def __init__(
@@ -186,6 +186,8 @@ class LoadedShaker:
         """As the engine moves it."""
         self._step_s = step_s
         self._place(specimen, start)
+        x, _, _, vx, _, _ = self.structure["specimen"]["motion"]
+        self.structure["reactions_before"] = specimen.stiffnesses[0] * x + specimen.dampings[0] * vx
         equations = shaker.equations()
         inputs = equations.B.shape[1]
         joint = np.zeros((_SHAKER_SIZE + inputs, _SHAKER_SIZE + inputs))

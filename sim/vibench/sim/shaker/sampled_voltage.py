@@ -20,8 +20,8 @@ ComplexArray = NDArray[np.complex128]
 Gain = Callable[[FloatArray], ComplexArray]
 """Complex gain of a sensor over frequency [Hz], shape kept."""
 
-FINEST_STEP_HZ = 1e5
-"""The steps are at least so many a second: 600 Hz then errs by 1e-3 of the specimen's push on the table."""
+FINEST_STEP_HZ = 5e4
+"""The steps are at least so many a second: 600 Hz then errs by 5e-4 of the specimen's push on the table."""
 _PASS_PART = 0.45
 """Of the sample rate: passed whole; from there a cosine edge to half the rate, as behind a converter."""
 _MARGIN = 2048
@@ -103,7 +103,7 @@ def follow_voltage(
     block = max(1, round(_BLOCK_S * sample_rate_hz)) * ratio
     tail = np.zeros((2, 0))
     done = 0
-    resampling = _Resampling(sample_rate_hz, ratio)
+    resampling = _Resampling(sample_rate_hz, ratio, table.shaker)
     for stop, fine in resampling.stretches(volts):
         means = np.empty((2, fine.size))
         for begin in range(0, fine.size, block):
@@ -137,9 +137,10 @@ class _Resampling:
     shifts cancel.
     """
 
-    def __init__(self, sample_rate_hz: float, ratio: int) -> None:
+    def __init__(self, sample_rate_hz: float, ratio: int, shaker: Shaker) -> None:
         self._sample_rate_hz = sample_rate_hz
         self._ratio = ratio
+        self._shaker = shaker
         # The pieces of a record are of one length, but the last.
         self._weights: dict[tuple[int, Gain | None], FloatArray | ComplexArray] = {}
 
@@ -173,9 +174,23 @@ class _Resampling:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
             mean_of_step = np.sinc(frequency_hz / (self._sample_rate_hz * self._ratio)) * self._ratio
             band = _pass_band(frequency_hz / self._sample_rate_hz)
-            known = band * mean_of_step if gain is None else band * gain(frequency_hz) / mean_of_step
+            if gain is None:
+                known = band * mean_of_step / self._held(frequency_hz)
+            else:
+                known = band * gain(frequency_hz) / mean_of_step
             self._weights[size, gain] = known
         return known
+
+    def _held(self, frequency_hz: FloatArray) -> ComplexArray:
+        """Return the coil's mean current under a voltage held over steps, over that under the voltage itself.
+
+        A coil at rest, whose current lags with time constant L / R: about 1 - (omega h)^2 / 12.
+        """
+        time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
+        lag = 2j * np.pi * frequency_hz * time_constant_s
+        turns = self._sample_rate_hz * self._ratio * time_constant_s
+        left, turned = np.exp(-1 / turns), np.exp(lag / turns)
+        return np.asarray((1 + lag) * (1 - turns * (turned - 1) * (1 - left) / (turned - left)))
 
 
 def _padded(samples: int) -> int:
