@@ -59,17 +59,16 @@ def base_transmissibility(specimen: Specimen, frequency_hz: ArrayLike) -> Comple
     if frequency.ndim != 1 or not bool(np.all(np.isfinite(frequency) & (frequency >= 0.0))):
         msg = "Frequencies must be one row of finite numbers, zero or positive, in Hz."
         raise ValueError(msg)
-    omega = 2.0 * np.pi * frequency[:, None, None]
-    dynamic = (
-        specimen.stiffness_matrix - omega**2 * specimen.mass_matrix + 1j * omega * specimen.damping_matrix
-    )
-    forcing = np.zeros((len(frequency), 3, 1), dtype=np.complex128)
-    forcing[:, 0, 0] = specimen.stiffnesses[0] + 1j * omega[:, 0, 0] * specimen.dampings[0]
-    # In mass-normalised coordinates: a light mass beside a heavy one keeps all its digits.
-    root = np.sqrt(np.asarray(specimen.masses))
-    scaled = np.linalg.solve(dynamic / np.outer(root, root), forcing / root[:, None])
-    moved = (scaled[:, :, 0] / root).astype(np.complex128)
-    return np.column_stack([moved, moved[:, 1] - moved[:, 2]])
+    omega = 2.0 * np.pi * frequency
+    (m0, m1, m2), squared = specimen.masses, omega**2
+    springs, dampers = specimen.stiffnesses, specimen.dampings
+    k0, k1, k2 = (k + 1j * omega * c for k, c in zip(springs, dampers, strict=True))
+    # m1 and m2 eliminated without differences of nearly equal stiffnesses.
+    pair = k1 * (k2 - squared * m2) - squared * m1 * (k1 + k2 - squared * m2)
+    carried = (m1 + m2) * k1 - squared * m1 * m2
+    per_force = k0 / ((k0 - squared * m0) * pair - k2 * squared * carried)
+    y, p = per_force * k1 * k2, per_force * k2 * squared * m1
+    return np.column_stack([per_force * pair, y, y - p, p])
 
 
 class ModalForm(NamedTuple):
