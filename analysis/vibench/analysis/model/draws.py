@@ -9,7 +9,8 @@ from itertools import islice
 from typing import ClassVar, Generic, TypeVar
 
 import numpy as np
-import scipy
+from numpy.typing import NDArray
+from scipy import fft
 
 from vibench.acquisition.plan import Measurement
 from vibench.acquisition.recording import BridgedChannel, Recording
@@ -33,10 +34,15 @@ from .simulated_channels import (
 
 _FRAME_SAMPLES = 1 << 15
 """Within which a drive's lines stand apart from noise: half a second to a second."""
+_BATCH_FRAMES = 16
+"""Changed together: some ten megabytes."""
 _LEVEL_LINES = 256
 """Over which the level of noise is taken: of their median, which a few lines of the drive hardly move."""
 _SURELY = 20.0
 """Power of a line over that of noise, which exceeds it once in 5e8 lines."""
+
+
+Singles = NDArray[np.float32]
 
 
 class PlayedVoltage:
@@ -51,33 +57,63 @@ class PlayedVoltage:
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
         self._volts, self._own_v = volts, converter_rms_v
-        frame = min(_FRAME_SAMPLES, max(4, volts.size // 2))
-        self._frames = scipy.signal.ShortTimeFFT(scipy.signal.windows.hann(frame, sym=False), frame // 2, 1.0)
+        self._hop = min(_FRAME_SAMPLES, max(4, volts.size // 2)) // 2
+        self._shape = 2 - (-volts.size // self._hop), self._hop
+        """Halves of frames, of which the first and the last lie outside."""
+        self._window = np.hanning(2 * self._hop + 1)[:-1]
+        halves = self._window.reshape(2, self._hop)
+        self._back = (halves / np.sum(halves**2, axis=0)).ravel()
+        """Window of synthesis, with which frames that overlap by half add up to what was taken apart."""
 
     @cached_property
-    def _likely(self) -> tuple[Complexes, Reals]:
-        """Lines of each frame, shape (lines, frames): the likely part, and its share of what was recorded."""
-        lines = self._frames.stft(self._volts)
-        own = self._own_v**2 * float(np.sum(self._frames.win**2))
-        power = np.abs(lines) ** 2
-        # The median of exponentially distributed powers is log 2 of their mean.
-        level = np.concatenate(
-            [
-                np.broadcast_to(np.median(each, axis=0) / np.log(2.0), each.shape)
-                for each in np.array_split(power, max(1, len(power) // _LEVEL_LINES))
-            ]
-        )
-        total = np.maximum(level, own)
-        share = np.where(power > _SURELY * total, 1.0, 1.0 - own / np.where(total > 0.0, total, 1.0))
-        return share * lines, share
+    def _likely(self) -> tuple[Reals, list[Singles]]:
+        """The likely voltage, and roots of the shares of what was recorded, by line in batches of frames."""
+        own = self._own_v**2 * float(np.sum(self._window**2))
+        roots: list[Singles] = []
+
+        def filtered(lines: Complexes) -> Complexes:
+            power = np.abs(lines) ** 2
+            # The median of exponentially distributed powers is log 2 of their mean.
+            level = np.concatenate(
+                [
+                    np.broadcast_to(np.median(each, axis=1, keepdims=True) / np.log(2.0), each.shape)
+                    for each in np.array_split(power, max(1, power.shape[1] // _LEVEL_LINES), axis=1)
+                ],
+                axis=1,
+            )
+            total = np.maximum(level, own)
+            share = np.where(power > _SURELY * total, 1.0, 1.0 - own / np.where(total > 0.0, total, 1.0))
+            roots.append(np.sqrt(share, dtype=np.float32))
+            return share * lines
+
+        recorded = np.zeros(self._shape)
+        recorded.ravel()[self._hop : self._hop + self._volts.size] = self._volts
+        return self._through(filtered, recorded), roots
 
     def drawn(self, rng: np.random.Generator) -> Reals:
         """Give a voltage that may have been played, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._volts
-        lines, share = self._likely
-        own = self._frames.stft(self._own_v * rng.standard_normal(self._volts.size))
-        return np.asarray(self._frames.istft(lines + np.sqrt(share) * own, k1=self._volts.size).real)
+        likely, roots = self._likely
+        share = iter(roots)
+        own = rng.standard_normal(self._shape)
+        own *= self._own_v
+        drawn = self._through(lambda lines: next(share) * lines, own)
+        drawn += likely
+        return drawn
+
+    def _through(self, change: Callable[[Complexes], Complexes], halves: Reals) -> Reals:
+        """Change the lines of frames, shape (frames, lines) in batches; a frame is two of ``halves``."""
+        hop, frames = self._hop, len(halves) - 1
+        result = np.zeros_like(halves)
+        for first in range(0, frames, _BATCH_FRAMES):
+            last = min(first + _BATCH_FRAMES, frames)
+            whole = np.concatenate([halves[first:last], halves[first + 1 : last + 1]], axis=1)
+            lines = change(fft.rfft(whole * self._window, overwrite_x=True))
+            whole = fft.irfft(lines, self._window.size, overwrite_x=True) * self._back
+            result[first:last] += whole[:, :hop]
+            result[first + 1 : last + 1] += whole[:, hop:]
+        return result.ravel()[hop : hop + self._volts.size]
 
 
 def above_noise(volts: Reals, rms: float) -> Reals:
@@ -337,15 +373,13 @@ def _drawn_channels(
 ) -> SimulatedChannels:
     rng = np.random.default_rng([_SEED, number])
     table = rig.table if fitted is None else replace(rig.table, shaker=fitted.drawn(rng))
-    motion, base, velocity = _moved(
-        replace(rig, table=table), voltage.drawn(rng), recorded.recording, noise, rng
-    )
+    motion = _moved(replace(rig, table=table), voltage.drawn(rng), recorded.recording, noise, rng)
     return SimulatedChannels(
         recorded,
-        velocity,
+        motion.m0_velocity,
         (motion.impact_times_s, motion.impacts.astype(np.float64)),
         recorded.response_delay_s,
-        base,
+        motion.base_acceleration,
         drive_v,
         recorded.response_gain,
     )
@@ -353,8 +387,8 @@ def _drawn_channels(
 
 def _moved(
     rig: DrivenRig, volts: Reals, recording: Recording, noise: ChannelNoise, rng: np.random.Generator
-) -> tuple[SampledMotion, Reals, Reals]:
-    """Move rig and specimen from a start of their own; gives the base's and m0's channels too, with noise."""
+) -> SampledMotion:
+    """Move rig and specimen from a random start; the channels of base and m0 get their noise."""
     try:
         motion = follow_voltage(
             rig.table,
@@ -364,11 +398,11 @@ def _moved(
         )
     except MotionFailed as error:
         raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
-    base, velocity = (
-        seen + noise.rms[role] * rng.standard_normal(seen.size)
-        for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity))
-    )
-    return motion, base, velocity
+    for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity)):
+        own = rng.standard_normal(seen.size)
+        own *= noise.rms[role]
+        seen += own
+    return motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -411,8 +445,8 @@ class StretchDraws:
         rig = replace(self.rig, table=replace(self.rig.table, shaker=shaker, specimen=specimen))
         rms = {role: each * np.exp(rng.uniform(-1, 1) * _NOISE) for role, each in self.noise.rms.items()}
         noise = ChannelNoise(rms, self.noise.converter_v)
-        _, base, velocity = _moved(rig, self.volts, self.recording, noise, rng)
-        return np.stack([base[self.kept], velocity[self.kept]])
+        motion = _moved(rig, self.volts, self.recording, noise, rng)
+        return np.stack([motion.base_acceleration[self.kept], motion.m0_velocity[self.kept]])
 
 
 def stretch_draws(
