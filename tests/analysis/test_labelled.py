@@ -173,6 +173,7 @@ is_clear slow_change strobe_sample surrogates transmission turns_per_period up w
 """
 PURE = set(_PURE.split())
 """Counts, shares, ratios, flags and numbers of samples: names that mean the same in every result."""
+_OF_A_SWEEP = ("linear_residual", "steady_over_swept")
 PURE_HERE = {
     *(f"ZeroOne.{name}" for name in ("k", "spread")),
     *(f"Evidence.{name}" for name in ("spread", "noise")),
@@ -185,8 +186,7 @@ PURE_HERE = {
     "DwellResponse.slow_change",
     "SteppedResponse.slow_change",
     "SurrogateTest.least_margin",
-    "SweepResponse.linear_residual",
-    "SweepResponse.steady_over_swept",
+    *(f"{kind}.{name}" for kind in ("SweptMotion", "SweepResponse") for name in _OF_A_SWEEP),
     "Divergence.size",
     "Divergence.last",
     "Collisions.samples",

@@ -1,5 +1,6 @@
 """The analysis of a branch that a fast loop held: that of stepped sines, without a simulation."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import nan
 
@@ -11,7 +12,7 @@ from vibench.analysis.model.simulated_channels import SimulatedChannels
 from vibench.analysis.sine.stepped_response import SteppedResponse, SteppedSineAnalysis
 
 
-def _undrawn(_: SteppedSineAnalysis, __: SimulatedChannels) -> Draw[SteppedResponse]:
+def _undrawn(_: SteppedSineAnalysis) -> Callable[[SimulatedChannels], Draw[SteppedResponse]]:
     raise UnusableData(
         "the motions of a branch were held by a fast loop, and under the recorded voltage alone the model "
         "leaves them; nothing was simulated, compare them with the model's branch"
@@ -20,5 +21,5 @@ def _undrawn(_: SteppedSineAnalysis, __: SimulatedChannels) -> Draw[SteppedRespo
 
 # A branch folds: it is no curve over frequency.
 BRANCH_CONTINUATION = replace(
-    stepped(lambda *_: nan, SegmentLabel.BRANCH), draw=_undrawn, curves=lambda *_: iter(())
+    stepped(lambda *_: nan, SegmentLabel.BRANCH), draws=_undrawn, curves=lambda *_: iter(())
 )

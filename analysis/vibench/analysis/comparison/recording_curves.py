@@ -19,7 +19,7 @@ from ..signals.confidence import DEFAULT_CONFIDENCE
 from ..signals.window import Window
 from ..sine.dwell import DwellResponse
 from ..sine.stepped_response import SteppedResponse
-from ..sine.sweep import SweepResponse
+from ..sine.sweep import SweptMotion
 from .curve import Curve, CurveKind, CurveOrigin
 
 SAME_HZ = 0.01
@@ -52,7 +52,7 @@ def noise_traces(name: str, origin: CurveOrigin, response: NoiseResponse) -> Ite
     )
 
 
-def sweep_traces(name: str, origin: CurveOrigin, found: SweepResponse) -> Iterator[Curve]:
+def sweep_traces(name: str, origin: CurveOrigin, found: SweptMotion) -> Iterator[Curve]:
     """Make a curve of each response that a sweep measured."""
     note = f"{found.sweep_rate_hz_per_s:+.3g} Hz/s"
     yield from _responses(

@@ -53,8 +53,8 @@ class AnalysisKind(Generic[P, A, L]):
     family: str
     """What JSON calls the results; kinds with equal results share it."""
     analyse: Callable[[RecordingFacts, Channels, P, FrequencyResponseRequest], A]
-    draw: Callable[[A, SimulatedChannels], Draw[Any]]
-    """Estimate from simulated channels what was estimated from the recorded ones."""
+    draws: Callable[[A], Callable[[SimulatedChannels], Draw[Any]]]
+    """Give what estimates from simulated channels what was estimated from the recorded ones."""
     compared: Callable[[A], tuple[Quantity, ...]]
     """What of the measurement is set into the draws."""
     lay: Callable[[A, Drawn[Any]], L]

@@ -1,5 +1,7 @@
 """Dwells: both responses, the lines of the spectrum, and how the motion repeats."""
 
+from functools import partial
+
 import numpy as np
 
 from vibench.acquisition.recording import SegmentLabel
@@ -78,7 +80,7 @@ def _lay(analysis: DwellAnalysis, drawn: Drawn[DwellResponse]) -> DwellOverlay:
 DWELL = AnalysisKind(
     family="dwell",
     analyse=_analyse,
-    draw=_draw,
+    draws=lambda analysis: partial(_draw, analysis),
     compared=_compared,
     lay=_lay,
     curves=dwell_traces,

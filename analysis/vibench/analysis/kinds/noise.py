@@ -58,7 +58,7 @@ def _noise(
     return AnalysisKind(
         family=NOISE_FAMILY,
         analyse=analyse,
-        draw=draw,
+        draws=lambda analysis: partial(draw, analysis),
         compared=lambda analysis: noise_quantities(analysis.response),
         lay=noise_overlay,
         curves=noise_traces,

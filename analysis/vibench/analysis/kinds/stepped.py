@@ -1,6 +1,7 @@
 """Stepped sines: responses frequency by frequency or level by level."""
 
 from collections.abc import Callable
+from functools import partial
 from math import nan
 
 import numpy as np
@@ -60,7 +61,7 @@ def stepped(
     return AnalysisKind(
         family="stepped_sine",
         analyse=analyse,
-        draw=draw,
+        draws=lambda analysis: partial(draw, analysis),
         compared=_compared,
         lay=stepped_overlay,
         curves=stepped_traces,

@@ -1,5 +1,7 @@
 """Sweeps: responses over frequency, and where the masses collide."""
 
+from collections.abc import Callable
+
 from vibench.acquisition.recording import SegmentLabel
 
 from ..comparison.recording_curves import sweep_traces
@@ -11,8 +13,15 @@ from ..recordings.channels import Channels
 from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts, known_specimen
 from ..sine.collision_region import collisions
-from ..sine.sweep import SweepResponse
-from ..sine.sweep_analysis import Sweep, SweepAnalysis, measured_sweep, played_check, smooth_jumps
+from ..sine.sweep import SweptMotion
+from ..sine.sweep_analysis import (
+    Sweep,
+    SweepAnalysis,
+    SweepDraws,
+    measured_sweep,
+    played_check,
+    smooth_jumps,
+)
 from ..uncertainty.quantities import sweep_budgets
 from .analysis_kind import AnalysisKind
 
@@ -27,17 +36,22 @@ def _analyse(
     return SweepAnalysis(facts, checks, plan, response, colliding, jumps, picture)
 
 
-def _draw(analysis: SweepAnalysis, channels: SimulatedChannels) -> Draw[SweepResponse]:
-    found, _ = measured_sweep(channels, analysis.excitation, known_specimen(analysis.facts.bench))
-    colliding = collisions(found)
-    impacts = channels.played_impacts(SegmentLabel.SWEEP)
-    return Draw(found, sweep_quantities(found, colliding), sweep_endings(colliding), *impacts)
+def _draws(analysis: SweepAnalysis) -> Callable[[SimulatedChannels], Draw[SweptMotion]]:
+    swept = SweepDraws(analysis.excitation, known_specimen(analysis.facts.bench))
+
+    def draw(channels: SimulatedChannels) -> Draw[SweptMotion]:
+        found = swept.motion(channels)
+        colliding = collisions(found)
+        impacts = channels.played_impacts(SegmentLabel.SWEEP)
+        return Draw(found, sweep_quantities(found, colliding), sweep_endings(colliding), *impacts)
+
+    return draw
 
 
 SWEEP = AnalysisKind(
     family="sweep",
     analyse=_analyse,
-    draw=_draw,
+    draws=_draws,
     compared=lambda analysis: sweep_quantities(analysis.response, analysis.collisions),
     lay=sweep_overlay,
     curves=sweep_traces,

@@ -401,7 +401,7 @@ def _moved(
     for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity)):
         own = rng.standard_normal(seen.size)
         own *= noise.rms[role]
-        seen += own
+        np.add(seen, own, out=seen)
     return motion
 
 

@@ -23,7 +23,7 @@ from ..sine.dwell_analysis import (
     terminal_levels,
 )
 from ..sine.stepped_response import SteppedResponse, SteppedSineAnalysis
-from ..sine.sweep import SweepResponse
+from ..sine.sweep import SweptMotion
 from ..sine.sweep_analysis import SweepAnalysis
 from ..tables import Labelled
 from .draws import Drawn, SimulatedRun
@@ -96,7 +96,7 @@ class NoiseOverlay(AbstractOverlay[NoiseResponse]):
 
 
 @dataclass(frozen=True, eq=False)
-class SweepOverlay(AbstractOverlay[SweepResponse]):
+class SweepOverlay(AbstractOverlay[SweptMotion]):
     """A sweep, and what the model says of it."""
 
     DOCUMENT: ClassVar = f"{AbstractOverlay.DOCUMENT} collision_regions=collisions.regions"
@@ -202,8 +202,8 @@ def equivalent_amplitude(analysis: NoiseAnalysis) -> tuple[float, str]:
 def _sine_difference(
     drawn: Drawn[R],
     compared: Sequence[Quantity],
-    measured: SweepResponse | DwellResponse | SteppedResponse,
-    simulated: SweepResponse | DwellResponse | SteppedResponse,
+    measured: SweptMotion | DwellResponse | SteppedResponse,
+    simulated: SweptMotion | DwellResponse | SteppedResponse,
 ) -> CurveDifference:
     """Compare Responses II."""
     (quantity,) = (each for each in compared if each.name == RESPONSE_II)
@@ -217,7 +217,7 @@ _EDGE_S = 1.0
 """How near the edge of a stretch of collisions a sweep's intervals are not compared."""
 
 
-def sweep_quantities(response: SweepResponse, found: Collisions) -> tuple[Quantity, ...]:
+def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
     """Give what a draw of a sweep is compared by: where one collides and another does not, nothing.
 
     Nor within a second of an edge, where an interval holds some of either motion.
@@ -240,7 +240,7 @@ def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
     return (Ending("collisions", longest.start.time_s, longest.stop.time_s, not longest.reaches_stop),)
 
 
-def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweepResponse]) -> SweepOverlay:
+def sweep_overlay(analysis: SweepAnalysis, drawn: Drawn[SweptMotion]) -> SweepOverlay:
     """Compare a sweep with those of the draws."""
     measured = analysis.response
     rising = np.argsort(measured.frequency_hz)

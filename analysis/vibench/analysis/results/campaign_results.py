@@ -76,7 +76,7 @@ def overlay(
     stage(f"simulating {simulation.value}")
     source = _source(recording, analysis, model, accuracy, simulation, shaker, draws)
     row = ANALYSES[analysis.excitation.kind]
-    found = drawn(source, lambda channels: row.draw(analysis, channels), row.compared(analysis))
+    found = drawn(source, row.draws(analysis), row.compared(analysis))
     stage("predicting the response to sines")
     laid: AbstractOverlay[Any] = row.lay(analysis, found)
     return laid

@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d
 from ..errors import InvalidRequest
 from ..signals.arrays import Flags, Reals
 from ..tables import Labelled
-from .sweep import SweepResponse
+from .sweep import SweptMotion
 
 _NOISE_FACTOR = 4.0
 """Residual over noise: an interval's rms of hundreds of samples scatters by a few percent only."""
@@ -93,7 +93,7 @@ class Collisions(Labelled):
     """Noise that the threshold allows for [m/s]."""
 
 
-def collisions(sweep: SweepResponse) -> Collisions:
+def collisions(sweep: SweptMotion) -> Collisions:
     """Find where the motion stops being a smooth, slowly varying sine.
 
     Impacts break the motion: they leave velocity that no order of the drive explains. So does a fast sweep,
@@ -141,7 +141,7 @@ def collisions(sweep: SweepResponse) -> Collisions:
     )
 
 
-def _noise(sweep: SweepResponse, residual: Reals, fundamental: Reals) -> float:
+def _noise(sweep: SweptMotion, residual: Reals, fundamental: Reals) -> float:
     quiet = float(np.quantile(residual, _QUIET_QUANTILE))
     smooth = _SMOOTH_AT_MOST * float(np.median(fundamental))
     return max(sweep.noise_rms, min(quiet, smooth / _NOISE_FACTOR))
@@ -194,7 +194,7 @@ def _best_split(above: Flags, low: int, high: int) -> int:
     return low + int(np.argmin(before + after))
 
 
-def _region(sweep: SweepResponse, excess: Reals, first: int, last: int) -> CollisionRegion:
+def _region(sweep: SweptMotion, excess: Reals, first: int, last: int) -> CollisionRegion:
     clear = np.flatnonzero(excess[first : last + 1] > _CLEARLY) + first
     if clear.size == 0:
         clear = np.array([(first + last) // 2])
@@ -207,7 +207,7 @@ def _region(sweep: SweepResponse, excess: Reals, first: int, last: int) -> Colli
     )
 
 
-def _edge(sweep: SweepResponse, edge: int, outside: int, inside: int) -> Edge:
+def _edge(sweep: SweptMotion, edge: int, outside: int, inside: int) -> Edge:
     """Bounds from the middle of the nearest quiet interval to that of the nearest clearly colliding one."""
     end = sweep.frequency_hz.size - 1
     quiet_hz = float(sweep.frequency_hz[min(max(outside, 0), end)])

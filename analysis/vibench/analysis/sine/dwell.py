@@ -1,5 +1,6 @@
 """What a dwell shows at one frequency: Responses I and II, spectrum, lines, and how the motion repeats."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
@@ -24,7 +25,7 @@ from ..tones.order_tracking import (
     cycles_needed,
     order_label,
     order_turns,
-    tracked_orders,
+    tracked_together,
 )
 from ..tones.sine_fit import DriveLevel, drive_level, peaks, steady_phase
 
@@ -342,8 +343,10 @@ def dwell_response(
     level = drive_level(drive[window], base[window], sample_rate_hz, near_hz=near_hz)
     phase = steady_phase(base[window].size, level.frequency_hz / sample_rate_hz, level.phase_rad)
     motion = displacement.samples[window]
-    whole, parts = _whole_and_parts(response[window], phase, orders)
-    base_whole, base_parts = _whole_and_parts(base[window], phase, orders)
+    whole, base_whole, repeating = tracked_together(
+        (response[window], base[window], motion), phase, interval_samples=motion.size, orders=orders
+    )
+    parts, base_parts = _tenths((response[window], base[window]), phase, orders)
     omega = 2 * np.pi * level.frequency_hz
     turn = 1j * omega * np.exp(1j * omega * delay_s) / sensors
     ratio = complex(turn * whole.order(1.0)[0] / base_whole.order(1.0)[0])
@@ -354,7 +357,7 @@ def dwell_response(
     level = replace(level, sd_amplitude_m=of_base_m)
     noise_density, sensor = _sensor_noise(response, displacement)
     silent = heard_in(silence, (displacement.low_hz, displacement.high_hz), sample_rate_hz)
-    repeated = _repeated(motion, phase, orders)
+    repeated = np.asarray(np.real(repeating.value[:, 0] @ order_turns(phase, orders)))
     rest = left_between(motion - repeated, sample_rate_hz)
     noise = background_of(rest, float(np.std(motion)), sensor, silent)
     most_m = max(LARGEST_NOISE * float(np.std(motion)), OVERHEARD * louder(silent, sensor).rms_m)
@@ -422,18 +425,14 @@ def _clear(bridged: Flags, displacement: ConvertedSignal, near_hz: float, window
     return clear
 
 
-def _whole_and_parts(
-    samples: Reals, phase: Reals, orders: tuple[float, ...]
-) -> tuple[TrackedOrders, TrackedOrders]:
-    """Fit over the window, and over its tenths, whose scatter holds all that moves, chaos included.
+def _tenths(signals: Sequence[Reals], phase: Reals, orders: tuple[float, ...]) -> tuple[TrackedOrders, ...]:
+    """Fit over tenths of the window, whose scatter holds all that moves, chaos included.
 
     A window that is too short for ten parts is cut into fewer.
     """
     cycles = float(phase[-1] - phase[0]) / (2 * np.pi)
     blocks = max(2, min(_SCATTER_BLOCKS, int(cycles / (1.05 * cycles_needed(orders)))))
-    whole = tracked_orders(samples, phase, interval_samples=samples.size, orders=orders)
-    parts = tracked_orders(samples, phase, interval_samples=samples.size // blocks, orders=orders)
-    return whole, parts
+    return tracked_together(signals, phase, interval_samples=phase.size // blocks, orders=orders)
 
 
 def _slow_changes(
@@ -458,12 +457,6 @@ def _sensor_noise(response: Reals, displacement: ConvertedSignal) -> tuple[float
     # White velocity noise integrated once: density ~ 1/f^2, with rms frequency sqrt(low high).
     rms_m = level / (2 * np.pi) * np.sqrt(1 / low - 1 / high)
     return level, Background(float(rms_m), float(np.sqrt(low * high)), "velocity channel")
-
-
-def _repeated(motion: Reals, phase: Reals, orders: tuple[float, ...]) -> Reals:
-    """Give what of a motion repeats with the drive."""
-    fit = tracked_orders(motion, phase, interval_samples=motion.size, orders=orders)
-    return np.asarray(np.real(fit.value[:, 0] @ order_turns(phase, orders)))
 
 
 def _order_lines(whole: TrackedOrders, parts: TrackedOrders, drive_hz: float) -> tuple[Line, ...]:

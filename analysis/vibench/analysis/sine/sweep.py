@@ -4,7 +4,7 @@ The phase of a recorded sine drive: the clock that a sweep and a dwell are analy
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import partial
 from math import ceil
 from typing import ClassVar
@@ -19,7 +19,14 @@ from ..signals.interpolation import Decimator, decimation_factor
 from ..signals.quantity import Quantity, converted_signal, disturbed_samples
 from ..tables import Labelled
 from ..tones.noise_lift import noise_lift
-from ..tones.order_tracking import ALL_ORDERS, ORDERS, TrackedOrders, cycles_needed, tracked_orders
+from ..tones.order_tracking import (
+    ALL_ORDERS,
+    ORDERS,
+    TrackedOrders,
+    cycles_needed,
+    tracked_orders,
+    tracked_together,
+)
 from .dwell import LEAST_CLEAR
 
 _MARGIN = 0.5
@@ -118,14 +125,13 @@ _NOISE_DIFFERENCE = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / np.sqr
 
 
 @dataclass(frozen=True)
-class SweepResponse(Labelled):
-    """A sweep, interval by interval; arrays of shape (intervals,) unless said otherwise."""
+class SweptMotion(Labelled):
+    """What draws of a sweep are compared by; arrays of shape (intervals,) unless said otherwise."""
 
     OWN_UNITS: ClassVar = {
         "upper": "m s-1",
         "lower": "m s-1",
         "velocity": "m s-1",
-        "harmonics": "m",
         "noise_rms": "m s-1",
     }
     DOCUMENT: ClassVar = (
@@ -147,17 +153,10 @@ class SweepResponse(Labelled):
     sd_drive_amplitude_m: Reals
     velocity: TrackedOrders
     """The response's velocity at orders of the drive [m/s]."""
-    harmonics: TrackedOrders
-    """Displacement at orders 1/3 to 5 [m], in longer intervals: `harmonics_hz` says where."""
-    harmonics_hz: Reals
-    """Drive frequency in the middle of each of these, shape (longer intervals,)."""
     peak_displacement_m: Reals
     """Largest |x| in the interval [m]."""
     response_i: Reals
     """Largest |x| over the drive amplitude, clear of drop-outs; NaN where they leave too little."""
-    noise_bias_i: Reals
-    noise_error_i: Reals
-    """By how much noise is expected to have lifted Response I."""
     response_ii: Reals
     """Amplitude of x at the drive frequency over the drive amplitude."""
     sd_response_ii: Reals
@@ -194,6 +193,21 @@ class SweepResponse(Labelled):
         return float(np.polyfit(self.time_s, self.frequency_hz, 1)[0])
 
 
+@dataclass(frozen=True)
+class SweepResponse(SweptMotion):
+    """A measured sweep, interval by interval; arrays of shape (intervals,) unless said otherwise."""
+
+    OWN_UNITS: ClassVar = {**SweptMotion.OWN_UNITS, "harmonics": "m"}
+
+    harmonics: TrackedOrders
+    """Displacement at orders 1/3 to 5 [m], in longer intervals: `harmonics_hz` says where."""
+    harmonics_hz: Reals
+    """Drive frequency in the middle of each of these, shape (longer intervals,)."""
+    noise_bias_i: Reals
+    noise_error_i: Reals
+    """By how much noise is expected to have lifted Response I."""
+
+
 Transmission = Callable[[Reals], Complexes]
 """Displacement of m0 over that of the base against frequency [Hz], both of shape (lines,)."""
 
@@ -209,6 +223,8 @@ class SweepSums:
         Ends of the sweep, in this order whichever way it ran.
     interval_s
         Length of one interval; half orders need two cycles of half the drive frequency.
+    clock
+        Of the drive, where it was measured before: blocks need no drive then.
 
     """
 
@@ -219,6 +235,7 @@ class SweepSums:
         low_hz: float,
         high_hz: float,
         interval_s: float = 0.1,
+        clock: DrivePhase | None = None,
     ) -> None:
         if not 0 < low_hz < high_hz < sample_rate_hz / 4:
             raise InvalidRequest(
@@ -231,7 +248,9 @@ class SweepSums:
         self._low_hz, self._high_hz = low_hz, high_hz
         self._before = self._after = 0
         """Samples that were added beside the sweep."""
-        self._decimator = Decimator(3, self._factor)
+        self._clock = clock
+        self._first_row = _DRIVE if clock is None else _BASE
+        self._decimator = Decimator(3 - self._first_row, self._factor)
         self._parts: list[Reals] = []
         self._carry = np.empty((2, 0))
         self._bridged: list[Flags] = []
@@ -253,7 +272,7 @@ class SweepSums:
             self._after += block.shape[1]
         else:
             self._before += block.shape[1]
-        self._parts.append(self._decimator.add(block))
+        self._parts.append(self._decimator.add(block[self._first_row :]))
         self._bridged.append(np.zeros(block.shape[1], dtype=np.bool_) if bridged is None else bridged)
 
     def add(self, block: Reals, bridged: Flags | None = None) -> None:
@@ -263,7 +282,7 @@ class SweepSums:
         """
         if block.shape[0] != 3:
             raise InvalidRequest(f"a block has {block.shape[0]} rows; a sweep takes drive, base and response")
-        self._parts.append(self._decimator.add(block))
+        self._parts.append(self._decimator.add(block[self._first_row :]))
         self._bridged.append(np.zeros(block.shape[1], dtype=np.bool_) if bridged is None else bridged)
         full = self._interval * self._factor
         seen = np.where(self._bridged[-1], 0.0, block[_RESPONSE])
@@ -289,8 +308,43 @@ class SweepSums:
             Transmission of the specimen without contact, which is swept in the same way for comparison.
 
         """
+        motion, swept, velocity, phase = self._analysed(delay_s, linear)
+        harmonics, harmonics_hz = self._harmonics(velocity, phase)
+        low_hz, high_hz = self._band_hz
+        noise_density = motion.noise_rms / np.sqrt(self._rate_hz / 2)
+        noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
+        independent = 2 * np.sqrt(low_hz * high_hz) * self._interval / self._rate_hz
+        bias_m, error_m = np.transpose([noise_lift(each, noise_m, independent) for each in swept])
+        return SweepResponse(
+            **{each.name: getattr(motion, each.name) for each in fields(motion)},
+            harmonics=harmonics,
+            harmonics_hz=harmonics_hz,
+            noise_bias_i=bias_m / motion.drive_amplitude_m,
+            noise_error_i=error_m / motion.drive_amplitude_m,
+        )
+
+    def motion(self, *, delay_s: float = 0.0, linear: Transmission | None = None) -> SweptMotion:
+        """Analyse everything added as far as draws are compared, like `response`."""
+        return self._analysed(delay_s, linear)[0]
+
+    @property
+    def clock(self) -> DrivePhase:
+        """Phase of the drive, after the analysis."""
+        assert self._clock is not None
+        return self._clock
+
+    @property
+    def _band_hz(self) -> tuple[float, float]:
+        """In which displacement is kept."""
+        return _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
+
+    def _analysed(
+        self, delay_s: float, linear: Transmission | None
+    ) -> tuple[SweptMotion, Reals, Reals, DrivePhase]:
+        """Give the motion, x of shape (intervals, samples) [m], the velocity [m/s] and the drive's phase."""
         self._parts.append(self._decimator.finish())
         whole = np.concatenate(self._parts, axis=1)
+        self._parts.clear()
         inside = slice(self._before // self._factor, whole.shape[1] - self._after // self._factor)
         data = whole[:, inside]
         count = data.shape[1] // self._interval
@@ -298,36 +352,72 @@ class SweepSums:
         upper, lower, noise = extremes[:, :count]
         if upper.size == 0:
             raise NotEnoughData("the sweep is shorter than one interval; use shorter intervals")
-        phase = drive_phase(data[_DRIVE], self._rate_hz, low_hz=self._low_hz, high_hz=self._high_hz)
-        track = partial(tracked_orders, phase_rad=phase.phase_rad, interval_samples=self._interval)
-        velocity, base = track(data[_RESPONSE]), track(data[_BASE])
+        if self._clock is None:
+            self._clock = drive_phase(data[0], self._rate_hz, low_hz=self._low_hz, high_hz=self._high_hz)
+        phase = self._clock
+        track = partial(tracked_together, phase_rad=phase.phase_rad, interval_samples=self._interval)
+        base, velocity = track((data[-2], data[-1]))
         frequency_hz = _means(phase.frequency_hz[: upper.size * self._interval], self._interval)
         noise_density = float(np.median(noise)) / np.sqrt(self._rate_hz * self._factor / 2)
-        residual, ratio = np.full(upper.size, np.nan), np.nan
+        residual, steady_over_swept = np.full(upper.size, np.nan), np.nan
         if linear is not None:
             # Order 1 alone: noise of the accelerometer would ring in a linear specimen too.
             middles = (np.arange(upper.size) + 0.5) * self._interval
             smooth = np.interp(np.arange(data.shape[1]), middles, base.order(1.0)) * np.exp(
                 1j * phase.phase_rad
             )
-            moved = np.concatenate((whole[_BASE, : inside.start], smooth.real, whole[_BASE, inside.stop :]))
-            swept = track(self._linear_velocity(moved, linear)[inside])
+            moved = np.concatenate((whole[-2, : inside.start], smooth.real, whole[-2, inside.stop :]))
+            (swept,) = track((self._linear_velocity(moved, linear)[inside],))
             residual = swept.residual_rms / np.abs(swept.order(1.0))
             played_hz = np.linspace(frequency_hz.min(), frequency_hz.max(), _STEADY_POINTS)
             of_base = np.abs(swept.order(1.0) / base.order(1.0))
-            ratio = float(np.max(np.abs(linear(played_hz))) / np.max(2 * np.pi * frequency_hz * of_base))
-        return self._scaled(
-            whole[_RESPONSE],
-            velocity,
-            base,
-            (upper, lower),
-            frequency_hz,
-            self._harmonics(data[_RESPONSE], phase),
-            noise_density,
-            delay_s,
-            (residual, ratio),
-            self._bridges()[inside][: upper.size * self._interval].reshape(-1, self._interval),
+            largest = np.max(2 * np.pi * frequency_hz * of_base)
+            steady_over_swept = float(np.max(np.abs(linear(played_hz))) / largest)
+        omega = 2 * np.pi * frequency_hz
+        fundamental = ORDERS.index(1.0)
+        amplitude_m = np.abs(base.order(1.0)) / omega**2
+        low_hz, high_hz = self._band_hz
+        displacement = converted_signal(
+            whole[-1],
+            self._rate_hz,
+            given=Quantity.VELOCITY,
+            wanted=Quantity.DISPLACEMENT,
+            low_hz=low_hz,
+            high_hz=high_hz,
         )
+        used = count * self._interval
+        intervals = displacement.samples[inside][:used].reshape(count, self._interval)
+        bridged = self._bridges()[inside][:used].reshape(count, self._interval)
+        clear = far_from(bridged.ravel(), round(_BRIDGE_PERIODS * self._rate_hz / low_hz)).reshape(
+            bridged.shape
+        )
+        peak_m = np.max(np.abs(intervals), axis=1, where=clear, initial=0.0)
+        peak_m[np.mean(clear, axis=1) < LEAST_CLEAR] = np.nan
+        ratio = 1j * omega * velocity.order(1.0) / base.order(1.0) * np.exp(1j * omega * delay_s)
+        relative = np.hypot(
+            velocity.sd[fundamental] / velocity.amplitude[fundamental],
+            base.sd[fundamental] / base.amplitude[fundamental],
+        )
+        motion = SweptMotion(
+            time_s=(np.arange(count, dtype=np.float64) + 0.5) * (self._interval / self._rate_hz),
+            frequency_hz=frequency_hz,
+            upper=upper,
+            lower=lower,
+            drive_amplitude_m=amplitude_m,
+            sd_drive_amplitude_m=base.sd[fundamental] / omega**2,
+            velocity=velocity,
+            peak_displacement_m=peak_m,
+            response_i=peak_m / amplitude_m,
+            response_ii=np.abs(ratio),
+            sd_response_ii=np.abs(ratio) * relative,
+            phase_rad=np.angle(ratio),
+            noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
+            is_clear=np.asarray(~bridged.any(axis=1)),
+            linear_residual=residual,
+            steady_over_swept=steady_over_swept,
+            interval_s=self._interval / self._rate_hz,
+        )
+        return motion, intervals, data[-1], phase
 
     def _bridges(self) -> Flags:
         """Return which decimated samples hold some of a bridge over a drop-out."""
@@ -358,71 +448,6 @@ class SweepSums:
         omega = 2 * np.pi * frequency_hz * np.asarray(ALL_ORDERS)[:, np.newaxis]
         scaled = replace(tracked, value=tracked.value / (1j * omega), sd=tracked.sd / omega)
         return scaled, frequency_hz
-
-    def _scaled(
-        self,
-        response: Reals,
-        velocity: TrackedOrders,
-        base: TrackedOrders,
-        extremes: tuple[Reals, Reals],
-        frequency_hz: Reals,
-        harmonics: tuple[TrackedOrders, Reals],
-        noise_density: float,
-        delay_s: float,
-        linear: tuple[Reals, float],
-        bridged: Flags,
-    ) -> SweepResponse:
-        omega = 2 * np.pi * frequency_hz
-        fundamental = ORDERS.index(1.0)
-        amplitude_m = np.abs(base.order(1.0)) / omega**2
-        low_hz, high_hz = _BAND_BELOW * self._low_hz, _BAND_ABOVE * self._rate_hz
-        displacement = converted_signal(
-            response,
-            self._rate_hz,
-            given=Quantity.VELOCITY,
-            wanted=Quantity.DISPLACEMENT,
-            low_hz=low_hz,
-            high_hz=high_hz,
-        )
-        count = frequency_hz.size
-        swept = displacement.samples[self._before // self._factor :][: count * self._interval]
-        intervals = swept.reshape(count, self._interval)
-        clear = far_from(bridged.ravel(), round(_BRIDGE_PERIODS * self._rate_hz / low_hz)).reshape(
-            bridged.shape
-        )
-        peak_m = np.max(np.abs(intervals), axis=1, where=clear, initial=0.0)
-        peak_m[np.mean(clear, axis=1) < LEAST_CLEAR] = np.nan
-        noise_m = noise_density / (2 * np.pi) * np.sqrt(1 / low_hz - 1 / high_hz)
-        independent = 2 * np.sqrt(low_hz * high_hz) * self._interval / self._rate_hz
-        bias_m, error_m = np.transpose([noise_lift(each, noise_m, independent) for each in intervals])
-        ratio = 1j * omega * velocity.order(1.0) / base.order(1.0) * np.exp(1j * omega * delay_s)
-        relative = np.hypot(
-            velocity.sd[fundamental] / velocity.amplitude[fundamental],
-            base.sd[fundamental] / base.amplitude[fundamental],
-        )
-        return SweepResponse(
-            time_s=(np.arange(count, dtype=np.float64) + 0.5) * (self._interval / self._rate_hz),
-            frequency_hz=frequency_hz,
-            upper=extremes[0],
-            lower=extremes[1],
-            drive_amplitude_m=amplitude_m,
-            sd_drive_amplitude_m=base.sd[fundamental] / omega**2,
-            velocity=velocity,
-            harmonics=harmonics[0],
-            harmonics_hz=harmonics[1],
-            peak_displacement_m=peak_m,
-            response_i=peak_m / amplitude_m,
-            noise_bias_i=bias_m / amplitude_m,
-            noise_error_i=error_m / amplitude_m,
-            response_ii=np.abs(ratio),
-            sd_response_ii=np.abs(ratio) * relative,
-            phase_rad=np.angle(ratio),
-            noise_rms=noise_density * np.sqrt(self._rate_hz / 2),
-            is_clear=np.asarray(~bridged.any(axis=1)),
-            linear_residual=linear[0],
-            steady_over_swept=linear[1],
-            interval_s=self._interval / self._rate_hz,
-        )
 
 
 def _means(values: Reals, length: int) -> Reals:

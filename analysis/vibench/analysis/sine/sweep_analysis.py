@@ -1,7 +1,8 @@
 """From a recorded sweep to its responses and a picture of its velocity."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -17,9 +18,10 @@ from ..spectra.spectra import Spectrogram, SpectrogramSums
 from .collision_region import Collisions
 from .dwell import LEAST_CLEAR
 from .jumps import Jump, jumps
-from .sweep import SweepResponse, SweepSums
+from .sweep import DrivePhase, SweepResponse, SweepSums, SweptMotion, Transmission
 
 Sweep = SineSweep | HeldSweep
+M = TypeVar("M", bound=SweptMotion)
 _BLOCK = 1 << 20
 _RESPONSE = 2
 _LEAD_S = 5.0
@@ -94,10 +96,43 @@ def measured_sweep(
     The ``specimen``, where one is known, is swept without contact for comparison.
     """
     stretch = only_stretch(channels, SegmentLabel.SWEEP)
-    ends = sorted((sweep.start_hz, sweep.stop_hz))
+    highest_hz = min(_SPECTROGRAM_ORDER * max(sweep.start_hz, sweep.stop_hz), 0.5 * channels.sample_rate_hz)
+    picture = SpectrogramSums(channels.sample_rate_hz, stretch.samples, highest_hz=highest_hz)
+    sums = _sums(sweep, channels, None)
+    first = _read(channels, sums, picture.add)
+    found = sums.response(delay_s=channels.response_delay_s, linear=_without_contact(specimen))
+    return _seen(found, channels, first), picture.spectrogram()
+
+
+class SweepDraws:
+    """Analyses draws of one recorded sweep as far as they are compared; their drive is the same."""
+
+    def __init__(self, sweep: Sweep, specimen: Specimen | None) -> None:
+        self._sweep, self._specimen = sweep, specimen
+        self._clock: DrivePhase | None = None
+
+    def motion(self, channels: Channels) -> SweptMotion:
+        """Analyse a draw like `measured_sweep`; the first one measures the drive."""
+        sums = _sums(self._sweep, channels, self._clock)
+        first = _read(channels, sums, lambda _: None)
+        found = sums.motion(delay_s=channels.response_delay_s, linear=_without_contact(self._specimen))
+        self._clock = sums.clock
+        return _seen(found, channels, first)
+
+
+def _sums(sweep: Sweep, channels: Channels, clock: DrivePhase | None) -> SweepSums:
+    low_hz, high_hz = sorted((sweep.start_hz, sweep.stop_hz))
+    return SweepSums(channels.sample_rate_hz, low_hz=low_hz, high_hz=high_hz, clock=clock)
+
+
+def _without_contact(specimen: Specimen | None) -> Transmission | None:
+    return None if specimen is None else lambda at_hz: base_transmissibility(specimen, at_hz)[:, 0]
+
+
+def _read(channels: Channels, sums: SweepSums, show: Callable[[Reals], None]) -> float:
+    """Add the sweep and what lies beside it, and show its velocity; gives where the sums begin [s]."""
+    stretch = only_stretch(channels, SegmentLabel.SWEEP)
     rate = channels.sample_rate_hz
-    sums = SweepSums(rate, low_hz=ends[0], high_hz=ends[1])
-    highest_hz = min(_SPECTROGRAM_ORDER * ends[1], 0.5 * rate)
     # Where nothing whole was recorded beside the sweep, its own end stands for it.
     reach = min(sums.neighbour_samples, stretch.samples // 4)
     start = stretch.start + (0 if _is_whole(channels, stretch.start - reach, stretch.start) else reach)
@@ -105,7 +140,6 @@ def measured_sweep(
     # What the specimen still rings of began before the sweep.
     lead = reach * max(1, min(round(_LEAD_S * rate), start) // max(reach, 1))
     lead = lead if _is_whole(channels, start - lead, start - reach) else reach
-    picture = SpectrogramSums(rate, stretch.samples, highest_hz=highest_hz)
     for begin, end, add in (
         (start - lead, start, sums.add_neighbour),
         (start, stop, sums.add),
@@ -120,9 +154,12 @@ def measured_sweep(
                     "across a hole; measure again"
                 )
             add(block, channels.bridged(first, min(first + _BLOCK, end)))
-            picture.add(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
-    linear = None if specimen is None else lambda at_hz: base_transmissibility(specimen, at_hz)[:, 0]
-    found = sums.response(delay_s=channels.response_delay_s, linear=linear)
+            show(block[_RESPONSE, max(stretch.start - first, 0) : max(stretch.stop - first, 0)])
+    return (start - stretch.start) / rate
+
+
+def _seen(found: M, channels: Channels, first_s: float) -> M:
+    """Count time from the sweep's first sample, and take the sensors' gains out."""
     if np.mean(found.is_clear) < LEAST_CLEAR or np.isnan(found.response_i[found.is_clear]).all():
         raise UnusableData(
             f"the vibrometer lost its light too often: {100 * np.mean(found.is_clear):.0f} % of the sweep's "
@@ -130,14 +167,13 @@ def measured_sweep(
             "and measure again"
         )
     sensors = channels.response_gain(found.frequency_hz)
-    corrected = replace(
+    return replace(
         found,
-        time_s=found.time_s + (start - stretch.start) / rate,
+        time_s=found.time_s + first_s,
         response_ii=found.response_ii / np.abs(sensors),
         sd_response_ii=found.sd_response_ii / np.abs(sensors),
         phase_rad=np.angle(np.exp(1j * found.phase_rad) / sensors),
     )
-    return corrected, picture.spectrogram()
 
 
 _SAME = 1e-3

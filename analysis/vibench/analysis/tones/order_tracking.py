@@ -1,5 +1,6 @@
 """Amplitude and phase of a signal at multiples of the drive frequency, interval by interval."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
@@ -60,7 +61,19 @@ class TrackedOrders(Labelled):
 def tracked_orders(
     samples: Reals, phase_rad: Reals, *, interval_samples: int, orders: tuple[float, ...] = ORDERS
 ) -> TrackedOrders:
-    """Fit all orders at once to each interval of a signal, by least squares.
+    """Track one signal as `tracked_together` tracks several."""
+    (tracked,) = tracked_together((samples,), phase_rad, interval_samples=interval_samples, orders=orders)
+    return tracked
+
+
+def tracked_together(
+    signals: Sequence[Reals],
+    phase_rad: Reals,
+    *,
+    interval_samples: int,
+    orders: tuple[float, ...] = ORDERS,
+) -> tuple[TrackedOrders, ...]:
+    """Fit all orders at once to each interval of signals, by least squares.
 
     One order at a time would be biased by the others whenever an interval is not a whole number of
     *subharmonic* periods. A constant and a linear change of order 1 are fitted too, so that a sweep
@@ -68,17 +81,17 @@ def tracked_orders(
 
     Parameters
     ----------
-    samples, phase_rad
-        The signal and the drive's phase at the same instants, shape (samples,); what is left over
+    signals, phase_rad
+        The signals and the drive's phase at the same instants, each of shape (samples,); what is left over
         after the last whole interval is not used.
     interval_samples
         Must hold at least two periods of the smallest distance between orders.
 
     """
-    count = samples.size // interval_samples
+    count = phase_rad.size // interval_samples
     if count == 0:
         raise InvalidRequest(
-            f"the signal has {samples.size} samples, less than one interval of {interval_samples}"
+            f"the signal has {phase_rad.size} samples, less than one interval of {interval_samples}"
         )
     turns = abs(float(phase_rad[count * interval_samples - 1] - phase_rad[0])) / (2 * np.pi) / count
     needed = cycles_needed(orders)
@@ -87,14 +100,15 @@ def tracked_orders(
             f"an interval of {interval_samples} samples holds {turns:.1f} drive cycles; orders "
             f"{2 / needed:g} apart need at least {needed:g}: use longer intervals or fewer orders"
         )
-    signal = samples[: count * interval_samples].reshape(count, interval_samples)
-    phase = phase_rad[: count * interval_samples].reshape(count, interval_samples)
-    parts = [
-        _fit(signal[first : first + _BATCH_INTERVALS], phase[first : first + _BATCH_INTERVALS], orders)
-        for first in range(0, count, _BATCH_INTERVALS)
-    ]
+    used = count * interval_samples
+    cut = [each[:used].reshape(count, interval_samples) for each in signals]
+    phase = phase_rad[:used].reshape(count, interval_samples)
+    parts = []
+    for first in range(0, count, _BATCH_INTERVALS):
+        batch = slice(first, first + _BATCH_INTERVALS)
+        parts.append(_fit(np.stack([each[batch] for each in cut], axis=2), phase[batch], orders))
     value, sd, residual = (np.concatenate(part, axis=-1) for part in zip(*parts, strict=True))
-    return TrackedOrders(orders, value, sd, residual)
+    return tuple(TrackedOrders(orders, *each) for each in zip(value, sd, residual, strict=True))
 
 
 def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> Complexes:
@@ -119,14 +133,14 @@ def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
     return powers[exponent]
 
 
-def _fit(signal: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Complexes, Reals, Reals]:
-    samples = signal.shape[1]
+def _fit(signals: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Complexes, Reals, Reals]:
+    """Fit signals of shape (intervals, samples, signals); results have shape (signals, ..., intervals)."""
+    samples = signals.shape[1]
     turned = order_turns(phase, (*orders, 1.0))
     changing = np.linspace(-1.0, 1.0, samples) * turned[-1]
     first = np.stack((changing.real, changing.imag, np.ones_like(phase)))
     basis = np.concatenate((turned[:-1].real, turned[:-1].imag, first)).transpose(1, 0, 2)
     normal = basis @ basis.transpose(0, 2, 1)
-    target = basis @ signal[:, :, np.newaxis]
     try:
         inverse = np.linalg.inv(normal)
     except np.linalg.LinAlgError as singular:
@@ -134,11 +148,13 @@ def _fit(signal: Reals, phase: Reals, orders: tuple[float, ...]) -> tuple[Comple
             "the drive phase stands still in an interval, so orders cannot be told apart there; "
             "cut the record to where the drive runs"
         ) from singular
-    solution = (inverse @ target)[:, :, 0]
-    residual = signal - np.einsum("ik,iks->is", solution, basis)
-    variance = np.sum(residual**2, axis=1) / max(1, samples - basis.shape[1])
+    solution = inverse @ (basis @ signals)
+    residual = signals - basis.transpose(0, 2, 1) @ solution
+    squares = np.sum(residual**2, axis=1)
     count = len(orders)
     value = solution[:, :count] - 1j * solution[:, count : 2 * count]
     diagonal = np.einsum("ikk->ik", inverse)
-    spread = np.sqrt(variance[:, np.newaxis] * (diagonal[:, :count] + diagonal[:, count : 2 * count]) / 2)
-    return value.T, spread.T, np.sqrt(np.mean(residual**2, axis=1))
+    mean = (diagonal[:, :count] + diagonal[:, count : 2 * count]) / 2
+    variance = squares / max(1, samples - basis.shape[1])
+    spread = np.sqrt(variance[:, np.newaxis] * mean[:, :, np.newaxis])
+    return value.T, spread.T, np.sqrt(squares / samples).T
