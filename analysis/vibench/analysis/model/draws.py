@@ -58,8 +58,8 @@ class PlayedVoltage:
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
         self._volts, self._own_v = volts, converter_rms_v
         self._hop = min(_FRAME_SAMPLES, max(4, volts.size // 2)) // 2
-        self._shape = 2 - (-volts.size // self._hop), self._hop
-        """Halves of frames, of which the first and the last lie outside."""
+        self._frames = 1 - (-volts.size // self._hop)
+        """They overlap by half; the first begins and the last ends half a frame outside."""
         self._window = np.hanning(2 * self._hop + 1)[:-1]
         halves = self._window.reshape(2, self._hop)
         self._back = (halves / np.sum(halves**2, axis=0)).ravel()
@@ -86,9 +86,10 @@ class PlayedVoltage:
             roots.append(np.sqrt(share, dtype=np.float32))
             return share * lines
 
-        recorded = np.zeros(self._shape)
+        recorded = np.zeros((self._frames + 1, self._hop))
         recorded.ravel()[self._hop : self._hop + self._volts.size] = self._volts
-        return self._through(filtered, recorded), roots
+        rows = iter(recorded)
+        return self._through(filtered, lambda count: np.array(list(islice(rows, count)))), roots
 
     def drawn(self, rng: np.random.Generator) -> Reals:
         """Give a voltage that may have been played, shape (samples,) [V]."""
@@ -96,19 +97,25 @@ class PlayedVoltage:
             return self._volts
         likely, roots = self._likely
         share = iter(roots)
-        own = rng.standard_normal(self._shape)
-        own *= self._own_v
-        drawn = self._through(lambda lines: next(share) * lines, own)
+        drawn = self._through(
+            lambda lines: next(share) * lines,
+            lambda count: self._own_v * rng.standard_normal((count, self._hop)),
+        )
         drawn += likely
         return drawn
 
-    def _through(self, change: Callable[[Complexes], Complexes], halves: Reals) -> Reals:
-        """Change the lines of frames, shape (frames, lines) in batches; a frame is two of ``halves``."""
-        hop, frames = self._hop, len(halves) - 1
-        result = np.zeros_like(halves)
-        for first in range(0, frames, _BATCH_FRAMES):
-            last = min(first + _BATCH_FRAMES, frames)
-            whole = np.concatenate([halves[first:last], halves[first + 1 : last + 1]], axis=1)
+    def _through(self, change: Callable[[Complexes], Complexes], following: Callable[[int], Reals]) -> Reals:
+        """Change the lines of frames, shape (frames, lines) in batches.
+
+        ``following`` gives so many further halves of frames, shape (halves, samples).
+        """
+        hop = self._hop
+        result = np.zeros((self._frames + 1, hop))
+        halves = following(1)
+        for first in range(0, self._frames, _BATCH_FRAMES):
+            last = min(first + _BATCH_FRAMES, self._frames)
+            halves = np.concatenate([halves[-1:], following(last - first)])
+            whole = np.concatenate([halves[:-1], halves[1:]], axis=1)
             lines = change(fft.rfft(whole * self._window, overwrite_x=True))
             whole = fft.irfft(lines, self._window.size, overwrite_x=True) * self._back
             result[first:last] += whole[:, :hop]
@@ -190,9 +197,11 @@ _NOISE = 0.15
 """How far, as a logarithm, a channel's noise may be from what its quietest stretch shows."""
 _MORE = 3
 _SEED = 17
-_MOST_BYTES = 2e9
+_BLOCK = 1 << 17
+"""Samples that get their noise together."""
+_MOST_BYTES = 1.1e9
 """That the draws under way at a time may take."""
-_BYTES_PER_SAMPLE = 120
+_BYTES_PER_SAMPLE = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,9 +408,9 @@ def _moved(
     except MotionFailed as error:
         raise UnusableData(f"the simulation under the {rig.driven.value} ended: {error}") from error
     for role, seen in ((BASE, motion.base_acceleration), (RESPONSE, motion.m0_velocity)):
-        own = rng.standard_normal(seen.size)
-        own *= noise.rms[role]
-        np.add(seen, own, out=seen)
+        for first in range(0, seen.size, _BLOCK):
+            block = seen[first : first + _BLOCK]
+            block += noise.rms[role] * rng.standard_normal(block.size)
     return motion
 
 

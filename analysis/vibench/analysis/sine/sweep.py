@@ -115,6 +115,8 @@ _BAND_ABOVE = 0.3
 _LINEAR_ABOVE = 5.5
 """Linear motion is computed up to this part of the highest drive frequency: its order 5 is within."""
 _STEADY_POINTS = 10_001
+_LINES = 1 << 15
+"""At which linear motion is computed together."""
 _BRIDGE_PERIODS = 3.0
 """Periods of the band's lower edge after which a bridge of three times the motion's size is below 2 %."""
 _ROOM = 1.1
@@ -363,10 +365,11 @@ class SweepSums:
         if linear is not None:
             # Order 1 alone: noise of the accelerometer would ring in a linear specimen too.
             middles = (np.arange(upper.size) + 0.5) * self._interval
-            smooth = np.interp(np.arange(data.shape[1]), middles, base.order(1.0)) * np.exp(
-                1j * phase.phase_rad
-            )
-            moved = np.concatenate((whole[-2, : inside.start], smooth.real, whole[-2, inside.stop :]))
+            place = np.arange(data.shape[1])
+            at_middles = base.order(1.0)
+            cosine, sine = (np.interp(place, middles, each) for each in (at_middles.real, at_middles.imag))
+            moved = whole[-2].copy()
+            moved[inside] = cosine * np.cos(phase.phase_rad) - sine * np.sin(phase.phase_rad)
             (swept,) = track((self._linear_velocity(moved, linear)[inside],))
             residual = swept.residual_rms / np.abs(swept.order(1.0))
             played_hz = np.linspace(frequency_hz.min(), frequency_hz.max(), _STEADY_POINTS)
@@ -433,9 +436,10 @@ class SweepSums:
         low_hz, high_hz = _BAND_BELOW * self._low_hz, _LINEAR_ABOVE * self._high_hz
         kept = np.flatnonzero((frequency_hz > low_hz) & (frequency_hz < high_hz))
         spectrum = fft.rfft(base, padded)
-        moved = np.zeros_like(spectrum)
-        moved[kept] = spectrum[kept] * linear(frequency_hz[kept]) / (2j * np.pi * frequency_hz[kept])
-        return np.asarray(fft.irfft(moved, padded)[: base.size])
+        spectrum[: kept[0]] = spectrum[kept[-1] + 1 :] = 0.0
+        for lines in np.array_split(kept, 1 + kept.size // _LINES):
+            spectrum[lines] *= linear(frequency_hz[lines]) / (2j * np.pi * frequency_hz[lines])
+        return np.asarray(fft.irfft(spectrum, padded, overwrite_x=True)[: base.size])
 
     def _harmonics(self, response: Reals, phase: DrivePhase) -> tuple[TrackedOrders, Reals]:
         """Displacement at many orders, in intervals that are long enough to tell them apart."""

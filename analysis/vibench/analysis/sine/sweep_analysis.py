@@ -22,7 +22,7 @@ from .sweep import DrivePhase, SweepResponse, SweepSums, SweptMotion, Transmissi
 
 Sweep = SineSweep | HeldSweep
 M = TypeVar("M", bound=SweptMotion)
-_BLOCK = 1 << 20
+_BLOCK = 1 << 17
 _RESPONSE = 2
 _LEAD_S = 5.0
 _SPECTROGRAM_ORDER = 3.2
