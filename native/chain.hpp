@@ -468,6 +468,12 @@ class ChainRun {
       place(at.end, length);
       outcome = cross_cells(length);
     }
+    if (outcome != REACHED_END) {
+      // A cell ended somewhere within: the motion stays where the window began.
+      for (int64_t n = 0; n < followed; n++) at.now[at.busy[n]] = at.begun[at.busy[n]];
+      m.impacts = impacts;
+      return outcome;
+    }
     if (watches()) see_window(length);
     keep_samples(length);
     add_forces(at.end, at.now);
