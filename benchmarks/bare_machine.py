@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 ABSENT = ("gcc", "cc", "clang", "git", "libGL.so.1")
 LINES = 4
-AFTERWARDS = ("QT_QPA_PLATFORM=offscreen vibench gui",)
+AFTERWARDS = ("env QT_QPA_PLATFORM=offscreen vibench gui",)
 """Beyond the README's two: the window, which needs libraries of the system."""
 
 

@@ -108,7 +108,8 @@ class Found:
             if what == "stop" and may_have_ended:
                 allowed = {0, 1}
             if what == "measure" and self.cell.cause == "limit passed":
-                allowed = {1}
+                # No limit applies to the ramp of a stop: that run was stopped by a person.
+                allowed = {3} if self.cell.state == "ramping_down" else {1}
             elif what == "measure" and not may_have_ended and self.cell.cause != "Ctrl-C twice":
                 allowed = {3}
             if code not in allowed:

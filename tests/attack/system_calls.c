@@ -13,7 +13,8 @@
 enum call { PWRITE, FSYNC, RENAME, FTRUNCATE, UNLINK };
 enum moment { BEFORE, INSIDE, AFTER };
 
-static int armed, wanted, left, moment, failure; /* failure 0: kill */
+int left; /* until the call that is wanted */
+static int armed, wanted, moment, failure; /* failure 0: kill */
 static char under[PATH_MAX];
 
 void arm(int call, int number, int when, int error, const char *folder) {

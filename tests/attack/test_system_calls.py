@@ -45,7 +45,71 @@ RESULT = """
 import h5py
 from vibench.acquisition.recording._preallocate import replace_with_change
 arm()
-replace_with_change(folder / "dwell.h5", 1000, lambda file: file.attrs.__setitem__("note", "all of it"))
+replace_with_change(folder / "dwell.h5", lambda file: file.attrs.__setitem__("note", "all of it"))
+"""
+HDF5_WRITERS = {
+    "finish": """
+from vibench.acquisition.recording import recover
+def write(folder): recover(folder / "cut_off.h5.part")
+""",
+    "prepare": """
+from vibench.acquisition.recording import ChannelHeader, Origin, RecordingHeader, create_recording
+channel = ChannelHeader("m0_velocity", "Dev1/ai0", "velocity", "m s-1", physical_per_volt=0.125, range_v=5.0)
+def write(folder):
+    header = RecordingHeader((channel,), 1000.0, expected_samples=500, origin=Origin.SIMULATED)
+    create_recording(folder / "new.h5", header)
+""",
+    "result": """
+import numpy as np
+from vibench.acquisition import open_recording
+from vibench.acquisition.recording import ResultArray
+def write(folder):
+    with open_recording(folder / "dwell.h5") as recording:
+        recording.save_results("peak", {"level": ResultArray(np.ones(9), "V")}, {})
+""",
+    "nexus": """
+from vibench.acquisition import open_recording
+from vibench.analysis.exchange import Format, excerpt, export_samples
+def write(folder):
+    with open_recording(folder / "dwell.h5") as recording:
+        export_samples(excerpt(recording), Format.NEXUS, folder / "new.nxs")
+""",
+    "spectrum": """
+from vibench.analysis.dynamics._dynamics_file import _created
+def write(folder):
+    with _created(folder / "new.h5", "spectrum", "{}", 1.0) as file:
+        file["column"] = [0.0] * 9
+""",
+    "study": """
+from vibench.sim.study import Study
+from vibench.sim.study._file_store import make_file
+def write(folder):
+    make_file(folder / "new.h5", Study(frequencies_hz=[200.0, 260.0], amplitudes_m=[5e-6]))
+""",
+}
+"""Every place that writes HDF5."""
+IN_FORKS = """
+import shutil
+from tests.attack.recordings_kills import LIBRARY
+from vibench.acquisition import RecordingError
+from vibench.analysis.errors import InvalidRequest
+from vibench.sim.study import StudyError
+shim, before = ctypes.CDLL(os.environ[LIBRARY]), {path.name for path in folder.iterdir()}
+def code_of_write(number):
+    copy = shutil.copytree(folder, folder.with_name(f"copy-{number}"))
+    shim.arm(call, number, when, fault, bytes(copy))
+    try:
+        write(copy)
+    except (RecordingError, InvalidRequest, StudyError) as error:
+        return 1 if str(error).strip() and {path.name for path in copy.iterdir()} == before else 2
+    return 0
+assert code_of_write(1000) == 0
+count = 1000 - ctypes.c_int.in_dll(shim, "left").value
+for number in {1, count // 4, count // 2, 3 * count // 4, count - 1, count}:
+    child = os.fork()
+    if child == 0:
+        os._exit(code_of_write(number))
+    print(number, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
 CATALOGUE = """
 from vibench.acquisition.campaign import list_recordings
@@ -98,6 +162,18 @@ def test_a_result_is_reported_as_added_exactly_when_it_is_in_the_recording(libra
     made = ended(library, RESULT, tmp_path, "rename", when)
     assert (made.returncode == 0) == (b"all of it" in path.read_bytes()) == (when == "after")
     assert [each.name for each in tmp_path.iterdir()] == ["dwell.h5"]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("when", WHEN)
+@pytest.mark.parametrize("writer", HDF5_WRITERS)
+def test_a_refused_write_of_hdf5_is_an_error_and_leaves_no_file(library, tmp_path, writer, when):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    for name in ("cut_off.h5.part", "dwell.h5"):
+        (folder / name).write_bytes(good_recordings()[name])
+    made = ended(library, HDF5_WRITERS[writer] + IN_FORKS, folder, "pwrite", when)
+    assert {line.split()[1] for line in made.stdout.splitlines()} == {"1"}, made.stdout
 
 
 @pytest.mark.parametrize("when", WHEN)

@@ -10,7 +10,7 @@ from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentL
 from vibench.acquisition.bench.bench import RigPower
 from vibench.acquisition.campaign import ReconnectingBench
 from vibench.acquisition.errors import DataLost, InstrumentBusy
-from vibench.acquisition.recording._preallocate import claim_room
+from vibench.acquisition.recording._disk_trouble import meet_trouble
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
 from vibench.virtual_rig.analogue import Coupling, Input
@@ -167,13 +167,13 @@ class TestEffects:
         # The first at once, half a second each after it, and nothing else lets the time of this rig pass.
         assert failures == 5
 
-    def test_a_full_disk_is_emptied_in_time_for_who_tries_again(self, scripted, tmp_path):
+    def test_a_full_disk_is_emptied_in_time_for_who_tries_again(self, scripted):
         with RigPower(scripted(fault("fill_disk", 0.1, for_s=2.5))) as power:
             power.let_pass(0.2)
             refusals = 0
-            for attempt in range(10):
+            for _ in range(10):
                 try:
-                    claim_room(tmp_path / f"{attempt}", 10, 10)
+                    meet_trouble()
                 except OSError:
                     refusals += 1
             assert refusals == 4  # the first at once, a second each after it

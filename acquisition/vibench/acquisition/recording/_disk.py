@@ -175,6 +175,6 @@ def open_disk(path: Path) -> Disk:
 
 
 def meet_trouble() -> None:
-    """Fail as a full disk does where room is claimed for a whole file; nothing happens on a sound one."""
+    """Fail as a full disk does before a whole file is written; nothing happens on a sound one."""
     for trouble in tuple(_installed):
         trouble.meet()

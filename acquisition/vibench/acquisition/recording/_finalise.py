@@ -17,13 +17,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from vibench.sim.hdf5_files.writing import written_hdf5
 from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
 from ..host.log import LOG
 from ..instruments import Counts
 from . import _layout as layout, _tables as tables
-from ._disk import sole_use
+from ._disk import meet_trouble, sole_use
 from ._layout import (
     COUNT_DTYPE,
     DEFLATE_LEVEL,
@@ -34,8 +35,7 @@ from ._layout import (
     write_attributes,
     write_text_dataset,
 )
-from ._overview import BIN_BYTES, BIN_SAMPLES, CountOverview, OverviewSums, bins_of, write_overview
-from ._preallocate import HEAD_BYTES, ITEM_BYTES, claim_room, extend_room, release_room
+from ._overview import BIN_SAMPLES, CountOverview, OverviewSums, write_overview
 from ._reader import open_recording
 from ._seal import SealDepth, SealKey, SealState, check_seal, seal_key, write_seal
 from ._tables import Columns
@@ -48,8 +48,6 @@ from ._tables import Columns
 SIGNAL = "values"
 FIRST_CHOICE = "m0_velocity"
 """What is plotted where nobody chooses a channel; without it, the last one."""
-VIEW_BYTES, VIEW_TIME_BYTES = 8, 16
-"""Of a channel's bin, and of the time axis that all share, when nothing can be compressed."""
 
 
 def write_view(file: h5py.File, role: str, overview: CountOverview, title: str) -> None:
@@ -156,8 +154,6 @@ def _chunk(counts: Counts, length: int) -> bytes:
 
 INTERRUPTED_KIND = "interrupted"
 INTERRUPTED_REASON = "the recording program ended before it could say how the run ended"
-TIME_BYTES = 1
-"""Room for a sample of the time axis (measured: 0.1 bytes) and for what deflate adds at worst (0.03 %)."""
 INT32_SAMPLES = 2**31
 """Longer recordings (11 h at 51.2 kS/s) number their samples with 64 bits."""
 
@@ -174,9 +170,8 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
     if final.exists():
         raise RecordingError(f"{final} exists, and nothing is ever overwritten; move it away.")
     try:
-        room = _largest_size(part)
-        claim_room(tmp, room, room)
-        _copy(part, tmp, room, key, written)
+        meet_trouble()
+        _copy(part, tmp, key, written)
         sync_file(tmp)
         rename(tmp, final)
     except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
@@ -218,21 +213,8 @@ def discard(part: Path) -> None:
             LOG.warning("%s is complete; %s could not be deleted (%s)", name, part.name, error)
 
 
-def _largest_size(part: Path) -> int:
-    """Bytes of the finished file if nothing could be compressed."""
-    with h5py.File(part, "r", locking=False) as source:
-        samples = int(source[layout.N_VALID][0])
-        channels = len(str(read_attributes(source)["roles"]).split())
-    bins = bins_of(samples) * (channels * (BIN_BYTES + VIEW_BYTES) + ITEM_BYTES + VIEW_TIME_BYTES)
-    return HEAD_BYTES + samples * (channels * ITEM_BYTES + TIME_BYTES) + bins
-
-
-def _copy(part: Path, tmp: Path, room: int, key: SealKey | None, written: Mapping[str, str] | None) -> None:
-    with (
-        h5py.File(part, "r", locking=False) as source,
-        h5py.File(tmp, "w", libver=layout.LIBVER, locking=False) as copy,
-    ):
-        extend_room(tmp, room)
+def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str] | None) -> None:
+    with h5py.File(part, "r", locking=False) as source, written_hdf5(tmp, "x", layout.LIBVER) as copy:
         samples = int(source[layout.N_VALID][0])
         _copy_file_attributes(source, copy, samples)
         source.copy(layout.CONFIGURATION, copy)
@@ -250,7 +232,6 @@ def _copy(part: Path, tmp: Path, room: int, key: SealKey | None, written: Mappin
             _write_table(copy, table, _rows(source, table, samples))
         copy.create_group(layout.RESULTS)
         write_seal(copy, digests, key)
-    release_room(tmp)
     with h5py.File(tmp, "r", locking=False) as copy:
         found = check_seal(copy, SealDepth.WHOLE, key)
     if found.state is not SealState.INTACT:

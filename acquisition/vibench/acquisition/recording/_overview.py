@@ -17,8 +17,6 @@ from ._layout import read_attributes, write_attributes
 BIN_SAMPLES = 128
 """A picture 1000 columns wide needs no more than 128 000 samples to be read: 10 ms for four channels."""
 LOW_SUFFIX, HIGH_SUFFIX = "_low", "_high"
-BIN_BYTES = 8
-"""Low and high of one bin, when nothing can be compressed."""
 _LARGEST = np.int32(layout.LARGEST_COUNT)
 
 

@@ -4,7 +4,6 @@ After this, nothing but bytes at known places is written until the recording end
 closed the file, so that no crash can catch it between two steps.
 """
 
-import errno
 import os
 import shutil
 import tempfile
@@ -19,61 +18,14 @@ from typing import TypeVar
 import h5py
 import numpy as np
 
-from vibench.sim.operating_system.this import allocate, open_to_write, rename, sync_file, sync_folder
+from vibench.sim.hdf5_files.writing import written_hdf5
+from vibench.sim.operating_system.this import rename, sync_file, sync_folder
 
 from ..errors import RecordingError
 from . import _layout as layout
 from ._disk import PositionedFile, meet_trouble
 from ._header import RecordingHeader
-from ._layout import Table, read_text_dataset, write_attributes, write_text_dataset
-
-# Room on the disk for what HDF5 is going to write, claimed before and given back after.
-#
-# HDF5 must never meet a full disk: closing a file that cannot be flushed crashes the process
-# (seen with HDF5 2.0). So plain system calls meet it first, and fail as they should.
-
-FILE_MODE = 0o666
-"""Before the user's mask, as for any file a program makes."""
-
-SIGNATURE = b"\x89HDF\r\n\x1a\n\x00"
-"""HDF5's, followed by version 0 of the superblock."""
-END_ADDRESS = slice(40, 48)
-"""Where superblock 0 keeps the end of the file (HDF5 File Format Specification 3.0, II.A)."""
-
-
-def claim_room(path: Path, allocated: int, length: int) -> None:
-    """Create a file that the disk gives ``allocated`` bytes, and that may be ``length`` bytes long.
-
-    Raises OSError when the file exists, or the disk or a limit refuses; a file made here is gone again.
-    """
-    meet_trouble()
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, FILE_MODE)
-    try:
-        allocate(descriptor, 0, allocated)
-        os.ftruncate(descriptor, length)
-    except OSError:
-        path.unlink()
-        raise
-    finally:
-        os.close(descriptor)
-
-
-def extend_room(path: Path, allocated: int) -> None:
-    """Give an existing file at least ``allocated`` bytes on the disk."""
-    descriptor = open_to_write(path)
-    try:
-        allocate(descriptor, 0, allocated)
-    finally:
-        os.close(descriptor)
-
-
-def release_room(path: Path) -> None:
-    """Cut off what HDF5 did not use. Call it when HDF5 has closed the file."""
-    with path.open("r+b") as file:
-        head = file.read(END_ADDRESS.stop)
-        if head.startswith(SIGNATURE):  # another superblock keeps its surplus, which does no harm
-            file.truncate(int.from_bytes(head[END_ADDRESS], "little"))
-
+from ._layout import Table, write_attributes, write_text_dataset
 
 MARGIN_S = 10.0
 MARGIN_FRACTION = 0.05
@@ -88,9 +40,6 @@ RESERVE_AHEAD_S = 60.0
 
 ROOM_FACTOR = 2
 """While a recording is finished, it and its compressed copy lie side by side."""
-
-HEAD_BYTES = 8_000_000
-"""More than tables, attributes and configuration take together (5 MB)."""
 
 ITEM_BYTES = 4
 
@@ -128,25 +77,17 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
     """
     capacity, reserved = _lengths(header)
     _require_room(path, reserved * ITEM_BYTES * len(header.channels))
-    channel_bytes = ITEM_BYTES * len(header.channels)
     made = layout.tmp_of(path)
     try:
-        claim_room(made, HEAD_BYTES + reserved * channel_bytes, HEAD_BYTES + capacity * channel_bytes)
-    except OSError as error:
-        raise RecordingError(
-            f"{part} cannot be created with {reserved * channel_bytes / 1e6:.0f} MB: {error}."
-            " Nothing was recorded; make room, or choose another folder or a shorter measurement."
-        ) from error
-    try:
-        with h5py.File(made, "w", libver=layout.LIBVER, locking=False) as file:
+        meet_trouble()
+        with written_hdf5(made, "x", layout.LIBVER) as file:
             places = _write_layout(file, header, capacity, reserved)
         _claim(made, places)
-        _require_whole(made, header)
         rename(made, part)
         sync_folder(part.parent)
     # HDF5 reports a failing disk as one or the other.
     except (OSError, RuntimeError) as error:
-        for each in (made, part):
+        for each in () if isinstance(error, FileExistsError) else (made, part):
             with suppress(OSError):
                 each.unlink()
         raise RecordingError(
@@ -154,18 +95,6 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
             " Nothing was recorded; make room, or choose another folder or a shorter measurement."
         ) from error
     return places
-
-
-def _require_whole(made: Path, header: RecordingHeader) -> None:
-    """Read back the written data: h5py does not report a disk that fails while it closes an object.
-
-    Raises OSError where something is missing.
-    """
-    with h5py.File(made, "r", locking=False) as file:
-        texts = file[layout.CONFIGURATION]
-        for name, text in header.configuration().items():
-            if name not in texts or read_text_dataset(texts, name) != text:
-                raise OSError(errno.EIO, f"{name} could not be read back")
 
 
 def _lengths(header: RecordingHeader) -> tuple[int, int]:
@@ -273,8 +202,8 @@ ATTEMPTS = 10
 _one_at_a_time = threading.Lock()
 
 
-def replace_with_change(path: Path, room: int, change: Callable[[h5py.File], Answer]) -> Answer:
-    """Apply ``change``, which adds at most ``room`` bytes, to a copy of the file, and swap the two.
+def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> Answer:
+    """Apply ``change`` to a copy of the file, and swap the two.
 
     A crash leaves the old file untouched (and perhaps a ``.tmp`` beside it). When another program has changed
     the file meanwhile, the change is made again on top of that. Raises RecordingError when the disk refuses;
@@ -284,7 +213,7 @@ def replace_with_change(path: Path, room: int, change: Callable[[h5py.File], Ans
         with _one_at_a_time:
             for _ in range(ATTEMPTS):
                 before = _fingerprint(path)
-                tmp, answer = _changed_copy(path, room, change)
+                tmp, answer = _changed_copy(path, change)
                 try:
                     if _fingerprint(path) == before:
                         rename(tmp, path)
@@ -306,17 +235,15 @@ def replace_with_change(path: Path, room: int, change: Callable[[h5py.File], Ans
     )
 
 
-def _changed_copy(path: Path, room: int, change: Callable[[h5py.File], Answer]) -> tuple[Path, Answer]:
+def _changed_copy(path: Path, change: Callable[[h5py.File], Answer]) -> tuple[Path, Answer]:
     descriptor, name = tempfile.mkstemp(prefix=path.name + ".", suffix=layout.TMP_SUFFIX, dir=path.parent)
     os.close(descriptor)
     tmp = Path(name)
     try:
         shutil.copyfile(path, tmp)
         shutil.copymode(path, tmp)
-        extend_room(tmp, tmp.stat().st_size + room)
-        with h5py.File(tmp, "r+", libver=layout.LIBVER, locking=False) as file:
+        with written_hdf5(tmp, "r+", layout.LIBVER) as file:
             answer = change(file)
-        release_room(tmp)
         sync_file(tmp)
     except BaseException:
         tmp.unlink(missing_ok=True)

@@ -19,7 +19,7 @@ from . import _layout as layout, _tables as tables
 from ._contents import channel_header, configuration_facts, file_facts
 from ._disk import is_being_recorded
 from ._header import ChannelHeader, require_different
-from ._layout import Origin, RecordingState, json_text, read_attributes
+from ._layout import Origin, RecordingState, read_attributes
 from ._overview import CountOverview, read_overview
 from ._preallocate import replace_with_change
 from ._results import ResultArray, SavedResult, Setting, read_results, result_groups, write_result
@@ -144,8 +144,6 @@ class OpenRecording:
         self.file = open_hdf5(self.path)
 
 
-RESULT_HEAD_BYTES = 100_000
-"""More than HDF5 needs to describe one array of a result."""
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError)
 """What h5py raises when a file's inside is not what its outside promised."""
 
@@ -391,16 +389,12 @@ class Recording(RecordingDescription):
         """
         self._require_finished("added to")
         used = self.roles if roles is None else tuple(self.channel(role).role for role in roles)
-        room = RESULT_HEAD_BYTES * (1 + len(arrays)) + sum(
-            np.asarray(each.values).nbytes for each in arrays.values()
-        )
-        room += len(json_text(f"The settings of result {name!r}", settings))
         key = seal_key()
         seal = self.check_seal(SealDepth.QUICK)
         if seal.state is SealState.DAMAGED:
             raise RecordingError(f"{self.path} is damaged ({seal.sentence}), so nothing was added to it.")
         given = replace_with_change(
-            self.path, room, lambda file: write_result(file, name, arrays, settings, used, key)
+            self.path, lambda file: write_result(file, name, arrays, settings, used, key)
         )
         self._open.reopen()
         return given

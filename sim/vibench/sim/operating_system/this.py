@@ -64,6 +64,14 @@ __all__ = [
 Buffer = bytes | memoryview
 
 
+def write_all(descriptor: int, data: Buffer, offset: int) -> None:
+    """Write bytes at a place; a short write is continued."""
+    rest = memoryview(data).cast("B")
+    while len(rest):
+        written = write_at(descriptor, rest, offset)
+        rest, offset = rest[written:], offset + written
+
+
 class OpenFile:
     """An existing file, open to be written; its marks vanish with the process, however that ends.
 
@@ -90,11 +98,8 @@ class OpenFile:
         return is_locked_alone(self._descriptor)
 
     def write(self, offset: int, data: Buffer) -> None:
-        """Put ``data`` at ``offset``, in the system's cache at least; a short write is continued."""
-        rest = memoryview(data).cast("B")
-        while len(rest):
-            written = write_at(self._descriptor, rest, offset)
-            rest, offset = rest[written:], offset + written
+        """Put ``data`` at ``offset``, in the system's cache at least."""
+        write_all(self._descriptor, data, offset)
 
     def sync(self) -> None:
         """Return when everything written so far would survive a power cut."""

@@ -15,12 +15,13 @@ from collections.abc import Callable, Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hdf5_files.writing import written_hdf5
 from ..operating_system.this import OpenFile, rename, sync_file, sync_folder
 from . import _grid as layout
 from ._errors import StudyError
@@ -40,19 +41,6 @@ from ._store import Arrays, PointAnswer, put
 
 _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
 """Of a reader; a writer has a file open for as long as it runs."""
-
-
-class Disk(Protocol):
-    """What a store needs of a file."""
-
-    def write(self, offset: int, data: bytes) -> None:
-        """Put ``data`` at ``offset``, in the system's cache at least."""
-
-    def sync(self) -> None:
-        """Return when everything written so far would survive a power cut."""
-
-    def close(self) -> None:
-        """Release the file."""
 
 
 def sole_writer(path: Path) -> OpenFile:
@@ -108,7 +96,8 @@ def make_file(path: Path, plan: GridPlan) -> None:
     making = path.with_name(path.name + MAKING_SUFFIX)
     try:
         _require_room(path, plan)
-        with h5py.File(making, "w", libver=layout.LIBVER, locking=False) as file:
+        making.unlink(missing_ok=True)
+        with written_hdf5(making, "x", layout.LIBVER) as file:
             _fill(file, plan)
         sync_file(making)
         rename(making, path)
@@ -241,7 +230,7 @@ class FileStore:
 
     """
 
-    def __init__(self, path: Path, plan: GridPlan, opened: Callable[[Path], Disk] = sole_writer) -> None:
+    def __init__(self, path: Path, plan: GridPlan, opened: Callable[[Path], OpenFile] = sole_writer) -> None:
         self._path = path
         self._columns = plan.columns
         self._disk = opened(path)

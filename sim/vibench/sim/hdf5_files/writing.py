@@ -1,0 +1,48 @@
+"""Writing an HDF5 file to a disk that may refuse: an error, never a crash and never a silent gap.
+
+HDF5 2.0 crashes when it closes a file and a write fails, and h5py prints an error that it meets while it
+closes an object and goes on. So HDF5 writes to a file object that reports every write as done and keeps the
+first error, which is raised when HDF5 has closed the file.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from io import FileIO
+from pathlib import Path
+from typing import Literal
+
+import h5py
+
+from ..operating_system.this import Buffer, write_all
+
+
+class _Disk(FileIO):
+    refusal: OSError | None = None
+
+    def write(self, data: Buffer) -> int:  # type: ignore[override]  # h5py passes nothing else
+        try:
+            write_all(self.fileno(), data, self.tell())
+        except OSError as error:
+            self.refusal = self.refusal or error
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.refusal = self.refusal or error
+            return 0
+
+
+@contextmanager
+def written_hdf5(
+    path: Path, mode: Literal["x", "r+"], libver: tuple[str, str] | None = None
+) -> Iterator[h5py.File]:
+    """Create (``x``) or change (``r+``) a file; raises OSError where the disk refuses any of it."""
+    with _Disk(path, "x+" if mode == "x" else mode) as disk:
+        try:
+            with h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file:
+                yield file
+        finally:
+            if disk.refusal is not None:
+                raise disk.refusal
