@@ -1,5 +1,6 @@
 """`vibench demo`: the paper's experiment on the virtual rig, from the first volt to the report."""
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -11,13 +12,14 @@ from vibench.acquisition.engine import CampaignRequest
 from vibench.acquisition.rig import load_rig
 from vibench.analysis import DRAWS, FEWEST_DRAWS, campaign_summary
 from vibench.sim.background import Progress
+from vibench.sim.operating_system.this import replaced
 
 from .analyse import complain_about
 from .analyst import second_process
 from .exit_code import ExitCode
 from .measure import the_bench
 from .options import option
-from .output import bold, console, leave_output_to_json, print_json, write_json
+from .output import bold, console, leave_output_to_json, print_json
 from .paths import AsJson, unused
 from .progress_bars import analysis_bar
 
@@ -61,7 +63,8 @@ def demo(
         results = analyst.together()
     report = write_report(results, folder / "report.html", folder / "figures")
     summary = campaign_summary(results)
-    write_json(summary, folder / "results.json")
+    with replaced(folder / "results.json") as coming:
+        coming.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     console.print()
     console.print("The report:", bold(report.resolve()))
     if as_json:

@@ -3,7 +3,6 @@
 import json
 import sys
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -76,8 +75,3 @@ def print_json(document: Mapping[str, object]) -> None:
     """Print one JSON document on standard output, and nothing else."""
     json.dump(document, sys.stdout, indent=2, allow_nan=False)
     sys.stdout.write("\n")
-
-
-def write_json(document: Mapping[str, object], path: Path) -> None:
-    """Write one JSON document for other programs."""
-    path.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -5,9 +5,7 @@ said in decibels (gains) and ppm (clock).
 """
 
 import hashlib
-import os
 import re
-import tempfile
 from collections.abc import Callable
 from datetime import UTC, datetime
 from enum import StrEnum
@@ -18,7 +16,7 @@ from typing import assert_never
 from pydantic import ValidationError
 
 from vibench.sim.operating_system.state_folder import state_folder
-from vibench.sim.operating_system.this import rename
+from vibench.sim.operating_system.this import replaced
 
 from ..bench.bench import Bench, BenchKind
 from ..bench.result import BenchReport, Bounds, CheckResult, Finding, Verdict, ago, judged, rig_digest
@@ -95,10 +93,8 @@ def _write(result: CheckResult, *, passed: bool) -> Path:
     try:
         path = archive_path(result.rig, passed=passed)
         path.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, name = tempfile.mkstemp(prefix=path.name, suffix=".tmp", dir=path.parent)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as file:
-            file.write(result.model_dump_json(indent=2))
-        rename(Path(name), path)
+        with replaced(path) as coming:
+            coming.write_text(result.model_dump_json(indent=2), encoding="utf-8")
     except OSError as error:
         raise RecordingError(
             f"The result of the bench check cannot be kept in {error.filename} ({error.strerror}). The bench "

@@ -11,6 +11,8 @@ from typing import Protocol, cast
 
 from pydantic import AwareDatetime, Field
 
+from vibench.sim.operating_system.this import replaced
+
 from ..errors import CheckFailed, CheckStopped, ConfigurationError
 from ..host.toml_file import FrozenModel, load_toml
 from ..instruments import Knob, PlugInKind, SensorFacts, driver_of
@@ -255,7 +257,8 @@ def save_knob_sheet(sheet: KnobSheet, path: Path) -> None:
     )
     text = f"operator = {_quoted(sheet.operator)}\nconfirmed = {sheet.confirmed.isoformat()}\n{knobs}"
     try:
-        path.write_text(text, encoding="utf-8")
+        with replaced(path) as coming:
+            coming.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(
             f"{path} cannot be written ({error.strerror}); nothing was energised, give another place"

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogFormatter, NullLocator
 
 from vibench.acquisition import printable
+from vibench.sim.operating_system.this import replaced
 
 from ..figure_choices import ImageKind
 from ..tables import Table, write_tables
@@ -200,12 +201,7 @@ class DrawnFigure:
         drawn = []
         for kind in kinds:
             path = folder / f"{self.name}.{kind.value}"
-            match kind:
-                case ImageKind.PNG:
-                    path.write_bytes(self.png)
-                case ImageKind.SVG:
-                    path.write_bytes(self.svg)
-                case ImageKind.PDF:
-                    path.write_bytes(self.pdf)
+            with replaced(path) as coming:
+                coming.write_bytes(getattr(self, kind.value))
             drawn.append(path)
         return (*drawn, *write_tables(self.tables, folder))

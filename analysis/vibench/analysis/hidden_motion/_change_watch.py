@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from vibench.acquisition.rig import Rig
 from vibench.sim import FrozenModel, Specimen
 from vibench.sim.operating_system.state_folder import state_folder
-from vibench.sim.operating_system.this import rename
+from vibench.sim.operating_system.this import replaced
 
 from ._parameters import Hidden
 
@@ -89,9 +89,8 @@ def kept_baseline(path: Path) -> Baseline | None:
 def keep_baseline(baseline: Baseline, path: Path) -> None:
     """Keep a baseline in the place of the last one; raises OSError when the folder cannot be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    coming = path.with_suffix(".coming")
-    coming.write_text(baseline.model_dump_json(indent=2), encoding="utf-8")
-    rename(coming, path)
+    with replaced(path) as coming:
+        coming.write_text(baseline.model_dump_json(indent=2), encoding="utf-8")
 
 
 class ChangeWatch:

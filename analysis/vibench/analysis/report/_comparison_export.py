@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from vibench.sim.operating_system.this import replaced
+
 from ..comparison.curve import Curve, curve_difference
 from ..errors import InvalidRequest
 from ..figures.comparison import comparison_figure
@@ -69,12 +71,10 @@ def write_comparison(
             _report(target, recordings)
         case ExportKind.CSV:
             write_csv(comparison_table(target.stem, curves, pair), target)
-        case ExportKind.PNG:
-            target.write_bytes(comparison_figure(target.stem, curves, pair, markers_hz).png)
-        case ExportKind.SVG:
-            target.write_bytes(comparison_figure(target.stem, curves, pair, markers_hz).svg)
-        case ExportKind.PDF:
-            target.write_bytes(comparison_figure(target.stem, curves, pair, markers_hz).pdf)
+        case _:
+            drawn = comparison_figure(target.stem, curves, pair, markers_hz)
+            with replaced(target) as coming:
+                coming.write_bytes(getattr(drawn, kind.value))
     return target
 
 

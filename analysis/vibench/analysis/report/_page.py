@@ -12,6 +12,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from vibench.acquisition import printable
+from vibench.sim.operating_system.this import replaced
 
 from ..figures.style import DrawnFigure
 
@@ -127,7 +128,8 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
         version=version("vibench"),
     )
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
+    with replaced(path) as coming:
+        coming.write_text(text, encoding="utf-8")
     return path
 
 

@@ -2,6 +2,8 @@
 
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 if sys.platform == "win32":
@@ -127,6 +129,21 @@ def sync_file(path: Path) -> None:
     finally:
         os.close(descriptor)
     sync_folder(path.parent)
+
+
+@contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """Yield a name to write to; the file then replaces an older one, which stays if there is an error."""
+    target = path.resolve()  # a link stays one
+    if target.exists():
+        target.open("r+b").close()  # raises OSError where it is write-protected
+    coming = target.with_name(f"{target.name}.{os.getpid()}.coming")
+    try:
+        yield coming
+        rename(coming, target)
+    finally:
+        with suppress(OSError):
+            coming.unlink()
 
 
 def rename(unfinished: Path, final: Path) -> None:
