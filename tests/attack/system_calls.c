@@ -10,7 +10,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum call { PWRITE, FSYNC, RENAME, FTRUNCATE, UNLINK };
+enum call { PWRITE, FSYNC, RENAME, FTRUNCATE, UNLINK, PREAD };
 enum moment { BEFORE, INSIDE, AFTER };
 
 int left; /* until the call that is wanted */
@@ -41,7 +41,9 @@ static int is_due(int call, int fd, const char *path) {
     /* The folder itself is synchronised too. */
     size_t length = strlen(under);
     if (strncmp(found, under, length) && (strlen(found) + 1 != length || strncmp(found, under, length - 1))) return 0;
-    return __sync_sub_and_fetch(&left, 1) == 0;
+    /* A disk that cannot be read stays so. */
+    int more = __sync_sub_and_fetch(&left, 1);
+    return call == PREAD ? more <= 0 : more == 0;
 }
 
 /* The call may be made in part: PART is what of it. */
@@ -69,6 +71,14 @@ ssize_t pwrite(int fd, const void *data, size_t size, off_t at) {
 ssize_t pwrite64(int fd, const void *data, size_t size, off64_t at) {
     REAL(pwrite64);
     FAULTY(PWRITE, fd, NULL, real(fd, data, size / 2, at), real(fd, data, size, at))
+}
+ssize_t pread(int fd, void *data, size_t size, off_t at) {
+    REAL(pread);
+    FAULTY(PREAD, fd, NULL, 0, real(fd, data, size, at))
+}
+ssize_t pread64(int fd, void *data, size_t size, off64_t at) {
+    REAL(pread64);
+    FAULTY(PREAD, fd, NULL, 0, real(fd, data, size, at))
 }
 int fsync(int fd) { REAL(fsync); FAULTY(FSYNC, fd, NULL, 0, real(fd)) }
 int fdatasync(int fd) { REAL(fdatasync); FAULTY(FSYNC, fd, NULL, 0, real(fd)) }

@@ -183,6 +183,56 @@ def test_recordings_are_listed_where_their_catalogue_cannot_be_removed(library, 
     assert (listed.stdout, listed.stderr) == ("1 1\n", "")
 
 
+READERS = """
+import shutil
+from tests.attack.recordings_kills import LIBRARY
+from vibench.acquisition import RecordingError, open_recording
+from vibench.acquisition.campaign import list_recordings, verify_recordings
+from vibench.analysis import analyse
+from vibench.analysis.errors import AnalysisError
+from vibench.analysis.exchange import Format, excerpt, export_samples, opened_source
+shim = ctypes.CDLL(os.environ[LIBRARY])
+def read_source(path):
+    with opened_source(path) as source:
+        source.read(source.channels[-1], 0, 100)
+READ = {
+    "verify": lambda path: verify_recordings(path)[0].sentence,
+    "catalogue": lambda path: list_recordings(path.parent)[0].reason,
+    "analyse": analyse,
+    "import": read_source,
+}
+PREAD = 5
+for name, read in READ.items():
+    for number in range(1, 300, 9):
+        copy = folder.with_name(f"{name}-{number}")
+        shutil.copytree(folder, copy)
+        shim.arm(PREAD, number, 0, 5, bytes(copy))
+        try:
+            said = str(read(copy / "dwell.h5"))
+        except (RecordingError, AnalysisError) as error:
+            said = str(error)
+        left = ctypes.c_int.in_dll(shim, "left").value
+        if left > 0:
+            break
+        if "could not be read (Input/output error)" not in said or "damaged" in said:
+            print(name, number, said)
+    shim.arm(PREAD, 10**6, 0, 5, bytes(copy))
+    if name == "catalogue":
+        assert list_recordings(copy)[0].verdict == "good", list_recordings(copy)
+    print(name, number)
+"""
+
+
+@pytest.mark.thorough
+def test_a_disk_that_cannot_be_read_is_not_a_damaged_file(library, tmp_path):
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "dwell.h5").write_bytes(good_recordings()["dwell.h5"])
+    made = ended(library, READERS, folder, "pwrite", "before")
+    assert made.stderr == ""
+    assert len(made.stdout.splitlines()) == 4, made.stdout
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_a_rename_that_was_made_ends_no_campaign_whatever_it_reports(library, tmp_path, number):

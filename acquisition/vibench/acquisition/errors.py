@@ -94,3 +94,7 @@ class CheckStopped(CheckFailed):
 
 class RecordingError(AcquisitionError, OSError):
     """A recording cannot be created, written, finished or read."""
+
+
+class RecordingUnreachable(RecordingError):
+    """The system could not read a recording, which may be intact."""

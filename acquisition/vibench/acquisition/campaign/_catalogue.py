@@ -250,7 +250,8 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
             marks = ", ".join("?" * (len(_COLUMNS) + 1))
             connection.execute(
                 f"INSERT OR REPLACE INTO recordings VALUES ({marks})",  # noqa: S608 - question marks alone
-                (*astuple(entry), stamp),
+                # A disk that could not be read may be readable the next time.
+                (*astuple(entry), "" if entry.state == UNREADABLE else stamp),
             )
     connection.executemany("DELETE FROM recordings WHERE path = ?", ((path,) for path in known))
     connection.execute("COMMIT")

@@ -178,11 +178,9 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
         # Incomplete, and made by this call; everything in it is in the .part.
         with suppress(OSError):
             tmp.unlink()
+        if isinstance(error, RecordingError):
+            raise
         raise RecordingError(f"{final} could not be written: {error}. {whereabouts(part, error)}") from error
-    except RecordingError:
-        with suppress(OSError):
-            tmp.unlink()
-        raise
     return final
 
 

@@ -213,8 +213,15 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
         with _one_at_a_time:
             for _ in range(ATTEMPTS):
                 before = _fingerprint(path)
-                tmp, answer = _changed_copy(path, change)
+                descriptor, name = tempfile.mkstemp(layout.TMP_SUFFIX, f"{path.name}.", path.parent)
+                os.close(descriptor)
+                tmp = Path(name)
                 try:
+                    shutil.copyfile(path, tmp)
+                    shutil.copymode(path, tmp)
+                    with written_hdf5(tmp, "r+", layout.LIBVER) as file:
+                        answer = change(file)
+                    sync_file(tmp)
                     if _fingerprint(path) == before:
                         rename(tmp, path)
                         with suppress(OSError):  # after a power cut either file is there, and both are whole
@@ -233,22 +240,6 @@ def replace_with_change(path: Path, change: Callable[[h5py.File], Answer]) -> An
     raise RecordingError(
         f"{path} was changed by another program each of {ATTEMPTS} times. Nothing was added; try again later."
     )
-
-
-def _changed_copy(path: Path, change: Callable[[h5py.File], Answer]) -> tuple[Path, Answer]:
-    descriptor, name = tempfile.mkstemp(prefix=path.name + ".", suffix=layout.TMP_SUFFIX, dir=path.parent)
-    os.close(descriptor)
-    tmp = Path(name)
-    try:
-        shutil.copyfile(path, tmp)
-        shutil.copymode(path, tmp)
-        with written_hdf5(tmp, "r+", layout.LIBVER) as file:
-            answer = change(file)
-        sync_file(tmp)
-    except BaseException:
-        tmp.unlink(missing_ok=True)
-        raise
-    return tmp, answer
 
 
 def _fingerprint(path: Path) -> tuple[int, int, int]:

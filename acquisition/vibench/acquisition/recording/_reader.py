@@ -34,6 +34,7 @@ from ._seal import (
     check_seal,
     noted_seals,
     remember,
+    require_reachable,
     seal_key,
     seal_of,
     was_checked,
@@ -67,6 +68,7 @@ def open_hdf5(path: Path) -> h5py.File:
                 f"{path} is open in this program already, by another library and with another locking: close "
                 "it there first. The file was not touched."
             ) from error
+        require_reachable(str(path), error)
         raise RecordingError(
             f"{path} is no readable HDF5 file ({error}). It was cut short, or is something else;"
             " copy it again from where it was recorded."
@@ -107,6 +109,7 @@ def _require_ours(path: Path, file: h5py.File) -> None:
     try:
         attributes = read_attributes(file)
     except (OSError, RuntimeError, ValueError) as error:
+        require_reachable(file, error)
         raise RecordingError(f"{path} is damaged: its attributes cannot be read ({error}).") from error
     if attributes.get("format") != layout.FORMAT:
         raise RecordingError(
@@ -268,6 +271,7 @@ class Recording(RecordingDescription):
         try:
             return self._open.counts.read(self.seal, self._open.file[role], begin, end)
         except DAMAGE as error:
+            require_reachable(self._open.file, error)
             raise RecordingError(
                 f"Samples {begin} to {end} of {role!r} in {self.path} cannot be read: {error}."
                 " The file is damaged or closed; copy it again from where it was recorded."
@@ -337,7 +341,12 @@ class Recording(RecordingDescription):
         found = check_seal(self._open.file, depth, seal_key() if key is None else key, states)
         if found.state not in (SealState.INTACT, SealState.OTHER_KEY) or not found.seal:
             return found
-        if repr(_read(self._open)) != self._open.described:
+        try:
+            described = repr(_read(self._open))
+        except (RecordingError, *DAMAGE) as error:
+            require_reachable(self._open.file, error)
+            described = ""
+        if described != self._open.described:
             return SealCheck(SealState.DAMAGED, "it was changed after it had been opened", found.seal)
         if depth is SealDepth.WHOLE:
             remember(found.seal, {f"/{role}": states[f"/{role}"] for role in self.roles})
@@ -359,6 +368,7 @@ class Recording(RecordingDescription):
         try:
             return read_results(self._open.file)
         except DAMAGE as error:
+            require_reachable(self._open.file, error)
             raise RecordingError(
                 f"The results in {self.path} cannot be read: {error}. Its samples are as before; analyse it."
             ) from error
@@ -444,6 +454,7 @@ def open_recording(path: Path | str) -> Recording:
         _require_as_checked(handle, recording.seal)
     except (RecordingError, *DAMAGE) as error:
         handle.file.close()
+        require_reachable(str(path), error)
         raise RecordingError(
             f"{path} is damaged, or no recording of vibench: {str(error)[:LONGEST]}."
             " Copy it again from where it was recorded."

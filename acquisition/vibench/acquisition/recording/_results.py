@@ -15,7 +15,7 @@ from . import _layout as layout
 from ._contents import json_object
 from ._header import collect_provenance
 from ._layout import json_text, read_attributes, read_text_dataset, write_attributes, write_text_dataset
-from ._seal import SealKey, SealState, check_result, seal_result
+from ._seal import SealKey, SealState, check_result, require_reachable, seal_result
 
 REAL_SUFFIX, IMAG_SUFFIX = "_real", "_imag"
 COMPLEX_PART = "complex_part"
@@ -91,6 +91,7 @@ def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
         results = file.get(layout.RESULTS)
         found = {} if results is None else dict(results.items())
     except (OSError, RuntimeError, KeyError, AttributeError) as error:
+        require_reachable(file, error)
         raise RecordingError(f"the results cannot be read ({error})") from error
     for name, group in found.items():
         if not isinstance(group, h5py.Group):

@@ -22,9 +22,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from vibench.sim.hdf5_files.door import walk
+from vibench.sim.hdf5_files.door import system_error, walk
 
-from ..errors import RecordingError
+from ..errors import RecordingError, RecordingUnreachable
 from ..instruments import Counts
 from . import _layout as layout
 from ._layout import READ_KINDS, read_attributes, read_text_dataset, write_attributes, write_text_dataset
@@ -163,11 +163,23 @@ def check_seal(
             return SealCheck(SealState.DAMAGED, "the seal itself was changed", "")
         differing = list(_differing(file, manifest, depth, states))
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        require_reachable(file, error)
         return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
     if differing:
         more = f" and {len(differing) - 3} more" if len(differing) > 3 else ""
         return SealCheck(SealState.DAMAGED, f"not as it was sealed: {', '.join(differing[:3])}{more}", seal)
     return _signature_check(text, [str(marks.get(each, "")) for each in (HMAC, KEY_ID)], key, seal)
+
+
+def require_reachable(file: h5py.File | str, error: Exception) -> None:
+    """Raise RecordingUnreachable where an error comes from the system: it says nothing about the file."""
+    if isinstance(error, RecordingUnreachable):
+        raise error
+    if said := system_error(error):
+        raise RecordingUnreachable(
+            f"{getattr(file, 'filename', file)} could not be read ({said}). The file may be intact: check "
+            "the disk and its connection, copy the file to another disk, and try again."
+        ) from error
 
 
 def seal_of(file: h5py.File) -> str:
@@ -191,6 +203,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
             return _unsealed("it was saved before results had one", key)
         text = _result_text(group)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        require_reachable(group.file, error)
         return SealCheck(SealState.DAMAGED, f"it cannot be read as it was sealed ({error})", "")
     if _sha256(text.encode()) != said:
         return SealCheck(SealState.DAMAGED, "not as it was sealed", said)
@@ -267,7 +280,8 @@ def _data_or_nothing(item: h5py.Dataset, states: list["Hash"]) -> str:
     """Return a checksum, or a word that is none where data cannot be read."""
     try:
         return _data_sha256(item, states)
-    except OSError:
+    except OSError as error:
+        require_reachable(item.file, error)
         return "unreadable"
 
 
@@ -289,6 +303,7 @@ def _without_seal(file: h5py.File, depth: SealDepth, key: SealKey | None) -> Sea
     try:
         other = [role for role in roles if _data_sha256(file[role]) != read_attributes(file[role])["sha256"]]
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, AttributeError) as error:
+        require_reachable(file, error)
         return SealCheck(SealState.DAMAGED, f"it has no seal, and cannot be read ({error})", "")
     if other:
         sentence = f"it has no seal, and the samples of {', '.join(other)} do not match their checksum"

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from vibench.acquisition.recording import Origin
-from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, walk
+from vibench.sim.hdf5_files.door import UnsafeHdf5, open_hdf5, system_error, walk
 
 from ..errors import UnusableData
 from ..signals.arrays import Reals
@@ -84,6 +84,8 @@ def opened_hdf5(path: Path) -> Iterator[Hdf5Source]:
             raise UnusableData(
                 f"{path.name} announces {cut[2]} bytes, and {cut[1]} are there; copy or export it again"
             ) from error
+        if said := system_error(error):
+            raise UnusableData(f"{path.name} could not be read ({said}); check the disk") from error
         raise UnusableData(f"{path.name} is no HDF5 file ({error}); copy or export it again") from error
     with file:
         yield Hdf5Source(file, dict(_places(file)))

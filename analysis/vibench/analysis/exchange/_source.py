@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from vibench.acquisition import shortened
+from vibench.sim.hdf5_files.door import system_error
 
 from ..errors import InvalidRequest, UnusableData
 from ..signals.arrays import Reals
@@ -170,6 +171,8 @@ def _readable(path: Path) -> Iterator[None]:
     except (InvalidRequest, UnusableData):
         raise
     except DAMAGE as error:
+        if said := system_error(error):
+            raise UnusableData(f"{path.name} could not be read ({said}); check the disk") from error
         raise UnusableData(
             f"{path.name} is damaged, or not what its suffix says ({shortened(str(error))}); copy or export "
             "it again"

@@ -3,7 +3,6 @@
 HDF5 lets a file name other files whose bytes it then gives out as its own (external storage, external links,
 virtual datasets), and believes what a file says of its sizes. `opened_hdf5` refuses the first, unless
 `external_data_allowed`, and compares the second with the file's length before anything is read.
-`written_hdf5` raises an error where the disk refuses a file that HDF5 writes.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory

@@ -1,6 +1,8 @@
 """What every HDF5 file must pass before anything in it is read: its own data only, and sizes that can be."""
 
+import errno
 import math
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,12 +38,22 @@ OWN_FILTERS = frozenset(
 UNREADABLE = (RuntimeError, KeyError, TypeError, OverflowError, ValueError)
 """What h5py raises where the description of an object, or a type of numbers, cannot be read."""
 
+_SYSTEM_ERROR = re.compile(r"errno = (?!22,)\d+, error message = '([^']*)'")
+"""In errors of HDF5; 22 means an address that cannot be, so that the file is wrong."""
+
 _allowances: list[None] = []
 """One for each `external_data_allowed` that is on in this process, whichever thread asks."""
 
 
 class UnsafeHdf5(ValueError):
     """The file points outside itself, or says of itself what cannot be; the text does not name the file."""
+
+
+def system_error(error: BaseException) -> str:
+    """Return what the system reported when it could not read ("Input/output error"); else an empty text."""
+    if found := _SYSTEM_ERROR.search(str(error)):
+        return found[1]
+    return error.strerror or "" if isinstance(error, OSError) and error.errno else ""
 
 
 @contextmanager
@@ -81,6 +93,8 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
                 _require_dataset(item, size_bytes)
     except BaseException as error:
         file.close()
+        if said := system_error(error):
+            raise OSError(errno.EIO, said) from error
         if isinstance(error, UNREADABLE) and not isinstance(error, UnsafeHdf5):
             raise UnsafeHdf5(f"its inside cannot be read ({error})") from error
         raise

@@ -8,7 +8,6 @@ import contextlib
 import hashlib
 import json
 import math
-import os
 import platform
 import threading
 import time
@@ -19,6 +18,7 @@ from typing import Self
 
 from ..engine.library import physics_digest
 from ..operating_system.state_folder import state_folder, state_place
+from ..operating_system.this import replaced
 from .plan import ScenePlan, plan_scene
 from .scene import Scene
 from .solve import Question, Solver, settle_scene, solve_scene
@@ -123,11 +123,10 @@ class CostLedger:
                 return
             self._is_new = False
             text = json.dumps({kind: asdict(known) for kind, known in sorted(self._kinds.items())}, indent=1)
-        beside = self._path.with_suffix(f".{os.getpid()}")
         with contextlib.suppress(OSError):
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            beside.write_text(text, encoding="utf-8")
-            beside.replace(self._path)
+            with replaced(self._path) as coming:
+                coming.write_text(text, encoding="utf-8")
 
 
 def _names(kind: str) -> list[str]:

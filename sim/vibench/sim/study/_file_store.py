@@ -102,11 +102,10 @@ def make_file(path: Path, plan: GridPlan) -> None:
         sync_file(making)
         rename(making, path)
         sync_folder(path.parent)
-    except OSError as error:
+    except BaseException as error:
         _discard(making, path)
-        raise StudyError(f"{path} cannot be created: {error}. Nothing was computed.") from error
-    except BaseException:
-        _discard(making, path)
+        if isinstance(error, OSError):
+            raise StudyError(f"{path} cannot be created: {error}. Nothing was computed.") from error
         raise
 
 

@@ -104,7 +104,8 @@ def _offset(dataset: "h5py.Dataset") -> int:
 
 @contextmanager
 def _opened(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
-    from ..hdf5_files.door import UnsafeHdf5, open_hdf5  # noqa: PLC0415 - h5py, which answers in memory do without
+    # h5py, which answers in memory do without.
+    from ..hdf5_files.door import UnsafeHdf5, open_hdf5, system_error  # noqa: PLC0415
 
     if not path.is_file():
         raise StudyError(f"{path} does not exist, or is no file; give the path of a {kind.called}'s file.")
@@ -115,6 +116,10 @@ def _opened(path: Path, kind: type[GridPlan]) -> Iterator["h5py.File"]:
     except UnsafeHdf5 as error:
         raise StudyError(f"{path} was not read: {error}") from error
     except OSError as error:
+        if said := system_error(error):
+            raise StudyError(
+                f"{path} could not be read ({said}). The file may be intact: check the disk, and try again."
+            ) from error
         raise StudyError(
             f"{path} is no readable HDF5 file ({error}); give the path of a {kind.called}'s file."
         ) from error
