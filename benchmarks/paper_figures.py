@@ -11,7 +11,7 @@ import os
 import time
 
 from vibench.sim import Harmonic, Observable, Scene, gong2025, solve_scene
-from vibench.sim.scene.solve import Question
+from vibench.sim.scene.solve import InBatches
 from vibench.sim.study import MemoryStore, Study, ThreadExecutor, run_study
 from vibench.sim.study._executor import solve_timed
 
@@ -25,7 +25,7 @@ ASKED = {
     "10": FIGURE | {"observe": (Observable.RESPONSE, Observable.LYAPUNOV)},
     "curve": {"amplitudes_m": (20e-6,), "frequencies_hz": {"start": 100, "stop": 400, "step": 2.5}},
 }
-SOLVERS = {"in batches": Question.ANSWER, "one by one": solve_scene}
+SOLVERS = {"in batches": InBatches(), "one by one": solve_scene}
 
 
 def main():

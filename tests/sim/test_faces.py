@@ -67,6 +67,9 @@ CALLS = {
         study.solve_study(ONE_POINT).arrays, 0, 90.0, 1e-6, start="rest", **words
     ),
     sim.Scene: lambda **words: sim.Scene(SPECIMEN, DRIVE, **words),
+    sim.solve_scene: lambda **words: sim.solve_scene(
+        sim.Scene(SPECIMEN, DRIVE, duration=sim.FixedDuration(0.2, 0.1)), **words
+    ),
     sim.BalanceOptions: sim.BalanceOptions,
 }
 """How each thing that asks for an enum is called."""

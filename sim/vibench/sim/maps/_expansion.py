@@ -15,7 +15,7 @@ from ..model.state import Floats
 from ..scene.cost import expected_cost_s, longest_cost_s
 from ..scene.prediction import MotionKind
 from ..scene.scene import Given, Scene
-from ..scene.solve import Question, Solved, settle_scene
+from ..scene.solve import InBatches, Question, Solved, settle_scene
 from ..study import (
     NUMBERS,
     Arrays,
@@ -53,7 +53,9 @@ def map_solver(plan: Map) -> Solver:
     registers. What they cannot follow (other stops than Hertz's, accuracy *reference*) goes one by one.
     """
     is_one_specimen = not any(each in OF_SPECIMEN for each in plan.varied)
-    return Question.MOTION if is_one_specimen and not plan.chain and batches_pay() else settle_scene
+    return (
+        InBatches(Question.MOTION) if is_one_specimen and not plan.chain and batches_pay() else settle_scene
+    )
 
 
 class MapPoints:
@@ -285,6 +287,6 @@ def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
         workers=(os.cpu_count() or 1) if workers is None else max(1, workers),
         file_bytes=plan.grid.size * row_bytes,
         followed="eight at a time, in lanes"
-        if map_solver(plan) is Question.MOTION
+        if isinstance(map_solver(plan), InBatches)
         else "one after the other",
     )

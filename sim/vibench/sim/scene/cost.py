@@ -21,7 +21,7 @@ from ..operating_system.state_folder import state_folder, state_place
 from ..operating_system.this import replaced
 from .plan import ScenePlan, plan_scene
 from .scene import Scene
-from .solve import Question, Solver, settle_scene, solve_scene
+from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 30
 """So many runs later a run counts for a third of a new one."""
@@ -175,8 +175,8 @@ DETUNED = (0.93, 1.07, 0.87, 1.13, 1.0)
 
 LEARNT_AS: dict[Solver, str] = {
     settle_scene: "settled",
-    Question.MOTION: "settled in lanes",
-    Question.ANSWER: "in lanes",
+    InBatches(Question.MOTION): "settled in lanes",
+    InBatches(Question.ANSWER): "in lanes",
 }
 """Solvers other than `solve_scene`, and what their runs are learnt as."""
 

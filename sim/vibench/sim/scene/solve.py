@@ -6,13 +6,14 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ..model.accuracy import Accuracy
 from ..model.outcome import Outcome
 from ..model.state import Floats
+from ..model.stops import chosen
 from .course import FixedCourse, SceneRun, SettlingCourse
 from .followed_run import FollowedRun, spectrum_of, states_of, whole_periods
 from .plan import LinearMotion, linear_motion, plan_of, transient_decay_s
@@ -61,11 +62,21 @@ class Question(StrEnum):
     """The motion and its responses alone: for maps, whose neighbouring points tell more than errors."""
 
 
-Solver = Callable[[Scene], ScenePrediction] | Question
-"""What answers scenes one by one; or the question that is answered for all of them in batches."""
+QuestionWord = Literal["answer", "motion"]
 
 
-def solve_scene(scene: Scene, question: Question = Question.ANSWER) -> ScenePrediction:
+@dataclass(frozen=True)
+class InBatches:
+    """Answer scenes as `solve_scenes` does."""
+
+    question: Question = Question.ANSWER
+
+
+Solver = Callable[[Scene], ScenePrediction] | InBatches
+"""How scenes are answered: one by one by a function, or in batches."""
+
+
+def solve_scene(scene: Scene, question: Question | QuestionWord = Question.ANSWER) -> ScenePrediction:
     """Run a scene as planned, and say what was seen and how far to trust it.
 
     Each response has an error: how far, relatively, that of another run of the same scene at a far stricter
@@ -81,6 +92,7 @@ def solve_scene(scene: Scene, question: Question = Question.ANSWER) -> ScenePred
         When the specimen cannot be followed in time, or not from such a start.
 
     """
+    question = chosen(Question, question)
     method, motion = _planned(scene)
     if method is Method.CLOSED_FORM:
         return _in_closed_form(scene, motion, question)

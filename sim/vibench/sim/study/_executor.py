@@ -17,7 +17,7 @@ from typing import Protocol, TypeAlias, TypeVar
 from ..scene.cost import learn_cost
 from ..scene.prediction import Method, ScenePrediction
 from ..scene.scene import Scene
-from ..scene.solve import Question, Solved, Solver as SceneSolver, solve_scene, solve_scenes
+from ..scene.solve import InBatches, Solved, Solver as SceneSolver, solve_scene, solve_scenes
 from ._errors import InvalidStudy
 
 
@@ -80,12 +80,15 @@ def solve_timed(scenes: Sequence[Scene], solver: Solver) -> Iterator[Solved]:
     What they cost is learnt. A scene that begins before one of its kind has ended may have loaded modules and
     made tables: its time says nothing.
     """
-    for group in [scenes] if isinstance(solver, Question) else [[scene] for scene in scenes]:
+    for group in [scenes] if isinstance(solver, InBatches) else [[scene] for scene in scenes]:
         kinds: list[Kind] = [
             (solver, type(each.specimen.contact), each.observe, type(each.duration)) for each in group
         ]
         are_prepared = [kind in _solved_before for kind in kinds]
-        found = solve_scenes(group, solver) if isinstance(solver, Question) else [_timed(group[0], solver)]
+        if isinstance(solver, InBatches):
+            found = solve_scenes(group, solver.question)
+        else:
+            found = [_timed(group[0], solver)]
         _solved_before.update(kinds)
         for scene, is_prepared, each in zip(group, are_prepared, found, strict=True):
             # To plan a closed form takes about as long as to evaluate it.

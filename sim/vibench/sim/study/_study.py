@@ -21,7 +21,7 @@ from ..model.drive import Harmonic
 from ..model.frozen_model import FrozenModel
 from ..model.specimen_description import ContactWord, SpecimenTable, usual_specimen
 from ..scene.scene import BUDGET_S, AutomaticDuration, FixedDuration, Given, Observable, Rest, Scene
-from ..scene.solve import Question, Solver, solve_scene
+from ..scene.solve import InBatches, Solver, solve_scene
 from ..scene.states_alone import batches_are_worth_it
 from ._grid import COLUMNS, FORMAT, FREQUENCY, MODEL, START, Column, GridPlan, StudyAxis
 
@@ -313,7 +313,7 @@ def study_solver(study: Study) -> Solver:
     starts = OTHER_STARTS if study.budget_s > 0.0 else 1
     motions = starts * math.prod(study.grid.shape[AXES_OF_SPECIMEN:])
     pays = not is_chained and batches_are_worth_it(motions, study.duration)
-    return Question.ANSWER if pays else solve_scene
+    return InBatches() if pays else solve_scene
 
 
 MOST_GAPS = 1000.0
