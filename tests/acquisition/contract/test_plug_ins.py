@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from vibench.acquisition import ConfigurationError
-from vibench.acquisition.instruments import PlugInKind, _plug_in, plug_in, plug_in_names
+from vibench.acquisition.instruments import PlugInKind, _guarded, plug_in, plug_in_names
 from vibench.acquisition.instruments._guarded import OURS
 from vibench.acquisition.rig import load_rig
 
@@ -106,7 +106,7 @@ def test_two_packages_with_one_name_are_told_apart_by_nobody(tmp_path, monkeypat
 
 def test_installed_packages_are_looked_at_once_and_again_when_the_path_changes(tmp_path, monkeypatch):
     looks = []
-    monkeypatch.setattr(_plug_in, "entry_points", lambda: looks.append("look") or EntryPoints())
+    monkeypatch.setattr(_guarded, "entry_points", lambda: looks.append("look") or EntryPoints())
     monkeypatch.syspath_prepend(tmp_path / "first")
     for _ in range(3):
         plug_in_names(PlugInKind.SENSOR)

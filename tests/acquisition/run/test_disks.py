@@ -13,7 +13,7 @@ import pytest
 
 from vibench.acquisition import AcquisitionError, StopLevel, open_bench, open_recording
 from vibench.acquisition.plan import RunState
-from vibench.acquisition.recording import RecordingState, _journal, create_recording, part_of, recover
+from vibench.acquisition.recording import RecordingState, _committer, create_recording, part_of, recover
 from vibench.acquisition.rig import CalibrationRule, confirm_simulated
 from vibench.acquisition.run.run import Run
 from vibench.acquisition.stopping.stop import Cause, StopRequest
@@ -115,7 +115,8 @@ def test_a_clock_that_jumps_an_hour_changes_labels_and_nothing_else(laboratory, 
         with Run(bench, PLAN, tmp_path / "run.h5") as run:
             upto(run, RunState.RECORDING)
             # The recording's own look at the clock: gRPC's must agree with that of its core.
-            monkeypatch.setattr(_journal, "time", SimpleNamespace(time=lambda: now() + by_s))
+            clock = SimpleNamespace(time=lambda: now() + by_s, monotonic=time.monotonic)
+            monkeypatch.setattr(_committer, "time", clock)
             run.switch.ask(StopRequest(Cause.OPERATOR, StopLevel.ABORT, "enough"))
             deque(run, maxlen=0)
         assert terminal_v(virtual) < SILENT_V
