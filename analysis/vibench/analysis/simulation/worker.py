@@ -19,16 +19,18 @@ from vibench.sim.study import (
     run_study,
 )
 
-from ..dynamics import (
-    BranchRequest,
-    ChainRequest,
-    SpectrumRequest,
-    branch_lines,
-    chain_runs,
-    spectrum_points,
+from ..dynamics import BranchRequest, ChainRequest, SpectrumRequest, branch_lines, chain_runs, spectrum_points
+from .progress import (
+    MapRequest,
+    MotionRequest,
+    PartialResult,
+    SimulatedPoint,
+    SimulatedSignal,
+    SimulationRequest,
+    Trouble,
+    map_pictures,
+    settled_motion,
 )
-from .map_request import MapRequest, MotionRequest, map_pictures, settled_motion
-from .progress import PartialResult, SimulatedPoint, SimulatedSignal, SimulationRequest, Trouble
 
 Tell = Callable[[tuple[PartialResult, ...]], None]
 SIGNAL_PERIODS = 12

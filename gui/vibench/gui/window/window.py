@@ -1,8 +1,7 @@
 """The frame: banner and STOP, messages, navigation, the status line."""
 
 from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from time import monotonic
@@ -55,27 +54,17 @@ from .banner import NEXT_STEPS, Banner, MessageStrip, StatusField, StatusLine, i
 from .event_loop_monitor import EventLoopMonitor
 from .menus import AbortKey, build_menus
 
-
-@dataclass(frozen=True)
-class PageEntry:
-    """A page by its name, its place on the rail, and how it is made."""
-
-    name: str
-    number: int
-    """Ctrl and this number shows it."""
-    make: Callable[[AppContext], Page]
-
-
-PAGES: tuple[PageEntry, ...] = (
-    PageEntry(RIG, 1, RigPage),
-    PageEntry(TEST, 2, TestPage),
-    PageEntry(RUN, 3, RunPage),
-    PageEntry(FILES, 4, FilesPage),
-    PageEntry(COMPARE, 5, ComparePage),
-    PageEntry(SIMULATE, 6, SimulatePage),
-    PageEntry(QUEUE, 7, QueuePage),
-    PageEntry(MAPS, 8, MapsPage),
-)
+PAGES: Mapping[str, Callable[[AppContext], Page]] = {
+    RIG: RigPage,
+    TEST: TestPage,
+    RUN: RunPage,
+    FILES: FilesPage,
+    COMPARE: ComparePage,
+    SIMULATE: SimulatePage,
+    QUEUE: QueuePage,
+    MAPS: MapsPage,
+}
+"""The pages in the order of the navigation bar; Ctrl and its number shows one."""
 
 
 DONE = "✔"
@@ -143,25 +132,9 @@ class NavigationBar(QListWidget):
 
 
 SPAN_S = 1.0
+"""Frames are counted over so many seconds."""
 MOST_DROPPED = 20
 """Files that are opened at once."""
-
-
-class FrameCount:
-    """Counts frames as they are drawn."""
-
-    def __init__(self) -> None:
-        self._drawn_s: deque[float] = deque()
-
-    def counted(self) -> float:
-        """Count one more, and give the frames of the last second [1/s]."""
-        now_s = monotonic()
-        self._drawn_s.append(now_s)
-        while now_s - self._drawn_s[0] > SPAN_S:
-            self._drawn_s.popleft()
-        return len(self._drawn_s) / SPAN_S
-
-
 TICK_MS = 50
 """Twenty pictures a second: more cost a core, fewer look jerky."""
 
@@ -169,15 +142,14 @@ TICK_MS = 50
 class Window(QMainWindow):
     """Holds the pages; what they show, and what the banner shows, comes from the engine at every tick."""
 
-    def __init__(self, context: AppContext, entries: tuple[PageEntry, ...]) -> None:
+    def __init__(self, context: AppContext, pages: Mapping[str, Callable[[AppContext], Page]]) -> None:
         super().__init__()
         self.context = context
         self.setWindowTitle("vibench")
         self.banner = Banner()
         self.strip = MessageStrip()
         self.status_line = StatusLine()
-        ordered = sorted(entries, key=lambda entry: entry.number)
-        self.pages: dict[str, Page] = {entry.name: entry.make(context) for entry in ordered}
+        self.pages: dict[str, Page] = {name: make(context) for name, make in pages.items()}
         self.navigation = NavigationBar(tuple(self.pages))
         self.navigation.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self._stack = QStackedWidget()
@@ -194,7 +166,8 @@ class Window(QMainWindow):
         self._timer = QTimer(self, interval=TICK_MS)
         self._timer.timeout.connect(self.tick)
         self._timer.start()
-        self._frames = FrameCount()
+        self._drawn_s: deque[float] = deque()
+        """Moments of the newest frames."""
         self.event_loop_monitor = EventLoopMonitor(lambda: f"{self.navigation.chosen_name} page", self)
 
     @property
@@ -222,9 +195,12 @@ class Window(QMainWindow):
         status = self.context.bridge.status
         self.banner.show_indicator(indicator_of(status, self.context.bridge.is_ordering))
         self.strip.hint(NEXT_STEPS[self.context.bridge.state])
-        self.status_line.show_fields(
-            *status_fields(status, self._frames.counted(), self.event_loop_monitor.longest_s)
-        )
+        now_s = monotonic()
+        self._drawn_s.append(now_s)
+        while now_s - self._drawn_s[0] > SPAN_S:
+            self._drawn_s.popleft()
+        frames = len(self._drawn_s) / SPAN_S
+        self.status_line.show_fields(*status_fields(status, frames, self.event_loop_monitor.longest_s))
         self.status_line.explain(StatusField.FRAMES, self.event_loop_monitor.text)
         self.page.refresh()
         self.navigation.show_done({name: page.is_done for name, page in self.pages.items()})

@@ -14,14 +14,15 @@ from PySide6.QtWidgets import QLabel, QLayout, QSplitter, QVBoxLayout, QWidget
 
 from vibench.analysis import recorded_response
 from vibench.analysis.dynamics import MOTION_CLASSES, RecordedLevel
-from vibench.analysis.simulation.map_request import (
+from vibench.analysis.simulation.progress import (
     MapPicture,
     MapRequest,
     MotionRequest,
+    PartialResult,
     SettledMotion,
+    Trouble,
     settled_motion,
 )
-from vibench.analysis.simulation.progress import PartialResult, Trouble
 from vibench.sim.background import Job
 
 from ...forms.editor import Choice

@@ -23,9 +23,8 @@ from ...widgets.boxes import TimedBar, boxed, column, filled, push_button, row
 from ...widgets.notice import COMPARE, SIMULATE, Notice, NoticeKind
 from ...widgets.read_table import ReadTable
 from ...widgets.units import SentenceLabel
-from .answer_plots import AnswerPlots
 from .dynamics_view import BRANCHES, CHAIN, SPECTRUM, DynamicsView
-from .pictures import BranchPicture, ChainPicture, SpectrumPicture
+from .pictures import AnswerPlots, BranchPicture, ChainPicture, SpectrumPicture
 
 _LINES = 6
 """Of the table of motions, headings among them."""
