@@ -3,7 +3,7 @@
 What makes a channel useless for any analysis: it never moved, or it was cut off throughout.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -14,11 +14,9 @@ from vibench.acquisition.recording import ChannelHeader, Recording
 from ..errors import NotEnoughData, UnusableData
 from ..signals.arrays import Integers, Reals
 from ..signals.envelope import DEFAULT_BINS, Envelope
-from .channels import BASE, DRIVE, RESPONSE
+from .channels import BASE, DRIVE, RESPONSE, OnRead, ignore_reading
 
 _BLOCK_S = 2.0
-OnRead = Callable[[int, int], None]
-"""Told (samples per channel read, of how many)."""
 _AT_FULL_SCALE = 0.999
 """Converters cut off a few counts to either side of their nominal range."""
 
@@ -57,10 +55,6 @@ class ChannelLevel:
     def span(self) -> float:
         """Largest minus smallest value; zero when the channel never moved."""
         return float(np.nanmax(self.envelope.upper) - np.nanmin(self.envelope.lower))
-
-
-def ignore_reading(samples: int, of: int) -> None:
-    """Watch nothing."""
 
 
 def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tuple[ChannelLevel, ...]:

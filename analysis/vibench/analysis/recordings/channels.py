@@ -1,7 +1,4 @@
-"""The three channels that every analysis uses: drive, base and response, from a recording or a simulation.
-
-Who is told how far an analysis is: a progress bar, or nobody.
-"""
+"""The three channels that every analysis uses: drive, base and response, from a recording or a simulation."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -53,6 +50,14 @@ def coupled_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz:
 def _number(bench: Mapping[str, Any], section: str, key: str) -> float | None:
     said = (bench.get(section) or {}).get(key)
     return float(said) if isinstance(said, int | float) and said > 0 else None
+
+
+OnRead = Callable[[int, int], None]
+"""Called with the samples per channel that are read, and how many there are."""
+
+
+def ignore_reading(samples: int, of: int) -> None:
+    """Watch nothing."""
 
 
 DRIVE, BASE, RESPONSE = "drive_voltage", "base_acceleration", "m0_velocity"
@@ -111,6 +116,7 @@ class RecordedChannels:
     """The channels of a recording; lost samples read as NaN, and the vibrometer's drop-outs are bridged."""
 
     recording: Recording
+    on_read: OnRead = ignore_reading
     _response: BridgedChannel = field(init=False)
 
     def __post_init__(self) -> None:
@@ -162,7 +168,9 @@ class RecordedChannels:
     def read(self, start: int, stop: int) -> Reals:
         """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
         drive, base = (self.recording.read(role, start, stop) for role in (DRIVE, BASE))
-        return np.stack([drive, base, self._response.read(start, stop)])
+        read = np.stack([drive, base, self._response.read(start, stop)])
+        self.on_read(stop, self.samples)
+        return read
 
     def overloaded(self, start: int, stop: int) -> Flags:
         """Say at which samples one of the channels was near its full scale, shape (samples,)."""
@@ -210,49 +218,3 @@ def read_whole(channels: Channels, stretch: Stretch) -> Reals:
             "followed across a hole; measure again"
         )
     return data
-
-
-@dataclass(frozen=True, eq=False)
-class ObservedChannels:
-    """Channels whose reading is watched."""
-
-    channels: Channels
-    on_read: Callable[[int, int], None]
-    """Called with the samples that were read, and how many there are."""
-
-    @property
-    def sample_rate_hz(self) -> float:
-        """Of all channels."""
-        return self.channels.sample_rate_hz
-
-    @property
-    def samples(self) -> int:
-        """Valid samples per channel."""
-        return self.channels.samples
-
-    @property
-    def response_delay_s(self) -> float:
-        """By how much the response channel lags the base channel."""
-        return self.channels.response_delay_s
-
-    def response_gain(self, frequency_hz: Reals) -> Complexes:
-        """Gain of the response's sensor over that of the base's, without their delays."""
-        return self.channels.response_gain(frequency_hz)
-
-    def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Give the named parts of the record."""
-        return self.channels.stretches(label)
-
-    def read(self, start: int, stop: int) -> Reals:
-        """Give drive, base and response, shape (3, samples), and say how far the record is read."""
-        data = self.channels.read(start, stop)
-        self.on_read(stop, self.samples)
-        return data
-
-    def overloaded(self, start: int, stop: int) -> Flags:
-        """Say at which samples one of the channels was near its full scale."""
-        return self.channels.overloaded(start, stop)
-
-    def bridged(self, start: int, stop: int) -> Flags:
-        """Return at which samples the response is a bridge over a drop-out."""
-        return self.channels.bridged(start, stop)

@@ -23,8 +23,8 @@ from vibench.acquisition.recording import (
 from vibench.sim import Specimen, SpecimenTable, fault_in_words
 
 from ..errors import UnusableData
-from .channel_levels import ChannelLevel, OnRead, channel_levels, ignore_reading
-from .channels import RESPONSE
+from .channel_levels import ChannelLevel, channel_levels
+from .channels import RESPONSE, OnRead, ignore_reading
 
 MOST_BYTES = 1e9
 """Of memory, for what need not be held against the file's size."""

@@ -11,7 +11,7 @@ from ..frequency_response.noise_response import DEFAULT_REQUEST
 from ..frequency_response.request import FrequencyResponseRequest
 from ..kinds.analyses import ANALYSES
 from ..recordings.channel_levels import require_moving_channels
-from ..recordings.channels import ObservedChannels, RecordedChannels
+from ..recordings.channels import RecordedChannels
 from ..recordings.checks import AbstractAnalysis
 from ..recordings.facts import recording_facts
 
@@ -48,7 +48,7 @@ def analyse(
     name = recording.path.name
     facts = recording_facts(recording, stage(observer, f"{name}: looking at every channel"))
     try:
-        channels = ObservedChannels(RecordedChannels(recording), stage(observer, f"{name}: analysing"))
+        channels = RecordedChannels(recording, stage(observer, f"{name}: analysing"))
         require_moving_channels(facts.channels)
         plan = facts.measurement.excitation
         found: AbstractAnalysis[Any, Any] = ANALYSES[plan.kind].analyse(facts, channels, plan, request)
