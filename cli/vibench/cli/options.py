@@ -16,7 +16,7 @@ from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Generic, TypeVar, Union, get_args, get_origin
 
 import typer
-from typer.core import TyperArgument, TyperCommand, TyperGroup
+from typer.core import TyperArgument, TyperCommand, TyperGroup, TyperOption
 from typer.models import OptionInfo
 
 from vibench.analysis import InvalidRequest
@@ -177,11 +177,16 @@ def with_options(function: Callable[..., None]) -> Callable[..., None]:
 
 def _parameter(model: "type[BaseModel]", name: str, panel: str | None) -> inspect.Parameter:
     field = model.model_fields[name]
-    option, plain = _option(model, name, panel), _plain(field.annotation)
-    if field.is_required():
-        return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[plain, option])
-    annotation = Annotated[plain | None, option]
-    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
+    kind = _plain(field.annotation)
+    default = inspect.Parameter.empty if field.is_required() else None
+    if not field.is_required():
+        kind = kind | None
+    return inspect.Parameter(
+        name,
+        inspect.Parameter.KEYWORD_ONLY,
+        default=default,
+        annotation=Annotated[kind, _option(model, name, panel)],
+    )
 
 
 class SectionedCommand(TyperCommand):
@@ -195,7 +200,7 @@ class SectionedCommand(TyperCommand):
         sections: dict[str, list[tuple[str, str]]] = {}
         models = getattr(self.callback, "fields", {})
         for each in self.get_params(ctx):
-            if each.name in models:
+            if isinstance(each, TyperOption) and each.name in models:
                 each.help = _help(models[each.name], each.name)
             record = each.get_help_record(ctx)
             usual = "Arguments" if isinstance(each, TyperArgument) else "Options"
