@@ -39,7 +39,7 @@ def test_no_text_of_the_reference_is_taken_for_a_type(site):
     assert len(pages) > 15
     assert [page.name for page in pages if ">Type<" in page.read_text(encoding="utf-8")] == []
     page = (site / "reference" / "vibench.acquisition.plan.html").read_text(encoding="utf-8")
-    assert "From which side the level is met at the start: from rest" in unescape(page)
+    assert "Which motion of m0 that is: the one against the base, or the absolute one" in unescape(page)
 
 
 def test_paths_of_pages_are_links(site):
