@@ -38,13 +38,23 @@ FOR_OUR_PROGRAMS = (
     "vibench.sim.engine",
     "vibench.sim.shaker",
     "vibench.sim.background",
+    "vibench.analysis.field_docstrings",
     "vibench.sim.hdf5_files",
     "vibench.sim.operating_system",
     "vibench.stop_files",
     "vibench.sim.accuracy_benchmark",
     "vibench.analysis.simulation",
 )
-ONE_FILE_ROOMS = ("background", "errors", "figure_choices", "tables", "analogue", "command", "stop_files")
+ONE_FILE_ROOMS = (
+    "background",
+    "errors",
+    "field_docstrings",
+    "figure_choices",
+    "tables",
+    "analogue",
+    "command",
+    "stop_files",
+)
 
 
 def sources():

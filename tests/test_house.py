@@ -11,15 +11,15 @@ ROOT = Path(__file__).resolve().parent.parent
 TOOLS = Path(sys.executable).parent
 PORTIONS = ("cli", "gui", "analysis", "virtual_rig", "acquisition", "sim")
 LINES_AT_MOST = {
-    "acquisition": 28_650,
-    "analysis": 32_190,
-    "cli": 5_470,
+    "acquisition": 28_200,
+    "analysis": 31_980,
+    "cli": 5_050,
     "extensions": 2_750,
-    "gui": 13_140,
+    "gui": 12_610,
     "native": 6_600,
-    "sim": 20_670,
+    "sim": 20_650,
     "studies": 3_220,
-    "virtual_rig": 8_640,
+    "virtual_rig": 8_510,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
 
