@@ -10,7 +10,7 @@ from vibench.acquisition import ConfigurationError, InstrumentError, InstrumentL
 from vibench.acquisition.bench.bench import RigPower
 from vibench.acquisition.campaign import ReconnectingBench
 from vibench.acquisition.errors import DataLost, InstrumentBusy
-from vibench.acquisition.recording._disk_trouble import meet_trouble
+from vibench.acquisition.recording._disk import meet_trouble
 from vibench.acquisition.rig import load_rig, with_faults
 from vibench.virtual_rig import DiskFaults, VirtualRig, load_fault_script
 from vibench.virtual_rig.analogue import Coupling, Input
