@@ -14,7 +14,7 @@ from vibench.sim.shaker.loaded_shaker import Shaker
 from ..errors import UnusableData
 from ..frequency_response.noise_response import NoiseAnalysis, repeated_response, streamed_response
 from ..frequency_response.results import FrequencyResponse
-from ..recordings.channels import BASE, DRIVE, RecordedChannels, Stretch, coupled_gain
+from ..recordings.channels import BASE, DRIVE, RecordedChannels, coupled_gain
 from ..signals.arrays import Complexes, Flags, Reals
 from ..tables import plus_minus
 from .driven_rig import AMPLIFIER
@@ -143,35 +143,20 @@ def _carried_mass(specimen: Specimen, frequency_hz: Reals) -> Complexes:
 
 
 @dataclass(frozen=True, eq=False)
-class _VoltageAndBase:
+class _VoltageAndBase(RecordedChannels):
     """The voltage in the base's place and the base in m0's, as the estimators of noise take them."""
 
-    recorded: RecordedChannels
     role: str
-    response_delay_s: float = 0.0
 
     @property
-    def sample_rate_hz(self) -> float:
-        return self.recorded.sample_rate_hz
-
-    @property
-    def samples(self) -> int:
-        return self.recorded.samples
+    def response_delay_s(self) -> float:
+        return 0.0
 
     def response_gain(self, frequency_hz: Reals) -> Complexes:
-        return coupled_gain(
-            self.recorded.recording.bench, self.recorded.recording.channel(BASE), frequency_hz
-        )
-
-    def stretches(self, label: str) -> tuple[Stretch, ...]:
-        return self.recorded.stretches(label)
+        return coupled_gain(self.recording.bench, self.recording.channel(BASE), frequency_hz)
 
     def read(self, start: int, stop: int) -> Reals:
-        recording = self.recorded.recording
-        return np.stack([recording.read(each, start, stop) for each in (DRIVE, self.role, BASE)])
-
-    def overloaded(self, start: int, stop: int) -> Flags:
-        return self.recorded.overloaded(start, stop)
+        return np.stack([self.recording.read(each, start, stop) for each in (DRIVE, self.role, BASE)])
 
     def bridged(self, start: int, stop: int) -> Flags:
         return np.zeros(stop - start, dtype=np.bool_)
@@ -180,7 +165,7 @@ class _VoltageAndBase:
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
     """Give s times the base's acceleration over the voltage: the estimators take it for displacements."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
-    channels = _VoltageAndBase(RecordedChannels(recording), role)
+    channels = _VoltageAndBase(recording, role)
     match analysis.excitation:
         case StreamedNoise() as plan:
             return streamed_response(channels, plan, analysis.request).frequency_response

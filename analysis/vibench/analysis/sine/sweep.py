@@ -66,7 +66,6 @@ def drive_phase(drive: Reals, sample_rate_hz: float, *, low_hz: float, high_hz: 
             f"the drive holds {drive.size * low_hz / sample_rate_hz:.1f} cycles at {low_hz:g} Hz; "
             f"its phase needs at least {_LEAST_CYCLES}"
         )
-    padded = fft.next_fast_len(drive.size)
     edge = min(int(_EDGE_CYCLES * sample_rate_hz / low_hz), drive.size // 8)
     padded = fft.next_fast_len(drive.size + edge)
     spectrum = fft.fft(drive - np.mean(drive), padded)
