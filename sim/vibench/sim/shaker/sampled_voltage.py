@@ -65,8 +65,6 @@ class SampledMotion:
     """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
     impacts: NDArray[np.int64]
     """Contacts begun up to them, shape (blocks + 1,)."""
-    limited_steps: int
-    """Steps in which the amplifier clipped or limited its current."""
 
 
 def follow_voltage(
@@ -126,7 +124,6 @@ def follow_voltage(
         m0_velocity=kept[1],
         impact_times_s=blocks_s,
         impacts=np.array(impacts, dtype=np.int64),
-        limited_steps=shaken.limited_steps,
     )
 
 
@@ -151,7 +148,7 @@ class _Resampling:
         length = ceil(_PIECE / block) * block
         for first in range(0, volts.size, length):
             stop = min(first + length, volts.size)
-            padded = np.zeros(_padded(stop - first))
+            padded = np.zeros(fft.next_fast_len(stop - first + 2 * _MARGIN, real=True))
             low, high = max(first - _MARGIN, 0), min(stop + _MARGIN, volts.size)
             padded[low - first + _MARGIN : high - first + _MARGIN] = volts[low:high]
             spectrum = fft.rfft(padded) * self._weights_of(padded.size, None)
@@ -161,7 +158,7 @@ class _Resampling:
     def samples(self, means: FloatArray, gain: Gain) -> FloatArray:
         """Give the samples behind a sensor of this gain."""
         count = means.size // self._ratio
-        size = _padded(count)
+        size = int(fft.next_fast_len(count + 2 * _MARGIN, real=True))
         padded = np.zeros(size * self._ratio)
         padded[_MARGIN * self._ratio : (_MARGIN + count) * self._ratio] = means
         spectrum = fft.rfft(padded)[: size // 2 + 1] * self._weights_of(size, gain)
@@ -182,20 +179,12 @@ class _Resampling:
         return known
 
     def _held(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the coil's mean current under a voltage held over steps, over that under the voltage itself.
-
-        A coil at rest, whose current lags with time constant L / R: about 1 - (omega h)^2 / 12.
-        """
+        """Return the coil's mean current under a held voltage over that without: 1 - (omega h)^2 / 12."""
         time_constant_s = self._shaker.coil_inductance_h / self._shaker.coil_resistance_ohm
         lag = 2j * np.pi * frequency_hz * time_constant_s
         turns = self._sample_rate_hz * self._ratio * time_constant_s
         left, turned = np.exp(-1 / turns), np.exp(lag / turns)
         return np.asarray((1 + lag) * (1 - turns * (turned - 1) * (1 - left) / (turned - left)))
-
-
-def _padded(samples: int) -> int:
-    """Give a length that a transform likes, with room for the margins."""
-    return int(fft.next_fast_len(samples + 2 * _MARGIN, real=True))
 
 
 def _coupled(values: FloatArray, cut: float) -> FloatArray:
