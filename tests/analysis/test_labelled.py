@@ -3,6 +3,8 @@
 import dataclasses
 import importlib
 import inspect
+import json
+import pathlib
 import pkgutil
 import typing
 
@@ -23,7 +25,7 @@ from vibench.analysis.model_updating.updated_specimen import UpdatedSpecimen
 from vibench.analysis.recordings.checks import AbstractAnalysis
 from vibench.analysis.results.compared_recording import ComparedRecording
 from vibench.analysis.sine.dwell_analysis import DwellMotion
-from vibench.analysis.tables import Labelled, holds_array, unit_of
+from vibench.analysis.tables import Labelled, holds_array, rows, unit_of
 from vibench.analysis.uncertainty.budget import Budget
 
 xarray = pytest.importorskip("xarray", reason="pip install vibench[exchange] brings xarray")
@@ -349,3 +351,39 @@ def test_every_result_with_arrays_has_the_method():
     found = {*results(), *wholes()}
     assert len(found) > 25
     assert sorted(each.__name__ for each in found if not issubclass(each, Labelled)) == []
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Measured(Labelled):
+    DOCUMENT: typing.ClassVar = "*part lowest_hz=frequency_hz.0 missing_m=absent.size_m folder"
+
+    part: "Spread"
+    frequency_hz: np.ndarray
+    absent: Part | None
+    folder: pathlib.Path
+
+
+@dataclasses.dataclass(frozen=True)
+class Spread:
+    mean_m: np.float64
+    sd_m: float
+
+
+def measured(mean_m=2.0):
+    return Measured(Spread(np.float64(mean_m), np.nan), np.array([95.0, 266.0]), None, pathlib.Path("here"))
+
+
+def test_a_document_has_the_keys_of_its_class_in_their_order_and_null_where_nothing_is_known():
+    document = measured().to_dict()
+    assert list(document) == ["mean_m", "sd_m", "lowest_hz", "missing_m", "folder"]
+    assert json.dumps(document, allow_nan=False) == (
+        '{"mean_m": 2.0, "sd_m": null, "lowest_hz": 95.0, "missing_m": null, "folder": "here"}'
+    )
+
+
+def test_rows_of_several_parts_lie_below_each_other_and_miss_nothing():
+    found = rows([measured(), measured(3.0)], "frequency_hz mean_m=part.mean_m size_m=absent.size_m")
+    np.testing.assert_array_equal(found["frequency_hz"], [95.0, 266.0, 95.0, 266.0])
+    np.testing.assert_array_equal(found["mean_m"], [2.0, 3.0])
+    np.testing.assert_array_equal(found["size_m"], [np.nan, np.nan])
+    assert rows([], "frequency_hz")["frequency_hz"].size == 0

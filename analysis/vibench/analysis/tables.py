@@ -3,7 +3,7 @@
 import csv
 import inspect
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from decimal import Decimal
 from itertools import zip_longest
@@ -81,6 +81,18 @@ def columns(source: object, keys: str) -> dict[str, Any]:
                 value = value[int(step)] if step.lstrip("-").isdigit() else getattr(value, step)
         found[key] = value
     return found
+
+
+def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
+    """Give values of several parts below each other, by keys as in `columns`; NaN where a part has none."""
+    found = [columns(each, keys) for each in parts]
+    names = [each.partition("=")[0] for each in keys.split()]
+    return {
+        name: np.concatenate([np.atleast_1d(np.nan if each[name] is None else each[name]) for each in found])
+        if found
+        else np.zeros(0)
+        for name in names
+    }
 
 
 def plain(value: Any) -> Any:

@@ -75,11 +75,6 @@ def rotation(points: Reals) -> Rotation:
     return Rotation(float(best.x), float(best.fun) / spread if spread > 0 else 0.0)
 
 
-def is_torus(found: Rotation, noise_over_spread: float) -> bool:
-    """Whether the closed curve explains all but noise."""
-    return found.left_over <= min(max(_EXPLAINED, _NOISE_MARGIN * noise_over_spread), _CLEAR)
-
-
 def mains_hz(found: Rotation, drive_hz: float, periods: int) -> float | None:
     """Return the mains frequency, or its harmonic, that explains this rotation of the points; else None."""
     for mains in _MAINS_HZ:
@@ -315,7 +310,9 @@ def _undecided(why: str, evidence: Evidence) -> MotionVerdict:
 def _aperiodic(points: Points, so_far: Evidence, seed: int) -> MotionVerdict:
     found = rotation(points.value)
     evidence = replace(so_far, rotation=found)
-    is_curve = is_torus(found, evidence.noise / evidence.spread)
+    is_curve = found.left_over <= min(
+        max(_EXPLAINED, _NOISE_MARGIN * (evidence.noise / evidence.spread)), _CLEAR
+    )
     turns = found.turns_per_period * len(points.value)
     if slow_share(points) > SLOW or (is_curve and turns < _FEWEST_TURNS):
         return _undecided(

@@ -60,14 +60,15 @@ def opened_tdms(path: Path) -> Iterator[TdmsSource]:
         # It writes what it doubts to standard error, at any length; what matters, it raises.
         nptdms.log.log_manager.set_level(logging.CRITICAL)
         file = TdmsFile.open(raw)
-        found = [each for group in file.groups() for each in group.channels() if _is_real(each)]
+        found = [
+            each
+            for group in file.groups()
+            for each in group.channels()
+            if len(each) > 1 and each.dtype.kind in "iuf"
+        ]
         starts = [np.datetime64(each.properties[START], "us") for each in found if START in each.properties]
         origin = min(starts, default=np.datetime64(0, "us"))
         yield TdmsSource({_channel(file, each, origin): each for each in found})
-
-
-def _is_real(channel: Any) -> bool:
-    return len(channel) > 1 and channel.dtype.kind in "iuf"
 
 
 def _channel(file: Any, channel: Any, origin: np.datetime64) -> SourceChannel:

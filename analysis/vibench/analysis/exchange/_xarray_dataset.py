@@ -73,7 +73,9 @@ def xarray_dataset(
             "started_utc": recording.started_utc,
             "origin": recording.origin.value,
             "state": recording.state.value,
-            "segments_json": _said_of_segments(recording),
+            "segments_json": json.dumps(
+                [{"label": each.label, **each.numbers} for each in recording.segments]
+            ),
         },
     )
 
@@ -90,7 +92,3 @@ def _numbers_of_segments(recording: Recording, start: int, stop: int) -> NDArray
     for number, each in enumerate(recording.segments):
         numbers[max(each.start - start, 0) : max(each.stop - start, 0)] = number
     return numbers
-
-
-def _said_of_segments(recording: Recording) -> str:
-    return json.dumps([{"label": each.label, **each.numbers} for each in recording.segments])

@@ -17,7 +17,7 @@ from ..sine.tracked_resonance import (
     lost_levels,
     tracked_resonances,
 )
-from ..tables import table
+from ..tables import rows, table
 from .stepped_sine import tracked_caption
 from .style import (
     BOUNDS,
@@ -47,7 +47,6 @@ def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | No
     """Draw the resonance over level, and m0's amplitude over the resonance; of levels where it was found."""
     levels = tracked_resonances(analysis.facts.feedback)
     base = np.array([each.base_m_per_s2 for each in levels])
-    amplitude_m = np.array([each.amplitude_m for each in levels])
     simulated_m = _simulated_m(levels, analysis, laid)
     lost = lost_levels(analysis.facts.feedback)
     with styled():
@@ -64,15 +63,9 @@ def backbone_figure(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | No
         places["frequency"].tick_params(labelbottom=False)
         legend_above(figure, [places["frequency"], places["amplitude"]], columns=2)
     name = f"backbone_{analysis.facts.name}"
-    columns = {
-        "base_m_per_s2": base,
-        "frequency_hz": np.array([each.frequency_hz for each in levels]),
-        "u_frequency_hz": np.array([each.u_frequency_hz for each in levels]),
-        "mode_hz": _or_nan([each.mode_hz for each in levels]),
-        "u_mode_hz": _or_nan([each.u_mode_hz for each in levels]),
-        "damping_ratio": _or_nan([each.damping_ratio for each in levels]),
-        "amplitude_m": amplitude_m,
-    }
+    columns = rows(
+        levels, "base_m_per_s2 frequency_hz u_frequency_hz mode_hz u_mode_hz damping_ratio amplitude_m"
+    )
     if simulated_m is not None:
         columns["amplitude_m_simulated"] = simulated_m
     return DrawnFigure(
@@ -107,7 +100,7 @@ def _frequencies(axes: Axes, levels: Sequence[TrackedResonance]) -> None:
         _base(levels), [each.frequency_hz for each in levels], [2 * each.u_frequency_hz for each in levels],
         color=MEASURED, marker="o", markersize=4, capsize=2, linewidth=0.8, label=_PHASE,
     )  # fmt: skip
-    mode_hz, u_hz = _or_nan([each.mode_hz for each in levels]), _or_nan([each.u_mode_hz for each in levels])
+    mode_hz, u_hz = rows(levels, "mode_hz u_mode_hz").values()
     if np.isfinite(mode_hz).any():
         axes.errorbar(
             _base(levels), mode_hz, 2 * u_hz, color=PREDICTED, marker="D", markerfacecolor="none",
@@ -174,10 +167,6 @@ def _simulated_m(
 
 def _numbers(levels: Sequence[TrackedResonance]) -> list[int]:
     return [each.number for each in levels]
-
-
-def _or_nan(values: Sequence[float | None]) -> Reals:
-    return np.array([np.nan if each is None else each for each in values])
 
 
 def _caption(analysis: SteppedSineAnalysis, levels: Sequence[TrackedResonance]) -> str:

@@ -13,7 +13,7 @@ from ..comparison.curve import Curve, CurveKind, CurveOrigin
 from ..dynamics import BranchDiagram, BranchLine
 from ..signals.arrays import Reals
 from ..sine.tracked_resonance import TrackedResonance
-from ..tables import Table, table
+from ..tables import Table, rows, table
 from .style import (
     COLLIDING,
     LEVELS,
@@ -211,14 +211,11 @@ def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
         "branches",
         branch=owner,
         periods=np.concatenate([np.full(line.points, line.periods) for line in lines]),
-        frequency_hz=np.concatenate([line.frequency_hz for line in lines]),
-        amplitude_m=np.concatenate([line.amplitude_m for line in lines]),
-        response_i=np.concatenate([line.response_i[:, 0] for line in lines]),
-        response_ii=np.concatenate([line.response_ii[:, 0] for line in lines]),
-        largest_multiplier=np.concatenate([line.largest_multiplier for line in lines]),
-        growth_time_s=np.concatenate([line.growth_time_s for line in lines]),
-        impacts=np.concatenate([line.impacts for line in lines]),
-        error_estimate=np.concatenate([line.error_estimate for line in lines]),
+        **rows(
+            lines,
+            "frequency_hz amplitude_m response_i=response_i.T.0 response_ii=response_ii.T.0 "
+            "largest_multiplier growth_time_s impacts error_estimate",
+        ),
     )
     events = [(number, each) for number, line in enumerate(lines) for each in line.events]
     if not events:
@@ -226,8 +223,6 @@ def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
     special = table(
         "branches_special_points",
         branch=[number for number, _ in events],
-        kind=[each.kind for _, each in events],
-        frequency_hz=[each.frequency_hz for _, each in events],
-        amplitude_m=[each.amplitude_m for _, each in events],
+        **rows([each for _, each in events], "kind frequency_hz amplitude_m"),
     )
     return points, special

@@ -7,7 +7,7 @@ from vibench.sim import Parameter
 
 from ..dynamics import ExponentSpectrum
 from ..signals.arrays import Reals
-from ..tables import Table, table
+from ..tables import Table, rows, table
 from .style import BOUNDS, LEVELS, MEASURED, DrawnFigure, legend_above, new_figure, styled
 
 _HEIGHT_IN = 5.2
@@ -86,12 +86,7 @@ def _numbers(found: ExponentSpectrum) -> Table:
     }
     return table(
         "spectrum",
-        frequency_hz=found.column("frequency_hz"),
-        amplitude_m=found.column("amplitude_m"),
+        **rows(found.points, "frequency_hz amplitude_m"),
         **six,
-        sum_per_s=found.column("sum_per_s"),
-        dampers_per_s=found.column("dampers_per_s"),
-        dimension=found.column("dimension"),
-        dimension_low=found.column("dimension_low"),
-        dimension_high=found.column("dimension_high"),
+        **rows(found.points, "sum_per_s dampers_per_s dimension dimension_low dimension_high"),
     )

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 
 from ..hidden_motion import FoundParameter, Hidden, HiddenMotion, measured_gaps
 from ..signals.arrays import Reals
-from ..tables import Table, table
+from ..tables import Table, columns, table
 from .style import (
     BOUNDS,
     COLLIDING,
@@ -205,21 +205,17 @@ def _impact_tables(motion: HiddenMotion) -> tuple[Table, ...]:
         table(
             f"hidden_impacts_{motion.name}",
             time_s=(motion.first_sample + found.samples) / motion.sample_rate_hz,
-            side=found.sides,
-            duration_s=found.durations_s,
-            impulse_ns=found.impulses,
-            penetration_m=found.penetrations_m,
-            speed_before_m_per_s=found.speeds_before,
-            speed_after_m_per_s=found.speeds_after,
+            **columns(
+                found,
+                "side=sides duration_s=durations_s impulse_ns=impulses penetration_m=penetrations_m "
+                "speed_before_m_per_s=speeds_before speed_after_m_per_s=speeds_after",
+            ),
         ),
         table(
             f"hidden_impacts_without_contact_model_{motion.name}",
             middle_s=(motion.first_sample + free.samples) / motion.sample_rate_hz,
-            side=free.sides,
-            impulse_ns=free.impulses,
-            p_m=free.p,
+            **columns(free, "side=sides impulse_ns=impulses p_m=p"),
             gap_m=measured_gaps(free),
-            speed_before_m_per_s=free.rate_before,
-            speed_after_m_per_s=free.rate_after,
+            **columns(free, "speed_before_m_per_s=rate_before speed_after_m_per_s=rate_after"),
         ),
     )

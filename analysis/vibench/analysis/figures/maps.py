@@ -24,7 +24,7 @@ from ..dynamics import (
 )
 from ..figure_choices import SHOWN
 from ..signals.arrays import Reals
-from ..tables import Table, table
+from ..tables import Table, rows, table
 from .branches import draw_line
 from .style import (
     LEVELS,
@@ -222,9 +222,5 @@ def motion_table(motions: Sequence[MapMotion]) -> Table:
         "map_motions",
         motion=[str(each.motion) for each in motions],
         period=[-1 if each.period is None else each.period for each in motions],
-        response_i=[each.response_i for each in motions],
-        response_ii=[each.response_ii for each in motions],
-        share=[each.share.share for each in motions],
-        share_low=[each.share.low for each in motions],
-        share_high=[each.share.high for each in motions],
+        **rows(motions, "response_i response_ii share=share.share share_low=share.low share_high=share.high"),
     )

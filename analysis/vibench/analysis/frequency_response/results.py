@@ -1,8 +1,8 @@
 """Frequency responses: the shape every estimator of response over drive hands on to figures and reports."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,12 +56,9 @@ class FrequencyResponseSettings:
 class FrequencyResponse(Labelled):
     """Response over drive against frequency, with bounds; all arrays have the shape (lines,)."""
 
-    OWN_UNITS: ClassVar = {
-        "value": "{unit}",
-        "magnitude": "{unit}",
-        "magnitude_lower": "{unit}",
-        "magnitude_upper": "{unit}",
-    }
+    OWN_UNITS: ClassVar = dict.fromkeys(
+        ("value", "magnitude", "magnitude_lower", "magnitude_upper"), "{unit}"
+    )
 
     frequency_hz: Reals
     value: Complexes
@@ -154,20 +151,11 @@ class FrequencyResponse(Labelled):
             raise InvalidRequest(
                 f"no line lies between {low_hz:g} and {high_hz:g} Hz; the lines are at {span}"
             )
-        steady, reference = self.steady_relative_sd, self.reference_coherence
-        slope = self.drive_slope_per_hz
-        return replace(
-            self,
-            frequency_hz=self.frequency_hz[kept],
-            value=self.value[kept],
-            coherence=self.coherence[kept],
-            relative_sd_magnitude=self.relative_sd_magnitude[kept],
-            sd_phase_rad=self.sd_phase_rad[kept],
-            half_width=self.half_width[kept],
-            steady_relative_sd=None if steady is None else steady[kept],
-            drive_slope_per_hz=None if slope is None else slope[kept],
-            reference_coherence=None if reference is None else reference[kept],
-        )
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        arrays: dict[str, Any] = {
+            name: each[kept] for name, each in values.items() if isinstance(each, np.ndarray)
+        }
+        return replace(self, **arrays)
 
 
 def converted_frequency_response(

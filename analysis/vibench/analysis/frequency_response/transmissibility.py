@@ -153,11 +153,6 @@ def least_squares(
             )
 
 
-def drive_referenced(s_rx: Complexes, s_ry: Complexes) -> Complexes:
-    """S_ry / S_rx: the reference acts as an instrument, noise on x and y averages out."""
-    return _ratio(s_ry, s_rx)
-
-
 def drive_referenced_relative_sd(products: Complexes, value: Complexes, n_eff: float) -> Reals:
     """Relative standard deviation of the drive-referenced estimate.
 
@@ -381,7 +376,8 @@ def frequency_response_of(
 
 def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexes:
     if settings.estimator is Estimator.DRIVE:
-        return drive_referenced(products[_REFERENCE, _DRIVE], products[_REFERENCE, _RESPONSE])
+        # The reference is an instrument: noise on x and y averages out.
+        return _ratio(products[_REFERENCE, _RESPONSE], products[_REFERENCE, _DRIVE])
     s_xx, s_yy = products[_DRIVE, _DRIVE].real, products[_RESPONSE, _RESPONSE].real
     return least_squares(settings.estimator, s_xx, s_yy, products[_DRIVE, _RESPONSE], settings.noise_ratio)
 

@@ -96,12 +96,7 @@ def with_unit(value: float, half: float, unit: str) -> str:
 class FoundParameter:
     """One parameter as collisions tell it."""
 
-    OWN_UNITS: ClassVar = {
-        "value": "{0.unit}",
-        "low": "{0.unit}",
-        "high": "{0.unit}",
-        "described": "{0.unit}",
-    }
+    OWN_UNITS: ClassVar = dict.fromkeys(("value", "low", "high", "described"), "{0.unit}")
 
     what: Hidden
     value: float

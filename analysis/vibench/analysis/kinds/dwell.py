@@ -9,9 +9,9 @@ from vibench.acquisition.recording import SegmentLabel
 from ..chaos.verdict import MotionKind
 from ..comparison.recording_curves import dwell_traces
 from ..frequency_response.request import FrequencyResponseRequest
-from ..model.draws import Draw, Drawn
+from ..model.draws import Draw
 from ..model.ensemble import Ending, Quantity
-from ..model.overlay import DwellOverlay, dwell_overlay, dwell_quantities
+from ..model.overlay import dwell_overlay, dwell_quantities
 from ..model.simulated_channels import SimulatedChannels
 from ..recordings.channels import Channels
 from ..recordings.checks import measurement_checks
@@ -73,16 +73,12 @@ def _compared(analysis: DwellAnalysis) -> tuple[Quantity, ...]:
     return dwell_quantities(analysis.response, towards_hz, _endings(analysis.irregular))
 
 
-def _lay(analysis: DwellAnalysis, drawn: Drawn[DwellResponse]) -> DwellOverlay:
-    return dwell_overlay(analysis, drawn, _endings(analysis.irregular))
-
-
 DWELL = AnalysisKind(
     family="dwell",
     analyse=_analyse,
     draws=lambda analysis: partial(_draw, analysis),
     compared=_compared,
-    lay=_lay,
+    lay=lambda analysis, drawn: dwell_overlay(analysis, drawn, _endings(analysis.irregular)),
     curves=dwell_traces,
     budgets=dwell_budgets,
     place=lambda plan: (plan.frequency_hz, plan.amplitude_vpp),

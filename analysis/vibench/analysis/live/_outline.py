@@ -438,7 +438,9 @@ def thumbnail(path: Path) -> Thumbnail | None:
     """Draw a recording small; None where there is nothing to draw, or it would take too long."""
     try:
         with open_recording(path) as recording:
-            if recording.samples == 0 or not _is_quickly_seen(recording):
+            if recording.samples == 0 or not (
+                has_overview(recording) or recording.samples * len(recording.roles) <= READ_WHOLE_SAMPLES
+            ):
                 return None
             role = RESPONSE if RESPONSE in recording.roles else recording.roles[-1]
             picture = overview_of(recording).picture((role,), 0, recording.samples, THUMBNAIL_COLUMNS)
@@ -452,7 +454,3 @@ def thumbnail(path: Path) -> Thumbnail | None:
     if largest <= 0:
         return None
     return Thumbnail(*(np.asarray(each / largest, dtype=np.float32) for each in (low, high)))
-
-
-def _is_quickly_seen(recording: Recording) -> bool:
-    return has_overview(recording) or recording.samples * len(recording.roles) <= READ_WHOLE_SAMPLES

@@ -58,13 +58,7 @@ SHOWN = {
 class FittedValue:
     """A parameter with its interval."""
 
-    OWN_UNITS: ClassVar = {
-        "value": "{0.unit}",
-        "low": "{0.unit}",
-        "high": "{0.unit}",
-        "sd": "{0.unit}",
-        "nominal": "{0.unit}",
-    }
+    OWN_UNITS: ClassVar = dict.fromkeys(("value", "low", "high", "sd", "nominal"), "{0.unit}")
     DOCUMENT: ClassVar = "value low high sd bench=nominal"
 
     parameter: Parameter

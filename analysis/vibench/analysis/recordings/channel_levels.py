@@ -73,7 +73,8 @@ def channel_levels(recording: Recording, on_read: OnRead = ignore_reading) -> tu
     counts = np.zeros((len(recording.channels), _COUNTED), dtype=np.int64)
     for each in recording.blocks(recording.roles, block):
         parts.append(_extremes(each.values, length))
-        cut += _cut_off(each.values, offset, _AT_FULL_SCALE * full_scale)
+        # Lost samples (NaN) are at no limit.
+        cut += np.count_nonzero(np.abs(each.values - offset) >= _AT_FULL_SCALE * full_scale, axis=1)
         for row, shares in enumerate((each.values - offset) / full_scale):
             bins = np.rint((np.clip(shares[np.isfinite(shares)], -1, 1) + 1) / 2 * (_COUNTED - 1))
             counts[row] += np.bincount(bins.astype(np.int64), minlength=_COUNTED)
@@ -146,11 +147,6 @@ def _flat_top(counts: Integers, header: ChannelHeader, full_scale: float) -> int
 
 _LEAST_HEIGHT = 0.1
 """Of a peak above the median, over the whole span: less is a channel that rests at its lowest value."""
-
-
-def _cut_off(values: Reals, offset: Reals, limit: Reals) -> Integers:
-    """Count the samples of each channel at or beyond a limit; lost ones (NaN) are at none."""
-    return np.asarray(np.count_nonzero(np.abs(values - offset) >= limit, axis=1))
 
 
 def _extremes(values: Reals, length: int) -> tuple[Reals, Reals, Reals]:

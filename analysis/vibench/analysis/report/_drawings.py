@@ -90,16 +90,6 @@ def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
     yield from feedback_sentences(result.analysis.facts.feedback)
 
 
-def level_findings(result: SteppedSineResult) -> Iterator[str]:
-    """Say between which levels the motion jumps."""
-    yield stepped_level_caption(result.analysis.response)
-
-
-def tracked_findings(result: SteppedSineResult) -> Iterator[str]:
-    """Say where the resonance was at each level."""
-    yield from feedback_sentences(result.analysis.facts.feedback)
-
-
 def dwell_findings(result: DwellResult) -> Iterator[str]:
     """Say both responses, measured and simulated, and how the motion repeats."""
     found, plan = result.analysis.response, result.analysis.excitation
@@ -198,11 +188,6 @@ def _noise_levels(noise: Sequence[NoiseResult]) -> Iterator[DrawnFigure]:
         yield transmission_levels_figure([each.analysis for each in noise])
 
 
-def _sweep_figures(sweep: SweepResult) -> Iterator[DrawnFigure]:
-    yield sweep_figure(sweep.analysis, sweep.laid)
-    yield sweep_orders_figure(sweep.analysis)
-
-
 def _dwell_figures(dwells: Sequence[DwellResult]) -> Iterator[DrawnFigure]:
     yield dwells_figure([(each.analysis, each.laid) for each in dwells])
     yield portraits_figure([each.analysis for each in dwells])
@@ -290,7 +275,13 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
             _noise_figures, noise_findings, _noise_numbers, (resonance_table,), _noise_levels
         ),
         Family.SWEEP: Drawing(
-            _sweep_figures, sweep_findings, _sweep_numbers, (collision_table,), _hysteresis_figures
+            lambda sweep: iter(
+                (sweep_figure(sweep.analysis, sweep.laid), sweep_orders_figure(sweep.analysis))
+            ),
+            sweep_findings,
+            _sweep_numbers,
+            (collision_table,),
+            _hysteresis_figures,
         ),
         Family.DWELL: Drawing(
             lambda dwell: _dwell_figures((dwell,)),
@@ -302,8 +293,16 @@ DRAWINGS: Mapping[str, Drawing[Any, Any]] = rows_by_kind(
         Family.STEPPED: STEPPED,
     },
     {
-        "stepped_level": Drawing(_stepped_figures(STEPPED_LEVELS), level_findings, _stepped_numbers),
-        "resonance_tracking": Drawing(_tracked_figures, tracked_findings, _stepped_numbers),
+        "stepped_level": Drawing(
+            _stepped_figures(STEPPED_LEVELS),
+            lambda level: iter((stepped_level_caption(level.analysis.response),)),
+            _stepped_numbers,
+        ),
+        "resonance_tracking": Drawing(
+            _tracked_figures,
+            lambda tracked: feedback_sentences(tracked.analysis.facts.feedback),
+            _stepped_numbers,
+        ),
     },
     PlugInKind.DRAWING,
 )

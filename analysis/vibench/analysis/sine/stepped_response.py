@@ -19,13 +19,18 @@ from ..errors import NotEnoughData
 from ..recordings.channels import Channels, Stretch
 from ..recordings.checks import AbstractAnalysis, Check, Verdict
 from ..signals.arrays import Integers, Reals
-from ..tables import Labelled
+from ..tables import Labelled, columns
 from .dwell import LEAST_CLEAR, DwellResponse, clear_of_dropouts, dwell_response, silence_before
 
 Steps = SteppedSine | SteppedLevel | SettledSine | ResonanceTracking | HeldResponse
 """What is recorded frequency by frequency, or level by level."""
 _EDGE_PERIODS = 60.0
 """Drive periods that integration disturbs at each end."""
+_OF_A_STEP = (
+    "frequency_hz=drive.frequency_hz drive_amplitude_m=drive.amplitude_m "
+    "sd_drive_amplitude_m=drive.sd_amplitude_m response_i noise_bias_i noise_error_i response_ii "
+    "sd_response_ii slow_change phase_rad"
+)
 
 
 @dataclass(frozen=True)
@@ -82,20 +87,11 @@ def stepped_response(
             f"none of the steps of {plan.record_s:g} s was recorded whole, so there is no response to show; "
             "measure again"
         )
-    steps = [found for _, found in pairs]
+    steps = [columns(found, _OF_A_STEP) for _, found in pairs]
     return SteppedResponse(
-        frequency_hz=np.array([each.drive.frequency_hz for each in steps]),
+        **{key: np.array([each[key] for each in steps]) for key in steps[0]},
         direction=tuple(str(stretch.numbers.get("direction", "up")) for stretch, _ in pairs),
         amplitude_vpp=np.array([setting_vpp(plan, stretch) for stretch, _ in pairs]),
-        drive_amplitude_m=np.array([each.drive.amplitude_m for each in steps]),
-        sd_drive_amplitude_m=np.array([each.drive.sd_amplitude_m for each in steps]),
-        response_i=np.array([each.response_i for each in steps]),
-        noise_bias_i=np.array([each.noise_bias_i for each in steps]),
-        noise_error_i=np.array([each.noise_error_i for each in steps]),
-        response_ii=np.array([each.response_ii for each in steps]),
-        sd_response_ii=np.array([each.sd_response_ii for each in steps]),
-        slow_change=np.array([each.slow_change for each in steps]),
-        phase_rad=np.array([each.phase_rad for each in steps]),
         left_out=len(stretches) - len(steps),
     )
 
