@@ -1,4 +1,4 @@
-"""Asking an engine, from a window, a command or a script: plain blocking calls that return at once."""
+"""Engines of this user: where they are announced, calls that ask one, and the process that attends it."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""A background thread for jobs that may hang, such as writing to a network folder."""
+"""Threads beside the main one that may hang or must end it, and things that a ``with`` closes."""
 
 import os
 from abc import ABC, abstractmethod
