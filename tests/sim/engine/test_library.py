@@ -11,7 +11,8 @@ import pytest
 from tests.sim.engine.native_calls import calls
 from vibench.sim import Harmonic, gong2025
 from vibench.sim.engine.batch import follow_batch
-from vibench.sim.engine.library import Engine, EngineError, library_path, parse_structures, usable_families
+from vibench.sim.engine.library import Engine, EngineError, library_path, parse_structures
+from vibench.sim.engine.processor import usable_families
 from vibench.sim.engine.run import NativeRun, RunRecord, Watch, check_known_answer, native_engine
 from vibench.sim.engine.scene import collision_structure, power_structure, scene_of
 

@@ -1,7 +1,7 @@
 """The shaker's numbers from weak noise: what the recorded voltage did to the loaded table."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -146,7 +146,7 @@ def _carried_mass(specimen: Specimen, frequency_hz: Reals) -> Complexes:
 class _VoltageAndBase(RecordedChannels):
     """The voltage in the base's place and the base in m0's, as the estimators of noise take them."""
 
-    role: str
+    role: str = field(kw_only=True)
 
     @property
     def response_delay_s(self) -> float:
@@ -165,7 +165,7 @@ class _VoltageAndBase(RecordedChannels):
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
     """Give s times the base's acceleration over the voltage: the estimators take it for displacements."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
-    channels = _VoltageAndBase(recording, role)
+    channels = _VoltageAndBase(recording, role=role)
     match analysis.excitation:
         case StreamedNoise() as plan:
             return streamed_response(channels, plan, analysis.request).frequency_response

@@ -1,0 +1,43 @@
+"""Which family of processors this computer's belongs to: the native engine is compiled for each.
+
+The build hook reads this file too, so it needs nothing but the standard library.
+"""
+
+import ctypes
+import platform
+import sys
+from pathlib import Path
+
+FAMILIES = ("x86_64", "x86_64_v3", "x86_64_v4", "arm64")
+"""As compilers call them: every x86-64 processor; those with AVX2; those with AVX-512; ARM."""
+_ARM = {"arm64", "aarch64"}
+_X86 = {"x86_64", "amd64"}
+_V3 = {"avx2", "bmi1", "bmi2", "fma", "movbe", "abm"}
+_V4 = _V3 | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}
+_WINDOWS_AVX2, _WINDOWS_AVX512 = 40, 41
+"""What IsProcessorFeaturePresent takes (winnt.h)."""
+
+
+def usable_families() -> tuple[str, ...]:
+    """Return the families whose code this processor runs, the fastest first; none for an unknown one."""
+    machine = platform.machine().lower()
+    if machine in _ARM:
+        return ("arm64",)
+    if machine not in _X86:
+        return ()
+    level = _level()
+    return tuple(reversed(FAMILIES[:level]))
+
+
+def _level() -> int:
+    """Return 3 for AVX-512, 2 for AVX2, else 1; what the system does not tell counts as absent."""
+    if sys.platform == "win32":
+        has = ctypes.windll.kernel32.IsProcessorFeaturePresent
+        return 1 + bool(has(_WINDOWS_AVX2)) * (1 + bool(has(_WINDOWS_AVX512)))
+    else:  # noqa: RET505 - a type checker for Windows must see that the rest is another system's
+        described = Path("/proc/cpuinfo")
+        if not described.is_file():
+            return 1
+        lines = described.read_text(encoding="utf-8", errors="replace").splitlines()
+        flags = next((set(line.split()) for line in lines if line.startswith("flags")), set())
+        return 3 if flags >= _V4 else 2 if flags >= _V3 else 1
