@@ -38,7 +38,6 @@ FOR_OUR_PROGRAMS = (
     "vibench.sim.engine",
     "vibench.sim.shaker",
     "vibench.sim.background",
-    "vibench.analysis.field_docstrings",
     "vibench.sim.hdf5_files",
     "vibench.sim.operating_system",
     "vibench.stop_files",
@@ -48,7 +47,6 @@ FOR_OUR_PROGRAMS = (
 ONE_FILE_ROOMS = (
     "background",
     "errors",
-    "field_docstrings",
     "figure_choices",
     "tables",
     "analogue",

@@ -17,7 +17,7 @@ from vibench.acquisition import open_recording
 from vibench.acquisition.campaign import JournalPointState, read_journal
 from vibench.acquisition.engine import Engine, EngineClient, EngineError, EngineState, the_engine
 from vibench.acquisition.plan import RunState
-from vibench.acquisition.recording import RecordingState
+from vibench.acquisition.recording import RecordingState, _writer as writer
 from vibench.acquisition.run import silence_watch as drive_guard
 from vibench.acquisition.stopping.stop import Cause, StopRequest
 from vibench.cli.exit_code import ExitCode
@@ -135,8 +135,10 @@ def test_a_run_that_stalls_has_failed_and_says_so(vibench_here, tmp_path, monkey
     runs = "".join(RUN.format(name=name, duration_s=LONG_S, ramp_s=0.3) for name in ("first", "second"))
     (tmp_path / "c.toml").write_text(f'name = "c"\n{runs}')
     (tmp_path / "f.toml").write_text(
-        '[[faults]]\nat_s = 1.0\nfault = "slow_disk"\ndelay_s = 1.0\nfor_s = 9.0\n'
+        '[[faults]]\nat_s = 1.0\nfault = "slow_disk"\ndelay_s = 0.2\nfor_s = 9.0\n'
     )
+    # A short queue is full before the rig's time reaches the end of the fault.
+    monkeypatch.setattr(writer, "QUEUE_S", 0.5)
     monkeypatch.setattr(drive_guard, "STANDSTILL_BLOCKS", 3)
     words = ("measure", "c.toml", "--out", "out", "--check", "waived", "--faults", "f.toml")
     ended = vibench_here(*words, cwd=tmp_path)

@@ -69,7 +69,18 @@ FOUND_IN: Mapping[str, str] = MappingProxyType(
 
 
 def missing_package(name: str) -> str | None:
-    """Say which package of ours offers a name that is not installed; None where none of them does."""
+    """Return the sentence that names our package for something that is not installed.
+
+    Parameters
+    ----------
+    name
+        Word in a plan or a hardware configuration, such as ``"branch_continuation"``.
+
+    Returns
+    -------
+    The sentence; None where no package of ours offers that name.
+
+    """
     folder = FOUND_IN.get(name)
     if folder is None:
         return None
