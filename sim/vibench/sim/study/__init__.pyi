@@ -32,7 +32,6 @@ from ._results import (
     read_sessions as read_sessions,
 )
 from ._software import (
-    PACKAGES as PACKAGES,
     software as software,
 )
 from ._solve import (
