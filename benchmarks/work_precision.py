@@ -1,17 +1,15 @@
 """Work against precision: this engine and general solvers on the same motions, in one run.
 
-``python benchmarks/work_precision.py --markdown docs/speed.md``; peers: ``pip install -e '.[peers]'``
+``python benchmarks/work_precision.py --markdown docs/accuracy.md``; peers: ``pip install -e '.[peers]'``
 (numbalsoda is built from source and wants a Fortran compiler). A peer that is not installed is left out,
 and the page says so.
 
-Every solver begins in the same settled state; its error is the distance from the independent solution's end
-after 0.2 s, in chaos after 0.03 s. Costs are processor time over simulated time in runs of three seconds
-(scipy: of 0.3 s), least of several, with everything made beforehand that depends on the specimen alone.
-Peers are given the plain equations: scipy with a compiled right-hand side; numbalsoda's LSODA and DOP853
-wholly compiled; heyoka's Taylor method with terminal events at the stops, because its series must not meet
-a kink. heyoka stands here twice more as its best user would write it, in the variables in which its series
-is at home (in contact the penetration is w^2, and time runs as w): one trajectory at a time, and eight in
-its batch mode, from starts a millionth of the gap apart, whose time is divided by eight.
+Every solver starts in the same settled state; its error is the distance from the independent solution
+after 0.2 s, in chaos after 0.03 s. Cost is processor time over simulated time in runs of three seconds
+(scipy: 0.3 s), the least of several, without preparation. scipy has a compiled right-hand side; numbalsoda
+is compiled completely; heyoka's Taylor method has terminal events at the stops. "At its best" heyoka has
+the variables in which its series converges (in contact the penetration is w^2, and time runs as w): one
+trajectory at a time, and eight in its batch mode, with the time divided by eight.
 """
 
 import argparse
@@ -20,6 +18,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,6 @@ from vibench.sim.accuracy_benchmark.independent_solution import (
 from vibench.sim.accuracy_benchmark.measuring import settled_state
 from vibench.sim.model.state import Floats
 from vibench.sim.scene.followed_run import FollowedRun
-from vibench.sim.study import software
 
 PERIODIC_S, CHAOTIC_S = 0.2, 0.03
 """For errors. Chaos of 112 per second makes e^3 of an error in 0.03 s: still the error of the solver."""
@@ -46,6 +44,7 @@ COST_S, SLOW_COST_S = 3.0, 0.3
 """For costs, and for those of solvers that are a thousand times slower: what a call costs beside its motion
 is next to nothing then."""
 REPEATS = 5
+HEADING = "## Other solvers"
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 LOWEST_M = 1e-13
 """Absolute tolerance over the relative one, for solvers that want one."""
@@ -64,20 +63,19 @@ class Work:
 
 
 def main():
-    """Measure, print, and write the page where it is asked for."""
+    """Measure, print, and write the section where it is requested."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--markdown", type=Path, help="write the tables to this page, the figure beside it")
+    parser.add_argument("--markdown", type=Path, help="replace the last section of this page")
     arguments = parser.parse_args()
-    parts, curves = [], {}
+    curves = {}
     for motion in MOTIONS:
         if motion.regime is Regime.FREE:
             continue
         works = measured(motion)
         curves[motion.name] = works
-        parts.append(table_of(motion, works))
-        print(parts[-1], flush=True)
+        print(*table_of({motion.name: works}), sep="\n", flush=True)
     if arguments.markdown:
-        write_page(arguments.markdown, parts, curves)
+        write_section(arguments.markdown, curves)
 
 
 def measured(motion):
@@ -264,48 +262,50 @@ def cost_at(works, error):
     return math.exp(np.interp(math.log(error), errors, costs))
 
 
-def table_of(motion, works):
-    """Say what every solver costs at the error of our standard level."""
-    standard = next(w for w in works if w.solver == OURS and w.tolerance == Accuracy.STANDARD.tolerance)
-    lines = [
-        f"## {motion.regime.value.capitalize()}: {motion.name}",
-        "",
-        (
-            f"At {Accuracy.STANDARD} accuracy vibench simulates {1.0 / standard.cost:.0f} s per second, "
-            f"with an error of {standard.error:.1e}."
-        ),
-        "",
-        "| solver | time for the same error | at its tolerance of 1e-6: time | error |",
-        "|---|---|---|---|",
-    ]
-    for name in dict.fromkeys(work.solver for work in works if work.solver != OURS):
-        its = [work for work in works if work.solver == name]
-        equal = cost_at(its, standard.error)
-        usual = next((work for work in its if work.tolerance == 1e-6), None)
-        lines.append(
-            f"| {name} | {'never as exact' if equal is None else f'{equal / standard.cost:.3g} times'} | "
-            + (
-                "gave up | – |"
-                if usual is None
-                else f"{usual.cost / standard.cost:.3g} times | {usual.error:.1e} |"
-            )
-        )
-    return "\n".join(lines) + "\n"
+def table_of(curves):
+    """Return what every solver costs at the error of our standard level: one column for each motion."""
+    level = Accuracy.STANDARD
+    ours = {
+        name: next(work for work in works if work.solver == OURS and work.tolerance == level.tolerance)
+        for name, works in curves.items()
+    }
+    yield f"| solver | {' | '.join(curves)} |"
+    yield f"|{'---|' * (1 + len(curves))}"
+    cells = (f"{1.0 / each.cost:.0f} s per s ({each.error:.1e})" for each in ours.values())
+    yield f"| vibench, {level} | {' | '.join(cells)} |"
+    solvers = dict.fromkeys(work.solver for works in curves.values() for work in works)
+    for solver in (each for each in solvers if each != OURS):
+        cells = []
+        for name, works in curves.items():
+            its = [work for work in works if work.solver == solver]
+            equal = cost_at(its, ours[name].error)
+            usual = next((work for work in its if work.tolerance == 1e-6), None)
+            same, at_usual = "never" if equal is None else f"{equal / ours[name].cost:.3g}", "gave up"
+            if usual is not None:
+                at_usual = f"{usual.cost / ours[name].cost:.3g} ({usual.error:.1e})"
+            cells.append(f"{same}; {at_usual}")
+        yield f"| {solver} | {' | '.join(cells)} |"
 
 
-def write_page(page, parts, curves):
-    """Write the tables and draw the curves."""
+def write_section(page, curves):
+    """Replace the last section of the page by these tables, and draw the curves."""
     missing = [name for name in ("numbalsoda", "heyoka") if not importlib.util.find_spec(name)]
     absent = f" Not installed: {', '.join(missing)}." if missing else ""
-    page.write_text(
-        "# Work and precision, beside other solvers\n\n"
-        f"Made by `python benchmarks/work_precision.py --markdown {page}`; not edited by hand.\n"
-        f"{software()}.{absent}\n\n"
-        + " ".join(__doc__.split("\n\n", 2)[2].split())
-        + "\n\n![Error over cost](images/work_precision.png)\n\n"
-        + "\n".join(parts),
-        encoding="utf-8",
+    lines = (
+        HEADING,
+        "",
+        __doc__.split("\n\n", 2)[2].strip(),
+        f"Measured with vibench {version('vibench')}.{absent}",
+        "",
+        "Cells: time over that of vibench for the same error (never: no tolerance reaches it); then, at the",
+        "solver's tolerance of 1e-6, time over that of vibench, and error.",
+        "",
+        "![Error over cost](images/work_precision.png)",
+        "",
+        *table_of(curves),
     )
+    before = page.read_text(encoding="utf-8").split(f"\n{HEADING}\n")[0]
+    page.write_text(before + "\n" + "\n".join(lines) + "\n", encoding="utf-8")
     draw(page.parent / "images" / "work_precision.png", curves)
 
 

@@ -1,6 +1,8 @@
 """The trade of speed for accuracy as a Markdown page, made from one measurement of it."""
 
+import json
 from collections.abc import Iterator
+from itertools import groupby
 
 from vibench.sim import Accuracy
 from vibench.sim.accuracy_benchmark.figures import (
@@ -14,10 +16,7 @@ from vibench.sim.accuracy_benchmark.figures import (
     TransientFigures,
 )
 
-_HEAD = (
-    "| level or solver | simulated s per s | error of the state "
-    "| of Response I | of Response II | exponent [1/s] |"
-)
+_HEAD = "| level | simulated s per s | error of the state | of Response I | of Response II | exponent [1/s] |"
 _RULE = "|---|---|---|---|---|---|"
 _LOTTERY_HEAD = (
     "| scene | motion | Response I | error | share stated | of many | covered | chaos dies out [1/s] | cost |"
@@ -43,21 +42,22 @@ def _lines(benchmark: AccuracyBenchmark, picture: str) -> Iterator[str]:
     yield from (
         "# Speed and accuracy, measured",
         "",
-        "`standard` is the default. Use `quick` to look around, and `reference` to check a result. In chaos,",
-        "no level gives digits of a single motion; only averages mean something.",
+        "`standard` is the default. Use `quick` to look around, and `reference` to check a result. In chaos",
+        "no level predicts a single motion; only averages are meaningful.",
     )
     yield from _promises(benchmark)
     yield from (
         "",
         "## How it was measured",
         "",
-        "Made by `vibench tradeoff --markdown docs/accuracy.md`; not edited by hand.",
-        f"Machine: {benchmark.machine}. {benchmark.software}.",
+        "Made by `vibench tradeoff --markdown docs/accuracy.md`; then `python benchmarks/work_precision.py",
+        "--markdown docs/accuracy.md` adds the comparison with other solvers. Not edited by hand.",
+        f"Machine: {benchmark.machine}; vibench {json.loads(benchmark.software)['vibench']}.",
         "",
-        "Errors of the state are the largest of six parts, in units of 100 µm and 0.1 m/s, against an",
-        "independent solution of the plain equations (scipy's DOP853 at 1e-12, begun anew at every touch).",
-        "Errors of the responses are relative to the reference level. scipy's solvers run at a relative",
-        "tolerance of 1e-6 on the plain equations, over a shorter stretch. Times are of one core.",
+        "Errors of the state are the largest of six components, in units of 100 µm and 0.1 m/s, against an",
+        "independent solution (scipy's DOP853 at 1e-12, restarted at every contact). Errors of the responses",
+        "are relative to the reference level. scipy's solvers have a relative tolerance of 1e-6; the numbers",
+        "are simulated seconds per second and the error of the state. Times are of one core.",
         "",
         f"![Error of the state over cost, for every level and solver]({picture})",
     )
@@ -76,9 +76,9 @@ def _lotteries(lotteries: tuple[LotteryFigures, ...]) -> Iterator[str]:
         "## Where the start is forgotten",
         "",
         f"Scenes followed until they settle, and {lotteries[0].starts} more starts of each, a millionth of",
-        "the gap apart, for at most 300 s. What is pending (chaotic, or undecided) may come to any motion;",
-        "intervals of shares, 19 in 20 together, hold for now and in the end. Cost is that of the whole",
-        "answer over one run.",
+        "the gap apart, for at most 300 s. A chaotic or undecided motion may still end in any other; the",
+        "intervals of the shares hold together in 19 of 20 cases, now and in the end. Cost is that of the",
+        "whole answer over one run.",
         "",
         _LOTTERY_HEAD,
         "|---|---|---|---|---|---|---|---|---|",
@@ -108,26 +108,31 @@ def _share(found: LotteryFigures, stated: StatedShare) -> str:
 
 
 def _transients(transients: tuple[TransientFigures, ...]) -> Iterator[str]:
-    """Say what the levels are worth where nothing has been forgotten yet."""
+    """Write the errors of each level in transients."""
     if not transients:
         return
     yield from (
         "",
         "## Transients, from rest",
         "",
-        "A motion that has settled forgets the errors of its steps; a transient carries them along, and a",
-        "small change of it may grow a thousandfold. A level promises here what it promises above, times the",
-        "largest growth of a small change on the way. What an answer states of its responses holds either",
-        "way: it is measured, by a stricter run from the start. State compared with the independent solution",
-        "after 0.1 s, responses of its second half with the reference level.",
+        "A settled motion forgets the errors of its steps; in a transient a small change may grow a",
+        "thousandfold. A level promises its error above times the largest growth. The stated error of the",
+        "responses is measured by a stricter run from the start. The state is compared after 0.1 s with the",
+        "independent solution, the responses of the second half with the reference level. Cells: error of",
+        "the state (promised); of the responses (stated).",
         "",
-        "| motion | growth | level | error of the state | promised | of the responses | stated |",
-        "|---|---|---|---|---|---|---|",
+        f"| motion | growth | {' | '.join(Accuracy)} |",
+        "|---|---|---|---|---|",
     )
-    for each in transients:
-        numbers = (each.state_error, each.promise, each.response_error, each.stated_error)
-        cells = " | ".join(f"{number:.1e}" for number in numbers)
-        yield f"| {each.motion.name} | {each.growth:.0f} | {each.accuracy.value} | {cells} |"
+    for name, group in groupby(transients, key=lambda each: each.motion.name):
+        levels = tuple(group)
+        cells = " | ".join(map(_transient, levels))
+        yield f"| {name} | {levels[0].growth:.0f} | {cells} |"
+
+
+def _transient(level: TransientFigures) -> str:
+    state = f"{level.state_error:.1e} ({level.promise:.1e})"
+    return f"{state}; {level.response_error:.1e} ({level.stated_error:.1e})"
 
 
 def _motion(found: MotionBenchmark) -> Iterator[str]:
@@ -135,16 +140,15 @@ def _motion(found: MotionBenchmark) -> Iterator[str]:
         "",
         f"## {found.motion.regime.value.capitalize()}: {found.motion.name}",
         "",
-        f"State compared after {found.span_s:.3g} s, scipy's after {found.solver_span_s:.3g} s.",
-        found.advice,
+        f"State compared after {found.span_s:.3g} s. {found.advice}",
         "",
         _HEAD,
         _RULE,
     )
     for level in found.levels:
         yield _level(level)
-    for solver in found.solvers:
-        yield _solver(solver)
+    solvers = "; ".join(map(_solver, found.solvers))
+    yield from ("", f"scipy, compared after {found.solver_span_s:.3g} s: {solvers}.")
 
 
 def _level(level: LevelFigures) -> str:
@@ -157,8 +161,8 @@ def _level(level: LevelFigures) -> str:
 
 
 def _solver(solver: SolverFigures) -> str:
-    cells = (_number(solver.state_error), ABSENT, ABSENT, ABSENT)
-    return f"| scipy {solver.name} | {1 / solver.cost:.2g} | {' | '.join(cells)} |"
+    error = "" if solver.state_error is None else f" ({_number(solver.state_error)})"
+    return f"{solver.name} {1 / solver.cost:.2g}{error}"
 
 
 def _number(value: float | None) -> str:
@@ -172,26 +176,18 @@ def _promises(benchmark: AccuracyBenchmark) -> Iterator[str]:
         kept = "yes" if worst <= accuracy.promise else "**no**"
         yield f"| {accuracy.value} | {accuracy.promise:.0e} | {worst:.1e} | {kept} |"
     yield from _without_gain(benchmark)
-    yield from (
-        "",
-        "## Times of scipy's DOP853 over the standard level",
-        "",
-        "| motion | ratio |",
-        "|---|---|",
-    )
-    for name, ratio in benchmark.solver_ratio("DOP853", Accuracy.STANDARD).items():
-        yield f"| {name} | {ratio:.0f} |"
 
 
 def _without_gain(benchmark: AccuracyBenchmark) -> Iterator[str]:
     """Name the motions on which a level buys nothing."""
-    lines = [
-        f"- {level.accuracy.value} is no better than {before.accuracy.value}: {each.motion.name}"
-        for each in benchmark.motions
-        for level, before in each.without_gain
-    ]
-    if lines:
-        yield from ("", f"Errors that a level does not lessen by a factor of {LEAST_GAIN:g}:", "", *lines)
+    names: dict[str, list[str]] = {}
+    for each in benchmark.motions:
+        for level, before in each.without_gain:
+            pair = f"{level.accuracy.value} is no better than {before.accuracy.value}"
+            names.setdefault(pair, []).append(each.motion.name)
+    if names:
+        lines = (f"- {pair}: {'; '.join(motions)}" for pair, motions in names.items())
+        yield from ("", f"Errors that a level does not reduce by a factor of {LEAST_GAIN:g}:", "", *lines)
 
 
 def worst_error(benchmark: AccuracyBenchmark, accuracy: Accuracy) -> float:

@@ -286,13 +286,3 @@ class AccuracyBenchmark:
     software: str
     lotteries: tuple[LotteryFigures, ...] = ()
     transients: tuple[TransientFigures, ...] = ()
-
-    def solver_ratio(self, name: str, accuracy: Accuracy) -> dict[str, float]:
-        """Cost of a general solver over that of a level, by motion."""
-        return {
-            each.motion.name: solver.cost / level.cost
-            for each in self.motions
-            for solver in each.solvers
-            for level in each.levels
-            if solver.name == name and level.accuracy is accuracy
-        }
