@@ -185,16 +185,15 @@ def _except(judged: Judgement) -> str:
 
 
 def _values(claim: Claim, found: Finding) -> str:
-    return "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.wanted))
+    said = "; ".join(_value(wanted, found, number) for number, wanted in enumerate(claim.wanted))
+    return said if len(found.draws) < 2 else f"{said}; over {len(found.draws)} starts"
 
 
 def _value(wanted: Expectation, found: Finding, number: int) -> str:
     """One number, and its spread over starts where there are several."""
     value = f"{wanted.name}: {wanted.shown(found.values[number])}"
-    if len(found.draws) < 2:
-        return value
-    low, high = found.spread(number)
-    return f"{value} ({wanted.shown(low, '')} to {wanted.shown(high)} over {len(found.draws)} starts)"
+    low, high = (wanted.shown(each, "") for each in found.spread(number))
+    return value if low == high else f"{value} ({low} to {high})"
 
 
 def _tried(judged: Judgement) -> Iterator[str]:

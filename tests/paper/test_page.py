@@ -93,7 +93,7 @@ def test_an_option_that_some_starts_uphold_is_said_to_hold_for_those():
     except_it = ", except c = 3e-05 s · k for 3 of 4 starts"
     assert f"None of 1 options tried upholds it{except_it}." in page
     assert rows(page)["chance"].endswith(f"| **does not hold**{except_it} |")
-    assert "Numbers of c = 3e-05 s · k: exponent: 130 1/s (50 to 130 1/s over 4 starts)." in page
+    assert "Numbers of c = 3e-05 s · k: exponent: 130 1/s (50 to 130); over 4 starts." in page
 
 
 def test_the_score_names_the_damping_at_which_most_claims_hold_and_what_does_not(found):
