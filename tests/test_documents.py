@@ -28,6 +28,26 @@ PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})/[\w.*/-]*\w")
 LINK = re.compile(r"\]\(([^)#:]+)(?:#[^)]*)?\)")
 CODE = re.compile(r"^```python\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
 
+PLAIN = {
+    "anew": "again",
+    "bears": "has",
+    "begun": "started",
+    "but for": "except",
+    "held against": "compared with",
+    "in the mean": "on average",
+    "is told": "is reported",
+    "are told": "are reported",
+    "laid over": "overlaid",
+    "lottery": "several attractors",
+    "mended": "fixed",
+    "minded": "checked",
+    "so many": "this number of",
+    "surely": "certainly",
+    "there and back": "up and down",
+    "whoever": "anyone who",
+}
+"""Worn or foreign words that readers had to read twice, and what an engineer says."""
+
 FACES_WITH_AN_EXAMPLE = [
     "vibench.sim",
     "vibench.sim.study",
@@ -194,3 +214,10 @@ def test_the_page_on_architecture_lists_the_rooms_in_their_order_and_in_their_ow
     said = [importlib.util.find_spec(f"{package}.{room}") for room in rooms]
     first_lines = [ast.get_docstring(ast.parse(Path(spec.origin).read_text("utf-8"))) for spec in said]
     assert listed == [(room, text.split("\n")[0]) for room, text in zip(rooms, first_lines, strict=True)]
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_documents_use_plain_words(document):
+    text = re.sub(r"`[^`]*`", "", re.sub(r"^```.*?^```", "", document.read_text("utf-8"), flags=re.S | re.M))
+    found = {word: plain for word, plain in PLAIN.items() if re.search(rf"\b{word}\b", text, flags=re.I)}
+    assert found == {}, f"write instead: {found}"

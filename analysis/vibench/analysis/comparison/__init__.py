@@ -1,4 +1,4 @@
-"""Measurements and predictions laid over one another, as curves of one kind.
+"""Measurements and predictions overlaid as curves of one kind.
 
 A curve is displacement of m0 over displacement of the base, against frequency [Hz], with its relative
 standard deviation; a transmission, Response I or Response II, measured, simulated or predicted. Peaks,
