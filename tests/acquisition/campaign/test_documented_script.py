@@ -36,7 +36,11 @@ def script():
 def test_it_refines_the_step_around_the_jump_and_can_be_run_again(script, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rig = (ROOT / "hardware_configs" / "virtual_rig.toml").read_text(encoding="utf-8")
-    Path("bench.toml").write_text(rig.replace("sample_rate_hz = 51200", "sample_rate_hz = 5120"))
+    # With seed 1 the motion at 207.5 Hz leaves its collisions while it is recorded.
+    for given, other in (("sample_rate_hz = 51200", "sample_rate_hz = 5120"), ("seed = 1\n", "seed = 2\n")):
+        assert given in rig
+        rig = rig.replace(given, other)
+    Path("bench.toml").write_text(rig)
     # From 150 Hz on, where there is one motion, the specimen is led up the branch that collides.
     Path("campaign.toml").write_text(CAMPAIGN)
     exec(script, {})
