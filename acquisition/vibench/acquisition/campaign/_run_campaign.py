@@ -431,7 +431,7 @@ class CampaignEstimate:
 def estimate_campaign(
     campaign: Campaign, rig: Rig, folder: Path, existing: ExistingRecordings = ExistingRecordings.REFUSE
 ) -> CampaignEstimate:
-    """Say what a campaign will take on a rig; opens no instrument and writes nothing.
+    """Estimate the time and space that a campaign needs; open no instrument and write nothing.
 
     Raises
     ------

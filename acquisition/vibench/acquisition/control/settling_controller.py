@@ -47,7 +47,7 @@ Seek = Generator[float, SettledPoint, LocatedJump]
 def located(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:
     """Halve the bracket until it is no wider than ``resolution_hz``.
 
-    `side` says where a middle belongs. Whoever answers must reach each frequency from ``before``'s side.
+    The caller approaches each frequency from the side of ``before``; `side` then assigns it to an end.
     """
     while abs(after.frequency_hz - before.frequency_hz) > resolution_hz * (1 + 1e-9):
         middle = yield 0.5 * (before.frequency_hz + after.frequency_hz)

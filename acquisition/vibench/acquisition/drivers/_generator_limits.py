@@ -225,7 +225,7 @@ class NoGenerator:
         self._take(f"a waveform of {len(waveform)} points at {repetition_hz:g} Hz and {amplitude_vpp:g} Vpp")
 
     def load_sweep(self, sweep: Sweep, amplitude_vpp: float) -> None:
-        """Refuse: no sweep of its own is described."""
+        """Refuse: the description of the generator has no internal sweep."""
         raise ConfigurationError(f"{sweep} at {amplitude_vpp:g} Vpp was asked of {self.name}; nothing plays")
 
     def set_frequency(self, frequency_hz: float) -> None:

@@ -144,7 +144,7 @@ def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
 
 
 def out_of_reach() -> str:
-    """Say what drives on other computers that share the state folder; empty if nothing does."""
+    """Name the programs of other computers that share the state folder; empty if there are none."""
     others = [each for each in programs_of_other_places() if each.place is Place.ELSEWHERE]
     named = ", ".join(f"{each.what} (process {each.pid} on {each.computer})" for each in others)
     return f"Not reached, since it is of another computer: {named}; run 'vibench stop' there" if named else ""
@@ -347,7 +347,7 @@ AGAIN_S = 1.0
 
 
 class Attendant:
-    """Keeps an engine attended by a small process of its own, which sleeps most of the time.
+    """Keeps an engine attended by a small separate process, which sleeps most of the time.
 
     On a busy computer a thread of a window waits for Python's lock for a second and more, however often it
     would beat; a process that only sleeps and says a word is given a processor at once. It ends with the
@@ -400,7 +400,7 @@ class Attendant:
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             bufsize=0,
-            # A session of its own: Ctrl-C is not for it, and Linux shares processors among sessions.
+            # A separate session: Ctrl-C does not reach it, and Linux shares processors among sessions.
             start_new_session=True,
         )
         assert self._process.stdin is not None

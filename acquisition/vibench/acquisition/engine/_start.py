@@ -115,7 +115,7 @@ def start_engine(supervision: Supervision | str = Supervision.ATTENDED) -> Engin
         stdin=subprocess.PIPE if supervision is Supervision.ATTENDED else subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         text=True,
-        # Ctrl-C in a terminal is for whoever shows the run: that one decides what the engine is told.
+        # The program that shows the run handles Ctrl-C, and decides what to ask of the engine.
         start_new_session=True,
     )
     assert process.stdout is not None

@@ -244,7 +244,7 @@ class EngineStatus(FrozenModel):
 # The process of the live twin: started and ended by an engine, which never waits for it.
 #
 # It is a viewer like any other (`vibench twin`, reached by name as a virtual rig is): it pulls samples,
-# tells what it found, and keeps nothing running. When it is too slow it misses samples; the recording does
+# reports what it found, and keeps no run alive. When it is too slow it misses samples; the recording does
 # not.
 
 ENDING_S = 2.0
@@ -278,7 +278,7 @@ class TwinProcess:
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.PIPE,
                     text=True,
-                    # Ctrl-C in a terminal is for whoever shows the run.
+                    # Ctrl-C in a terminal is handled by the program that shows the run.
                     start_new_session=True,
                 )
             case TwinSwitch.OFF if self._process is not None:

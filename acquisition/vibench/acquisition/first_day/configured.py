@@ -55,7 +55,7 @@ QUESTIONS = (
     Question("daq.channels.base_acceleration.physical", "Which input reads the accelerometer on the base?"),
     Question(
         "daq.channels.base_acceleration.iepe_current_a",
-        "Current that this input feeds the accelerometer [A]? 0 for a supply of its own",
+        "Current that this input feeds the accelerometer [A]? 0 if it has its own supply",
     ),
     Question("daq.channels.m0_velocity.physical", "Which input reads the vibrometer?"),
     Question("amplifier.serial", "Serial number of the amplifier?"),
