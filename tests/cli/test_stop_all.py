@@ -1,7 +1,5 @@
 """`vibench stop` in danger: nobody has to find out first which of several programs it is that drives."""
 
-import os
-import signal
 import subprocess
 import sys
 from contextlib import ExitStack, contextmanager
@@ -9,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.frozen import frozen
 from tests.windows_here import sees_locks
 from vibench.acquisition.stopping.program import (
     Program,
@@ -85,13 +84,12 @@ def test_which_is_held_must_be_said(vibench_here, tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
 def test_one_that_hangs_is_named_and_keeps_no_stop_from_the_others(vibench_here, tmp_path):
     with driving("hangs") as hangs, driving("south") as south:
-        os.kill(hangs.pid, signal.SIGSTOP)
-        told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
-        assert south.communicate(timeout=20)[0] == "abort vibench stop\n"
-        assert told.returncode == 1
-        assert f"south, process {south.pid}: has taken the stop (abort)" in told.stdout
-        assert f"hangs, process {hangs.pid} lives and does not answer" in told.stderr
-        os.kill(hangs.pid, signal.SIGCONT)
+        with frozen(hangs.pid):
+            told = vibench_here("stop", "--level", "abort", cwd=tmp_path)
+            assert south.communicate(timeout=20)[0] == "abort vibench stop\n"
+            assert told.returncode == 1
+            assert f"south, process {south.pid}: has taken the stop (abort)" in told.stdout
+            assert f"hangs, process {hangs.pid} lives and does not answer" in told.stderr
         assert hangs.communicate(timeout=20)[0] == "abort vibench stop\n"
 
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -12,6 +11,7 @@ from threading import Event
 
 import pytest
 
+from tests.frozen import frozen
 from tests.windows_here import sees_locks
 from vibench.acquisition import StopSwitch, open_recording, stop_on_signal
 from vibench.acquisition.engine import (
@@ -92,16 +92,13 @@ def test_a_run_is_held_released_and_ended_from_another_terminal(running, vibench
 @pytest.mark.thorough
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no SIGSTOP")
 def test_a_stop_of_an_engine_that_stands_still_is_kept_and_said_so(running, tmp_path):
-    os.kill(running.pid, signal.SIGSTOP)
-    try:
+    with frozen(running.pid):
         told = vibench("stop", "--level", "abort", "--reason", "while it stood still")
         assert told.returncode == 1
         assert "lives and does not answer" in told.stderr
         seen = json.loads(vibench("watch", "--json").stdout)["engines"]
         assert [each["pid"] for each in seen] == [running.pid]
         assert "does not answer within" in seen[0]["silence"]
-    finally:
-        os.kill(running.pid, signal.SIGCONT)
     wait(running, EngineState.READY)
     with open_recording(tmp_path / "dwell.h5") as recording:
         assert recording.reason == "while it stood still"

@@ -14,6 +14,7 @@ from threading import Event
 import numpy as np
 import pytest
 
+from tests.frozen import frozen
 from vibench.acquisition import (
     CheckRule,
     LimitExceeded,
@@ -349,11 +350,8 @@ class TestNobodyLooks:
         self, client, shared_engine, shipped_rig, tmp_path
     ):
         before = running(client, shipped_rig, tmp_path).samples
-        os.kill(shared_engine.pid, signal.SIGSTOP)
-        try:
+        with frozen(shared_engine.pid):
             Event().wait(1.2)
-        finally:
-            os.kill(shared_engine.pid, signal.SIGCONT)
         until(client, lambda status: status.samples > before + 100_000)
 
     @pytest.mark.thorough

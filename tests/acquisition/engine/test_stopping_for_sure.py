@@ -3,7 +3,6 @@
 import json
 import os
 import shutil
-import signal
 import socket
 import subprocess
 import sys
@@ -14,6 +13,7 @@ from threading import Event
 
 import pytest
 
+from tests.frozen import frozen
 from vibench.acquisition import StopLevel, open_recording
 from vibench.acquisition.engine import (
     EngineClient,
@@ -84,15 +84,6 @@ def running(process, tmp_path):
 
 
 @contextmanager
-def stalled(process):
-    os.kill(process.pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(process.pid, signal.SIGCONT)
-
-
-@contextmanager
 def connections(address, count, said=b""):
     """Connections that say nothing, or no more than the beginning of something."""
     with ExitStack() as all_of_them:
@@ -129,7 +120,7 @@ def ended_by(tmp_path, reason):
 class TestAStallDoesNotMakeAnEngineUnstoppable:
     @pytest.mark.thorough
     def test_a_stop_during_it_is_kept_and_obeyed_when_the_engine_comes_back(self, running, tmp_path):
-        with stalled(running):
+        with frozen(running.pid):
             told = the_engine(None)
             assert told.pid == running.pid
             assert stop_engine(told, StopLevel.ABORT, "smoke") is StopDelivery.KEPT
@@ -139,7 +130,7 @@ class TestAStallDoesNotMakeAnEngineUnstoppable:
 
     @pytest.mark.thorough
     def test_a_stop_after_it_finds_the_engine(self, running, tmp_path):
-        with stalled(running), pytest.raises(EngineSilent, match=r"does not answer within 0\.3 s"):
+        with frozen(running.pid), pytest.raises(EngineSilent, match=r"does not answer within 0\.3 s"):
             EngineClient.attach(running.address, patience_s=0.3)
         assert stop_engine(the_engine(running.pid), "abort", "afterwards") is StopDelivery.TOLD
         ended_by(tmp_path, "afterwards")
