@@ -1,4 +1,5 @@
-/* Preloaded: the n-th call of one kind on files below a folder kills the process, or fails, before, inside or after. */
+/* Preloaded: the n-th call of one kind on files below a folder kills the process, or fails, before, inside or after.
+   A call that fails with EINTR was interrupted by Ctrl-C. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -49,6 +50,7 @@ static int is_due(int call, int fd, const char *path) {
 /* The call may be made in part: PART is what of it. */
 #define FAULTY(CALL, FD, PATH, PART, WHOLE)                                     \
     if (!is_due(CALL, FD, PATH)) return WHOLE;                                  \
+    if (failure == EINTR) kill(getpid(), SIGINT);                               \
     if (moment == BEFORE) { if (!failure) die(); errno = failure; return -1; }  \
     if (moment == INSIDE && !failure) {                                         \
         pthread_t other;                                                        \

@@ -1,5 +1,6 @@
 """A system call that did its work and reports an error, or did not: the program looks at the disk."""
 
+import errno
 import os
 import shutil
 import subprocess
@@ -18,8 +19,9 @@ pytestmark = pytest.mark.skipif(
 )
 
 ARMED = f"""
-import ctypes, os, sys
+import ctypes, os, signal, sys
 from pathlib import Path
+signal.signal(signal.SIGINT, signal.default_int_handler)
 folder, call, when, fault = Path(sys.argv[1]), *map(int, sys.argv[2:])
 def arm():
     ctypes.CDLL(os.environ["{LIBRARY}"]).arm(call, 1, when, fault, bytes(folder))
@@ -100,8 +102,9 @@ def code_of_write(number):
     shim.arm(call, number, when, fault, bytes(copy))
     try:
         write(copy)
-    except (RecordingError, InvalidRequest, StudyError) as error:
-        return 1 if str(error).strip() and {path.name for path in copy.iterdir()} == before else 2
+    except (RecordingError, InvalidRequest, StudyError, KeyboardInterrupt) as error:
+        is_explained = str(error).strip() or isinstance(error, KeyboardInterrupt)
+        return 1 if is_explained and {path.name for path in copy.iterdir()} == before else 2
     return 0
 assert code_of_write(1000) == 0
 count = 1000 - ctypes.c_int.in_dll(shim, "left").value
@@ -125,7 +128,8 @@ def library(tmp_path_factory):
 
 
 def ended(library, code, folder, call, when, fault="ENOSPC"):
-    arguments = (folder, list(CALLS).index(call), WHEN.index(when), FAULTS[fault])
+    faults = {**FAULTS, "EINTR": errno.EINTR}
+    arguments = (folder, list(CALLS).index(call), WHEN.index(when), faults[fault])
     return subprocess.run(
         [sys.executable, "-c", ARMED + code, *map(str, arguments)],
         env={**os.environ, "LD_PRELOAD": str(library), LIBRARY: str(library)},
@@ -165,14 +169,16 @@ def test_a_result_is_reported_as_added_exactly_when_it_is_in_the_recording(libra
 
 
 @pytest.mark.thorough
+@pytest.mark.parametrize("fault", ["ENOSPC", "EINTR"])
 @pytest.mark.parametrize("when", WHEN)
 @pytest.mark.parametrize("writer", HDF5_WRITERS)
-def test_a_refused_write_of_hdf5_is_an_error_and_leaves_no_file(library, tmp_path, writer, when):
+def test_a_refused_or_interrupted_write_of_hdf5_leaves_no_file(library, tmp_path, writer, when, fault):
     folder = tmp_path / "folder"
     folder.mkdir()
     for name in ("cut_off.h5.part", "dwell.h5"):
         (folder / name).write_bytes(good_recordings()[name])
-    made = ended(library, HDF5_WRITERS[writer] + IN_FORKS, folder, "pwrite", when)
+    made = ended(library, HDF5_WRITERS[writer] + IN_FORKS, folder, "pwrite", when, fault)
+    assert made.stderr == ""
     assert {line.split()[1] for line in made.stdout.splitlines()} == {"1"}, made.stdout
 
 

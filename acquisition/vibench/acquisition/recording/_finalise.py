@@ -174,11 +174,12 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
         _copy(part, tmp, key, written)
         sync_file(tmp)
         rename(tmp, final)
-    except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as either
+    # HDF5 reports a full disk as one or the other.
+    except (OSError, RuntimeError, KeyboardInterrupt) as error:
         # Incomplete, and made by this call; everything in it is in the .part.
         with suppress(OSError):
             tmp.unlink()
-        if isinstance(error, RecordingError):
+        if isinstance(error, (RecordingError, KeyboardInterrupt)):
             raise
         raise RecordingError(f"{final} could not be written: {error}. {whereabouts(part, error)}") from error
     return final

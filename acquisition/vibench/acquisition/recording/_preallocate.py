@@ -86,10 +86,12 @@ def preallocate(path: Path, part: Path, header: RecordingHeader) -> Places:
         rename(made, part)
         sync_folder(part.parent)
     # HDF5 reports a failing disk as one or the other.
-    except (OSError, RuntimeError) as error:
+    except (OSError, RuntimeError, KeyboardInterrupt) as error:
         for each in () if isinstance(error, FileExistsError) else (made, part):
             with suppress(OSError):
                 each.unlink()
+        if isinstance(error, KeyboardInterrupt):
+            raise
         raise RecordingError(
             f"{part} cannot be prepared for {reserved} samples of {len(header.channels)} channels: {error}."
             " Nothing was recorded; make room, or choose another folder or a shorter measurement."

@@ -2,13 +2,16 @@
 
 HDF5 2.0 crashes when it closes a file and a write fails, and h5py prints an error that it meets while it
 closes an object and goes on. So HDF5 writes to a file object that reports every write as done and keeps the
-first error, which is raised when HDF5 has closed the file.
+first error, which is raised when HDF5 has closed the file. A Ctrl-C in the middle of a write is kept too.
 """
 
-from collections.abc import Iterator
+import signal
+import threading
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
+from types import FrameType
 from typing import Literal
 
 import h5py
@@ -17,7 +20,7 @@ from ..operating_system.this import Buffer, write_all
 
 
 class _Disk(FileIO):
-    refusal: OSError | None = None
+    refusal: OSError | KeyboardInterrupt | None = None
 
     def write(self, data: Buffer) -> int:  # type: ignore[override]  # h5py passes nothing else
         try:
@@ -41,8 +44,42 @@ def written_hdf5(
     """Create (``x``) or change (``r+``) a file; raises OSError where the disk refuses any of it."""
     with _Disk(path, "x+" if mode == "x" else mode) as disk:
         try:
-            with h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file:
+            with (
+                _late_interrupts(disk),
+                h5py.File(disk, "w" if mode == "x" else mode, libver=libver) as file,
+            ):
                 yield file
         finally:
             if disk.refusal is not None:
                 raise disk.refusal
+
+
+@contextmanager
+def _late_interrupts(disk: _Disk) -> Iterator[None]:
+    """Keep a KeyboardInterrupt of a signal as the refusal, and raise it at once only outside this module."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    found = {number: signal.getsignal(number) for number in signal.valid_signals()}
+    handlers: dict[int, Callable[[int, FrameType | None], object]] = {
+        number: handler for number, handler in found.items() if callable(handler)
+    }
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        try:
+            handlers[number](number, frame)
+        except KeyboardInterrupt as interrupt:
+            disk.refusal = disk.refusal or interrupt
+            while frame is not None and frame.f_code.co_filename != __file__:
+                frame = frame.f_back
+            if frame is None:
+                raise
+
+    for number in handlers:
+        signal.signal(number, on_signal)
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            if signal.getsignal(number) is on_signal:  # a handler may have put another one in its place
+                signal.signal(number, handler)
