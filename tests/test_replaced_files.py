@@ -1,7 +1,10 @@
-"""A file that takes the place of an older one: a disk that refuses leaves the older one whole."""
+"""A user's file is whole under its name at any moment: a disk that refuses leaves the older one, or none."""
 
+import ast
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -54,3 +57,45 @@ def test_a_link_stays_a_link_and_its_target_is_replaced(tmp_path):
         coming.write_text("second")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "target").read_text() == "second"
+
+
+ROOT = Path(__file__).parents[1]
+WRITING = ("write_text", "write_bytes", "savefig", "copyfile", "copytree")
+UNFINISHED = {"coming", "unfinished", "tmp", "copy_file"}
+"""Names that a file has until it is whole."""
+UNFINISHED_FOR_CALLER = {"_wav.py", "_csv.py", "_uff.py", "_mat.py", "_facts_document.py"}
+"""Writers of exports: `new_file` gives them the unfinished name."""
+NO_FILE_OF_A_USER = {
+    "docs.py: shutil.copytree(shipped_folder(folder), root / folder, ignore=NOT_A_SOURCE)": "scratch",
+    "_log.py: path.open('a', encoding='utf-8')": "a log grows by whole lines",
+    "_log.py: self._path.open('a', encoding='utf-8')": "likewise",
+    "style.py: self.figure.savefig(target, format=kind, dpi=PNG_DPI, metadata=metadata)": "memory",
+    "screenshots.py: small.save(str(path), None, _SMALLEST_FILE)": "made again with the documents",
+    "_file_store.py: path.open('xb')": "claims the name while the file is made",
+    "tasks.py: settings.path.write_bytes(b'')": "the laboratory's converter writes it, as the real one does",
+}
+
+
+def writes(source):
+    """Yield each call that writes a file, and the names in it."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+            call, names = (
+                ast.unparse(node),
+                {each.id for each in ast.walk(node) if isinstance(each, ast.Name)},
+            )
+            opens = node.func.attr == "open" and re.search(r"open\('[wax]", call)
+            if opens or node.func.attr in WRITING or ".save(str(" in call:
+                yield call, names
+
+
+def test_no_file_of_a_user_is_written_under_its_final_name():
+    found = [
+        f"{path.name}: {call}"
+        for package in ("acquisition", "analysis", "cli", "gui", "sim", "virtual_rig", "extensions")
+        for path in (ROOT / package).rglob("*.py")
+        if path.name not in UNFINISHED_FOR_CALLER
+        for call, names in writes(path.read_text(encoding="utf-8"))
+        if not names & UNFINISHED
+    ]
+    assert sorted(each for each in found if each not in NO_FILE_OF_A_USER) == []

@@ -27,6 +27,7 @@ from vibench.acquisition.first_day.procedure import DayPage, first_day, in_a_com
 from vibench.acquisition.instruments import Knob
 from vibench.acquisition.rig import Confirm, KnobSheet, Rig, load_rig
 from vibench.sim import toml_table
+from vibench.sim.operating_system.this import replaced
 
 from .output import console, paragraph
 
@@ -162,7 +163,8 @@ def new_bench(target: Path, template: Path, answers: Path | None) -> DayPage:
     console.print()
     page = _day(rig, target, operator, given)
     kept = _free(target.with_suffix(".first_day.md"))
-    kept.write_text(page.text, encoding="utf-8")
+    with replaced(kept) as coming:
+        coming.write_text(page.text, encoding="utf-8")
     console.print(paragraph(page.text))
     console.print(f"kept: {kept}")
     return page

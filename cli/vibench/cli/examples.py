@@ -1,6 +1,5 @@
 """`vibench examples`: what comes with vibench, by name, and copies of it to change."""
 
-import shutil
 from collections import Counter
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +8,7 @@ from vibench.acquisition import ConfigurationError, shipped_folder
 
 from .options import option
 from .output import console, print_json
-from .paths import AsJson, room_for_folder
+from .paths import AsJson, copy_file, room_for_folder
 
 FOLDERS = ("campaigns", "hardware_configs", "studies", "schemas", "examples")
 
@@ -65,4 +64,4 @@ def copy_all(found: dict[str, list[Path]], target: Path) -> None:
         raise ConfigurationError(f"{standing} exists already; nothing was copied, give another folder")
     for path, copy in copies.items():
         copy.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(path, copy)
+        copy_file(path, copy)

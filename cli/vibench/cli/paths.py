@@ -1,11 +1,13 @@
 """Options that several commands share."""
 
+import shutil
 import tempfile
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vibench.acquisition import ConfigurationError, named
+from vibench.sim.operating_system.this import replaced
 
 from .options import option
 
@@ -101,3 +103,9 @@ def unused(path: Path) -> Path:
         number += 1
         candidate = path.with_name(f"{path.stem}-{number}{path.suffix}")
     return candidate
+
+
+def copy_file(source: str | Path, target: str | Path) -> None:
+    """Copy a file; ``target`` is whole, or as it was."""
+    with replaced(Path(target)) as coming:
+        shutil.copyfile(source, coming)

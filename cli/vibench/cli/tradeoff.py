@@ -19,6 +19,7 @@ from vibench.sim.accuracy_benchmark.figures import (
     MotionBenchmark,
 )
 from vibench.sim.accuracy_benchmark.measuring import Thoroughness, measure_accuracy
+from vibench.sim.operating_system.this import replaced
 
 from .options import option
 from .output import console, errors, print_json, print_table, words
@@ -74,7 +75,8 @@ def _save(benchmark: AccuracyBenchmark, folder: Path, markdown: Path | None) -> 
     paths = tradeoff_figure(benchmark).save(folder)
     if markdown is not None:
         picture = Path(os.path.relpath(paths[0], markdown.parent)).as_posix()
-        markdown.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
+        with replaced(markdown) as coming:
+            coming.write_text(accuracy_document(benchmark, picture), encoding="utf-8")
 
 
 def _tell(found: MotionBenchmark) -> None:

@@ -1,5 +1,7 @@
 """A plot says what will be in it while it is empty, and names its curves above the axes."""
 
+import sys
+
 import numpy as np
 import pyqtgraph as pg
 import pytest
@@ -232,6 +234,23 @@ def test_picture_and_numbers_are_copied_and_saved_and_nothing_is_overwritten(plo
             write_plot(plot, tmp_path / f"a.{ending}")
     with pytest.raises(OSError, match="ending"):
         write_plot(plot, tmp_path / "a.nothing")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits on file size exist on POSIX only")
+@pytest.mark.parametrize("ending", ["csv", "svg", "png"])
+def test_a_disk_that_refuses_a_picture_or_numbers_leaves_no_file(plot, tmp_path, ending):
+    plot.curve(curve_style(0), "mass").setData([0.0, 1.0], [0.5, 0.25])
+    plot.show()
+    import resource
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, before[1]))
+    try:
+        with pytest.raises(OSError, match="large"):
+            write_plot(plot, tmp_path / f"a.{ending}")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert [*tmp_path.iterdir()] == []
 
 
 def test_what_belongs_to_earlier_inputs_lies_under_a_veil(plot, qapp):

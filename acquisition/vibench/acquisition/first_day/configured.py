@@ -1,6 +1,8 @@
 """A configuration from a template and answers: asked one by one, looked up where the computer can see."""
 
+import errno
 import json
+import os
 import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
@@ -12,6 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+
+from vibench.sim.operating_system.this import replaced
 
 from ..bench.instrument_list import InstrumentList
 from ..errors import AcquisitionError, ConfigurationError
@@ -305,13 +309,10 @@ def _require_within_bounds(text: str, key: str) -> None:
 
 def _write(target: Path, text: str) -> None:
     try:
-        file = target.open("x", encoding="utf-8")
-        try:
-            with file:
-                file.write(text)
-        except OSError:
-            target.unlink()
-            raise
+        if target.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+        with replaced(target) as coming:
+            coming.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigurationError(f"{target} cannot be written ({error.strerror}); give another") from error
 

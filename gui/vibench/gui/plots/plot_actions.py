@@ -1,12 +1,16 @@
 """What can be done with a plot: by a key while it has the focus, and by its context menu; how it is saved."""
 
+import errno
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QBuffer, QRect, Qt
 from PySide6.QtGui import QAction, QGuiApplication, QKeySequence, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QMessageBox
+
+from vibench.sim.operating_system.this import replaced
 
 from ..widgets.boxes import new_path, plain_tip
 
@@ -55,16 +59,19 @@ def write_plot(plot: "Plot", path: Path) -> None:
 
     Raises OSError when something of that name is there, or the file cannot be written.
     """
-    path.open("xb").close()
+    if path.exists():
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST))
+    memory = QBuffer()  # Qt does not report every error of a disk
     match path.suffix.lower():
         case ".csv":
-            path.write_text(numbers_of(plot, ","), encoding="utf-8")
+            memory.setData(numbers_of(plot, ",").encode())
         case ".svg":
-            _write_svg(plot, path)
-        case _:
-            if not plot.grab().save(str(path)):
-                path.unlink()
+            _draw_svg(plot, memory)
+        case ending:
+            if not plot.grab().save(memory, ending.removeprefix(".")):
                 raise OSError(0, "give an ending: .png, .svg or .csv")
+    with replaced(path) as coming:
+        coming.write_bytes(memory.data().data())
 
 
 def numbers_of(plot: "Plot", separator: str) -> str:
@@ -81,9 +88,9 @@ def numbers_of(plot: "Plot", separator: str) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _write_svg(plot: "Plot", path: Path) -> None:
+def _draw_svg(plot: "Plot", memory: QBuffer) -> None:
     generator = QSvgGenerator()
-    generator.setFileName(str(path))
+    generator.setOutputDevice(memory)
     generator.setSize(plot.size())
     generator.setViewBox(QRect(0, 0, plot.width(), plot.height()))
     # With the usual resolution axes and curves would be shifted against each other.
