@@ -23,7 +23,8 @@ their specimen. The paper gives hardly any tolerances: the bounds are ours, wide
 which differs by some per cent from run to run; some were settled after a first look at the numbers.
 Where chance decides how chaos ends, a claim is measured from several starts, a millionth of the gap
 apart, and its spread is given. Where a claim does not hold, options are tried in order until one
-upholds it; DIR/report.html lists all of them. `vibench demo` repeats the experiment of Figs. 12 to 14."""
+upholds it. DIR/report.html lists all options, how each claim was measured, and the claims by setting.
+`vibench demo` repeats the experiment of Figs. 12 to 14."""
 COMMAND = "vibench reproduce --out DIR --markdown docs/reproduction.md"
 
 
@@ -35,7 +36,7 @@ class Reproduction:
     """By heading, in order."""
     scores: tuple[DampingScore, ...]
     tables: tuple[ReportTable, ...]
-    """After the claims."""
+    """At the end of the report."""
     options: str
     """The defaults, as a sentence."""
     made_with: str
@@ -108,11 +109,9 @@ def _lines(found: Reproduction, pictures: Sequence[tuple[str, str]]) -> Iterator
     for heading, judgements in found.sections.items():
         yield from ("", f"## {heading}", "", HEAD, f"|{'---|' * len(_HEADINGS)}")
         yield from (_row(each) for each in judgements)
-        yield from ("", "How each was measured:", "")
-        yield from (f"- **{each.claim.key}**: {each.claim.measured_by}" for each in judgements)
-    for table in found.tables:
-        yield from ("", f"## {table.title}", "", table.note, "", _line(table.headings))
-        yield from (f"|{'---|' * len(table.headings)}", *map(_line, table.rows))
+    table = score_table(found.scores)
+    yield from ("", f"## {table.title}", "", table.note, "", _line(table.headings))
+    yield from (f"|{'---|' * len(table.headings)}", *map(_line, table.rows))
     for title, path in pictures:
         yield from ("", f"![{title}]({path})")
 
