@@ -1,6 +1,7 @@
 """The house rules, checked as tests so that one command is the whole check."""
 
 import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -22,6 +23,11 @@ LINES_AT_MOST = {
     "virtual_rig": 8_510,
 }
 """Of Python, stubs, templates and C++, without the C++ program of tests; budgets are lowered, not raised."""
+
+TITLES_CHECKED_SINCE = "fa33b4fc66a96ac303cdf07b2454bceed13e319a"
+IMPERATIVES = {"Bring", "Embed", "Exceed", "Feed", "Focus", "Need", "Proceed", "Ring", "Speed", "String"}
+"""Verbs that end like a participle or like the third person."""
+NO_VERBS = set("A All An Each Every If It No One The There This What Where Who".split())
 
 
 @pytest.mark.timeout(300)  # mypy without a cache, beside another test, on two cores
@@ -55,6 +61,52 @@ def test_a_checkout_contains_nothing_that_a_program_generated():
     command = ["git", "ls-files", "--cached", "--ignored", "--exclude-standard"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert listed.stdout.splitlines() == []
+
+
+def commits_since(commit):
+    """Return the titles of later commits, or None without that history (a copy, or a shallow clone)."""
+    log = subprocess.run(
+        ["git", "log", "--no-merges", "--format=%s", f"{commit}..HEAD"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    return log.stdout.splitlines() if log.returncode == 0 else None
+
+
+def title_fault(title):
+    """Return what is wrong with the title of a commit, or an empty text."""
+    first = title.split(" ")[0]
+    if len(title) > 60:
+        return f"{len(title)} characters; at most 60 are allowed"
+    if not first.replace("-", "").isalpha() or not first[0].isupper():
+        return "must begin with a capital letter"
+    is_inflected = re.fullmatch(r".*(ed|ing|[^s]s)", first) and first not in IMPERATIVES
+    if is_inflected or first in NO_VERBS:
+        return "must begin with a verb in the imperative"
+    return "must not end with a full stop" if title.endswith(".") else ""
+
+
+def test_commit_titles_are_short_imperatives():
+    titles = commits_since(TITLES_CHECKED_SINCE)
+    if titles is None:
+        pytest.skip("this is a copy or a shallow clone: there is no history to check")
+    assert {title: fault for title in titles if (fault := title_fault(title))} == {}
+
+
+@pytest.mark.parametrize(
+    ("title", "is_allowed"),
+    [
+        ("Align channels by start time", True),
+        ("Embed the plan in the recording", True),
+        ("Aligned channels by start time", False),
+        ("Aligns channels by start time", False),
+        ("What rings of a fast sweep is counted by its test", False),
+        ("align channels", False),
+        ("Align channels.", False),
+        ("Align the channels of an imported file by the times at which they start", False),
+    ],
+)
+def test_the_check_of_commit_titles_knows_imperatives(title, is_allowed):
+    assert (title_fault(title) == "") is is_allowed
 
 
 @pytest.mark.parametrize("folder", sorted(LINES_AT_MOST))
