@@ -54,7 +54,7 @@ class Table:
     columns: tuple[tuple[str, tuple[float | str, ...]], ...]
 
     def column(self, heading: str) -> tuple[float | str, ...]:
-        """Give one column by its heading."""
+        """Return one column by its heading."""
         return dict(self.columns)[heading]
 
 
@@ -64,7 +64,7 @@ def table(name: str, **columns: ArrayLike) -> Table:
 
 
 def columns(source: object, keys: str) -> dict[str, Any]:
-    """Give values of a result by the keys of a document, or the headings of a table.
+    """Return values of a result by the keys of a document, or the headings of a table.
 
     ``"frequency_hz rms_m=base.rms_m first_hz=lines.0 *run"``: a field or property by its own name, one of a
     part (None where the part is None), one item of an array, and the keys of a part's document.
@@ -84,7 +84,7 @@ def columns(source: object, keys: str) -> dict[str, Any]:
 
 
 def rows(parts: Iterable[object], keys: str) -> dict[str, Any]:
-    """Give values of several parts below each other, by keys as in `columns`; NaN where a part has none."""
+    """Return values of several parts below each other, by keys as in `columns`; NaN where a part has none."""
     found = [columns(each, keys) for each in parts]
     names = [each.partition("=")[0] for each in keys.split()]
     return {
@@ -198,7 +198,7 @@ class Labelled:
         return dict(plain(self))
 
     def to_xarray(self) -> "xarray.Dataset":
-        """Give all numbers of the result as an `xarray.Dataset`.
+        """Return all numbers of the result as an `xarray.Dataset`.
 
         Arrays lie over the result's frequencies or times where they have as many values; bounds
         (``magnitude_lower``) and deviations (``sd_...``) stand beside their values; what is inside of a part
@@ -226,7 +226,7 @@ class Labelled:
 
 
 def unit_of(name: str) -> str:
-    """Give the unit that the end of a name says, in UDUNITS text; empty where it says none.
+    """Return the unit that the end of a name says, in UDUNITS text; empty where it says none.
 
     >>> unit_of("damping_ns_per_m"), unit_of("frequency_hz"), unit_of("response_i")
     ('N s m-1', 'Hz', '')
@@ -236,7 +236,7 @@ def unit_of(name: str) -> str:
 
 
 def _unit(part: Any, key: str, unit: str) -> str:
-    """Give the unit of one of its values; ``unit`` is what holds the part says of it."""
+    """Return the unit of one of its values; ``unit`` is what holds the part says of it."""
     said = getattr(part, "OWN_UNITS", {}).get(key)
     if said is None:
         return unit_of(key)
@@ -287,7 +287,7 @@ def _collect(
 
 
 def _is_table(parts: tuple[Any, ...]) -> bool:
-    """Say whether parts are of one kind and hold numbers, words and equally long lists of numbers only."""
+    """Return whether parts are of one kind and hold numbers, words and equally long lists of numbers only."""
     if not all(is_dataclass(each) for each in parts):
         return False
     shapes = {_row_shape(each) for each in parts}
@@ -295,7 +295,7 @@ def _is_table(parts: tuple[Any, ...]) -> bool:
 
 
 def _row_shape(part: Any) -> tuple[Any, ...] | None:
-    """Give type and length of every list of a part; None where it holds anything else."""
+    """Return type and length of every list of a part; None where it holds anything else."""
     lengths = []
     for _, value in _numbers_of(part):
         match value:

@@ -99,7 +99,7 @@ _SHORTEST_BLOCK = 50
 
 
 def begin_of_last_motion(points: Points) -> int:
-    """Give the index of the first point of the motion that a record ends in; 0 where it never changes.
+    """Return the index of the first point of the motion that a record ends in; 0 where it never changes.
 
     A record is cut into blocks, each of which repeats itself within its noise or does not. One change from
     the one to the other is a transient that has ended, or a motion that was lost. More than one are chaos

@@ -345,7 +345,7 @@ def surrogate(series: Reals, rng: np.random.Generator) -> tuple[Reals, float]:
 
 
 def prediction_error(series: Reals) -> float:
-    """Say how badly each value is foretold by what followed the most similar pasts, over the scatter.
+    """Return how badly each value is foretold by what followed the most similar pasts, over the scatter.
 
     Zeroth-order nonlinear prediction (Kantz and Schreiber, Nonlinear Time Series Analysis (2004), section
     4.2), the mean over neighbours: far below 1 where the past decides the future, near 1 where it does not.

@@ -123,7 +123,7 @@ def sorted_curve(curve: Curve) -> Curve:
 
 
 def curve_difference(curve: Curve, reference: Curve) -> CurveDifference:
-    """Say how far a curve lies above another, at its own frequencies within both.
+    """Return how far a curve lies above another, at its own frequencies within both.
 
     Raises
     ------

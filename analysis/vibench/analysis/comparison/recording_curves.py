@@ -27,7 +27,7 @@ SAME_HZ = 0.01
 
 
 def predicted_curves(name: str, found: ResponsePrediction) -> Iterator[Curve]:
-    """Give Responses I and II under sines."""
+    """Yield Responses I and II under sines."""
     low, high = 1e6 * float(found.amplitude_m.min()), 1e6 * float(found.amplitude_m.max())
     level = f"{low:.3g} µm" if low == high else f"{low:.3g} to {high:.3g} µm"
     note = f"sines of A0 = {level}, {found.accuracy.value}"

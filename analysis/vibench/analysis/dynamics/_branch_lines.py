@@ -108,7 +108,7 @@ class BranchLine(Labelled):
         return self.frequency_hz if parameter is Parameter.FREQUENCY else self.amplitude_m
 
     def pieces(self) -> Iterator[tuple[bool, slice]]:
-        """Give stretches that are stable throughout, or not; neighbours share a point."""
+        """Yield stretches that are stable throughout, or not; neighbours share a point."""
         is_stable = self.is_stable[1:] & self.is_stable[:-1]
         edges = [0, *(np.flatnonzero(is_stable[1:] != is_stable[:-1]) + 1).tolist(), self.points - 1]
         for first, last in pairwise(edges):
@@ -184,7 +184,7 @@ class BranchDiagram(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Say what was found, with its error and its cost."""
+        """Return what was found, with its error and its cost."""
         if not self.lines:
             return f"{self._none_found}; {self.elapsed_s:.1f} s."
         isolated = sum(line.is_isolated for line in self.lines)
@@ -213,7 +213,7 @@ class BranchDiagram(Labelled):
 
     @property
     def holding_sentence(self) -> str:
-        """Say how many unstable motions the bench can hold; nothing where no bench is named."""
+        """Return how many unstable motions the bench can hold; nothing where no bench is named."""
         holdable = self.holdable
         if not holdable:
             return ""
@@ -234,7 +234,7 @@ class BranchDiagram(Labelled):
         return None if loop_s is None else least_growth_time_s(loop_s)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Give Responses I and II of m0 over frequency, stable and unstable apart; none along amplitude."""
+        """Return Responses I and II of m0 over frequency, stable and unstable apart; none along amplitude."""
         if self.request.along is Parameter.AMPLITUDE:
             return ()
         found = []
@@ -249,7 +249,7 @@ class BranchDiagram(Labelled):
         return tuple(found)
 
     def _strung(self, name: str, *, is_stable: bool) -> tuple[Reals, Reals]:
-        """Give all stretches of one stability as one row; NaN keeps them apart."""
+        """Return all stretches of one stability as one row; NaN keeps them apart."""
         places: list[Reals] = []
         sizes: list[Reals] = []
         for line in self.lines:

@@ -169,7 +169,7 @@ MOST_BINS = 100
 
 
 def recorded_level(frequency_hz: Reals, drive_amplitude_m: Reals) -> tuple[tuple[float, float], ...]:
-    """Give pairs of frequency [Hz] and amplitude [m] of a sweep or of steps, ascending, 100 at most.
+    """Return pairs of frequency [Hz] and amplitude [m] of a sweep or of steps, ascending, 100 at most.
 
     Parameters
     ----------

@@ -167,7 +167,7 @@ class ChainAnswer(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Say what was found and what it cost."""
+        """Return what was found and what it cost."""
         gaps = ", ".join(
             f"{gap.lower_hz:.4g} Hz and above"
             if math.isinf(gap.upper_hz)
@@ -204,7 +204,7 @@ X, VX = 0, 3
 
 
 def chain_runs(request: ChainRequest) -> Iterator[ChainRun]:
-    """Give each run as soon as it has been computed; stop asking, and no more is computed.
+    """Yield each run as soon as it has been computed; stop asking, and no more is computed.
 
     Raises
     ------

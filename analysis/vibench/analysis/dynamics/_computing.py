@@ -12,7 +12,7 @@ from ._spectrum_request import ExponentSpectrum, SpectrumPoint, SpectrumRequest,
 
 
 def branch_lines(request: BranchRequest) -> Iterator[BranchLine]:
-    """Give each branch as soon as it has been followed; stop asking, and no more is computed."""
+    """Yield each branch as soon as it has been followed; stop asking, and no more is computed."""
     where = request.shaken, request.path, request.start, request.stop
     if request.resonance_band_hz is not None:
         found = _resonance(request, request.resonance_band_hz)

@@ -39,7 +39,7 @@ class RecordedLevel:
 
 
 def motion_classes(results: MapResults, start: int = 0) -> Reals:
-    """Give the place in `MOTION_CLASSES` of each point, from the start of number ``start``; NaN: not known.
+    """Return the place in `MOTION_CLASSES` of each point, from the start of number ``start``; NaN: not known.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def _specimen_words(specimen: SpecimenTable) -> str:
 
 
 def _fixed(plan: Map) -> list[str]:
-    """Say what a map states beside its ranges: all but a start at zero, which is no choice."""
+    """Return what a map states beside its ranges: all but a start at zero, which is no choice."""
     law = [] if plan.model is None else [f"model = {plan.model}"]
     values = {each.field: getattr(plan, each.field) for each in QUANTITIES}
     is_said = {name: value != 0.0 or Map.model_fields[name].default is None for name, value in values.items()}

@@ -22,7 +22,7 @@ ContactWord = Annotated[str, ChosenFrom(lambda: ["", *(law.example for law in CO
 
 
 def _at(field: str, error: ValueError) -> ValidationError:
-    """Give the error of one field, so that a form shows it there."""
+    """Return the error of one field, so that a form shows it there."""
     said = PydanticCustomError("value_error", "{said}", {"said": str(error)})
     return ValidationError.from_exception_data(field, [{"type": said, "loc": (field,), "input": None}])
 

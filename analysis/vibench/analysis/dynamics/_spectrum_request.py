@@ -165,7 +165,7 @@ class ExponentSpectrum(Labelled):
     elapsed_s: float
 
     def column(self, name: str) -> Reals:
-        """Give one quantity of every point, shape (n,) or (n, 6)."""
+        """Return one quantity of every point, shape (n,) or (n, 6)."""
         return np.array([getattr(each, name) for each in self.points], dtype=np.float64)
 
     @property
@@ -178,7 +178,7 @@ class ExponentSpectrum(Labelled):
 
     @property
     def cost_sentence(self) -> str:
-        """Say what was found, with its check and its cost."""
+        """Return what was found, with its check and its cost."""
         chaotic = sum(each.verdict == "chaotic" for each in self.points)
         if not self.request.is_elastic:
             check = "the contact takes energy, so that the dampers alone do not give the sum"

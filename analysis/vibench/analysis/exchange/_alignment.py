@@ -378,7 +378,7 @@ def _in_unit(channel: SourceChannel, unit: str) -> SourceChannel:
 
 
 def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Path) -> float:
-    """Give the mapping's rate, or the file's where it has none."""
+    """Return the mapping's rate, or the file's where it has none."""
     said = sorted({each.sample_rate_hz for each in channels if each.sample_rate_hz is not None})
     longest = max(each.samples for each in channels)
     given = mapping.sample_rate_hz
@@ -410,7 +410,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
 
 
 def _same(rates_hz: Sequence[float], samples: int) -> bool:
-    """Tell whether channels of these rates stay together over so many samples."""
+    """Return whether channels of these rates stay together over so many samples."""
     return all(
         (high / low - 1) * samples <= _APART for low, high in pairwise((*rates_hz[:1], *rates_hz[-1:]))
     )

@@ -170,12 +170,12 @@ def _about(
 
 
 def _unpacked(entities: list[Entity]) -> list[Entity] | Entity:
-    """Give one alone as itself: RO-Crate 1.1 recommends it (appendix on JSON-LD, compacted form)."""
+    """Return one alone as itself: RO-Crate 1.1 recommends it (appendix on JSON-LD, compacted form)."""
     return entities[0] if len(entities) == 1 else entities
 
 
 def _licence_name(address: str) -> str:
-    """Give "CC BY 4.0" for Creative Commons' addresses, those of deeds too, and the end of any other."""
+    """Return "CC BY 4.0" for Creative Commons' addresses, those of deeds too, and the end of any other."""
     found = _CREATIVE_COMMONS.search(address)
     if found is None:
         return address.rstrip("/").rpartition("/")[2]

@@ -26,7 +26,7 @@ from ._wav import require_sound, write_wav
 
 
 def require_results(recording: Recording) -> Mapping[str, SavedResult]:
-    """Give them; NotEnoughData when there are none."""
+    """Return them; NotEnoughData when there are none."""
     found = recording.results
     if not found:
         raise NotEnoughData(
@@ -54,7 +54,7 @@ def write_result_tables(recording: Recording, path: Path) -> tuple[Path, ...]:
 
 
 def matlab_results(recording: Recording) -> dict[str, Any]:
-    """Give the results as nested structs: ``results.noise.transmission.values``."""
+    """Return the results as nested structs: ``results.noise.transmission.values``."""
     return {
         _identifier(name): {
             "settings_json": json.dumps(dict(result.settings)),

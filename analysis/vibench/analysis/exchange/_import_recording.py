@@ -246,7 +246,7 @@ def _peak(source: Source, channel: SourceChannel) -> float:
 
 
 def _power_of_two_above(peak: float) -> float:
-    """Give the smallest power of two that is not below a peak.
+    """Return the smallest power of two that is not below a peak.
 
     Raises UnusableData when the peak is beyond what a recording's numbers can be scaled by.
     """
@@ -264,7 +264,7 @@ def _power_of_two_above(peak: float) -> float:
 def _bench(
     path: Path, mapping: ImportMapping, wanted: Sequence[_Wanted], remarks: Sequence[str]
 ) -> dict[str, Any]:
-    """Say what is known of the bench, and where the samples came from."""
+    """Return what is known of the bench, and where the samples came from."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     bench: dict[str, Any] = {

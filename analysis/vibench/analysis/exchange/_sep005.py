@@ -11,7 +11,7 @@ QUANTITIES = {"velocity": "v", "acceleration": "a", "displacement": "d", "force"
 
 
 def sep005(excerpt: Excerpt) -> list[dict[str, Any]]:
-    """Give the channels of an excerpt as SDyPy's packages take them; in memory, lost samples NaN.
+    """Return the channels of an excerpt as SDyPy's packages take them; in memory, lost samples NaN.
 
     Parameters
     ----------

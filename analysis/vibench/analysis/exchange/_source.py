@@ -34,7 +34,7 @@ class Source(Protocol):
         """Everything in it that can be a channel of a recording."""
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Give numbers as the file means them, lost ones as NaN, shape (stop - start,)."""
+        """Return numbers as the file means them, lost ones as NaN, shape (stop - start,)."""
 
 
 _READERS: dict[str, Callable[[Path], AbstractContextManager[Source]]] = {
@@ -180,7 +180,7 @@ def _readable(path: Path) -> Iterator[None]:
 
 
 def find_channel(source: Source, wanted: str, path: Path) -> SourceChannel:
-    """Give the channel of that name, or the only one of that label.
+    """Return the channel of that name, or the only one of that label.
 
     Raises InvalidRequest when there is none, or more than one; the sentence lists what there is.
     """

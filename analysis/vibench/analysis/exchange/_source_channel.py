@@ -85,5 +85,5 @@ class TableSource:
         return tuple(self.numbers)
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:
-        """Give a stretch."""
+        """Return a stretch."""
         return self.numbers[channel][start:stop]

@@ -27,7 +27,7 @@ def xarray_dataset(
     from_s: float | None = None,
     to_s: float | None = None,
 ) -> "xarray.Dataset":
-    """Give channels in their physical units over ``time`` [s since the first sample], in memory.
+    """Return channels in their physical units over ``time`` [s since the first sample], in memory.
 
     Lost samples are NaN. ``segment`` is the number of the segment that a sample lies in, -1 between them;
     the attribute ``segments_json`` says what each of them is. A finished file larger than memory is better

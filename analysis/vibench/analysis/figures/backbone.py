@@ -89,7 +89,7 @@ def _base(levels: Sequence[TrackedResonance]) -> list[float]:
 
 
 def _amplitude(levels: Sequence[TrackedResonance]) -> tuple[Reals, float, str]:
-    """Give amplitudes in the unit to draw them in, with its scale and name."""
+    """Return amplitudes in the unit to draw them in, with its scale and name."""
     amplitude_m = np.array([each.amplitude_m for each in levels])
     scale, unit = prefixed(float(np.nanmax(amplitude_m)), "m")
     return scale * amplitude_m, scale, unit
@@ -158,7 +158,7 @@ def _mark_lost(axes: Axes, lost_m_per_s2: Sequence[float]) -> None:
 def _simulated_m(
     levels: Sequence[TrackedResonance], analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None
 ) -> Reals | None:
-    """Give m0's simulated amplitude at each level, where one recorded stretch belongs to each."""
+    """Return m0's simulated amplitude at each level, where one recorded stretch belongs to each."""
     if laid is None or not levels[0].is_fundamental or laid.response.left_out or analysis.response.left_out:
         return None
     found = laid.response.response_ii * laid.response.drive_amplitude_m

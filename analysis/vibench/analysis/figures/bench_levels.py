@@ -40,7 +40,7 @@ def bench_levels_figure(facts: RecordingFacts) -> DrawnFigure:
 
 
 def bench_levels_caption(facts: RecordingFacts) -> str:
-    """Say how much of its range each channel used."""
+    """Return how much of its range each channel used."""
     parts = [f"{_peak(each)} ({100 * each.share_of_range:.2g} % of its range)" for each in facts.channels]
     return f"Extremes of every channel, ramps and waits included. Peaks: {', '.join(parts)}."
 

@@ -202,7 +202,7 @@ def _across(axes: Axes, diagram: BranchDiagram) -> None:
 
 
 def branch_tables(diagram: BranchDiagram) -> tuple[Table, ...]:
-    """Give every point of every branch, and every special point."""
+    """Return every point of every branch, and every special point."""
     lines = diagram.lines
     if not lines:
         return ()

@@ -131,7 +131,7 @@ def _span(curves: Sequence[Curve]) -> tuple[float, float]:
 
 
 def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None) -> str:
-    """Say what each curve is, with its numbers."""
+    """Return what each curve is, with its numbers."""
     said = [f"{each.name}: {each.note}." if each.note else f"{each.name}." for each in curves]
     said.append("Shaded: two standard deviations.")
     if pair is not None:
@@ -146,7 +146,7 @@ def comparison_caption(curves: Sequence[Curve], pair: tuple[Curve, Curve] | None
 def comparison_tables(
     name: str, curves: Sequence[Curve], pair: tuple[Curve, Curve] | None = None
 ) -> tuple[Table, ...]:
-    """Give every curve, the difference, and the peaks, with units in the headings."""
+    """Return every curve, the difference, and the peaks, with units in the headings."""
     found = [
         table(
             f"{name}_{number}_{_file_word(curve)}",

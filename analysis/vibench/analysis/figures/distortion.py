@@ -119,7 +119,7 @@ def _dots(axes: Axes, frequency_hz: Reals, amplitude: Reals, look: tuple[str, st
 
 
 def distortion_caption(periodic: PeriodicFrequencyResponse) -> str:
-    """Say how much of the scatter does not repeat from period to period, and how much is distortion."""
+    """Return how much of the scatter does not repeat from period to period, and how much is distortion."""
     found = distortion(periodic)
     said = [
         (

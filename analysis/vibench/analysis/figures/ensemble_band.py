@@ -52,7 +52,7 @@ def draw_band(
 
 
 def run_text(laid: AbstractOverlay[Any]) -> str:
-    """Say what was simulated, and where the measurement lies in it."""
+    """Return what was simulated, and where the measurement lies in it."""
     run = laid.run
     if not run.driven.by_voltage:
         why = f" ({run.why})" if run.why else ""
@@ -85,13 +85,13 @@ def agreement_text(laid: AbstractOverlay[Any]) -> str:
 
 
 def sines_table(name: str, sines: ResponsePrediction) -> Table:
-    """Give the responses to steady sines that a figure shows beside a measurement."""
+    """Return the responses to steady sines that a figure shows beside a measurement."""
     keys = "frequency_hz amplitude_m response_i response_ii linear impacts"
     return table(f"{name}_sines", **columns(sines, keys))
 
 
 def band_columns(laid: AbstractOverlay[Any], name: str, column: str) -> dict[str, Reals]:
-    """Give the columns of a table that hold a quantity's draws."""
+    """Return the columns of a table that hold a quantity's draws."""
     found = laid.quantity(name)
     if found is None or laid.run.draws == 1:
         return {}
@@ -119,7 +119,7 @@ class ModelResonances:
 
 
 def model_resonances(specimen: Specimen) -> ModelResonances:
-    """Give the undamped natural frequencies with and without contact."""
+    """Return the undamped natural frequencies with and without contact."""
     return ModelResonances(
         tuple(float(each) for each in specimen.natural_frequencies_hz),
         tuple(float(each) for each in specimen.bound_frequencies_hz),

@@ -113,7 +113,7 @@ def _draw(axes: Axes, results: MapResults, values: Reals, **style: Any) -> QuadM
 
 
 def _scaled(results: MapResults, quantity: Quantity) -> tuple[Reals, str]:
-    """Give the edges of the cells along one axis, in the unit that reads best, and its label."""
+    """Return the edges of the cells along one axis, in the unit that reads best, and its label."""
     chosen = results.plan.range_of(quantity)
     edges = np.array(chosen.edges)
     factor, unit = (
@@ -217,7 +217,7 @@ def _section(line: BranchLine) -> Reals:
 
 
 def motion_table(motions: Sequence[MapMotion]) -> Table:
-    """Give the motions of a map and their shares."""
+    """Return the motions of a map and their shares."""
     return table(
         "map_motions",
         motion=[str(each.motion) for each in motions],

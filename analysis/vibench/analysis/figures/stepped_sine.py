@@ -155,7 +155,7 @@ def _simulated(
 
 
 def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, look: SteppedLook[Any]) -> str:
-    """Say what was found, and how far the simulation lies from it."""
+    """Return what was found, and how far the simulation lies from it."""
     text = look.caption(analysis.excitation, analysis.response)
     text = " ".join([text, *feedback_sentences(analysis.facts.feedback)])
     if laid is None:
@@ -164,7 +164,7 @@ def _caption(analysis: SteppedSineAnalysis, laid: SteppedSineOverlay | None, loo
 
 
 def _frequencies_caption(plan: SteppedSine | SettledSine, found: SteppedResponse) -> str:
-    """Say where the largest response was."""
+    """Return where the largest response was."""
     top = int(np.argmax(found.response_ii))
     return (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp, {found.frequency_hz.size} "
@@ -193,7 +193,7 @@ def stepped_level_caption(found: SteppedResponse) -> str:
 
 
 def tracked_caption(found: SteppedResponse) -> str:
-    """Say how many levels there are."""
+    """Return how many levels there are."""
     return f"Resonance tracked, levels of the base: {found.frequency_hz.size}."
 
 

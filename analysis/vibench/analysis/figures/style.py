@@ -146,7 +146,7 @@ def _plain(value: float, _place: int | None = None) -> str:
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:
-    """Give the factor and the unit with SI prefix in which a quantity reads 1 to 1000."""
+    """Return the factor and the unit with SI prefix in which a quantity reads 1 to 1000."""
     fitting = [each for each in _PREFIXES if each[0] <= abs(largest)] or [_PREFIXES[0]]
     scale, prefix = fitting[-1]
     return 1 / scale, f"{prefix}{unit}"

@@ -141,7 +141,7 @@ def _responses(axes: Axes, analysis: SweepAnalysis, laid: SweepOverlay | None, w
 
 
 def sweep_caption(analysis: SweepAnalysis, laid: SweepOverlay | None) -> str:
-    """Say where the masses collided, with bounds, and what the simulation says."""
+    """Return where the masses collided, with bounds, and what the simulation says."""
     found = analysis.response
     amplitudes = 1e6 * found.drive_amplitude_m
     said = [

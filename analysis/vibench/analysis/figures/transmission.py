@@ -192,7 +192,7 @@ def _differences(axes: Axes, laid: NoiseOverlay, at: ModelResonances) -> None:
 
 
 def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> str:
-    """Say what the figure shows, with its numbers."""
+    """Return what the figure shows, with its numbers."""
     response = analysis.response
     view = analysis.request.view
     symbol, unit = view.symbol.replace(" ", ""), f" {view.unit}" if view.unit else ""
@@ -225,7 +225,7 @@ def transmission_caption(analysis: NoiseAnalysis, laid: NoiseOverlay | None) -> 
 
 
 def estimate_sentence(response: NoiseResponse) -> str:
-    """Say how a transmission was estimated, how fine its lines are, and what had to be left out."""
+    """Return how a transmission was estimated, how fine its lines are, and what had to be left out."""
     found = response.frequency_response
     how = found.settings
     ratio = "" if how.noise_ratio is None else f" with a noise ratio of {how.noise_ratio:g} s²"

@@ -64,7 +64,7 @@ def transmission_levels_figure(analyses: Sequence[NoiseAnalysis]) -> DrawnFigure
 
 
 def transmission_levels_caption(rising: Sequence[NoiseAnalysis]) -> str:
-    """Say where each level has its peaks."""
+    """Return where each level has its peaks."""
     said = []
     for each in rising:
         peaks = [f"{found.frequency_hz:.0f}" for found in each.response.resonances]

@@ -63,7 +63,7 @@ _SURELY = 5.0
 
 
 def scatters_beyond_noise(periodic: PeriodicFrequencyResponse) -> bool | None:
-    """Say whether realisations scatter more than their periods do; None when there was one of either only.
+    """Return whether realisations scatter more than their periods do; None when there was one of either only.
 
     The logarithm of a ratio of two variances has the mean and variance of that of Fisher's F; of a linear
     specimen, over many lines, its average stays within some standard deviations.

@@ -113,7 +113,7 @@ class Leakage:
     """Covariance of those that cut-off ringing makes, per |dH/df|^2 and relative variance [Hz^2]."""
 
     def smeared_pole(self, frequency_hz: Reals, pole: complex, slope_per_hz: Reals | Complexes) -> Complexes:
-        """Give what averages show of 1 / (i w - s), s = `pole` [rad/s].
+        """Return what averages show of 1 / (i w - s), s = `pole` [rad/s].
 
         With the autocorrelation r of the window over its segment T, T I(z), z = (s - i w) T and
         I(z) = integral of r(t) exp(z t) over 0 to 1, where the base's density is level; its relative slope
@@ -131,7 +131,7 @@ class Leakage:
         )
 
     def rung(self, line: Integers, value: Complexes, spread: Reals) -> Complexes:
-        """Give the standard deviation of either part of a line's error from cut-off ringing, along dH/df.
+        """Return the standard deviation of either part of a line's error from cut-off ringing, along dH/df.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class Leakage:
 
 
 def leakage_of(found: FrequencyResponse) -> Leakage | None:
-    """Give that of a transmission; None where whole periods leave none."""
+    """Return that of a transmission; None where whole periods leave none."""
     if found.resolution_hz == 0.0:
         return None
     how = found.settings
@@ -199,7 +199,7 @@ def _line_correlations(window: Window, overlap: float, segments: int) -> tuple[R
 
 @lru_cache(maxsize=8)
 def _autocorrelation(window: Window) -> tuple[Reals, Reals, Complexes]:
-    """Give r(t) = sum over b of exp(2 pi i b t) (f_b (1 - t) + g_b): b, f_b and g_b.
+    """Return r(t) = sum over b of exp(2 pi i b t) (f_b (1 - t) + g_b): b, f_b and g_b.
 
     Of w = sum of c_b exp(2 pi i b t), f_b = c_b^2 and g_b = c_b sum over a != b of c_a / (pi i (a - b)).
     """
@@ -286,17 +286,17 @@ class Lines:
         return np.concatenate([scaled.real, scaled.imag])
 
     def relative_sd(self, frequency_hz: float) -> float:
-        """Give the relative scatter of the line nearest to a frequency."""
+        """Return the relative scatter of the line nearest to a frequency."""
         line = int(np.argmin(np.abs(self.frequency_hz - frequency_hz)))
         return float(self._spread[line] / np.abs(self.value[line]))
 
     def squares(self, left: Reals) -> Reals:
-        """Give chi square of each line, 2 degrees of freedom, from residuals of variance one."""
+        """Return chi square of each line, 2 degrees of freedom, from residuals of variance one."""
         real, imaginary = np.split(left, 2)
         return chi_square_of(real**2 + imaginary**2, self._averages)
 
     def modes(self, poles: Reals) -> Complexes:
-        """Give the shapes of modes as the averages show them; see `mode_shapes`."""
+        """Return the shapes of modes as the averages show them; see `mode_shapes`."""
         if self._leakage is None:
             return mode_shapes(self.frequency_hz, poles)
         columns = []
@@ -314,7 +314,7 @@ class Lines:
 
 
 def mode_shapes(frequency_hz: Reals, poles: Reals) -> Complexes:
-    """Give two shapes with real factors for each mode, shape (lines, 2 modes), scaled to order one.
+    """Return two shapes with real factors for each mode, shape (lines, 2 modes), scaled to order one.
 
     2 zeta / (1 - r^2 + 2 i zeta r) and i r times it, with r = w / w0; `poles` are ln w0 / 2 pi and ln zeta.
     """
@@ -454,6 +454,6 @@ def _scaled(curvature: Reals) -> Reals:
 
 
 def _moved(shape: Callable[[Reals], Complexes | Reals], poles: Reals) -> Complexes:
-    """Give how a shape follows each pole, by central differences."""
+    """Return how a shape follows each pole, by central differences."""
     steps = _STEP * np.eye(poles.size)
     return np.stack([(shape(poles + step) - shape(poles - step)) / (2 * _STEP) for step in steps], axis=-1)

@@ -103,7 +103,7 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
 
 
 def driven_lines(spectra: Complexes) -> Flags:
-    """Tell which lines carry drive, from its spectra of shape (periods or realisations, lines)."""
+    """Return which lines carry drive, from its spectra of shape (periods or realisations, lines)."""
     amplitude = np.sqrt(np.mean(np.abs(spectra) ** 2, axis=0))
     amplitude[0] = 0.0
     strongest = float(np.max(amplitude))
@@ -436,7 +436,7 @@ class PeriodicSums:
         )
 
     def without_each(self) -> Iterator["PeriodicSums"]:
-        """Give what stays when each realisation in turn is left out; nothing where there is one."""
+        """Yield what stays when each realisation in turn is left out; nothing where there is one."""
         for place in range(len(self._realisations) if len(self._realisations) > 1 else 0):
             yield PeriodicSums(
                 self._sample_rate_hz,
@@ -446,14 +446,14 @@ class PeriodicSums:
             )
 
     def motion(self) -> Complexes:
-        """Give the mean spectra of base and response, shape (realisations, 2, lines)."""
+        """Return the mean spectra of base and response, shape (realisations, 2, lines)."""
         lines = min(one.drive.size for one in self._realisations)
         return np.stack([[one.base[:lines], one.response[:lines]] for one in self._realisations])
 
     def frequency_response(
         self, *, delay_s: float = 0.0, orders: Integers | None = None
     ) -> PeriodicFrequencyResponse:
-        """Give the transmission of the realisations added so far, at the driven lines.
+        """Return the transmission of the realisations added so far, at the driven lines.
 
         The bounds are Student's with 2 (realisations - 1) degrees of freedom, so that they also hold for two
         or three realisations.

@@ -71,7 +71,7 @@ class FrequencyResponseView:
                 return f"{self.symbol} [dB re 1{f' {unit}' if unit else ''}]"
 
     def factor(self, frequency_hz: Reals) -> Reals:
-        """Give what turns magnitudes of displacement over displacement into the view's quantities."""
+        """Return what turns magnitudes of displacement over displacement into the view's quantities."""
         start, stop = (Quantity.DISPLACEMENT, list(Quantity)[abs(self.power)])
         steps = (start, stop) if self.power >= 0 else (stop, start)
         return np.asarray(np.abs(derivative_factor(frequency_hz, *steps)))
@@ -221,7 +221,7 @@ class FrequencyResponseRequest:
 
 
 def longest_segment(samples: int, averages: float, window: Window, overlap: float) -> int:
-    """Give the longest segment that still leaves so many independent averages of a whole record.
+    """Return the longest segment that still leaves so many independent averages of a whole record.
 
     K segments are worth at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples hold
     K segments of N / (1 + (K - 1) (1 - overlap)).

@@ -117,7 +117,7 @@ def scattered_resonances(
 
 
 def _moved(found: Resonance, rest: Sequence[Resonance], name: str, realisations: int) -> float:
-    """Give the largest of what the fit says, what realisations move, and what the choice of a fit moves.
+    """Return the largest of what the fit says, what realisations move, and what the choice of a fit moves.
 
     A fit of all modes together and one of this mode alone differ by more than a realisation moves either:
     only fits over about as many lines tell the latter, which the jackknife multiplies.
@@ -216,7 +216,7 @@ def _split(poles: Reals, modes: int) -> Iterator[Reals]:
 
 
 def _is_told(found: Resonance, lines: Lines) -> bool:
-    """Say whether lines determine a mode: damping above zero, inside of them, and no ripple of noise."""
+    """Return whether lines determine a mode: damping above zero, inside of them, and no ripple of noise."""
     natural_hz, damping = found.frequency_hz, found.damping_ratio
     first_hz, last_hz = lines.frequency_hz[[0, -1]]
     if damping > 0.99 * LARGEST_DAMPING or not first_hz <= natural_hz <= last_hz:
@@ -282,7 +282,7 @@ def _best(band: FrequencyResponse, lines: Lines, starts: Sequence[Reals]) -> Mod
 
 
 def _told(fit: ModalFit, lines: Lines) -> tuple[Resonance, ...]:
-    """Give the modes of a fit that its lines determine, in the order of frequency."""
+    """Return the modes of a fit that its lines determine, in the order of frequency."""
     told = (each for each in fit.resonances if _is_told(each, lines))
     return tuple(sorted(told, key=lambda one: one.frequency_hz))
 

@@ -25,7 +25,7 @@ _FAINT = 1e-12
 
 
 def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freedom: float) -> Reals:
-    """Give the standard deviation of ln(magnitude) with which lines are weighted in a fit.
+    """Return the standard deviation of ln(magnitude) with which lines are weighted in a fit.
 
     One of two realisations is now and then a hundredth of the true one: as a weight it takes a few lines for
     the whole truth. What is level over neighbouring lines is not the relative scatter, but the noise of both
@@ -70,7 +70,7 @@ def steady_relative_sd(relative_sd: Reals, value: Complexes, power: Reals, freed
 
 
 def _sizes(variance: Reals, shapes: Reals) -> Reals:
-    """Give how much of each shape a row of variances holds, shape (shapes, rows); none is below zero.
+    """Return how much of each shape a row of variances holds, shape (shapes, rows); none is below zero.
 
     Fevotte, Bertin and Durrieu 2009 (Neural Comput. 21, 793-830): their updates raise the likelihood of
     chi-square distributed values in every round.
@@ -230,7 +230,7 @@ class FrequencyResponseSums:
         self._spectra.add(block, valid)
 
     def frequency_response(self) -> FrequencyResponse:
-        """Give the transmission of everything added so far.
+        """Return the transmission of everything added so far.
 
         Raises NotEnoughData when fewer than two valid segments were found: their coherence would be 1
         whatever they hold.
@@ -238,7 +238,7 @@ class FrequencyResponseSums:
         return self.by(self._settings.estimator, self._settings.noise_ratio)
 
     def by(self, estimator: Estimator, noise_ratio: float | None = None) -> FrequencyResponse:
-        """Give what another estimator makes of the same averages; errors as `transmissibility` has them."""
+        """Return what another estimator makes of the same averages; errors as `transmissibility` has them."""
         settings = replace(self._settings, estimator=estimator, noise_ratio=noise_ratio)
         _check(settings)
         if estimator is Estimator.DRIVE and self._channels < len(_ROWS):
@@ -383,7 +383,7 @@ def _value(products: Complexes, settings: FrequencyResponseSettings) -> Complexe
 
 
 def _slope(products: Complexes, value: Complexes, settings: FrequencyResponseSettings) -> Complexes:
-    """Give the relative change from line to line of the density P that value = (H P) / P is averaged with.
+    """Return the relative change from line to line of the density P that value = (H P) / P is averaged with.
 
     The estimator weights lines by the drive and by its instrument: the reference, x for h1, y for h2, and
     r x + H* y for hv with the noise ratio r. The instrument is compared with the reference, or with x where

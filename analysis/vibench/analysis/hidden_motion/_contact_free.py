@@ -152,7 +152,7 @@ def _runs(marks: Flags) -> Iterator[tuple[int, int]]:
 
 
 def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
-    """Give an impact for every window whose impulse is told from nothing, shape (impacts, 7)."""
+    """Return an impact for every window whose impulse is told from nothing, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
     force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
     # Held over the step that ends at a sample: its middle lies half a sample earlier.
@@ -217,7 +217,7 @@ class _GapLine:
 
 
 def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Give both gaps from |p| in the middle of contacts against the impulse; None of too few, or all alike.
+    """Return both gaps from |p| in the middle of contacts against the impulse; None of too few, or all alike.
 
     A stop is pressed in more the harder it is struck. The straight line of |p| over J^0.8, robustly fitted
     with one slope for both sides, begins at the gap.
@@ -226,7 +226,7 @@ def free_gaps(impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
 
 
 def free_loss(impacts: FreeImpacts) -> float | None:
-    """Give the loss of the stops [s/m] by the speeds before and after impacts; None where too few tell it.
+    """Return the loss of the stops [s/m] by the speeds before and after impacts; None where too few tell it.
 
     Hunt and Crossley's stops, hardly lossy, give back 1 - 2/3 loss speed of the approach: a beginning for a
     search, since both speeds are carried over from flights and a few per cent too low.
@@ -239,7 +239,7 @@ def free_loss(impacts: FreeImpacts) -> float | None:
 
 
 def measured_gaps(impacts: FreeImpacts) -> Reals:
-    """Give the gap as each impact measured it: |p| less the depth that belongs to its impulse [m].
+    """Return the gap as each impact measured it: |p| less the depth that belongs to its impulse [m].
 
     Shape (impacts,); NaN where a side has too few of them to tell a gap.
     """
@@ -275,7 +275,7 @@ def _gap_line(impacts: FreeImpacts) -> _GapLine:
 
 
 def _apart_by_side(values: Reals, sides: list[Flags]) -> Reals:
-    """Give how far values lie from the median of their side, NaN where they are on none."""
+    """Return how far values lie from the median of their side, NaN where they are on none."""
     apart = np.full(values.size, np.nan)
     for each in sides:
         apart[each] = values[each] - np.median(values[each])
@@ -358,7 +358,7 @@ def free_numbers(described: TrackedSpecimen, motion: PreparedMotion, firsts: Seq
 
 
 def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequence[LatentMotion]) -> Reals:
-    """Give the normalised innovations of stretches whose windows stay as they are."""
+    """Return the normalised innovations of stretches whose windows stay as they are."""
     model = motion_model(tracked, motion).without_stops
     begin = round(_RESIDUAL_START_S * motion.sample_rate_hz)
     parts = []

@@ -286,7 +286,7 @@ def looked_for(described: TrackedSpecimen, near: Mapping[Hidden, float]) -> dict
 
 
 def _gaps_by_law(described: TrackedSpecimen, impacts: FreeImpacts) -> tuple[FreeGap | None, FreeGap | None]:
-    """Give gaps where impacts are all alike: |p| there, less the depth that the described law has."""
+    """Return gaps where impacts are all alike: |p| there, less the depth that the described law has."""
 
     def gap(side: float) -> FreeGap | None:
         here = impacts.sides == side

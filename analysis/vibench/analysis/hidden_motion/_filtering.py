@@ -63,7 +63,7 @@ def motion_model(tracked: TrackedSpecimen, motion: PreparedMotion) -> MotionMode
 
 
 def step_noise(specimen: Specimen, tables: StepTables, noise: ChannelNoise) -> Reals:
-    """Give Q: the accelerometer's noise, what the model leaves out, and the drift of the acceleration."""
+    """Return Q: the accelerometer's noise, what the model leaves out, and the drift of the acceleration."""
     gap_m = min(specimen.gaps_m)
     speed = gap_m * 2.0 * np.pi * float(specimen.natural_frequencies_hz[-1])
     per_ms = tables.step_s / 1e-3
@@ -89,7 +89,7 @@ class FilterState:
     """Running mean of the squared normalised innovation."""
 
     def copy(self) -> "FilterState":
-        """Give one that moves on by itself."""
+        """Return one that moves on by itself."""
         return FilterState(self.sample, self.state.copy(), self.covariance.copy(), self.innovation_level)
 
 

@@ -100,7 +100,7 @@ class Forecaster:
 
 
 def _tones(turns: Reals) -> Reals:
-    """Give sine and cosine of the drive and its harmonics, shape (2 harmonics, samples)."""
+    """Return sine and cosine of the drive and its harmonics, shape (2 harmonics, samples)."""
     return np.concatenate([(np.sin(n * turns), np.cos(n * turns)) for n in range(1, _HARMONICS + 1)])
 
 

@@ -260,7 +260,7 @@ class _Combined:
 
 
 def combined(found: list[Estimate], described: TrackedSpecimen, independent: float) -> _Combined:
-    """Give the mean of restarts, and half the width of its bounds: from the larger of scatter and claims.
+    """Return the mean of restarts, and half the width of its bounds: from the larger of scatter and claims.
 
     Restarts over the same samples are not independent: their scatter tells what they have not forgotten.
     Scatter beyond what is claimed tells of a model that does not fit, and a few values tell it badly.
@@ -321,7 +321,7 @@ def _nothing(described: TrackedSpecimen, why: str, *, searched: bool = False) ->
 
 
 def not_believed(found: FoundSpecimen, why: str) -> FoundSpecimen:
-    """Give what was found without its values, of which ``why`` says that they are not the specimen's."""
+    """Return what was found without its values, of which ``why`` says that they are not the specimen's."""
     nan = float("nan")
     parameters = tuple(
         each if each.not_determined else replace(each, value=nan, low=nan, high=nan, not_determined=why)

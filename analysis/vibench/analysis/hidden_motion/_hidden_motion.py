@@ -136,12 +136,12 @@ class HiddenMotion(Labelled):
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Say what was followed, what was not, and what was found."""
+        """Return what was followed, what was not, and what was found."""
         return tuple(_sentences(self))
 
 
 def finite(value: float) -> float | None:
-    """Give None for what JSON cannot hold."""
+    """Return None for what JSON cannot hold."""
     return value if np.isfinite(value) else None
 
 
@@ -317,7 +317,7 @@ def _tracked(
 
 
 def _why_not_believed(tracked: TrackedMotion) -> str:
-    """Say why the numbers that a motion was tracked with are not its specimen's, or nothing."""
+    """Return why the numbers that a motion was tracked with are not its specimen's, or nothing."""
     told = ~np.isnan(tracked.p)
     held = float(np.mean(told[int(np.argmax(told)) :]))
     if held < _LEAST_HELD:
@@ -331,7 +331,7 @@ def _why_not_believed(tracked: TrackedMotion) -> str:
 
 
 def _gap_sd(found: FoundSpecimen | None) -> float:
-    """Give what the gaps' uncertainty, a quarter of the width of their bounds, adds to that of p."""
+    """Return what the gaps' uncertainty, a quarter of the width of their bounds, adds to that of p."""
     if found is None:
         return 0.0
     gaps = (Hidden.LOWER_GAP, Hidden.UPPER_GAP)
@@ -340,7 +340,7 @@ def _gap_sd(found: FoundSpecimen | None) -> float:
 
 
 def parameter_rows(motion: HiddenMotion) -> tuple[tuple[str, str, str], ...]:
-    """Give what was found as rows: name, value with bounds of 95 % or why there is none, as described."""
+    """Return what was found as rows: name, value with bounds of 95 % or why there is none, as described."""
     return tuple(each.row for each in motion.parameters)
 
 

@@ -136,7 +136,7 @@ def _with_surprises(windows: Flags, run: Filtered, sample_rate_hz: float) -> tup
 
 
 def _learnt(windows: Flags, forces: Reals, guess_n: float, closed: float) -> Reals:
-    """Give each window the mean square of the force found in it, as expectation maximisation does."""
+    """Return each window the mean square of the force found in it, as expectation maximisation does."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], windows.astype(np.int8), [0]))))
     begins, ends = edges[::2], edges[1::2]
     squares = np.concatenate(([0.0], np.cumsum(forces[:, 0] ** 2 + forces[:, 1])))

@@ -189,7 +189,7 @@ class LiveTwin:
 
     @property
     def newest(self) -> LiveMotion:
-        """Give what is known now: p of what is held, and the forecast behind it."""
+        """Return what is known now: p of what is held, and the forecast behind it."""
         limit = np.nan if self.watch.usual is None else self.watch.usual.limit
         return LiveMotion(
             self._state,
@@ -407,6 +407,6 @@ class LiveTwin:
 
 
 def _counted(run: Filtered) -> Reals:
-    """Give the squared innovations of flight, the largest clipped."""
+    """Return the squared innovations of flight, the largest clipped."""
     squared = run.squared
     return np.asarray(np.minimum(squared[~np.isnan(squared)], _CLIPPED))

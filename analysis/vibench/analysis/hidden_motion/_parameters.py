@@ -64,12 +64,12 @@ def value_of(tracked: TrackedSpecimen, what: Hidden) -> float:
 
 
 def scale_of(tracked: TrackedSpecimen, what: Hidden) -> float:
-    """Give what relative distances are parts of: the parameter; of the loss, which may be none, 1 s/m."""
+    """Return what relative distances are parts of: the parameter; of the loss, which may be none, 1 s/m."""
     return 1.0 if what is Hidden.LOSS else value_of(tracked, what)
 
 
 def with_values(tracked: TrackedSpecimen, values: Mapping[Hidden, float]) -> TrackedSpecimen:
-    """Give others; k1 stays when m1 changes."""
+    """Return others; k1 stays when m1 changes."""
     new = {each: values.get(each, value_of(tracked, each)) for each in PRIOR_SD}
     m0, _, m2 = tracked.specimen.masses
     specimen = replace(

@@ -68,15 +68,15 @@ class PreparedMotion:
         return self.velocity.size
 
     def accelerations(self, start: int, stop: int) -> Reals:
-        """Give those of a short stretch."""
+        """Return those of a short stretch."""
         return self.acceleration[start:stop].astype(np.float64, copy=False)
 
     def velocities(self, start: int, stop: int) -> Reals:
-        """Give those of a short stretch as measured; NaN without light, of which a filter uses nothing."""
+        """Return those of a short stretch as measured; NaN without light, of which a filter uses nothing."""
         return np.where(self.is_dark[start:stop], np.nan, self.velocity[start:stop].astype(np.float64))
 
     def part(self, start: int, stop: int) -> "PreparedMotion":
-        """Give a stretch of it, noise as found in the whole."""
+        """Return a stretch of it, noise as found in the whole."""
         return replace(
             self,
             acceleration=self.acceleration[start:stop],

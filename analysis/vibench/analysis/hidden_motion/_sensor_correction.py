@@ -45,7 +45,7 @@ class SensorCorrection:
     """Corner of the accelerometer's AC coupling, undone as a state of the tracker; 0 for DC."""
 
     def corrected(self, acceleration: Reals, velocity: Reals) -> tuple[Reals, Reals]:
-        """Give both channels as the base and m0 moved; values within HALF_LENGTH of an end are wrong."""
+        """Return both channels as the base and m0 moved; values within HALF_LENGTH of an end are wrong."""
         return (
             np.convolve(acceleration, self.acceleration, "same"),
             np.convolve(velocity, self.velocity, "same"),

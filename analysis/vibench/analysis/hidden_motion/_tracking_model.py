@@ -76,7 +76,7 @@ class StepTables:
 
 
 def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Reals, Reals]:
-    """Give A (8, 8), the input of the recorded acceleration (8,), and of a force on m1 against m2 (8,)."""
+    """Return A (8, 8), the input of the recorded acceleration (8,), and of a force on m1 against m2 (8,)."""
     m0, m1, m2 = specimen.masses
     k0, k1, k2 = specimen.stiffnesses
     c0, c1, c2 = specimen.dampings
@@ -98,7 +98,7 @@ def equations(specimen: Specimen, coupling_rad_per_s: float) -> tuple[Reals, Rea
 
 
 def exact_flow(a: Reals, inputs: Reals, step_s: float) -> Reals:
-    """Give the state one step later, of the state, an input and its linear rise, shape (n, n + 2)."""
+    """Return the state one step later, of the state, an input and its linear rise, shape (n, n + 2)."""
     n = len(a)
     joint = np.zeros((n + 2, n + 2))
     joint[:n, :n], joint[:n, n] = a * step_s, inputs * step_s

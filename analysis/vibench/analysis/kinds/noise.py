@@ -68,7 +68,7 @@ def _noise(
 
 
 def _repeated_again(analysis: NoiseAnalysis) -> Estimate:
-    """Give the estimate for draws: their drive is the recorded one, whose periods were measured with it."""
+    """Return the estimate for draws: their drive is the recorded one, whose periods were measured with it."""
     found = analysis.response
     if found.periodic is None or found.left_out:
         return repeated_response

@@ -106,7 +106,7 @@ class ImpactCounter:
         return inorder[np.diff(inorder, prepend=-self._apart - 1) > self._apart]
 
     def _smooth(self, data: Reals) -> float:
-        """Say what is left of a sine of the same mean square, and of the same mean square slope."""
+        """Return what is left of a sine of the same mean square, and of the same mean square slope."""
         known = data[np.isfinite(data)]
         spread = float(np.std(known)) if known.size > 1 else 0.0
         if spread == 0.0:
@@ -128,7 +128,7 @@ def _noise(data: Reals) -> float:
 
 
 def _kink(difference: Reals, sample_rate_hz: float) -> Reals:
-    """Give what the difference makes of the velocity after one impact of unit change of slope."""
+    """Return what the difference makes of the velocity after one impact of unit change of slope."""
     around = np.arange(-difference.size, 2 * difference.size) / sample_rate_hz
     moments_s = np.linspace(-0.5 * _CONTACT_S, 0.5 * _CONTACT_S, 7)
     since = np.clip(around[:, np.newaxis] - moments_s, 0.0, None)

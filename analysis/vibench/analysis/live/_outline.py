@@ -188,7 +188,7 @@ def period_of(samples: Samples, low: Samples, high: Samples) -> float:
 
 
 def widened(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samples, Samples]:
-    """Give every column the extremes of so many columns around it."""
+    """Return every column the extremes of so many columns around it."""
     lowest, highest = low.copy(), high.copy()
     for each in np.unique(reach[reach > 1]):
         here = reach == each
@@ -198,7 +198,7 @@ def widened(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samp
 
 
 def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
-    """Give every column the extreme of so many columns around it."""
+    """Return every column the extreme of so many columns around it."""
     before, found = (reach - 1) // 2, edge.copy()
     padded = np.pad(edge, (before, reach - 1 - before), mode="edge")
     for shift in range(reach):
@@ -344,7 +344,7 @@ def overview_of(recording: Recording, on_read: OnRead = ignore_reading) -> Recor
 def overview_levels(
     recording: Recording, on_read: OnRead = ignore_reading
 ) -> dict[str, tuple[OverviewLevel, ...]]:
-    """Give the extremes of every channel, fine to coarse: what crosses from a process that made them.
+    """Return the extremes of every channel, fine to coarse: what crosses from a process that made them.
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ def overview_levels(
 
 
 def kept_levels(recording: Recording, role: str) -> tuple[OverviewLevel, ...]:
-    """Give the extremes of one channel, fine to coarse, as the file keeps them; see `has_overview`.
+    """Return the extremes of one channel, fine to coarse, as the file keeps them; see `has_overview`.
 
     Parameters
     ----------

@@ -72,13 +72,13 @@ class Ring:
         self._next = first_sample + values.shape[1]
 
     def newest(self, samples: int) -> RingWindow:
-        """Give so many of the newest samples, fewer when there are not so many."""
+        """Return so many of the newest samples, fewer when there are not so many."""
         count = min(max(samples, 0), self.held)
         end = self._next % self._capacity + self._capacity
         return RingWindow(self._next - count, self._values[:, end - count : end])
 
     def since(self, sample: int) -> RingWindow:
-        """Give what came from a sample on, as far as it is still held."""
+        """Return what came from a sample on, as far as it is still held."""
         return self.newest(self._next - sample)
 
     def _put(self, first_sample: int, values: Values) -> None:

@@ -33,7 +33,7 @@ class DriveTone:
 
 @lru_cache(maxsize=32)
 def _hann(samples: int) -> Reals:
-    """Give the same lengths again and again: making a window costs as much as transforming it."""
+    """Return the same lengths again and again: making a window costs as much as transforming it."""
     return taper(Window.HANN, samples)
 
 
@@ -71,7 +71,7 @@ def amplitudes_at(frequency_hz: float, signals: Reals, sample_rate_hz: float) ->
 
 
 def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
-    """Give the moments at which the drive, a cosine, begins a period, in samples; a slow sweep too.
+    """Return the moments at which the drive, a cosine, begins a period, in samples; a slow sweep too.
 
     The drive is turned back by its frequency and kept within half of it: what is left is a slow phase,
     known from few samples. A tenth of the stretch at either end, where the filter lacks its past or
@@ -172,7 +172,7 @@ def sine_point(window: RingWindow, rows: tuple[int, int, int], sample_rate_hz: f
 
 
 def _is_ramped_down(drive: Reals, sample_rate_hz: float) -> bool:
-    """Tell whether the drive falls along a stretch, by more than a sweep downwards lets it."""
+    """Return whether the drive falls along a stretch, by more than a sweep downwards lets it."""
     quarter = drive.size // 4
     first, last = (drive_tone(each, sample_rate_hz) for each in (drive[:quarter], drive[-quarter:]))
     if first is None or last is None:

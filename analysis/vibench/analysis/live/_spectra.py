@@ -117,7 +117,7 @@ class LiveSpectra:
             self._spectra[place], self._power[place] = found, found.real**2 + found.imag**2
 
     def spectrum(self) -> LiveSpectrum | None:
-        """Give the spectral density of every channel; None before the first whole segment."""
+        """Return the spectral density of every channel; None before the first whole segment."""
         used = self._used()
         if not used.any():
             return None
@@ -141,7 +141,7 @@ class LiveSpectra:
         delay_s: float = 0.0,
         confidence: float = DEFAULT_CONFIDENCE,
     ) -> FrequencyResponse | None:
-        """Give displacement over displacement, with coherence and bounds; None before two segments.
+        """Return displacement over displacement, with coherence and bounds; None before two segments.
 
         Parameters
         ----------

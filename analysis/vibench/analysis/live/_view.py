@@ -61,7 +61,7 @@ class SweepTrace:
         self._begin = max(self._begin, self._end - self._most)
 
     def history(self) -> SweepHistory:
-        """Give all points."""
+        """Return all points."""
         return SweepHistory(*self._rows[:, self._begin : self._end].copy())
 
 
@@ -163,20 +163,20 @@ class LiveView:
             self._add_point()
 
     def time_histories(self, span_s: float, columns: int) -> TimeHistories:
-        """Give the newest seconds as columns of a picture."""
+        """Return the newest seconds as columns of a picture."""
         window = self._ring.newest(round(span_s * self._rate_hz))
         low, high = outline(window.values, columns)
         starts = column_starts(window.values.shape[1], columns)
         return TimeHistories((window.first_sample + starts) / self._rate_hz, low, high)
 
     def spectrum(self) -> LiveSpectrum | None:
-        """Give the spectral density of every channel; None before the first segment."""
+        """Return the spectral density of every channel; None before the first segment."""
         if self._spectrum[0] != self._spectra.segments:
             self._spectrum = (self._spectra.segments, self._spectra.spectrum())
         return self._spectrum[1]
 
     def frequency_response(self) -> FrequencyResponse | None:
-        """Give |x / U| of the newest segments, with coherence and bounds; None before two of them."""
+        """Return |x / U| of the newest segments, with coherence and bounds; None before two of them."""
         if not self._has(BASE, RESPONSE):
             return None
         if self._frequency_response[0] != self._spectra.segments:
@@ -194,7 +194,7 @@ class LiveView:
         self._spectrum = self._frequency_response = (-1, None)
 
     def portrait(self) -> Portrait | None:
-        """Give the orbit of the newest periods, and keep its Poincaré points; None without a sine."""
+        """Return the orbit of the newest periods, and keep its Poincaré points; None without a sine."""
         if not self._has(DRIVE, RESPONSE):
             return None
         if self._ring.next_sample - self._portrait[0] < _POINT_EVERY_S * self._rate_hz:
@@ -219,7 +219,7 @@ class LiveView:
         return self._section
 
     def history(self) -> SweepHistory:
-        """Give Responses I and II and extremes against the frequency really played, so far."""
+        """Return Responses I and II and extremes against the frequency really played, so far."""
         return self._trace.history()
 
     @property

@@ -92,7 +92,7 @@ class PlayedVoltage:
         return self._through(filtered, lambda count: np.array(list(islice(rows, count)))), roots
 
     def drawn(self, rng: np.random.Generator) -> Reals:
-        """Give a voltage that may have been played, shape (samples,) [V]."""
+        """Return a voltage that may have been played, shape (samples,) [V]."""
         if self._own_v == 0.0:
             return self._volts
         likely, roots = self._likely
@@ -124,7 +124,7 @@ class PlayedVoltage:
 
 
 def above_noise(volts: Reals, rms: float) -> Reals:
-    """Give what surely is voltage and no noise of its channel, which would shake a simulated table."""
+    """Return what surely is voltage and no noise of its channel, which would shake a simulated table."""
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * rms**2] = 0.0
     return np.asarray(np.fft.irfft(spectrum, volts.size))
@@ -164,7 +164,7 @@ def channel_noise(recording: Recording, roles: tuple[str, ...]) -> ChannelNoise:
 
 
 def _quiet(rms: list[float], length: int) -> float:
-    """Give the level of the blocks that are as quiet as the quietest: alone it is some per cent too low."""
+    """Return the level of the blocks that are as quiet as the quietest: alone it is some per cent too low."""
     if not rms:
         return 0.0
     power = np.square(rms)

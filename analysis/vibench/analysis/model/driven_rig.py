@@ -45,7 +45,7 @@ class DrivenRig:
 
 
 def driven_rig(recording: Recording, specimen: Specimen, shaker: Shaker | None = None) -> DrivenRig:
-    """Say what the recorded voltage was played into.
+    """Return what the recorded voltage was played into.
 
     Raises UnusableData when the recording does not say what shaker, or amplifier, it was made with.
 
@@ -90,7 +90,7 @@ def says_shaker(recording: Recording) -> bool:
 
 
 def described_shaker(recording: Recording) -> Shaker | None:
-    """Give the shaker that the bench configuration in a recording describes; None where it does not."""
+    """Return the shaker that the bench configuration in a recording describes; None where it does not."""
     rig = _configured(recording)
     return None if rig is None else shaker_of(rig)
 

@@ -244,7 +244,7 @@ def ensemble_curves(
 
 
 def _alike(measured: Quantity, drawn: Quantity) -> Reals:
-    """Give a draw's values where its motion is of the measured kind; equal places are the caller's."""
+    """Return a draw's values where its motion is of the measured kind; equal places are the caller's."""
     if drawn.value.shape != measured.value.shape:
         return np.full(measured.value.shape, np.nan)
     if measured.state is None or drawn.state is None:

@@ -81,7 +81,7 @@ class AbstractOverlay(Labelled, Generic[R]):
         return (*(headline if outside else []), *(each.sentence for each in ordered))
 
     def quantity(self, name: str) -> EnsembleCurve | None:
-        """Give one quantity that has draws; None where it has none."""
+        """Return one quantity that has draws; None where it has none."""
         return next((each for each in (*self.ensemble, *self.shown) if each.name == name), None)
 
 
@@ -151,7 +151,7 @@ def _difference(
 
 
 def noise_quantities(response: NoiseResponse) -> tuple[Quantity, ...]:
-    """Give what a draw of noise is compared by."""
+    """Return what a draw of noise is compared by."""
     found = response.frequency_response
     return (Quantity(TRANSMISSION, found.frequency_hz, found.magnitude),)
 
@@ -218,7 +218,7 @@ _EDGE_S = 1.0
 
 
 def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity, ...]:
-    """Give what a draw of a sweep is compared by: where one collides and another does not, nothing.
+    """Return what a draw of a sweep is compared by: where one collides and another does not, nothing.
 
     Nor within a second of an edge, where an interval holds some of either motion.
     """
@@ -233,7 +233,7 @@ def sweep_quantities(response: SweptMotion, found: Collisions) -> tuple[Quantity
 
 
 def sweep_endings(found: Collisions) -> tuple[Ending, ...]:
-    """Say when the longest stretch of collisions ended, in seconds of the sweep."""
+    """Return when the longest stretch of collisions ended, in seconds of the sweep."""
     if not found.regions:
         return ()
     longest = max(found.regions, key=lambda each: each.stop.time_s - each.start.time_s)
@@ -267,7 +267,7 @@ _LEAST_BAND = 1e-3
 def dwell_quantities(
     response: DwellResponse, towards_hz: tuple[float, ...], endings: Sequence[Ending]
 ) -> tuple[Quantity, ...]:
-    """Give what a draw of a dwell is compared by: both responses, and the bands that hold motion."""
+    """Return what a draw of a dwell is compared by: both responses, and the bands that hold motion."""
     at = np.array([response.drive.frequency_hz])
     state = np.array([sum(each.ended for each in endings)], dtype=np.int64)
     columns_hz, size = spectrum_columns(response)
@@ -315,7 +315,7 @@ def dwell_overlay(
 
 
 def stepped_quantities(response: SteppedResponse) -> tuple[Quantity, ...]:
-    """Give what a draw of a stepped sine is compared by."""
+    """Return what a draw of a stepped sine is compared by."""
     return (
         Quantity(RESPONSE_I, response.frequency_hz, response.response_i),
         Quantity(RESPONSE_II, response.frequency_hz, response.response_ii),

@@ -61,7 +61,7 @@ class FittedShaker:
         )
 
     def drawn(self, rng: np.random.Generator) -> Shaker:
-        """Give a shaker of this uncertainty."""
+        """Return a shaker of this uncertainty."""
         logarithms = rng.multivariate_normal(_logarithms(self.shaker), self.covariance, method="eigh")
         return _shaker(logarithms)
 
@@ -163,7 +163,7 @@ class _VoltageAndBase(RecordedChannels):
 
 
 def _over_voltage(recording: Recording, analysis: NoiseAnalysis) -> FrequencyResponse:
-    """Give s times the base's acceleration over the voltage: the estimators take it for displacements."""
+    """Return s times the base's acceleration over the voltage: the estimators take it for displacements."""
     role = AMPLIFIER if AMPLIFIER in recording.roles else DRIVE
     channels = _VoltageAndBase(recording, role=role)
     match analysis.excitation:

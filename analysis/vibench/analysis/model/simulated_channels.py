@@ -125,11 +125,11 @@ class SimulatedChannels:
         return self.sensors(frequency_hz)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Give the named parts of the record."""
+        """Return the named parts of the record."""
         return self.recorded.stretches(label)
 
     def read(self, start: int, stop: int) -> Reals:
-        """Give drive, base acceleration and simulated velocity, shape (3, samples)."""
+        """Return drive, base acceleration and simulated velocity, shape (3, samples)."""
         return np.stack([each[start:stop] for each in (self.drive_v, self.base_acceleration, self.velocity)])
 
     def overloaded(self, start: int, stop: int) -> Flags:
@@ -180,7 +180,7 @@ def under_base_motion(
 def shaken(
     specimen: Specimen, displacement_m: Reals, sample_rate_hz: float, accuracy: Accuracy
 ) -> tuple[Reals, Integers]:
-    """Give m0's velocity at every sample of the base's displacement, and the impacts up to every sample."""
+    """Return m0's velocity at every sample of the base's displacement, and the impacts up to every sample."""
     count = displacement_m.size
     velocity = np.zeros(count)
     impacts = np.zeros(count, dtype=np.int64)

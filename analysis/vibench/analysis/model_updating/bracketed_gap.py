@@ -30,7 +30,7 @@ class Bracket:
 
 
 def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedValue:
-    """Give the gap from the narrowest bracket; its value is the geometric mean of the bounds.
+    """Return the gap from the narrowest bracket; its value is the geometric mean of the bounds.
 
     Raises NotEnoughData when no frequency has a dwell on either side of the onset.
     """
@@ -52,7 +52,7 @@ def bracketed_gap(dwells: Sequence[DwellAnalysis], linear: Specimen) -> FittedVa
 
 
 def brackets(dwells: Sequence[DwellAnalysis], linear: Specimen) -> Iterator[Bracket]:
-    """Give a bracket for every frequency with dwells on both sides.
+    """Yield a bracket for every frequency with dwells on both sides.
 
     Collisions push the base off its course, so the motion that a colliding dwell would have without them is
     taken from the generator's setting and from what a volt did to the base in the largest calm dwell.

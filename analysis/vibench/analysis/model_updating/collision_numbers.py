@@ -71,7 +71,7 @@ class CollisionNumbers:
         return found if len(found) == len(_SIDES) else ()
 
     def on(self, specimen: Specimen) -> Specimen:
-        """Give a specimen the gaps that are told; a mean, which is told better, keeps their ratio."""
+        """Return a specimen the gaps that are told; a mean, which is told better, keeps their ratio."""
         mean = next((each for each in self.told if each.what is Hidden.MEAN_GAP), None)
         if mean is not None:
             lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
@@ -185,7 +185,7 @@ def _width(found: CollisionNumbers) -> float:
 
 
 def _refused(motion: HiddenMotion) -> str:
-    """Say why a motion's numbers are none, or nothing."""
+    """Return why a motion's numbers are none, or nothing."""
     missing = [each for each in motion.parameters if each.what in _SIDES and not each.is_determined]
     return missing[0].not_determined if missing else ""
 
@@ -202,7 +202,7 @@ class _Colliding:
     drive_hz: float | None = None
 
     def within(self, recording: Recording) -> tuple[float, float]:
-        """Give its begin and end [s]."""
+        """Return its begin and end [s]."""
         rate = recording.sample_rate_hz
         start_s, stop_s = max(
             (
@@ -220,7 +220,7 @@ class _Colliding:
 
 
 def _colliding(results: CampaignResults) -> Iterator[_Colliding]:
-    """Give what collides: dwells first, which stay where they are; the strongest of them first."""
+    """Yield what collides: dwells first, which stay where they are; the strongest of them first."""
     for dwell in sorted(results.dwells, key=lambda each: -each.analysis.excitation.amplitude_vpp):
         if peakedness(dwell.analysis) >= COLLIDING:
             facts, drive = dwell.analysis.facts, dwell.analysis.response.drive

@@ -47,7 +47,7 @@ def fit_gap(
     fit: SpecimenFit | None = None,
     confidence: float = DEFAULT_CONFIDENCE,
 ) -> FittedValue:
-    """Give the gap that explains the sharpest onset of collisions.
+    """Return the gap that explains the sharpest onset of collisions.
 
     Raises NotEnoughData when no sweep enters a colliding region.
 
@@ -87,7 +87,7 @@ def onsets(
     fit: SpecimenFit | None = None,
     confidence: float = DEFAULT_CONFIDENCE,
 ) -> Iterator[Onset]:
-    """Give every onset of a sweep with the gap that it implies."""
+    """Yield every onset of a sweep with the gap that it implies."""
     reach = float(norm.ppf(0.5 + 0.5 * confidence))
     rate = sweep.response.sweep_rate_hz_per_s
     for region in sweep.collisions.regions:

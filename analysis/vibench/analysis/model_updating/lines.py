@@ -64,7 +64,7 @@ def chained(
 
 
 def as_described(specimen: Specimen, frequency_hz: Reals, _: Reals) -> Complexes:
-    """Give the three masses alone."""
+    """Return the three masses alone."""
     return chained(specimen, frequency_hz, (0.0, 0.0))
 
 
@@ -130,7 +130,7 @@ class Lines:
         return chi_square_limit(self.freedom, self.correlation[1])
 
     def specimen(self, logarithms: Reals) -> Specimen:
-        """Give the specimen of these parameters, which are not taken beyond `_MOST_OFF`."""
+        """Return the specimen of these parameters, which are not taken beyond `_MOST_OFF`."""
         begun = self.start[: len(self.free)]
         values = np.exp(np.clip(logarithms, begun - _MOST_OFF, begun + _MOST_OFF)).tolist()
         return with_values(self.nominal, dict(zip(self.free, values, strict=True)))

@@ -97,7 +97,7 @@ def parameter_value(specimen: Specimen, parameter: Parameter) -> float:
 
 
 def with_values(specimen: Specimen, values: Mapping[Parameter, float]) -> Specimen:
-    """Give a specimen other parameters; frequencies stay when a mass changes.
+    """Return a specimen other parameters; frequencies stay when a mass changes.
 
     Dampings that are not given keep their proportions to the stiffnesses, and two gaps theirs to each other.
     """

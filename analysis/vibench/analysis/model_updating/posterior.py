@@ -111,7 +111,7 @@ def _left_out(u: Reals, sizes: Reals, target: Reals, ridge: float) -> Reals:
 
 
 def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
-    """Say how far observed statistics lie from what parameters give, over the furthest run's own.
+    """Return how far observed statistics lie from what parameters give, over the furthest run's own.
 
     Without what the parameters that a regression finds explain, along the largest components of the rest and
     beyond them. Each run is held against the others, as the observed statistics are against all: a run that

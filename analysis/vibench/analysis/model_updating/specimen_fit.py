@@ -59,13 +59,13 @@ class SpecimenFit(Labelled):
         return self.reduced_chi_square <= self.limit
 
     def drawn(self, rng: np.random.Generator) -> Specimen:
-        """Give a specimen of the fit's uncertainty."""
+        """Return a specimen of the fit's uncertainty."""
         logarithms = rng.multivariate_normal([np.log(each.value) for each in self.values], self.covariance)
         drawn = zip((each.parameter for each in self.values), np.exp(logarithms), strict=True)
         return with_values(self.specimen, {name: float(value) for name, value in drawn})
 
     def value(self, parameter: Parameter) -> FittedValue:
-        """Give one fitted value; InvalidRequest when it was not fitted."""
+        """Return one fitted value; InvalidRequest when it was not fitted."""
         for each in self.values:
             if each.parameter is parameter:
                 return each

@@ -33,7 +33,7 @@ _SHARES = (0.5, 0.9, 0.99, 0.999)
 
 
 def chaos_statistics(motion: Reals, rate_hz: float, drive_hz: float | None) -> Reals:
-    """Give what is compared of a stretch of irregular motion, shape (statistics,).
+    """Return what is compared of a stretch of irregular motion, shape (statistics,).
 
     Logarithms of the power of base acceleration and m0's velocity in bands; how much of the velocity follows
     the base, band by band; the distribution of m0's displacement (its spread, skewness, tails); and under a
@@ -77,7 +77,7 @@ def heard(statistics: Reals, noise_rms: Reals, rate_hz: float) -> Flags:
 
 
 def _bands(rate_hz: float) -> tuple[int, Integers]:
-    """Give the samples of a segment, and where the bands begin and end among its lines."""
+    """Return the samples of a segment, and where the bands begin and end among its lines."""
     length = round(_SEGMENT_S * rate_hz)
     edges = np.geomspace(_LOWEST_HZ, min(_HIGHEST_HZ, _HIGHEST_PART * rate_hz), _BANDS + 1)
     return length, np.asarray(np.ceil(edges * length / rate_hz), dtype=np.int64)
@@ -145,7 +145,7 @@ def statistical_numbers(
     linear: SpecimenFit | None = None,
     rounds: Sequence[int] = ROUNDS,
 ) -> tuple[tuple[FoundParameter, ...], float]:
-    """Give gaps, m1, c1 and contact force with bounds of 95 %, or why each is not determined.
+    """Return gaps, m1, c1 and contact force with bounds of 95 %, or why each is not determined.
 
     Rig and specimens are simulated together under the recorded voltage, and compared with the recording in
     what does not depend on instants.

@@ -182,7 +182,7 @@ def _off(_: Specimen, further: Reals) -> str:
 
 
 def _absorber(mass: float, frequency_hz: Reals, further: Reals) -> Complexes:
-    """Give the dynamic stiffness of a small mass on a spring that hangs on a mass."""
+    """Return the dynamic stiffness of a small mass on a spring that hangs on a mass."""
     own_hz, share, damping = np.exp(further)
     ratio = frequency_hz / own_hz
     spring = 1.0 + 2j * damping * ratio

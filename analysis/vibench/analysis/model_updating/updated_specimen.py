@@ -215,7 +215,7 @@ def _sentences(updated: UpdatedSpecimen) -> Iterator[str]:
 
 
 def culprits_text(suspects: Sequence[Suspect]) -> str:
-    """Say what would mend a model, as far as the data tell one explanation from another."""
+    """Return what would mend a model, as far as the data tell one explanation from another."""
     best = suspects[0]
     alike = list(dict.fromkeys(each.sentence for each in suspects if each.may_be_it))
     named = ", or ".join(alike)
@@ -361,7 +361,7 @@ def _with_gaps(
 def _onset_gap(
     results: CampaignResults, model: Specimen, linear: SpecimenFit | None, not_told: list[str]
 ) -> FittedValue | None:
-    """Give the narrower of what sweeps and dwells tell."""
+    """Return the narrower of what sweeps and dwells tell."""
     sweeps, dwells = [each.analysis for each in results.sweeps], [each.analysis for each in results.dwells]
     ways: tuple[Callable[[], FittedValue], ...] = (
         lambda: fit_gap(sweeps, model, linear),

@@ -42,7 +42,7 @@ def sensor_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: 
 
 
 def coupled_gain(bench: Mapping[str, Any], channel: ChannelHeader, frequency_hz: Reals) -> Complexes:
-    """Give the same with the channel's coupling, above 0 Hz."""
+    """Return the same with the channel's coupling, above 0 Hz."""
     coupling = 1j * frequency_hz / (1j * frequency_hz + coupling_cut_hz(channel.coupling))
     return np.asarray(sensor_gain(bench, channel, frequency_hz) * coupling)
 
@@ -99,13 +99,13 @@ class Channels(Protocol):
         """Gain of the response's sensor over that of the base's, without their delays; shape (lines,)."""
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Give the named parts of the record, in the order of time."""
+        """Return the named parts of the record, in the order of time."""
 
     def read(self, start: int, stop: int) -> Reals:
-        """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
+        """Return drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
 
     def overloaded(self, start: int, stop: int) -> Flags:
-        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+        """Return at which samples one of the channels was near its full scale, shape (samples,)."""
 
     def bridged(self, start: int, stop: int) -> Flags:
         """Return at which samples the response is a bridge over a drop-out, shape (samples,)."""
@@ -153,7 +153,7 @@ class RecordedChannels:
         return np.asarray(response / base * delay)
 
     def stretches(self, label: str) -> tuple[Stretch, ...]:
-        """Give the named parts of the record that hold samples, without averages that somebody rejected."""
+        """Return the named parts of the record that hold samples, without averages that somebody rejected."""
         found = tuple(
             Stretch(each.start, each.stop, dict(each.numbers), each.is_complete)
             for each in self.recording.segments
@@ -166,14 +166,14 @@ class RecordedChannels:
         return tuple(each for each in found if each.start not in rejected)
 
     def read(self, start: int, stop: int) -> Reals:
-        """Give drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
+        """Return drive [V], base acceleration [m/s2] and response velocity [m/s], shape (3, samples)."""
         drive, base = (self.recording.read(role, start, stop) for role in (DRIVE, BASE))
         read = np.stack([drive, base, self._response.read(start, stop)])
         self.on_read(stop, self.samples)
         return read
 
     def overloaded(self, start: int, stop: int) -> Flags:
-        """Say at which samples one of the channels was near its full scale, shape (samples,)."""
+        """Return at which samples one of the channels was near its full scale, shape (samples,)."""
         marks = np.zeros(stop - start, dtype=np.bool_)
         for each in self.recording.overloads:
             if each.channel in (DRIVE, BASE, RESPONSE):
@@ -199,7 +199,7 @@ def far_from(marks: Flags, reach: int) -> Flags:
 
 
 def only_stretch(channels: Channels, label: str) -> Stretch:
-    """Give the one stretch that a sweep or dwell was recorded as; NotEnoughData when there is none."""
+    """Return the one stretch that a sweep or dwell was recorded as; NotEnoughData when there is none."""
     found = channels.stretches(label)
     if not found:
         raise NotEnoughData(

@@ -168,7 +168,7 @@ def _drive(facts: RecordingFacts) -> Iterator[Check]:
 
 
 def _least_peak_v(facts: RecordingFacts) -> float:
-    """Give the lowest peak of the drive of a plan that was carried out; nothing, where it is not known.
+    """Return the lowest peak of the drive of a plan that was carried out; nothing, where it is not known.
 
     Feedback is quieter than its setting allows, the peak of streamed noise is a draw, and a few samples a
     period need not meet the peak of a sine.

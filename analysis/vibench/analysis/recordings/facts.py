@@ -115,7 +115,7 @@ class RecordingFacts(RecordingDescription):
         return self.origin is Origin.SIMULATED
 
     def level(self, role: str) -> ChannelLevel:
-        """Give one channel's level."""
+        """Return one channel's level."""
         return next(each for each in self.channels if each.header.role == role)
 
 
@@ -196,7 +196,7 @@ def known_specimen(bench: Mapping[str, Any]) -> Specimen | None:
 
 
 def described_specimen(bench: Mapping[str, Any]) -> SpecimenTable:
-    """Give the specimen that the bench configuration describes; the paper's where it says nothing.
+    """Return the specimen that the bench configuration describes; the paper's where it says nothing.
 
     Raises UnusableData when what it says is no specimen.
     """

@@ -191,7 +191,7 @@ def _without_gain(benchmark: AccuracyBenchmark) -> Iterator[str]:
 
 
 def worst_error(benchmark: AccuracyBenchmark, accuracy: Accuracy) -> float:
-    """Give the largest error of the state that a level made on any motion that is not chaotic.
+    """Return the largest error of the state that a level made on any motion that is not chaotic.
 
     Parameters
     ----------

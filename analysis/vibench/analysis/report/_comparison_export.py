@@ -112,7 +112,7 @@ def _cells(values: "np.ndarray[tuple[int, ...], np.dtype[np.float64]]") -> tuple
 
 
 def unused(path: Path) -> Path:
-    """Give the first of ``NAME.svg``, ``NAME-2.svg``, ... that no file has."""
+    """Return the first of ``NAME.svg``, ``NAME-2.svg``, ... that no file has."""
     if not path.exists():
         return path
     numbered = (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in count(2))

@@ -53,7 +53,7 @@ from ._result_tables import collision_table, dwell_table, edge_text, line_table,
 
 
 def noise_findings(result: NoiseResult) -> Iterator[str]:
-    """Say where the resonances are, and how far the simulation lies from the transmission."""
+    """Yield where the resonances are, and how far the simulation lies from the transmission."""
     peaks = ", ".join(f"{each.frequency_hz:.1f}" for each in result.analysis.response.resonances)
     where = f"resonances at {peaks} Hz" if peaks else "no resonance above its uncertainty"
     yield f"Noise at {result.analysis.excitation.amplitude_vpp:g} Vpp: {where}."
@@ -70,7 +70,7 @@ def noise_findings(result: NoiseResult) -> Iterator[str]:
 
 
 def sweep_findings(result: SweepResult) -> Iterator[str]:
-    """Say where the masses collide, measured and simulated."""
+    """Yield where the masses collide, measured and simulated."""
     plan = result.analysis.excitation
     yield (
         f"Sweep at {plan.amplitude_vpp:g} Vpp from {plan.start_hz:g} to {plan.stop_hz:g} Hz, "
@@ -81,7 +81,7 @@ def sweep_findings(result: SweepResult) -> Iterator[str]:
 
 
 def stepped_findings(result: SteppedSineResult) -> Iterator[str]:
-    """Say how far Response II went in steps of frequency, and what feedback found."""
+    """Yield how far Response II went in steps of frequency, and what feedback found."""
     found, plan = result.analysis.response.response_ii, result.analysis.excitation
     yield (
         f"{EXCITATION_KINDS[plan.kind].title} at {plan.amplitude_vpp:g} Vpp: Response II "
@@ -109,7 +109,7 @@ def dwell_findings(result: DwellResult) -> Iterator[str]:
 
 
 def limits(results: CampaignResults) -> Iterator[str]:
-    """Give the sentences that apply to these results."""
+    """Yield the sentences that apply to these results."""
     if any(each.is_simulated for each in results.facts):
         yield (
             "The instruments were simulated: the samples are what the simulated generator's output does to "
@@ -236,7 +236,7 @@ def _budgeted(result: AnyResult) -> Iterator[tuple[str, str]]:
 
 
 def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
-    """Give the frequencies of the resonances, the level of the base, and the rest of the budgets."""
+    """Yield the frequencies of the resonances, the level of the base, and the rest of the budgets."""
     budgets = budgets_of(noise)
     yield from ((each.quantity, each.text) for each in budgets if each.unit == "Hz")
     level = noise.analysis.response.base_level
@@ -246,7 +246,7 @@ def _noise_numbers(noise: NoiseResult) -> Iterator[tuple[str, str]]:
 
 
 def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
-    """Give where collisions begin, and the budgets."""
+    """Yield where collisions begin, and the budgets."""
     for region in sweep.analysis.collisions.regions[:1]:
         yield "collisions begin at", edge_text(region.start, "start of sweep" if region.reaches_start else "")
     amplitude, *largest = _budgeted(sweep)
@@ -254,7 +254,7 @@ def _sweep_numbers(sweep: SweepResult) -> Iterator[tuple[str, str]]:
 
 
 def _stepped_numbers(stepped: SteppedSineResult) -> Iterator[tuple[str, str]]:
-    """Give the first resonance tracked, if any, the budgets, and the level of the base."""
+    """Yield the first resonance tracked, if any, the budgets, and the level of the base."""
     for each in tracked_resonances(stepped.analysis.facts.feedback)[:1]:
         yield "phase resonance", f"{plus_minus(each.frequency_hz, 2 * each.u_frequency_hz)} Hz"
     yield from _budgeted(stepped)
@@ -323,7 +323,7 @@ def result_figures(results: CampaignResults) -> Iterator[DrawnFigure]:
 
 
 def findings(results: CampaignResults) -> Iterator[str]:
-    """Say what each measurement found, weak to strong, and how far the simulation lies from it.
+    """Yield what each measurement found, weak to strong, and how far the simulation lies from it.
 
     Parameters
     ----------

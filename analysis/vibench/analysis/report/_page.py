@@ -134,7 +134,7 @@ def write_page(page: Page, path: Path, figures_folder: Path | None = None) -> Pa
 
 
 def _figures(page: Page) -> Iterator[DrawnFigure]:
-    """Give every figure in the order of their numbers: shown ones first, then those in folds."""
+    """Yield every figure in the order of their numbers: shown ones first, then those in folds."""
     yield from (each for each in (page.figure, *(card.figure for card in page.cards)) if each is not None)
     yield from page.further.figures
     for fold in (*(fold for card in page.cards for fold in card.folds), *page.folds):

@@ -67,7 +67,7 @@ def _sentences(results: CampaignResults) -> Iterator[str]:
 
 
 def _levels(noise: Sequence[NoiseResult]) -> Iterator[str]:
-    """Say which resonances the weakest noise has, and what has become of them under the strongest."""
+    """Yield which resonances the weakest noise has, and what has become of them under the strongest."""
     if not noise:
         return
     weak, strong = noise[0], noise[-1]
@@ -106,7 +106,7 @@ def _resonances(result: NoiseResult) -> str:
 
 
 def _motions(dwells: Sequence[DwellResult]) -> Iterator[str]:
-    """Say at which levels the motion is of which kind, frequency by frequency."""
+    """Yield at which levels the motion is of which kind, frequency by frequency."""
     by_place: dict[float, dict[str, list[str]]] = {}
     for each in dwells:
         kinds = by_place.setdefault(each.analysis.excitation.frequency_hz, {})
@@ -222,7 +222,7 @@ def _laid_backbone(results: CampaignResults, diagram: BranchDiagram) -> DrawnFig
 
 
 def _lost_sentence(diagram: BranchDiagram, level_m_per_s2: float) -> str:
-    """Say what the model has at a level at which no resonance was found: multipliers, or no motion."""
+    """Return what the model has at a level at which no resonance was found: multipliers, or no motion."""
     sizes: list[float] = []
     for line in diagram.lines:
         above = line.amplitude_m * (2.0 * np.pi * line.frequency_hz) ** 2 > level_m_per_s2
@@ -250,7 +250,7 @@ def _level_sentence(diagram: BranchDiagram, result: AnyResult, level: tuple[tupl
 
 
 def measured_table(facts: RecordingFacts) -> ReportTable:
-    """Say what was played, when, and how it ended."""
+    """Return what was played, when, and how it ended."""
     plan = facts.measurement
     reason = f": {facts.reason}" if facts.reason else ""
     rows = (
@@ -274,7 +274,7 @@ def excitation_text(plan: Mapping[str, Any]) -> str:
 
 
 def bench_table(facts: RecordingFacts) -> ReportTable:
-    """Say which bench it was, who answered, and what was confirmed by hand."""
+    """Return which bench it was, who answered, and what was confirmed by hand."""
     rows = [("bench", str(facts.bench.get("name", "not named")))]
     rows += [
         (part, f"{who.maker} {who.model}, serial {who.serial}, firmware {who.firmware}")
@@ -303,7 +303,7 @@ def bench_table(facts: RecordingFacts) -> ReportTable:
 
 
 def bench_check_text(facts: RecordingFacts) -> str:
-    """Say how the last check of the whole bench came out, how long before, and what it did not like."""
+    """Return how the last check of the whole bench came out, how long before, and what it did not like."""
     check = facts.bench_check
     if not check:
         return "none"
@@ -335,7 +335,7 @@ _HEADINGS = "channel, input, sensor, serial, sensitivity, range, coupling, calib
 
 
 def channel_table(facts: RecordingFacts) -> ReportTable:
-    """Say how every channel was set and calibrated."""
+    """Return how every channel was set and calibrated."""
     rows = tuple(
         (
             each.header.role.replace("_", " "),
@@ -356,7 +356,7 @@ def channel_table(facts: RecordingFacts) -> ReportTable:
 
 
 def version_table(facts: RecordingFacts) -> ReportTable:
-    """Say which programs made the recording."""
+    """Return which programs made the recording."""
     provenance = facts.provenance
     packages = ", ".join(f"{name} {which}" for name, which in dict(provenance.get("packages", {})).items())
     rows = (
@@ -480,7 +480,7 @@ def _card(result: AnyResult, failed: Mapping[str, AnalysisFailure]) -> Card:
 
 
 def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Agreement, str]:
-    """Say whether the measurement could be one of the simulated draws, and if not yes, why.
+    """Return whether the measurement could be one of the simulated draws, and if not yes, why.
 
     Parameters
     ----------
@@ -503,7 +503,7 @@ def agreement_of(result: AnyResult, failure: AnalysisFailure | None) -> tuple[Ag
 
 
 def check_warnings(results: CampaignResults, checks: frozenset[str] | None = None) -> Iterator[str]:
-    """Say what to look at before a result is trusted.
+    """Yield what to look at before a result is trusted.
 
     Parameters
     ----------

@@ -46,7 +46,7 @@ def resonance_table(noise: Sequence[NoiseResult]) -> ReportTable:
 
 
 def uncertainty_table(results: Sequence[AnyResult]) -> ReportTable:
-    """Say what each cause adds to the uncertainty of each quantity."""
+    """Return what each cause adds to the uncertainty of each quantity."""
     return ReportTable(
         "Uncertainty, and what it is made of",
         ("recording", "quantity", "value", *(each.value for each in Cause)),
@@ -107,7 +107,7 @@ def _nearest(frequency_hz: float, among: Sequence[tuple[float, str]], form: str)
 
 
 def collision_table(sweeps: Sequence[SweepResult]) -> ReportTable:
-    """Say where each sweep collided, measured, simulated and published."""
+    """Return where each sweep collided, measured, simulated and published."""
     return ReportTable(
         "Where the masses collide in a sweep",
         ("sweep", "measured from", "measured to", "simulated from", "simulated to", "paper"),
@@ -223,7 +223,7 @@ def _simulated_band(laid: DwellOverlay, towards_hz: float) -> str:
 
 
 def line_table(dwells: Sequence[DwellResult]) -> ReportTable:
-    """Say how much of each dwell's motion lies at orders of the drive and in the terminal bands."""
+    """Return how much of each dwell's motion lies at orders of the drive and in the terminal bands."""
     rows = []
     for each in dwells:
         plan = each.analysis.excitation

@@ -76,7 +76,7 @@ def kept_result(compared: ComparedRecording) -> tuple[AnyResult, tuple[AnalysisF
 
 
 def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ...]:
-    """Give the base amplitude [m] over frequency [Hz] of a stepped sine or a sweep, as pairs that ascend.
+    """Return the base amplitude [m] over frequency [Hz] of a stepped sine or a sweep, as pairs that ascend.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def level_of_drive(compared: ComparedRecording) -> tuple[tuple[float, float], ..
 
 
 def recorded_response(path: Path) -> RecordedLevel:
-    """Give the level of a stepped sine or a sweep, and Response I as measured: a line on a map.
+    """Return the level of a stepped sine or a sweep, and Response I as measured: a line on a map.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def recorded_response(path: Path) -> RecordedLevel:
 
 
 def drive_level(result: AnyResult) -> tuple[tuple[float, float], ...]:
-    """Give the same of an analysed recording; nothing where it is of another kind, or of one frequency."""
+    """Return the same of an analysed recording; nothing where it is of another kind, or of one frequency."""
     match result.analysis.response:
         case (SweepResponse() | SteppedResponse()) as found:
             try:

@@ -23,7 +23,7 @@ def result_summary(result: AnyResult) -> Json:
 
 
 def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
-    """Give the budget of uncertainty of each number that a reader takes away from a result.
+    """Return the budget of uncertainty of each number that a reader takes away from a result.
 
     Returns
     -------

@@ -11,7 +11,7 @@ _SMALLEST_DEGREES_OF_FREEDOM = 1e-3
 
 
 def relative_sd(coherence: Reals, n_eff: float) -> Reals:
-    """Give the standard deviation of ln(magnitude), equal to that of the phase in radians.
+    """Return the standard deviation of ln(magnitude), equal to that of the phase in radians.
 
     sqrt((1 - g2) / (2 g2 n_eff)) for h1 and h2 (Bendat & Piersol, Random Data, 4th ed., section 9.2)
     and for hv too: Fuller's variance of a regression with errors in both variables comes to the same
@@ -33,7 +33,7 @@ def student_half_width(relative: Reals, n_eff: float, confidence: float) -> Real
 
 
 def standard_uncertainty(values: Reals | Complexes) -> float:
-    """Give that of the mean of few equal values, so that twice it holds the truth in 95 of 100 cases.
+    """Return that of the mean of few equal values, so that twice it holds the truth in 95 of 100 cases.
 
     Their standard error by Student's t over the normal deviate (JCGM 100:2008, G.3.2); of complex values that
     of either part.

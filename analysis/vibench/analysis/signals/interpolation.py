@@ -23,7 +23,7 @@ _PHASES = 512
 
 
 def _weights_of_phases() -> Reals:
-    """Give the windowed sinc at every tap, from one phase before a sample to one phase behind the next."""
+    """Return the windowed sinc at every tap, from one phase before a sample to one phase behind the next."""
     fraction = np.arange(-1, _PHASES + 2, dtype=np.float64) / _PHASES
     distance = fraction[:, np.newaxis] - np.arange(1 - REACH, REACH + 1)
     shape = np.sqrt(np.maximum(1 - (distance / REACH) ** 2, 0.0))
@@ -95,7 +95,7 @@ class Decimator:
         return self._filtered(np.concatenate((self._pending, block), axis=1))
 
     def finish(self) -> Reals:
-        """Give the last samples, with zeros standing for the time after the record."""
+        """Return the last samples, with zeros standing for the time after the record."""
         if self._factor == 1:
             return self._pending
         zeros = np.zeros((self._pending.shape[0], self._half))

@@ -32,7 +32,7 @@ the flat top as in D'Antona and Ferrero, Digital Signal Processing for Measureme
 
 
 def taper(window: Window | str, samples: int) -> Reals:
-    """Give the periodic form of a window, the one for spectra (``fftbins=True`` in scipy)."""
+    """Return the periodic form of a window, the one for spectra (``fftbins=True`` in scipy)."""
     if samples == 1:
         return np.ones(1)
     turns = np.arange(samples) / samples
@@ -41,7 +41,7 @@ def taper(window: Window | str, samples: int) -> Reals:
 
 
 def cosine_weights(window: Window | str) -> tuple[float, ...]:
-    """Give the weights of 1, cos, cos of twice the angle, ... that a window is the sum of."""
+    """Return the weights of 1, cos, cos of twice the angle, ... that a window is the sum of."""
     return _COSINES[named_window(window)]
 
 

@@ -38,7 +38,7 @@ CHAOS_SCATTER = 0.03
 
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
-    """Say what a request's accuracy costs and errs, and how long it takes on so many idle cores."""
+    """Return what a request's accuracy costs and errs, and how long it takes on so many idle cores."""
     level = MEASURED[request.accuracy]
     each_s = request.simulated_s / len(request.models)
     laws = [request.specimen_under(model).contact for model in request.models]

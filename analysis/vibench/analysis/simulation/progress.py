@@ -443,14 +443,14 @@ class SimulationProgress:
         return tuple(self._troubles)
 
     def column(self, model: str, name: str) -> tuple[Reals, Reals]:
-        """Give frequencies and one quantity of a model, NaN where it is not known."""
+        """Return frequencies and one quantity of a model, NaN where it is not known."""
         points = [self._found[model][key] for key in sorted(self._found.get(model, {}))]
         values = [getattr(point, name) for point in points]
         frequency_hz = np.array([point.frequency_hz for point in points], dtype=np.float64)
         return frequency_hz, np.array([np.nan if v is None else v for v in values], dtype=np.float64)
 
     def other_motions(self, model: str) -> tuple[Reals, Reals]:
-        """Give frequencies, and Response I of each motion that other starts came to there."""
+        """Return frequencies, and Response I of each motion that other starts came to there."""
         found = [
             (point.frequency_hz, motion.response_i)
             for point in self._found.get(model, {}).values()
@@ -486,7 +486,7 @@ class SimulationProgress:
         return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Give Responses I and II of every model, to be laid over recordings."""
+        """Return Responses I and II of every model, to be laid over recordings."""
         return tuple(
             Curve(
                 f"model {model}, {1e6 * self._amplitude_m:.4g} µm",

@@ -66,7 +66,7 @@ class Background:
 
 
 def silence_before(channels: Channels) -> Reals:
-    """Give the response while the check listened before anything played [m/s]; empty without a check."""
+    """Return the response while the check listened before anything played [m/s]; empty without a check."""
     for stretch in channels.stretches(SegmentLabel.CHECK):
         stop = stretch.start + round(CHECK_QUIET_S * channels.sample_rate_hz)
         heard: Reals = channels.read(stretch.start, min(stop, stretch.stop))[-1]
@@ -75,7 +75,7 @@ def silence_before(channels: Channels) -> Reals:
 
 
 def heard_in(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> Background:
-    """Say what a silence holds in a band, as displacement; NaN where it is too short for its low end."""
+    """Return what a silence holds in a band, as displacement; NaN where it is too short for its low end."""
     source = "silence before the check"
     if 2 * velocity.size < rate_hz / band_hz[0]:
         return Background(np.nan, np.nan, source)
@@ -88,14 +88,14 @@ def heard_in(velocity: Reals, band_hz: tuple[float, float], rate_hz: float) -> B
 
 
 def left_between(rest: Reals, rate_hz: float) -> Background:
-    """Say what a displacement holds without all that repeats with the drive."""
+    """Return what a displacement holds without all that repeats with the drive."""
     rms_m = float(np.std(rest))
     turns = float(np.std(np.diff(rest))) * rate_hz / (2 * np.pi)
     return Background(rms_m, turns / rms_m if rms_m else 0.0, BETWEEN)
 
 
 def background_of(rest: Background, motion_m: float, sensor: Background, silent: Background) -> Background:
-    """Say how much of what does not repeat with the drive is noise, and how fast that is.
+    """Return how much of what does not repeat with the drive is noise, and how fast that is.
 
     Chaos does not repeat either. What is left between the lines is noise where the vibrometer's own explains
     it, or what was heard before anything played, or where it is so small a part that a motion with it counts
@@ -128,7 +128,7 @@ def background_of(rest: Background, motion_m: float, sensor: Background, silent:
 
 
 def louder(silent: Background, sensor: Background) -> Background:
-    """Give the louder of what was heard and what the sensor makes by itself."""
+    """Return the louder of what was heard and what the sensor makes by itself."""
     return silent if silent.rms_m > sensor.rms_m else sensor
 
 

@@ -160,7 +160,7 @@ class IrregularMotion:
 
 
 def irregular_motion(channels: Channels, response: DwellResponse) -> IrregularMotion | None:
-    """Say how long the motion of a dwell did not repeat; None where all of it does."""
+    """Return how long the motion of a dwell did not repeat; None where all of it does."""
     section = _section(channels, response)
     points = _points(section, response, channels.sample_rate_hz)
     begin = begin_of_last_motion(points)
@@ -308,7 +308,7 @@ def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float
 
 
 def settled_envelope(response: DwellResponse) -> Envelope:
-    """Give x over the dwell as a plot shows it."""
+    """Return x over the dwell as a plot shows it."""
     motion = response.displacement
     start_s = motion.edge_samples / motion.sample_rate_hz
     return envelope(motion.settled, motion.sample_rate_hz, bins=_TIME_BINS, start_s=start_s)

@@ -208,7 +208,7 @@ def level_jumps(response: SteppedResponse, factor: float = JUMP_FACTOR) -> tuple
 
 
 def hysteresis_vpp(jumps: tuple[LevelJump, ...]) -> tuple[float, float] | None:
-    """Tell how far the level of the jump up lies above that of the fall back, at least and at most [V].
+    """Return how far the level of the jump up lies above that of the fall back, at least and at most [V].
 
     None when the motion did not jump up going up and fall going down.
     """

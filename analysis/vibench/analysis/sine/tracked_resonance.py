@@ -34,7 +34,7 @@ class NotedJump:
 
 
 def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
-    """Give the jumps that were bracketed as closely as the plan asks."""
+    """Return the jumps that were bracketed as closely as the plan asks."""
     return tuple(
         NotedJump(each.direction, *sorted((each.before_hz, each.after_hz)))
         for each in notes
@@ -43,7 +43,7 @@ def noted_jumps(notes: Sequence[FeedbackNote]) -> tuple[NotedJump, ...]:
 
 
 def feedback_sentences(notes: Sequence[FeedbackNote]) -> Iterator[str]:
-    """Say what feedback found; nothing for a measurement without it."""
+    """Yield what feedback found; nothing for a measurement without it."""
     jumps = noted_jumps(notes)
     if jumps:
         said = ", ".join(f"{each.low_hz:.5g} and {each.high_hz:.5g} Hz ({each.direction})" for each in jumps)
@@ -72,7 +72,7 @@ def _motions(steps: Sequence[SegmentNote]) -> Iterator[str]:
 
 
 def _spectrum(kept: Sequence[NoiseNote]) -> Iterator[str]:
-    """Say how near the base came to the spectrum that was asked for, over what was kept."""
+    """Yield how near the base came to the spectrum that was asked for, over what was kept."""
     if not kept:
         return
     worst = max(kept, key=lambda each: abs(each.worst_db))
@@ -142,12 +142,12 @@ class TrackedResonance:
 
 
 def tracked_resonances(notes: Sequence[FeedbackNote]) -> tuple[TrackedResonance, ...]:
-    """Give the levels at which the resonance was found, weakest first; where it was lost is left out."""
+    """Return the levels at which the resonance was found, weakest first; where it was lost is left out."""
     return tuple(sorted(_found(notes), key=lambda each: each.base_m_per_s2))
 
 
 def lost_levels(notes: Sequence[FeedbackNote]) -> tuple[float, ...]:
-    """Give the levels [m/s²] that were asked for and at which no resonance was found."""
+    """Return the levels [m/s²] that were asked for and at which no resonance was found."""
     lost = (each for each in notes if isinstance(each, ResonanceNote) and each.frequency_hz is None)
     return tuple(sorted(each.asked_m_per_s2 for each in lost))
 
@@ -172,7 +172,7 @@ def _found(notes: Sequence[FeedbackNote]) -> Iterator[TrackedResonance]:
 
 
 def backbone_sentence(levels: Sequence[TrackedResonance]) -> str:
-    """Say whether a mode softens or hardens from its weakest level to its strongest."""
+    """Return whether a mode softens or hardens from its weakest level to its strongest."""
     if len(levels) < 2:
         return ""
     first, last = levels[0], levels[-1]

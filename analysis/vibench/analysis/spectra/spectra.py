@@ -118,7 +118,7 @@ class SegmentSpectra:
                     self._sums[i, j] += np.einsum("kf,kf->f", conjugate, spectra[j])
 
     def averages(self) -> SpectralAverages:
-        """Give the averages over everything added so far.
+        """Return the averages over everything added so far.
 
         Raises NotEnoughData when no segment could be used, and UnusableData when a sample that was not marked
         invalid is not finite.
@@ -215,7 +215,7 @@ class DensitySums:
         self._spectra.add(samples[np.newaxis], valid)
 
     def density(self) -> SpectralDensity:
-        """Give the spectral density of everything added so far."""
+        """Return the spectral density of everything added so far."""
         averages = self._spectra.averages()
         density = averages.density(0, 0, self._sample_rate_hz).real
         lower, upper = chi_square_bounds(density, averages.n_eff, DEFAULT_CONFIDENCE)
@@ -395,7 +395,7 @@ class SpectrogramSums:
         self._carry = data[first:].copy()
 
     def spectrogram(self) -> Spectrogram:
-        """Give the picture of everything added."""
+        """Return the picture of everything added."""
         filled = self._count > 0
         mean = self._power[:, filled] / self._count[filled]
         starts = np.arange(self._segments) * self._columns // self._segments

@@ -23,7 +23,7 @@ class NoiseLift(NamedTuple):
 
 
 def noise_lift(samples: Reals, noise_sd: float, independent: float) -> NoiseLift:
-    """Give the rise of max|x| by Gaussian noise, as it is expected, and as root mean square.
+    """Return the rise of max|x| by Gaussian noise, as it is expected, and as root mean square.
 
     From the distribution of the largest, P(max < z) = prod_j P(|x_j + n_j| < z), where x_j is the largest
     of each run of samples that share one noise value; of noise alone over 51 200 samples it comes to 4.4

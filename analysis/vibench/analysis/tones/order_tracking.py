@@ -112,7 +112,7 @@ def tracked_together(
 
 
 def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> Complexes:
-    """Give exp(i order phase) for each order, shape (orders, ...).
+    """Return exp(i order phase) for each order, shape (orders, ...).
 
     Orders that are fractions of small numbers are powers of one turning number: a product costs a tenth of
     a sine and a cosine.
@@ -126,7 +126,7 @@ def order_turns(phase_rad: Reals, orders: tuple[float, ...]) -> Complexes:
 
 
 def _power(exponent: int, powers: dict[int, Complexes]) -> Complexes:
-    """Give a power of ``powers[1]``, by its halves; what was made is kept."""
+    """Return a power of ``powers[1]``, by its halves; what was made is kept."""
     if exponent not in powers:
         half = exponent // 2
         powers[exponent] = _power(half, powers) * _power(exponent - half, powers)

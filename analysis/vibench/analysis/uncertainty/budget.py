@@ -46,7 +46,7 @@ class Contribution:
 
 
 def scattered(cause: Cause, sd: float, value: float, source: str) -> Contribution:
-    """Give what a standard deviation adds to a value; not stated where their ratio says nothing."""
+    """Return what a standard deviation adds to a value; not stated where their ratio says nothing."""
     with np.errstate(all="ignore"):
         relative = float(np.divide(sd, abs(value)))
     return Contribution(cause, relative if np.isfinite(relative) else None, source)
@@ -141,7 +141,7 @@ class Stated:
         return float(np.sqrt(np.sum(np.square(stated))))
 
     def timed(self, power: int) -> tuple[Contribution, ...]:
-        """Give the clock's part in what follows a frequency to a power."""
+        """Return the clock's part in what follows a frequency to a power."""
         relative = None if self.clock.relative is None else abs(power) * self.clock.relative
         return (Contribution(Cause.CLOCK, relative, self.clock.source),)
 

@@ -93,7 +93,7 @@ def simulated_dwell(
 
 
 def _scatter(found: DwellResponse) -> tuple[float, float]:
-    """Give the relative scatter of both Responses, as the analysis will tell it."""
+    """Return the relative scatter of both Responses, as the analysis will tell it."""
     # What does not repeat and is small passes for noise.
     like_noise = float(np.nan_to_num(found.noise_error_i)) / found.response_i
     chance = of_one_draw(found).relative or 0.0
@@ -182,7 +182,7 @@ class Expected(Labelled):
 
 
 def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, ...]:
-    """Say how well a plan will tell what it is made for; opens no instrument.
+    """Return how well a plan will tell what it is made for; opens no instrument.
 
     Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
     Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
@@ -274,7 +274,7 @@ def _of_noise(measurement: Measurement, rig: Rig, stated: Stated) -> Iterator[Ex
 
 
 def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_hz: float) -> bool:
-    """Say whether p of the linear specimen reaches a stop: Gaussian, some thousand turns long."""
+    """Return whether p of the linear specimen reaches a stop: Gaussian, some thousand turns long."""
     grid: Reals = np.arange(low_hz, high_hz, _GRID_HZ, dtype=np.float64)
     p_m = rms_v * np.abs(RigModel(rig).transfer(BaseQuantity.P, grid)) / np.sqrt(high_hz - low_hz)
     rms_m = float(np.sqrt(np.sum(p_m**2) * _GRID_HZ))
@@ -282,7 +282,7 @@ def _fills_gap(specimen: Specimen, rig: Rig, rms_v: float, low_hz: float, high_h
 
 
 def _of_sine(measurement: Measurement, rig: Rig, stated: Stated, at_hz: float) -> Iterator[Expected]:
-    """Say what is to be expected of a sine.
+    """Yield what is to be expected of a sine.
 
     Nothing where a window has no period for each of its tenths, or the motion cannot be simulated.
     """

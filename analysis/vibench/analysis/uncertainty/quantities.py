@@ -35,7 +35,7 @@ _FEWEST_PERIODS = 20.0
 
 
 def noise_budgets(analysis: NoiseAnalysis, _: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Give frequency, damping ratio and transmissibility of every resonance."""
+    """Return frequency, damping ratio and transmissibility of every resonance."""
     stated = stated_of(analysis.facts.bench)
     found = analysis.response
     chance = _chance_share(found)
@@ -88,7 +88,7 @@ def _chance_share(found: NoiseResponse) -> float:
 
 
 def dwell_budgets(analysis: DwellAnalysis, laid: DwellOverlay | None) -> tuple[Budget, ...]:
-    """Give base amplitude and both responses of a dwell."""
+    """Return base amplitude and both responses of a dwell."""
     stated, found = stated_of(analysis.facts.bench), analysis.response
     is_steady = analysis.motion.verdict.kind is MotionKind.PERIODIC
     scatter = Cause.NOISE if is_steady else Cause.CHANCE
@@ -131,12 +131,12 @@ def _amplitude(value_m: float, stated: Stated, scatter: Contribution, where: str
 
 
 def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
-    """Give what the scatter of A0 adds to a maximum that is held against it."""
+    """Return what the scatter of A0 adds to a maximum that is held against it."""
     return scattered(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
 
 
 def _of_change(relative: float) -> tuple[Contribution, ...]:
-    """Give what slow change over the record adds to a maximum; nothing where there is none."""
+    """Return what slow change over the record adds to a maximum; nothing where there is none."""
     if relative == 0.0:
         return ()
     return (scattered(Cause.CHANCE, relative, 1.0, "slow change over the record"),)
@@ -164,7 +164,7 @@ def of_one_draw(found: DwellResponse) -> Contribution:
 
 
 def sd_of_largest(maxima: Reals) -> float:
-    """Tell how the largest of as many maxima scatters, as generalised extreme values.
+    """Return how the largest of as many maxima scatters, as generalised extreme values.
 
     With their shape k, from L-moments (Hosking, Wallis and Wood 1985, Technometrics 27), the scale of the
     largest of n is n^-k of that of one: less where the motion is bounded, the same where it is not.
@@ -189,7 +189,7 @@ def sd_of_largest(maxima: Reals) -> float:
 
 
 def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Give base amplitude and largest Responses of a sweep, with where they are."""
+    """Return base amplitude and largest Responses of a sweep, with where they are."""
     found = analysis.response
     top = found.largest(found.response_ii)
     # What no noise of a sensor explains may be chaos, of which one sweep shows one draw.
@@ -202,7 +202,7 @@ def sweep_budgets(analysis: SweepAnalysis, laid: AbstractOverlay[Any] | None) ->
 
 
 def stepped_budgets(analysis: SteppedSineAnalysis, laid: AbstractOverlay[Any] | None) -> tuple[Budget, ...]:
-    """Give the largest Responses of the steps, with where they are."""
+    """Return the largest Responses of the steps, with where they are."""
     found = analysis.response
     if not found.response_ii.size:
         return ()
