@@ -61,7 +61,7 @@ class Law(NamedTuple):
 
 
 def rates_at(place: Place, law: Law, numbers: Floats) -> Rates:
-    """Give d/dt of the state for as long as m1 stays at a place."""
+    """Return d/dt of the state for as long as m1 stays at a place."""
     return lambda time_s, state: rates(time_s, state, place, law, numbers)
 
 
@@ -87,7 +87,7 @@ def numbers_of(specimen: Specimen, drive: Harmonic) -> Floats:
 
 
 def place_of(state: Floats, law: Law) -> Place:
-    """Say where m1 is."""
+    """Return where m1 is."""
     if law.terms:
         return Place.ANYWHERE
     below, above = _depths(state, law)
@@ -97,7 +97,7 @@ def place_of(state: Floats, law: Law) -> Place:
 
 
 def clearances_at(place: Place, state: Floats, law: Law) -> tuple[float, ...]:
-    """Give how far each end of a phase is: positive while it lasts; a flight may end at two."""
+    """Return how far each end of a phase is: positive while it lasts; a flight may end at two."""
     below, above = _depths(state, law)
     match place:
         case Place.FLIGHT:
@@ -155,7 +155,7 @@ MOST_PHASES_PER_S = 100_000
 
 
 def state_error(state: ArrayLike, truth: ArrayLike) -> float:
-    """Give the largest difference of two states in units of 100 um and 0.1 m/s."""
+    """Return the largest difference of two states in units of 100 um and 0.1 m/s."""
     return float(np.max(np.abs(np.asarray(state) - np.asarray(truth)) / STATE_UNITS))
 
 

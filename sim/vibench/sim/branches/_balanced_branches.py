@@ -32,7 +32,7 @@ def balanced_branches(
     search: MotionSearch = MotionSearch(),  # noqa: B008 - frozen
     steps: ArcSteps = STEPS,
 ) -> Iterator[FoundBranch]:
-    """Give every branch of harmonic balances that is found in a range, one by one.
+    """Yield every branch of harmonic balances that is found in a range, one by one.
 
     Parameters
     ----------

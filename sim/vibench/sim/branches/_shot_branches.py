@@ -60,7 +60,7 @@ class FoundBranch:
 
 
 def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats) -> bool:
-    """Say whether any of some states at one drive, shape (n, 6), belongs to a branch."""
+    """Return whether any of some states at one drive, shape (n, 6), belongs to a branch."""
     branch, value = found.branch, parameter_value(path, drive)
     scales = state_scales(specimen, drive)
     along = branch.parameters
@@ -79,7 +79,7 @@ def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harm
 def known_among(
     known: Iterable[FoundBranch], specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats
 ) -> bool:
-    """Say whether a motion, as one of its states or of its mirror's, lies on a known branch."""
+    """Return whether a motion, as one of its states or of its mirror's, lies on a known branch."""
     return any(lies_on(each, specimen, path, drive, states) for each in known)
 
 
@@ -145,7 +145,7 @@ def shot_branches(
     search: MotionSearch = MotionSearch(),  # noqa: B008 - frozen
     steps: ArcSteps = STEPS,
 ) -> Iterator[FoundBranch]:
-    """Give every branch of periodic motions that is found in a range, one by one.
+    """Yield every branch of periodic motions that is found in a range, one by one.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ UPDATES_TO_HOLD = 10.0
 
 
 def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int = 1) -> NDArray[np.float64]:
-    """Give the time in which a small distance from a motion grows by e; infinite where it does not grow.
+    """Return the time in which a small distance from a motion grows by e; infinite where it does not grow.
 
     It is T / ln|mu| with T the period of the motion, and holds where the base moves as prescribed.
 
@@ -267,7 +267,7 @@ def growth_time_s(frequency_hz: ArrayLike, multiplier: ArrayLike, periods: int =
 
 
 def least_growth_time_s(loop_time_s: float) -> float:
-    """Give the shortest growth time that a loop can hold against [s].
+    """Return the shortest growth time that a loop can hold against [s].
 
     Parameters
     ----------

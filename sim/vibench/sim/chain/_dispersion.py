@@ -58,7 +58,7 @@ def bloch_factor(unit: Chain, frequency_hz: ArrayLike) -> Complex:
 
 
 def _across(cell: Specimen, omega: NDArray[np.float64]) -> Complex:
-    """Give what a cell makes of displacement and force, shape (n, 2, 2)."""
+    """Return what a cell makes of displacement and force, shape (n, 2, 2)."""
     outer, pushed, _, _ = seen_from_outside(cell, omega)
     one = np.ones_like(outer)
     return np.moveaxis(np.array([[one, 1.0 / outer], [pushed, one + pushed / outer]]), -1, 0)

@@ -276,7 +276,7 @@ def start_motion(chain: Chain, initial_state: ArrayLike | None) -> Floats:
 
 
 def _of_one(run: Trajectory) -> ChainTrajectory:
-    """Give the motion of one cell, which is that of the specimen, as that of a chain."""
+    """Return the motion of one cell, which is that of the specimen, as that of a chain."""
     impacts = run.impacts
     return ChainTrajectory(
         time_s=run.time_s,

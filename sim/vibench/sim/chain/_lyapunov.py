@@ -64,7 +64,7 @@ def chain_lyapunov_exponent(
     seed: int = 0,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> ChainExponent:
-    """Tell whether neighbouring motions of a chain part, and how fast.
+    """Return whether neighbouring motions of a chain part, and how fast.
 
     Parameters
     ----------

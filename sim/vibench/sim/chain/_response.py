@@ -134,7 +134,7 @@ def chain_response(
 
 
 def _of_one(cell: Specimen, one: Response) -> ChainResponse:
-    """Give the response of a specimen as that of a chain of one cell.
+    """Return the response of a specimen as that of a chain of one cell.
 
     The line of z is what the equation of motion of m0, against the drive and integrated by parts, leaves.
     """

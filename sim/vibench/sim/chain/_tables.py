@@ -215,7 +215,7 @@ class Pieces(NamedTuple):
 def pieces_between(
     tables: ChainTables, first: Specimen, drive: BaseDrive, start_s: float, end_s: float
 ) -> Iterator[tuple[Pieces, float]]:
-    """Give the drive's pieces, a batch at a time, and when each batch ends [s]."""
+    """Yield the drive's pieces, a batch at a time, and when each batch ends [s]."""
     interval, count = _grid(tables, drive)
     begin = min(int(start_s / interval * (1.0 + ALMOST)), count - 1)
     while True:
@@ -228,7 +228,7 @@ def pieces_between(
 
 
 def longest_window_s(tables: ChainTables, drive: Drive) -> float:
-    """Give the most time that a window may take: none reaches beyond a piece of the drive."""
+    """Return the most time that a window may take: none reaches beyond a piece of the drive."""
     window = float(tables.windows[0])
     match drive:
         case Harmonic():

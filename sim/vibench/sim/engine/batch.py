@@ -121,7 +121,7 @@ def _fastest(specimen: Specimen) -> float:
 
 
 def _time_over_fifth_root(specimen: Specimen) -> float:
-    """Give u times the fifth root of the speed: u = depth / speed, and m v^2 / 2 = 2 k d^(5/2) / 5."""
+    """Return u times the fifth root of the speed: u = depth / speed, and m v^2 / 2 = 2 k d^(5/2) / 5."""
     m1, m2 = specimen.masses[1:]
     reduced = m1 * m2 / (m1 + m2)
     return float((HALF_FORCE * reduced / specimen.contact.stops.contact_stiffness) ** 0.4)
@@ -140,7 +140,7 @@ def _box(specimen: Specimen) -> tuple[Vector, Vector]:
 
 
 def _coupling(specimen: Specimen) -> Vector:
-    """Give what the integrals of a force do to p, over what the second one does."""
+    """Return what the integrals of a force do to p, over what the second one does."""
     modes, orders, (_, m1, m2) = modal_form(specimen), np.arange(TERMS), specimen.masses
     kick = (modes.shapes[:, Y] - modes.shapes[:, Z]) * (modes.rows[:, VZ] / m2 - modes.rows[:, VY] / m1)
     onto_p = (kick * modes.rates ** orders[:, None]).real.sum(axis=1) / [math.factorial(m) for m in orders]
@@ -148,7 +148,7 @@ def _coupling(specimen: Specimen) -> Vector:
 
 
 def _free(accelerations: Table) -> Table:
-    """Give the depth without force in powers of the time after the middle, shape (n, DERIVATIVES + 2)."""
+    """Return the depth without force in powers of the time after the middle, shape (n, DERIVATIVES + 2)."""
     powers = np.arange(2, DERIVATIVES + 2)
     bent = accelerations / [math.factorial(k) for k in powers]
     speed = 1.0 - (powers * bent * (-MIDDLE) ** (powers - 1)).sum(axis=1)

@@ -84,7 +84,7 @@ class Precision:
             raise ValueError(msg)
 
     def is_reached_by(self, exponents: Floats) -> bool:
-        """Say whether the mean of local exponents, shape (n,), is known so well."""
+        """Return whether the mean of local exponents, shape (n,), is known so well."""
         if len(exponents) < FEWEST_INTERVALS:
             return False
         found = blocked_mean(exponents)
@@ -138,7 +138,7 @@ def lyapunov_exponent(
     precision: Precision | None = None,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> LyapunovEstimate:
-    """Tell whether neighbouring motions part, and how fast.
+    """Return whether neighbouring motions part, and how fast.
 
     The first ``settle_s`` only find the attractor; the exponent is that of the following ``duration_s``, or
     of the motion in which they end. Together the defaults are the paper's 30 s from rest.
@@ -280,7 +280,7 @@ def _described(
 
 
 def verdict_of(mean: float, error: float) -> ExponentVerdict:
-    """Say what an exponent means within its error."""
+    """Return what an exponent means within its error."""
     if not (math.isfinite(mean) and math.isfinite(error)):
         return ExponentVerdict.UNKNOWN
     if abs(mean) <= SURE * error:
@@ -295,7 +295,7 @@ def _verdict(taken: _Exponent) -> ExponentVerdict:
 
 
 def _transient(run: TangentRun, end: Settling) -> ChaoticTransient | None:
-    """Tell whether a run was chaotic before its final motion."""
+    """Return whether a run was chaotic before its final motion."""
     before = run.rates[ALIGNING : end.since, 0]
     if len(before) < FEWEST_INTERVALS:
         return None

@@ -99,7 +99,7 @@ def lyapunov_spectrum(
     interval_s: float | None = None,
     max_impact_rate_hz: float = MAX_IMPACT_RATE_HZ,
 ) -> LyapunovSpectrum:
-    """Tell how fast neighbouring motions part or come together, in every direction.
+    """Return how fast neighbouring motions part or come together, in every direction.
 
     Arguments as in `vibench.sim.lyapunov_exponent`, ``initial_state`` of shape (6,) [m, m/s]; the
     errors need blocks as long as the motion's memory too.
@@ -205,7 +205,7 @@ def _mean(rates: Floats) -> BlockedMean:
 
 
 def _dimension_error(rates: Floats, exponents: Floats) -> float:
-    """Give the standard error of the dimension: its linear part in the local exponents, averaged like one.
+    """Return the standard error of the dimension: its linear part in the local exponents, averaged like one.
 
     D = j - S / l with S = l_1 + ... + l_j and l = l_(j+1) < 0: dD = -dS / l + S dl / l^2.
     """

@@ -132,7 +132,7 @@ class Interval:
     """Drive periods in it; 0 if it is no whole number of them."""
 
     def count_in(self, duration_s: float) -> int:
-        """Say how many fit into a duration."""
+        """Return how many fit into a duration."""
         return math.floor(duration_s / self.length_s * (1.0 + ALMOST))
 
 

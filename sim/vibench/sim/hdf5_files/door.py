@@ -102,7 +102,7 @@ def open_hdf5(path: Path, *, locking: bool | None = None) -> h5py.File:
 
 
 def walk(file: h5py.Group) -> Iterator[tuple[str, h5py.HLObject]]:
-    """Give every group and dataset below a group, itself first, by path; each once, in the order of names.
+    """Yield every group and dataset below a group, itself first, by path; each once, in the order of names.
 
     Raises
     ------

@@ -94,7 +94,7 @@ def _uncertain(numbers: NDArray[np.int64], step: int, edge: int) -> NDArray[np.b
 
 
 def _left_out(uncertain: NDArray[np.bool_], part: int) -> float:
-    """Give the share of uncertain starts with one part of the map left out."""
+    """Return the share of uncertain starts with one part of the map left out."""
     rows, columns = (np.arange(length) * BLOCKS // length for length in uncertain.shape)
     is_in = (rows[:, None] * BLOCKS + columns) != part
     return max(float(uncertain[is_in].mean()), 1.0 / uncertain.size)

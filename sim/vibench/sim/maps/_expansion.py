@@ -117,7 +117,7 @@ class MapPoints:
         )
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Say what is kept of a prediction."""
+        """Return what is kept of a prediction."""
         found = solved.prediction
         numbers = {column.name: getattr(found, name) for name, column in NUMBERS.items()}
         cells: dict[str, Cell] = {
@@ -142,7 +142,7 @@ class MapPoints:
         )
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Say what is kept of a scene that could not be computed."""
+        """Return what is kept of a scene that could not be computed."""
         return failed_point(number, error)
 
     def _cost_s(self, number: int, cost_s: Callable[[Scene, Solver], float]) -> float:
@@ -153,7 +153,7 @@ class MapPoints:
 
 
 def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
-    """Say which cells of an adaptive map are to be computed next, and what was filled in."""
+    """Return which cells of an adaptive map are to be computed next, and what was filled in."""
     shape = plan.grid.shape
     state = np.asarray(arrays["state"]).reshape(shape)
     is_known = np.all((state != PointState.MISSING) & (state != PointState.FILLED), axis=1)
@@ -172,7 +172,7 @@ def refinement_of(plan: Map, arrays: Arrays) -> RefinementPlan:
 
 
 def cell_codes(label: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give each cell a number for what the first start came to and which motions were found.
+    """Return each cell a number for what the first start came to and which motions were found.
 
     From shape (rows, starts, columns) to (rows, columns).
     """
@@ -194,7 +194,7 @@ def cells_shape(grid: Grid) -> tuple[int, int]:
 
 
 def points_of(cells: NDArray[np.int64], grid: Grid) -> NDArray[np.int64]:
-    """Give the numbers of the points of some cells of a map over two quantities, from all starts."""
+    """Return the numbers of the points of some cells of a map over two quantities, from all starts."""
     _, starts, columns = grid.shape
     row, column = np.divmod(cells, columns)
     return np.asarray(((row[:, None] * starts + np.arange(starts)) * columns + column[:, None]).reshape(-1))
@@ -270,7 +270,7 @@ class MapEstimate:
 
 
 def estimate_map(plan: Map, workers: int | None = None) -> MapEstimate:
-    """Say what a map will take of ``workers`` threads, by what such points took here lately; none is run.
+    """Return what a map will take of ``workers`` threads, by what such points took here lately; none is run.
 
     How many points refinement will ask for, and how many motions repeat, is not known before: the estimate
     says the least and the most.

@@ -59,7 +59,7 @@ _MAP_COLUMNS = (
 
 
 def columns_with(more: Sequence[Column]) -> tuple[Column, ...]:
-    """Give all columns; the state of a point is the last."""
+    """Return all columns; the state of a point is the last."""
     return (*_MAP_COLUMNS, *more, _OF_STUDIES["state"])
 
 
@@ -71,7 +71,7 @@ _PERIODIC = list(MotionKind).index(MotionKind.PERIODIC)
 
 
 def without_impacts(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.bool_]:
-    """Say which points came to the motion that nothing but the drive tells from rest."""
+    """Return which points came to the motion that nothing but the drive tells from rest."""
     is_first = (arrays["motion"] == _PERIODIC) & (arrays["period"] == 1)
     return np.asarray(is_first & (arrays["impact_rate"] == 0.0))
 
@@ -318,7 +318,7 @@ class Map(GridPlan):
         return tuple(each for each in QUANTITIES if isinstance(getattr(self, each.field), Range))
 
     def range_of(self, quantity: Quantity) -> Range:
-        """Give the range of a quantity that varies."""
+        """Return the range of a quantity that varies."""
         found = getattr(self, quantity.field)
         assert isinstance(found, Range), "only what varies is asked for"
         return found
@@ -408,7 +408,7 @@ class Map(GridPlan):
     def _start(
         self, place: tuple[int, ...], said: Mapping[str, float], specimen: Specimen, drive: Harmonic
     ) -> Given | Rest:
-        """Give the start of a point that continues no other."""
+        """Return the start of a point that continues no other."""
         if place[-2] >= max(1, len(self.chain)):
             drawn = np.random.default_rng([self.seed, place[-2]])
             x, y, z, vx, vy, vz = (float(each) for each in random_state(specimen, drive, drawn))

@@ -66,7 +66,7 @@ class RefinementPlan:
 
 
 def plan_refinement(seen: Seen, coarse: int, seed: int) -> RefinementPlan:
-    """Say which cells are to be computed next; none when the map is done.
+    """Return which cells are to be computed next; none when the map is done.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ class _Sketch:
             wanted = beside
 
     def filling(self, fine: int, step: int) -> Filling:
-        """Say how the cells of a level that were not computed in the end are filled in.
+        """Return how the cells of a level that were not computed in the end are filled in.
 
         A corner that turned out to be another motion later on does not count.
         """
@@ -189,7 +189,7 @@ def _differs_from_neighbours(codes: Codes, sizes: Floats, jump: float) -> Mask:
 
 
 def _pairs() -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
-    """Give the neighbours along rows, columns and both diagonals."""
+    """Yield the neighbours along rows, columns and both diagonals."""
     whole, low, high = slice(None), slice(None, -1), slice(1, None)
     yield (low, whole), (high, whole)
     yield (whole, low), (whole, high)
@@ -198,12 +198,12 @@ def _pairs() -> Iterator[tuple[tuple[slice, slice], tuple[slice, slice]]]:
 
 
 def _lines(length: int, step: int) -> Indices:
-    """Give the lines of a lattice along one axis; the last line of the map is one of them."""
+    """Return the lines of a lattice along one axis; the last line of the map is one of them."""
     return np.unique([*range(0, length, step), length - 1])
 
 
 def lattice(shape: tuple[int, ...], step: int) -> Mask:
-    """Give the cells on every so manyth line, the last line of the map included."""
+    """Return the cells on every so manyth line, the last line of the map included."""
     found = np.zeros(shape, dtype=np.bool_)
     found[np.ix_(*(_lines(length, step) for length in shape))] = True
     return found
@@ -226,7 +226,7 @@ def _corners(shape: tuple[int, ...], cells: Indices, step: int) -> tuple[Indices
 
 
 def _between(place: Indices, lines: Indices) -> tuple[Indices, Indices, Floats]:
-    """Give the lines at or below and above each place, and how far it is from the one to the other."""
+    """Return the lines at or below and above each place, and how far it is from the one to the other."""
     above = np.searchsorted(lines, place, side="left")
     high = lines[above]
     low = np.where(high == place, place, lines[np.maximum(above - 1, 0)])

@@ -87,7 +87,7 @@ class Audit:
 
 
 def audit_of(numbers: NDArray[np.int64], found: RefinementPlan) -> Audit:
-    """Say how often filling in was wrong.
+    """Return how often filling in was wrong.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ class MapResults(GridResults[Map]):
         return self._described(numbers, None)
 
     def shown(self, name: str, start: int = 0) -> Floats:
-        """Give one quantity over what varies, from one of the starts; NaN where it is not known.
+        """Return one quantity over what varies, from one of the starts; NaN where it is not known.
 
         ``motions`` is how many motions the starts of a cell came to; all others are columns.
         """
@@ -188,7 +188,7 @@ class MapResults(GridResults[Map]):
         return np.asarray(np.take(values, start, axis=len(self.plan.grid.shape) - 2))
 
     def example(self, number: int) -> int:
-        """Give the first computed point that came to a motion of this number."""
+        """Return the first computed point that came to a motion of this number."""
         is_it = (self.motion_numbers.reshape(-1) == number) & (self.state.reshape(-1) == PointState.DONE)
         return int(np.flatnonzero(is_it)[0])
 
@@ -238,7 +238,7 @@ class MapResults(GridResults[Map]):
 
 
 def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64]:
-    """Give rows numbers by label and, where there are sizes, by size: a gap parts two motions."""
+    """Return rows numbers by label and, where there are sizes, by size: a gap parts two motions."""
     if sizes is None:
         return np.asarray(np.unique(labels, return_inverse=True)[1], dtype=np.int64)
     order = np.lexsort((sizes, labels))
@@ -249,7 +249,7 @@ def _groups(labels: NDArray[np.int64], sizes: Floats | None) -> NDArray[np.int64
 
 
 def _by_frequency(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Give the commonest the lowest number."""
+    """Return the commonest the lowest number."""
     if len(numbers) == 0:
         return numbers
     rank = np.argsort(np.argsort(-np.bincount(numbers), kind="stable"), kind="stable")

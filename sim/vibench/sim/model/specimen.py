@@ -118,7 +118,7 @@ _ROUNDING = 1e-12
 
 
 def _ratios_of_coupled_modes(own: Matrix, damping: Matrix) -> NDArray[np.float64]:
-    """Give the ratios of modes that the dampers couple: own frequencies [rad/s], modal damping [1/s]."""
+    """Return the ratios of modes that the dampers couple: own frequencies [rad/s], modal damping [1/s]."""
     poles = np.linalg.eigvals(np.block([[np.zeros_like(own), own], [-own, -damping]]))
     still = np.sort(np.abs(poles[poles.imag == 0.0]))
     # Of modes that do not oscillate the slowest pole belongs to the fastest: their product is the square of
@@ -134,7 +134,7 @@ JOIN = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
 
 
 def bound_matrices(specimen: Specimen) -> tuple[Matrix, Matrix, Matrix]:
-    """Give M, C and K of the two bodies, x and z, that are left while m1 sticks to m2.
+    """Return M, C and K of the two bodies, x and z, that are left while m1 sticks to m2.
 
     Returns
     -------
@@ -231,7 +231,7 @@ def state_scales(specimen: Specimen, drive: Harmonic) -> Floats:
 
 
 def energy_metric(specimen: Specimen) -> Floats:
-    """Give the matrix of twice the energy without stops, shape (6, 6)."""
+    """Return the matrix of twice the energy without stops, shape (6, 6)."""
     metric = np.zeros((6, 6))
     metric[:3, :3], metric[3:, 3:] = specimen.stiffness_matrix, specimen.mass_matrix
     return metric

@@ -289,7 +289,7 @@ class SpecimenTable(SpecimenDescription):
 
 
 def usual_specimen() -> SpecimenTable:
-    """Give the specimen that is meant where none is named: the paper's."""
+    """Return the specimen that is meant where none is named: the paper's."""
     return SpecimenTable.model_validate(USUAL_SPECIMEN)
 
 
@@ -309,7 +309,7 @@ def load_specimen(specimen: str | Path) -> SpecimenDescription:
 
 
 def shipped_specimens() -> Mapping[str, SpecimenDescription]:
-    """Give the specimens that come with vibench, by the names that may stand for a file."""
+    """Return the specimens that come with vibench, by the names that may stand for a file."""
     return {name: SpecimenDescription.model_validate(name) for name in _shipped()}
 
 

@@ -67,7 +67,7 @@ _IN_WORDS_OF_TOML: Mapping[str, str] = {
 
 
 def fault_in_words(fault: Mapping[str, Any]) -> str:
-    """Say what a value of a TOML file should be, in words of TOML and not of Python.
+    """Return what a value of a TOML file should be, in words of TOML and not of Python.
 
     Parameters
     ----------

@@ -116,19 +116,19 @@ def bound_memory(most_bytes: int) -> None:
 
 
 def usual_state_folder() -> Path:
-    """Give the place for what a user's programs leave behind."""
+    """Return the place for what a user's programs leave behind."""
     home = Path.home()
     linux = Path(os.environ.get("XDG_STATE_HOME", home / ".local" / "state"))
     return (home / "Library" / "Application Support" if sys.platform == "darwin" else linux) / "vibench"
 
 
 def usual_shared_folder() -> Path:
-    """Give a place where every user may make files and nobody removes those of others."""
+    """Return a place where every user may make files and nobody removes those of others."""
     return Path("/tmp")  # noqa: S108 - TMPDIR may be each user's own
 
 
 def process_start(pid: int) -> str | None:
-    """Say when a process began, in a form of the system's own; None when there is no such process.
+    """Return when a process began, in a form of the system's own; None when there is no such process.
 
     A process that has ended, and whose end nobody has taken note of yet, is none. Empty where it lives and
     nobody tells since when. On Linux the computer's start and the container come first (`Place`).

@@ -20,7 +20,7 @@ class Place(Enum):
 
 
 def place_of(start: str) -> Place:
-    """Tell where a process was started; `Place.HERE` where the system does not say."""
+    """Return where a process was started; `Place.HERE` where the system does not say."""
     own, other = ((each or "").split("_") for each in (process_start(os.getpid()), start))
     if len(own) != len(other) or own[:-1] == other[:-1]:
         return Place.HERE

@@ -11,13 +11,13 @@ LOCK_VARIABLE = "VIBENCH_LOCK_DIR"
 
 
 def state_place() -> Path:
-    """Give where the user's own folder is, or would be; ``VIBENCH_STATE_DIR`` names another place."""
+    """Return where the user's own folder is, or would be; ``VIBENCH_STATE_DIR`` names another place."""
     given = os.environ.get(VARIABLE)
     return Path(given) if given else usual_state_folder()
 
 
 def state_folder() -> Path:
-    """Give the user's own folder, made if need be; raises PermissionError where none can be made."""
+    """Return the user's own folder, made if need be; raises PermissionError where none can be made."""
     folder = state_place()
     try:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -29,5 +29,5 @@ def state_folder() -> Path:
 
 
 def shared_folder() -> Path:
-    """Give the folder where every user may make files; ``VIBENCH_LOCK_DIR`` names another."""
+    """Return the folder where every user may make files; ``VIBENCH_LOCK_DIR`` names another."""
     return Path(os.environ.get(LOCK_VARIABLE) or usual_shared_folder())

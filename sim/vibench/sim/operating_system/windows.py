@@ -85,17 +85,17 @@ def bound_memory(most_bytes: int) -> None:
 
 
 def usual_state_folder() -> Path:
-    """Give the place for what a user's programs leave behind."""
+    """Return the place for what a user's programs leave behind."""
     return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "vibench"
 
 
 def usual_shared_folder() -> Path:
-    """Give a place where every user may make files and nobody removes those of others."""
+    """Return a place where every user may make files and nobody removes those of others."""
     return Path(os.environ.get("PROGRAMDATA", "C:\\ProgramData"))
 
 
 def process_start(pid: int) -> str | None:
-    """Say when a process began, in a form of the system's own; None when there is no such process."""
+    """Return when a process began, in a form of the system's own; None when there is no such process."""
     kernel = ctypes.windll.kernel32
     handle = kernel.OpenProcess(_QUERY_LIMITED_INFORMATION, 0, pid)
     if not handle:

@@ -216,7 +216,7 @@ class BalanceFamily:
         )
 
     def balance_at(self, point: Vector) -> Balance:
-        """Give the solution at a point."""
+        """Return the solution at a point."""
         frequency, amplitude = self.drive(point)
         return described(self.problem, point[:-1], frequency, amplitude, self.tolerance)
 

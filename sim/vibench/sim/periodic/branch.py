@@ -205,7 +205,7 @@ def is_joined(before: OrbitSigns, after: OrbitSigns) -> bool:
 
 
 def sign_of(kind: BifurcationKind, here: OrbitSigns, before: OrbitSigns) -> float:
-    """Give the number whose change of sign is the happening."""
+    """Return the number whose change of sign is the happening."""
     match kind:
         case BifurcationKind.GRAZING:
             return 1.0 if here.contacts == before.contacts else -1.0

@@ -38,7 +38,7 @@ class DrivePath(Protocol):
         ...
 
     def slopes(self, value: float) -> tuple[float, float]:
-        """Give the derivatives of both by the parameter."""
+        """Return the derivatives of both by the parameter."""
         ...
 
 
@@ -158,7 +158,7 @@ class Family(Curve, Protocol):
         ...
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[Family, Vector, Vector] | None":
-        """Give the family at a higher resolution, with a point and a tangent carried over to it.
+        """Return the family at a higher resolution, with a point and a tangent carried over to it.
 
         None when this is the highest.
         """
@@ -196,7 +196,7 @@ def parameter_value(path: DrivePath, drive: Harmonic) -> float:
 
 
 def range_scale(low: float, high: float, value: float) -> float:
-    """Give how much of a range [Hz, or m] is a unit of length."""
+    """Return how much of a range [Hz, or m] is a unit of length."""
     if not 0.0 < low < high < math.inf or not low <= value <= high:
         msg = f"A branch from {low} to {high} through {value} is not allowed: positive, ascending, within."
         raise ValueError(msg)

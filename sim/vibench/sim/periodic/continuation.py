@@ -21,7 +21,7 @@ class Curve(Protocol):
     """Equations whose solutions are followed."""
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:
-        """Give r, shape (n,), and dr/dpoint, shape (n, n + 1), at (u, lambda), shape (n + 1,).
+        """Return r, shape (n,), and dr/dpoint, shape (n, n + 1), at (u, lambda), shape (n + 1,).
 
         Not finite where the equations cannot be evaluated.
         """
@@ -117,7 +117,7 @@ def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tu
 
 
 def tangent_at(curve: Curve, point: Vector, along: Vector) -> Vector:
-    """Give the unit tangent of the curve, in the half-space of ``along``."""
+    """Return the unit tangent of the curve, in the half-space of ``along``."""
     _, jacobian = curve.linearised(point)
     system = np.vstack([jacobian, along])
     aim = np.zeros(len(point))
@@ -209,7 +209,7 @@ def _advance(curve: Curve, here: ArcPoint, step: float, steps: ArcSteps) -> tupl
 
 
 def _passes(curve: Curve, start: ArcPoint, here: ArcPoint, ahead: ArcPoint, steps: ArcSteps) -> bool:
-    """Say whether the step from one point to the next went through the start of the curve."""
+    """Return whether the step from one point to the next went through the start of the curve."""
     step = ahead.point - here.point
     length = float(np.linalg.norm(step))
     part = float((start.point - here.point) @ step) / length**2

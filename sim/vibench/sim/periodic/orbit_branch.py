@@ -50,11 +50,11 @@ class OrbitFamily:
         return state_scales(self.mapping.specimen, self.reference)
 
     def drive_at(self, point: Vector) -> Harmonic:
-        """Give the drive at a point."""
+        """Return the drive at a point."""
         return Harmonic(*self.path.drive(float(point[-1]) * self.scale))
 
     def state_at(self, point: Vector) -> Vector:
-        """Give the state at the drive's time zero."""
+        """Return the state at the drive's time zero."""
         return point[:-1] * self.scales
 
     def linearised(self, point: Vector) -> tuple[Vector, Table]:

@@ -72,7 +72,7 @@ class PhaseResonanceFamily:
         return self.reference.amplitude_m * float(10.0 ** (point[7] / LENGTH_PER_DECADE))
 
     def drive_at(self, point: Vector) -> Harmonic:
-        """Give the drive at a point."""
+        """Return the drive at a point."""
         frequency_hz = self.reference.frequency_hz * math.exp(FREQUENCY_SHARE * float(point[6]))
         return Harmonic(frequency_hz, self.amplitude_m(point))
 

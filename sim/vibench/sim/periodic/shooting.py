@@ -374,7 +374,7 @@ class PhaseReference(StrEnum):
     """In space: of a mode far above others, where m0 hardly follows the base."""
 
     def motion(self, transmissibility: complex) -> complex:
-        """Give the motion whose phase counts, over that of the base, from m0's displacement over it."""
+        """Return the motion whose phase counts, over that of the base, from m0's displacement over it."""
         return transmissibility - 1.0 if self is PhaseReference.RELATIVE else transmissibility
 
 

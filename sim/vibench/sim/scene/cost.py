@@ -86,7 +86,7 @@ class CostLedger:
         self._is_new = False
 
     def expected(self, kind: str, planned_s: float) -> Expected:
-        """Say how long planned work of a kind will take here; a new kind as what its name begins with."""
+        """Return how long planned work of a kind will take here; a new kind as what its name begins with."""
         with self._lock:
             known = next((self._kinds[name] for name in _names(kind) if self._is_known(name)), _Kind())
         factor = UNKNOWN_FACTOR
@@ -130,7 +130,7 @@ class CostLedger:
 
 
 def _names(kind: str) -> list[str]:
-    """Give a kind, ``a/b/c``, and all that it begins with."""
+    """Return a kind, ``a/b/c``, and all that it begins with."""
     parts = kind.split("/")
     return ["/".join(parts[:count]) for count in range(len(parts), 0, -1)]
 
@@ -153,7 +153,7 @@ def _read(path: Path) -> dict[str, _Kind]:
 
 @cache
 def cost_ledger() -> CostLedger:
-    """Give the ledger of this machine, these versions and sources; it is saved when the process ends."""
+    """Return the ledger of this machine, these versions and sources; it is saved when the process ends."""
     about = (
         platform.node(),
         platform.machine(),
@@ -188,7 +188,7 @@ def learn_cost(scene: Scene, taken_s: float, solver: Solver = solve_scene) -> No
 
 
 def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
-    """Say how long a solver will take for a scene, by what such runs took lately [s].
+    """Return how long a solver will take for a scene, by what such runs took lately [s].
 
     Raises ValueError when the specimen cannot be followed in time.
     """
@@ -197,7 +197,7 @@ def expected_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
 
 
 def longest_cost_s(scene: Scene, solver: Solver = solve_scene) -> float:
-    """Say how long a solver will take for a scene whose motion never repeats, by what such runs took [s].
+    """Return how long a solver will take for a scene whose motion never repeats, by what such runs took [s].
 
     Raises ValueError when the specimen cannot be followed in time.
     """

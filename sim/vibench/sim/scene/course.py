@@ -107,7 +107,7 @@ class FixedCourse:
 def judged(
     run: FollowedRun, window: ObservedWindow, before: Sequence[Stretch], pace: Pace, ended: str
 ) -> SceneRun:
-    """Say what a motion is, from its window and the stretches before it.
+    """Return what a motion is, from its window and the stretches before it.
 
     Those before it that were watched are blocks as long as the window's own.
     """
@@ -270,7 +270,7 @@ class SettlingCourse:
         return self._on
 
     def seen(self) -> SceneRun:
-        """Say what was seen; of a motion that was followed on, after a last window."""
+        """Return what was seen; of a motion that was followed on, after a last window."""
         if self._on is not None:
             return self._after(self._on)
         assert self._seen is not None

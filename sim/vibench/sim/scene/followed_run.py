@@ -48,7 +48,7 @@ STEP = 1e-9
 def nominal_cost_s(
     contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int, steps: int
 ) -> float:
-    """Give the processor time for a stretch of motion with so many impacts, small changes and steps."""
+    """Return the processor time for a stretch of motion with so many impacts, small changes and steps."""
     strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
     match contact:
         case PowerLaw():
@@ -98,7 +98,7 @@ class Stretch:
         return self.end_s - self.start_s
 
     def thinned(self, every: int) -> "Stretch":
-        """Give the same with every so manyth state alone."""
+        """Return the same with every so manyth state alone."""
         first, rate_hz, count = self.samples.first_s, self.samples.rate_hz, self.samples.count
         kept = Samples(first + (every - 1) / rate_hz, rate_hz / every, count // every)
         return self if every == 1 else replace(self, samples=kept, states=self.states[every - 1 :: every])
@@ -191,7 +191,7 @@ class FollowedRun:
         self._run.carry(np.empty((0, DIRECTIONS)))
 
     def pushed(self, push: Floats) -> Self:
-        """Give another motion, which begins now and a small change of the state, shape (6,), away."""
+        """Return another motion, which begins now and a small change of the state, shape (6,), away."""
         twin, run = self.apart(), self._run.apart()
         run.place(start_motion(self.state + push))
         twin.__dict__.update(_run=run)

@@ -249,7 +249,7 @@ class Pace:
         return self.attractor_s + self.section_s
 
     def repeats(self, stretches: Sequence[Stretch]) -> Repetition | None:
-        """Say whether the motion of these stretches, one after the other, repeats at their end."""
+        """Return whether the motion of these stretches, one after the other, repeats at their end."""
         return self.repeats_in(states_of(stretches))
 
     def drifts(self, stretches: Sequence[Stretch]) -> bool:
@@ -257,7 +257,7 @@ class Pace:
         return is_drifting(states_of(stretches), 2.0 * np.pi * self.frequency_hz)
 
     def cycle(self, stretches: Sequence[Stretch]) -> int:
-        """Give the drive periods over which lines are taken: the motion's own, if it has nearly settled.
+        """Return the drive periods over which lines are taken: the motion's own, if it has nearly settled.
 
         What counts as nearly is the same at every level, so that a line is the same question at each.
         """
@@ -265,7 +265,7 @@ class Pace:
         return 1 if found is None else found.period
 
     def is_chaos(self, stretches: Sequence[Stretch]) -> bool:
-        """Say whether a small change has grown in each half of these stretches as only chaos makes it."""
+        """Return whether a small change has grown in each half of these stretches as only chaos makes it."""
         growth = growth_of(stretches)
         is_plenty = min(growth.halves) > CERTAIN_GROWTH
         return is_plenty and kind_of(None, growth, self.fading_s) is MotionKind.CHAOTIC

@@ -412,7 +412,7 @@ def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
 
 
 def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, float]:
-    """Give those of the start that shows a motion that repeats best; of others, the mean."""
+    """Return those of the start that shows a motion that repeats best; of others, the mean."""
     shown = group[:1] if group[0].period is not None else group
     means = np.mean([each.responses_m for each in shown], axis=0) / amplitude_m
     return dict(
@@ -421,7 +421,7 @@ def _responses(group: Sequence[ReachedMotion], amplitude_m: float) -> dict[str, 
 
 
 def _error(group: Sequence[ReachedMotion], error_of: ErrorOf) -> float | None:
-    """Give what one more draw of a motion may differ by from the mean of these, in 19 cases of 20."""
+    """Return what one more draw of a motion may differ by from the mean of these, in 19 cases of 20."""
     if group[0].period is not None:
         return error_of(group[0])
     if len(group) < FEWEST_DRAWS:
@@ -442,7 +442,7 @@ ALONE = 0.5
 
 
 def memory_of(scene: Scene, begin: FollowedRun, seen: SceneRun, motion: LinearMotion) -> StartMemory:
-    """Say whether the start decided which motion was reached.
+    """Return whether the start decided which motion was reached.
 
     Parameters
     ----------

@@ -250,7 +250,7 @@ def _planned(scene: Scene) -> tuple[Method, LinearMotion]:
 
 
 def _in_closed_form(scene: Scene, motion: LinearMotion, question: Question) -> ScenePrediction:
-    """Give the steady motion without contact."""
+    """Return the steady motion without contact."""
     amplitude, period_s = scene.drive.amplitude_m, 1.0 / scene.drive.frequency_hz
     settled_s: float | None = None
     match scene.duration:

@@ -259,7 +259,7 @@ def _are_together(scene: Scene, one: FollowedRun, other: FollowedRun) -> bool:
 
 
 def _places_and_speeds(scene: Scene) -> Floats:
-    """Give one, and the angular frequency of the drive: what differences of a state are measured by."""
+    """Return one, and the angular frequency of the drive: what differences of a state are measured by."""
     return np.repeat([1.0, 2.0 * np.pi * scene.drive.frequency_hz], 3)
 
 
@@ -286,5 +286,5 @@ def with_errors(found: ScenePrediction, stated: Floats) -> ScenePrediction:
 
 
 def known(value: float) -> float | None:
-    """Give a number, or None where there is none."""
+    """Return a number, or None where there is none."""
     return value if math.isfinite(value) else None

@@ -40,7 +40,7 @@ class LinearMotion:
         return self.per_volt - self.lever * self.per_volt[:, [_P]]
 
     def under(self, volts: ArrayLike, gap_m: float) -> ComplexArray:
-        """Give the motion under sines of these amplitudes, shape (n, 5).
+        """Return the motion under sines of these amplitudes, shape (n, 5).
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ def _amplified(amplifier: Amplifier, s: ComplexArray) -> ComplexArray:
 
 
 def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:
-    """Give the stops' force that leaves a free p as large as the gap, as a spring would, shape (n,) [N].
+    """Return the stops' force that leaves a free p as large as the gap, as a spring would, shape (n,) [N].
 
     With K the spring, p / (1 + K H) has the gap's size: one positive root of a quadratic.
     """

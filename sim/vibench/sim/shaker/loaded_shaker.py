@@ -99,7 +99,7 @@ class Shaker:
                 raise ValueError(msg)
 
     def equations(self) -> StateSpace:
-        """Give coil and table as first-order equations, driven by the coil's voltage and a force.
+        """Return coil and table as first-order equations, driven by the coil's voltage and a force.
 
         With m the moving mass, G the force constant and F a force on the table::
 

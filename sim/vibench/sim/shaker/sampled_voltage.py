@@ -156,7 +156,7 @@ class _Resampling:
             yield stop, fine[_MARGIN * ratio : (_MARGIN + stop - first) * ratio]
 
     def samples(self, means: FloatArray, gain: Gain) -> FloatArray:
-        """Give the samples behind a sensor of this gain."""
+        """Return the samples behind a sensor of this gain."""
         count = means.size // self._ratio
         size = int(fft.next_fast_len(count + 2 * _MARGIN, real=True))
         padded = np.zeros(size * self._ratio)

@@ -89,7 +89,7 @@ class ClusterExecutor:
         future.add_done_callback(partial(self._note, bundle))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Give what has come back; a bundle that the scheduler has dropped comes back empty."""
+        """Return what has come back; a bundle that the scheduler has dropped comes back empty."""
         arrived = arrived_in(self._arrived, timeout_s)
         if not arrived:
             self._is_in_contact()

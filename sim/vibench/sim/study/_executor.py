@@ -56,7 +56,7 @@ class Executor(Protocol):
         """Take a bundle, and compute it when its turn comes."""
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Give what has come back; waits for the first, at most ``timeout_s``.
+        """Return what has come back; waits for the first, at most ``timeout_s``.
 
         Raises ClusterLost when nothing can come back any more.
         """
@@ -142,7 +142,7 @@ class ThreadExecutor:
         future.add_done_callback(partial(self._note, bundle, solved))
 
     def replies(self, timeout_s: float) -> Sequence[Reply]:
-        """Give what has come back."""
+        """Return what has come back."""
         return arrived_in(self._arrived, timeout_s)
 
     def cancel(self) -> Sequence[Reply]:

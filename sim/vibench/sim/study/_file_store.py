@@ -177,7 +177,7 @@ def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
 
 
 def _numbered(column: Column) -> StudyAxis:
-    """Give the axis of a column whose components are told by their number."""
+    """Return the axis of a column whose components are told by their number."""
     return StudyAxis(column.along, tuple(float(k) for k in range(column.components)), "1", column.along)
 
 
@@ -337,7 +337,7 @@ SHOWN = 60
 
 
 def _difference(name: str, kept: GridPlan, asked: GridPlan) -> str:
-    """Say how one field of two plans differs; of long lists, where they begin to."""
+    """Return how one field of two plans differs; of long lists, where they begin to."""
     there, here = (plan.model_dump(mode="json")[name] for plan in (kept, asked))
     match there, here:
         case [*some], [*others]:

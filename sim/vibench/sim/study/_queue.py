@@ -234,10 +234,10 @@ class Points(Protocol):
         """Make the scene of a point whose predecessor, if it has one, is done; ValueError if not allowed."""
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Say what is kept of a prediction."""
+        """Return what is kept of a prediction."""
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Say what is kept of a scene that could not be computed."""
+        """Return what is kept of a scene that could not be computed."""
 
 
 def run_points(

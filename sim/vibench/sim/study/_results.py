@@ -247,7 +247,7 @@ class StudyResults(GridResults[Study]):
         return self.plan
 
     def predictions(self) -> Iterator[ScenePrediction]:
-        """Give the answers of all points that were computed, in the order of the arrays."""
+        """Yield the answers of all points that were computed, in the order of the arrays."""
         state = states(self.arrays)
         for number in np.flatnonzero((state == PointState.DONE) | (state == PointState.STOPPED)):
             yield self._prediction(int(number))
@@ -289,7 +289,7 @@ def open_study(path: Path | str) -> StudyResults:
 
 
 def results_of(study: Study, arrays: Arrays) -> StudyResults:
-    """Give what a store in memory holds."""
+    """Return what a store in memory holds."""
     return StudyResults(study, {name: values.copy() for name, values in arrays.items()})
 
 

@@ -77,7 +77,7 @@ PLANNED = 2000
 
 
 def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
-    """Give whom each point continues, or NOBODY, shape (points,); ``starts`` are the last axis but one."""
+    """Return whom each point continues, or NOBODY, shape (points,); ``starts`` are the last axis but one."""
     blocks = np.full(grid.shape, NOBODY)
     numbers = np.arange(grid.size).reshape(grid.shape)
     for index, start in enumerate(starts):
@@ -92,14 +92,14 @@ def predecessors(grid: Grid, starts: Sequence[object]) -> NDArray[np.int64]:
 
 
 def planned_times(grid: Grid, planned: Callable[[int], float]) -> Floats:
-    """Give the time that each point is ``planned`` to take [s], shape (points,)."""
+    """Return the time that each point is ``planned`` to take [s], shape (points,)."""
     every = max(1, math.ceil(grid.size / PLANNED))
     some = [planned(number) for number in range(0, grid.size, every)]
     return np.repeat(some, every)[: grid.size]
 
 
 def continued_point(before: int, arrays: Arrays) -> int:
-    """Give a point's predecessor, ``before``; NOBODY where ``arrays`` have no finite end of it."""
+    """Return a point's predecessor, ``before``; NOBODY where ``arrays`` have no finite end of it."""
     if before == NOBODY or not np.all(np.isfinite(arrays[FINAL_STATE][before].astype(np.float64))):
         return NOBODY
     return before
@@ -112,7 +112,7 @@ def end_phase(frequency_hz: float, before: int, arrays: Arrays) -> float:
 
 
 def failed_point(number: int, error: BaseException) -> PointAnswer:
-    """Say what is kept of scene ``number`` that ended in ``error``: a refusal is a sentence by itself."""
+    """Return what is kept of scene ``number`` that ended in ``error``: a refusal is a sentence by itself."""
     match error:
         case ValueError():
             said = str(error)
@@ -165,18 +165,18 @@ class Expansion:
         return self._study.scene(self.grid.place(number), start, self._end_phase(before, arrays))
 
     def answer(self, number: int, scene: Scene, solved: Solved, arrays: Arrays) -> PointAnswer:
-        """Say what is kept of a prediction."""
+        """Return what is kept of a prediction."""
         is_at_end = solved.prediction.outcome == Outcome.REACHED_END
         cells = {**cells_of(solved.prediction), **self._origin(number, scene, arrays), TAKEN: solved.taken_s}
         state = PointState.DONE if is_at_end else PointState.STOPPED
         return PointAnswer(number, state, cells, solved.taken_s)
 
     def failure(self, number: int, error: BaseException) -> PointAnswer:
-        """Say what is kept of a scene that could not be computed."""
+        """Return what is kept of a scene that could not be computed."""
         return failed_point(number, error)
 
     def _origin(self, number: int, scene: Scene, arrays: Arrays) -> dict[str, Cell]:
-        """Say where a point began, and which scene it is."""
+        """Return where a point began, and which scene it is."""
         before = self._predecessor(number, arrays)
         known = "" if before == NOBODY else bytes(arrays[IDENTITY][before]).decode()
         return {

@@ -163,7 +163,7 @@ def _own_gap(said: dict[str, Any]) -> tuple[float, ...] | None:
 
 
 def _described(said: dict[str, Any]) -> SpecimenTable:
-    """Give the specimen of a study that is being read; the usual one where its own is not allowed."""
+    """Return the specimen of a study that is being read; the usual one where its own is not allowed."""
     found: SpecimenTable = said.get("specimen") or usual_specimen()
     return found
 
@@ -285,7 +285,7 @@ class Study(GridPlan):
 
 
 def _axis(name: str, values: Numbers | None, units: str, long_name: str) -> StudyAxis:
-    """Give an axis of numbers, or of the one label of what only the specimen says."""
+    """Return an axis of numbers, or of the one label of what only the specimen says."""
     return (
         StudyAxis(name, (AS_DESCRIBED,), "", long_name)
         if values is None
@@ -324,7 +324,7 @@ _MICRO = 1e-6
 
 
 def plausibility_warnings(amplitudes_m: Iterable[float], gaps_m: Iterable[float]) -> Iterator[str]:
-    """Say what looks wrong; it can be computed all the same.
+    """Yield what looks wrong; it can be computed all the same.
 
     Parameters
     ----------
