@@ -135,7 +135,7 @@ def _largest(change: Reals, one: Reals, other: Reals, floor: float) -> Reals:
 
 
 def _next_steps(step_s: Reals, error: Reals, failures: Reals, method: TextbookMethod) -> Reals:
-    """Give the lengths to try after a step, as `ode45` does; ``failures`` came one after the other."""
+    """Return the lengths to try after a step, as `ode45` does; ``failures`` came one after the other."""
     if method.relative == math.inf:
         return np.full_like(step_s, method.longest_s)
     # A step without error grows by the most; after one whose error is no number follows a tenth.
