@@ -32,7 +32,7 @@ class AnyRate:
     maximum_hz: float
 
     def next_up(self, rate_hz: float) -> float:
-        """Give the rate itself."""
+        """Return the rate itself."""
         return rate_hz
 
 
@@ -222,7 +222,7 @@ class Catalogue:
 
 
 def catalogue_with(product_type: str, name: str) -> Catalogue:
-    """Give the default system, in which the device of that product bears that name.
+    """Return the default system, in which the device of that product bears that name.
 
     Raises ConfigurationError when there is no such product, or the name is taken by another one.
     """

@@ -65,7 +65,7 @@ class DaqmxRefusal(InstrumentError):
 
 
 def sentence(code: int) -> str:
-    """Say what a status code means: a sentence for the frequent ones, NI's name for the others."""
+    """Return what a status code means: a sentence for the frequent ones, NI's name for the others."""
     if code in _SENTENCES:
         return _SENTENCES[code]
     try:
@@ -79,7 +79,7 @@ Member = TypeVar("Member", bound=Enum)
 
 
 def member(kind: type[Member], code: int, property_name: str) -> Member:
-    """Give the member of one of NI's enums that a request's number stands for, or refuse it (-200077)."""
+    """Return the member of one of NI's enums that a request's number stands for, or refuse it (-200077)."""
     try:
         return kind(code)
     except ValueError:

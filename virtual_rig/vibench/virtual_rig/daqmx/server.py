@@ -264,7 +264,7 @@ class _Service(grpc.GenericRpcHandler):  # type: ignore[misc]
         self._listening = listening
 
     def service(self, handler_call_details: grpc.HandlerCallDetails) -> grpc.RpcMethodHandler | None:
-        """Give what answers a call; None where it is another service's."""
+        """Return what answers a call; None where it is another service's."""
         service, _, name = handler_call_details.method.removeprefix("/").partition("/")
         method = SERVICE.methods_by_name.get(name) if service == SERVICE.full_name else None
         return None if method is None else _rpc(method, self._unary, self._listening)

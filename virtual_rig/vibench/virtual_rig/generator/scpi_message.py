@@ -161,7 +161,7 @@ class HeaderPath:
 
 
 def mnemonic_matches(word: str, mnemonic: str) -> bool:
-    """Say whether a word is the long or the short form of a mnemonic such as ``SINusoid``, in any case."""
+    """Return whether a word is the long or the short form of a mnemonic such as ``SINusoid``, in any case."""
     short = "".join(letter for letter in mnemonic if not letter.islower())
     return word.upper() in (short.upper(), mnemonic.upper())
 

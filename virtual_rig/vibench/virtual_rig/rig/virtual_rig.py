@@ -206,7 +206,7 @@ class _Running:
 
 
 def _controller(rig: Rig, clock: Callable[[], float]) -> Any:
-    """Give what simulates a real-time controller: a `ScpiDevice` whose ``cables`` are a `ClosedLoop`."""
+    """Return what simulates a real-time controller: a `ScpiDevice` whose ``cables`` are a `ClosedLoop`."""
     if rig.controller is None:
         return None
     simulated = load_plug_in(PlugInKind.VIRTUAL_INSTRUMENT, "controller")

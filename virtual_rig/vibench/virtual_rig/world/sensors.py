@@ -221,7 +221,7 @@ class Sensor(Protocol):
     """What shows a motion."""
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Give what the motion is shown with in the next steps."""
+        """Return what the motion is shown with in the next steps."""
 
 
 def shown(sensor: Sensor, values: FloatArray, first_step: int) -> FloatArray:
@@ -269,7 +269,7 @@ class Vibrometer:
         self._demanded.append(disturbance)
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Give what the velocity [m/s] is shown with in the next steps."""
+        """Return what the velocity [m/s] is shown with in the next steps."""
         self._demanded = [one for one in self._demanded if one.stop_step > first_step]
         disturbed = self._dropouts.between(first_step, first_step + count) + self._demanded
         instead = np.full(count if disturbed else 0, np.nan)
@@ -298,7 +298,7 @@ class Accelerometer:
         self._noise = noise
 
     def parts(self, first_step: int, count: int) -> SensorParts:
-        """Give what the acceleration [m/s2] is shown with in the next steps, without bias."""
+        """Return what the acceleration [m/s2] is shown with in the next steps, without bias."""
         noise = self._noise_rms * self._noise.draw(first_step, count)
         scale = self._full_scale_v / self._sensitivity, self._full_scale_v
         return SensorParts(self._filter, noise, np.empty(0), *scale)

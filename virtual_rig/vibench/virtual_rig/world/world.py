@@ -57,7 +57,7 @@ class EventSchedule:
             heapq.heappop(self._due)[2]()
 
     def stop_before(self, step: int) -> int:
-        """Tell how far the world may be computed towards ``step`` without missing one."""
+        """Return how far the world may be computed towards ``step`` without missing one."""
         return min(step, self._due[0][0]) if self._due else step
 
 
