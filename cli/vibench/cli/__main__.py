@@ -95,7 +95,7 @@ class LateCommand(TyperCommand):
         self._place = place
 
     def get_short_help_str(self, limit: int = 45) -> str:  # noqa: ARG002 - the whole line, as it is
-        """Give the line of the list of commands."""
+        """Return the line of the list of commands."""
         return self._place.summary
 
     def make_context(self, info_name: str | None, args: list[str], *given: Any, **named: Any) -> Any:
@@ -325,7 +325,7 @@ def _disk_trouble(error: Exception) -> str:
 
 
 def _shortage(error: BaseException | None) -> str:
-    """Say which limit is behind an error, which libraries may have wrapped; empty if none is."""
+    """Return which limit is behind an error, which libraries may have wrapped; empty if none is."""
     if error is None:
         return ""
     text = str(error)

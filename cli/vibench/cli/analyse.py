@@ -273,5 +273,5 @@ def complain_about(results: CampaignResults) -> None:
 
 
 def _named(failure: AnalysisFailure) -> str:
-    """Give the sentence, with the recording's name where it does not say it itself."""
+    """Return the sentence, with the recording's name where it does not say it itself."""
     return failure.sentence if failure.name in failure.sentence else f"{failure.name}: {failure.sentence}"

@@ -32,7 +32,7 @@ class Analyst:
         self._pool.poll()
 
     def results(self) -> Iterator[CampaignResults]:
-        """Give the results one by one; waits for those that are not ready.
+        """Yield the results one by one; waits for those that are not ready.
 
         Raises AnalysisError when the process ended before it was done.
         """
@@ -51,7 +51,7 @@ class Analyst:
                     yield results
 
     def together(self) -> CampaignResults:
-        """Give the results as one campaign's."""
+        """Return the results as one campaign's."""
         return merged_results(self._name, tuple(self.results()))
 
 

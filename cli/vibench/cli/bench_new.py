@@ -62,7 +62,7 @@ class Answers:
         return answer
 
     def wired(self, pair: str) -> str:
-        """Say whether a pair of ends is plugged in."""
+        """Return whether a pair of ends is plugged in."""
         answer = self.given.get(_WIRED, "")
         console.print(f"Plug {pair}: {answer}")
         return "" if answer.strip().casefold() in _NOT_YET else answer
@@ -178,6 +178,6 @@ def _day(rig: Rig, target: Path, operator: str, given: Answers | None) -> DayPag
 
 
 def _free(path: Path) -> Path:
-    """Give the path, or the next of its name that nothing has."""
+    """Return the path, or the next of its name that nothing has."""
     names = (path.with_name(f"{path.stem}_{number}{path.suffix}") for number in range(2, 1000))
     return path if not path.exists() else next(name for name in names if not name.exists())

@@ -67,7 +67,7 @@ def doctor(as_json: AsJson = False) -> None:
 
 
 def installation() -> dict[str, str]:
-    """Give versions and places of vibench, Python and system."""
+    """Return versions and places of vibench, Python and system."""
     library = " ".join(platform.libc_ver()).strip()
     return {
         "version": version("vibench"),
@@ -79,7 +79,7 @@ def installation() -> dict[str, str]:
 
 
 def libraries() -> Iterator[tuple[str, str]]:
-    """Give the version of each library that vibench asks for; of one that is missing, who brings it."""
+    """Yield the version of each library that vibench asks for; of one that is missing, who brings it."""
     asking: dict[str, list[str]] = {}
     for requirement in requires("vibench") or ():
         name = re.split(r"[^\w.-]", requirement, maxsplit=1)[0]
@@ -110,7 +110,7 @@ def engine() -> Iterator[tuple[str, str]]:
 
 
 def folders() -> Iterator[tuple[str, str]]:
-    """Give where vibench keeps what it learns, and whether it may write there."""
+    """Yield where vibench keeps what it learns, and whether it may write there."""
     yield "state", _place(state_place())
     yield "this folder", _place(Path.cwd())
 
@@ -122,7 +122,7 @@ def _place(folder: Path) -> str:
 
 
 def instruments() -> Iterator[tuple[str, str]]:
-    """Give what can be seen of instruments, and what stands in between: libraries, drivers, permissions."""
+    """Yield what can be seen of instruments, and what stands in between: libraries, drivers, permissions."""
     try:
         need_extra("bench")
     except MissingLibrary as error:

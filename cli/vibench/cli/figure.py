@@ -78,7 +78,7 @@ def _numbers(asked: str) -> tuple[int, ...]:
 
 
 def _experiment(folder: Path | None, wanted: list[int]) -> "Callable[[int], Iterator[DrawnFigure]]":
-    """Give what draws the figures of the experiment; the recordings are analysed once."""
+    """Return what draws the figures of the experiment; the recordings are analysed once."""
     if not wanted:
         return lambda _: iter(())
     if folder is None:

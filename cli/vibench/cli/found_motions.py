@@ -11,7 +11,7 @@ _SHOWN = 24
 
 
 def share_text(point: ScenePrediction) -> str:
-    """Say how many starts came to the motion of a point, of how many; nothing where the start decides."""
+    """Return how many starts came to the motion of a point, of how many; nothing where the start decides."""
     match point:
         case ScenePrediction(ensemble=Ensemble() as ensemble):
             return f"{ensemble.motions[ensemble.asked].starts}/{ensemble.starts}"
@@ -50,7 +50,7 @@ def motion_text(motion: FoundMotion) -> str:
 
 
 def forgetting_text(points: Sequence[ScenePrediction]) -> str:
-    """Say where starts were forgotten, and what following others took; nothing where none was."""
+    """Return where starts were forgotten, and what following others took; nothing where none was."""
     lost = [point for point in points if point.memory is StartMemory.LOST]
     if not lost:
         return ""

@@ -148,7 +148,7 @@ def _roughness(results: MapResults) -> UncertaintyExponent | None:
 
 
 def document(results: MapResults, stability: tuple[KickStability, ...], file: Path) -> dict[str, object]:
-    """Say what a map holds, for other programs; its points are in the file."""
+    """Return what a map holds, for other programs; its points are in the file."""
     audit = results.audit
     rough = _roughness(results)
     return {

@@ -114,7 +114,7 @@ MailPath = Annotated[
 
 
 def messengers_of(notify: str | None, mail: Path | None) -> tuple[Messenger, ...]:
-    """Give the ways to reach somebody that were asked for; raises ConfigurationError."""
+    """Return the ways to reach somebody that were asked for; raises ConfigurationError."""
     found: list[Messenger] = []
     if notify is not None:
         found.append(CommandMessenger.of(notify))

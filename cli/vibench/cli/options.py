@@ -140,7 +140,7 @@ def _plain(annotation: Any) -> Any:
 
 
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Give a command's function the signature that typer reads, with an option for every field it asks for.
+    """Return a command's function the signature that typer reads, with an option for every field it asks for.
 
     A switch is typed as its name alone; ``--no-name`` exists only where a declaration says so.
     """

@@ -48,7 +48,7 @@ def bold(text: object) -> Text:
 
 
 def paragraph(text: str) -> Text:
-    """Give a text of several lines to a console."""
+    """Return a text of several lines to a console."""
     return Text(text)
 
 

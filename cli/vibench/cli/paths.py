@@ -85,7 +85,7 @@ def room_for_page(path: Path) -> None:
 
 
 def file_at(out: Path | None, usual: Path) -> Path:
-    """Give the path of a new file: the one that was named, or in a folder that was, by its usual name.
+    """Return the path of a new file: the one that was named, or in a folder that was, by its usual name.
 
     What is named without a suffix where nothing is, is a folder that is wanted: it is made.
     """
@@ -97,7 +97,7 @@ def file_at(out: Path | None, usual: Path) -> Path:
 
 
 def unused(path: Path) -> Path:
-    """Give a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
+    """Return a path that is not taken: the wish itself, or with -2, -3, ... before its suffix."""
     candidate, number = path, 1
     while candidate.exists():
         number += 1

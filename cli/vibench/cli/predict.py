@@ -141,7 +141,7 @@ def _budget(text: str) -> float:
 
 
 def _explanation(study: Study, points: Sequence[ScenePrediction], taken_s: Sequence[float]) -> str:
-    """Say how the points are answered: one passage for each run of points that are answered alike."""
+    """Return how the points are answered: one passage for each run of points that are answered alike."""
     from vibench.sim import measure_cost, plan_scene
 
     scenes = [study.scene((0, 0, 0, 0, 0, index), Rest()) for index in range(len(study.frequencies_hz))]

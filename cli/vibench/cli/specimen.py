@@ -57,7 +57,7 @@ def show_specimen(
 
 
 def figures_of(specimen: Specimen) -> dict[str, object]:
-    """Say what follows from a specimen's numbers: stiffnesses, resonances, damping ratios."""
+    """Return what follows from a specimen's numbers: stiffnesses, resonances, damping ratios."""
     return {
         "masses_kg": specimen.masses,
         "stiffnesses_n_per_m": specimen.stiffnesses,

@@ -71,7 +71,7 @@ def tell_work(study: Study, as_json: bool) -> None:
 
 
 def document(results: StudyResults, out: Path) -> dict[str, object]:
-    """Say what a file holds, for other programs; the numbers themselves are in it."""
+    """Return what a file holds, for other programs; the numbers themselves are in it."""
     return {
         "file": str(out),
         "points": results.study.grid.size,

@@ -154,7 +154,7 @@ class _Following:
 
 
 def _worth(newest: LiveMotion, step: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Give a forecast and its errors as far as it is worth anything, nothing where none was tried yet."""
+    """Return a forecast and its errors as far as it is worth anything, nothing where none was tried yet."""
     if newest.forecast is None:
         return (), ()
     error = newest.forecast.error
