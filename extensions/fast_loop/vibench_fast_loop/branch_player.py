@@ -72,7 +72,7 @@ class BranchPlayer:
         """Of deviations of blocks from their means in earlier looks, and how many there were."""
 
     def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
-        """Give what the controller is told."""
+        """Return what the controller is told."""
         program = LoopProgram(
             frequency_hz=setting.frequency_hz,
             reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),

@@ -104,7 +104,7 @@ class BranchSolver:
         self._begin = self._packed(start)
 
     def first(self) -> Foreseen:
-        """Give the start, whose frequency stays."""
+        """Return the start, whose frequency stays."""
         along = np.array([1.0, 0.0, 0.0])
         return Foreseen(self._begin, along * self._begin[0], along, 0.0)
 
@@ -123,7 +123,7 @@ class BranchSolver:
         return Foreseen(here.unknowns + length * moved, here.place + length * along, along, length)
 
     def setting(self, unknowns: Vector) -> LoopSetting:
-        """Give what is played."""
+        """Return what is played."""
         volts = np.exp(_REFERENCE_STEP * unknowns[1]) * self._volts[0]
         rest = (unknowns[2::2] + 1j * unknowns[3::2]) * self._volts[1:]
         return LoopSetting(
@@ -176,7 +176,7 @@ def is_new(seen: Seen, foreseen: Foreseen) -> bool:
 
 
 def residual_of(base_m: Coefficients, level_m: float) -> Vector:
-    """Give what of the base is wrong, over its level: amplitude of the fundamental, then each harmonic.
+    """Return what of the base is wrong, over its level: amplitude of the fundamental, then each harmonic.
 
     Parameters
     ----------
@@ -191,12 +191,12 @@ def residual_of(base_m: Coefficients, level_m: float) -> Vector:
 
 
 def noise_of(base_u: Vector, ratio_u: float) -> Vector:
-    """Give the standard errors of residual and ratio, from those of the base's harmonics over its level."""
+    """Return the standard errors of residual and ratio, from those of the base's harmonics over its level."""
     return np.concatenate([base_u[:1], np.repeat(base_u[1:], 2), [ratio_u, ratio_u]])
 
 
 def _behind(points: Sequence[Seen]) -> Seen:
-    """Give the latest point from which the chord to the last one is a direction, else the first."""
+    """Return the latest point from which the chord to the last one is a direction, else the first."""
     here = points[-1]
     for there in reversed(points[1:-1]):
         error = float(np.linalg.norm([here.noise[-_RATIO:], there.noise[-_RATIO:]]))

@@ -264,7 +264,7 @@ def perturbed_stability(
 
 
 def _changes(count: int, seed: int) -> Coefficients:
-    """Give corners of a square at random, shape (count, coefficients)."""
+    """Return corners of a square at random, shape (count, coefficients)."""
     corners = np.random.default_rng(seed).integers(0, 4, (count, len(_CHANGED)))
     return np.asarray(np.exp(1j * np.pi * (0.25 + 0.5 * corners)))
 

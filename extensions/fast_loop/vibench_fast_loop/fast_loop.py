@@ -58,7 +58,7 @@ class FastLoop:
         )
 
     def gains(self, frequency_hz: float, harmonics: int) -> Coefficients:
-        """Give base displacement over volts at each harmonic, by the model [m/V], shape (harmonics,)."""
+        """Return base displacement over volts at each harmonic, by the model [m/V], shape (harmonics,)."""
         orders = range(1, harmonics + 1)
         return np.array([loop_transfer(self.plant, self.law, k * frequency_hz) for k in orders])
 
@@ -142,12 +142,12 @@ def require_held(fast: FastLoop, plan: BranchContinuation) -> None:
 
 
 def level_at(plan: BranchContinuation, frequency_hz: float) -> float:
-    """Give the amplitude of the base's displacement that is held [m]."""
+    """Return the amplitude of the base's displacement that is held [m]."""
     return plan.base_level.acceleration_at(frequency_hz) / (2 * pi * frequency_hz) ** 2
 
 
 def _units_per_volt(rig: Rig) -> tuple[float, float]:
-    """Give base acceleration and m0 velocity per volt of their sensors [m/s2 per V, m/s per V]."""
+    """Return base acceleration and m0 velocity per volt of their sensors [m/s2 per V, m/s per V]."""
     return 1 / rig.accelerometer.sensitivity_v_per_m_per_s2, rig.vibrometer.range_mm_per_s_per_v * 1e-3
 
 
@@ -265,7 +265,7 @@ def impact_branch(
 def _last_held(
     plant: SampledPlant, law: LinearLaw, branch: Branch, points: Points, held: Floats, allowed: float
 ) -> int | None:
-    """Give the last motion of a branch up to which a law holds every one; None where it loses the first."""
+    """Return the last motion of a branch up to which a law holds every one; None where it loses the first."""
     first = int(np.argmax(held > allowed))
     if held[first] <= allowed:
         return int(points[-1])
@@ -282,7 +282,7 @@ def _last_held(
 
 
 def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, points: Iterable[int]) -> Floats:
-    """Give the largest multiplier over a period of motions of a branch, with the law acting.
+    """Return the largest multiplier over a period of motions of a branch, with the law acting.
 
     Parameters
     ----------
@@ -306,7 +306,7 @@ def branch_multipliers(plant: SampledPlant, law: LinearLaw, branch: Branch, poin
 def motion_slopes(
     specimen: Specimen, branch: Branch, point: int, rate_hz: float
 ) -> tuple[Floats, Floats, int, int]:
-    """Give the slopes of the spring's force along one motion of a branch, with all its harmonics.
+    """Return the slopes of the spring's force along one motion of a branch, with all its harmonics.
 
     Parameters
     ----------

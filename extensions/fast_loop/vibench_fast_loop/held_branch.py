@@ -95,7 +95,7 @@ def held_branch(notes: Sequence[FeedbackNote]) -> HeldBranch:
 
 
 def branch_sentences(notes: Sequence[FeedbackNote]) -> tuple[str, ...]:
-    """Say how far a branch was followed, and what it turned at."""
+    """Return how far a branch was followed, and what it turned at."""
     found, ends = held_branch(notes), [each for each in notes if isinstance(each, BranchEndNote)]
     if not found.frequency_hz.size:
         return ("No motion of the branch was held.",)

@@ -136,7 +136,7 @@ def _weighed(plant: SampledPlant, weights: LawWeights) -> _Weighed:
 
 
 def _expected_cost(problem: _Weighed, law: LinearLaw) -> float:
-    """Give what motion and volts cost a sample in the mean, under noise; infinite where they grow."""
+    """Return what motion and volts cost a sample in the mean, under noise; infinite where they grow."""
     answer = np.hstack([law.direct @ problem.shown, law.output])[0]
     own = len(problem.step)
     closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.shown, law.step])])
@@ -165,7 +165,7 @@ def loop_multiplier(
     periods: int = 1,
     parts: int = 1,
 ) -> float:
-    """Give the largest multiplier over a period of a motion, with the law acting: below 1 it is held.
+    """Return the largest multiplier over a period of a motion, with the law acting: below 1 it is held.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def loop_multiplier(
 
 
 def loop_transfer(plant: SampledPlant, law: LinearLaw, frequency_hz: float) -> complex:
-    """Give the base's displacement per volt of what is played beside the law's answer [m/V].
+    """Return the base's displacement per volt of what is played beside the law's answer [m/V].
 
     The phases are those at the moments of the samples; the motion is that without stops.
     """

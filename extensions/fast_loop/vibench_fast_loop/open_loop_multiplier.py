@@ -113,7 +113,7 @@ def open_loop_multiplier(motion: PerturbedMotion) -> OpenLoopMultiplier:
 
 
 def envelope_deviation(signal: Vector, period: float) -> float:
-    """Give the rms deviation of a signal's fundamental from its mean and drift, over that mean.
+    """Return the rms deviation of a signal's fundamental from its mean and drift, over that mean.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def _turn(motion: PerturbedMotion) -> Complexes:
 
 
 def _envelope(signal: Vector, turn: Complexes, period: float, order: int) -> Complexes:
-    """Give a derivative of an envelope, per period, under a window cos^4 of several periods."""
+    """Return a derivative of an envelope, per period, under a window cos^4 of several periods."""
     half = round(_HALF * period)
     place = np.arange(-half, half + 1) / half * np.pi / 2
     per_period = np.pi / 2 * period / half
