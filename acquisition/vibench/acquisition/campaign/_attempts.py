@@ -210,7 +210,7 @@ class Attempts:
 
 
 def _seal_of(path: Path) -> str:
-    """Give the seal that a recording got at its end; empty where it came to none."""
+    """Return the seal that a recording got at its end; empty where it came to none."""
     try:
         with open_recording(path) as recording:
             return recording.seal
@@ -219,7 +219,7 @@ def _seal_of(path: Path) -> str:
 
 
 def _over_range(path: Path, labels: Collection[str]) -> str:
-    """Say which inputs were near full scale while it counted; empty when none was, or it is gone."""
+    """Return which inputs were near full scale while it counted; empty when none was, or it is gone."""
     if not path.exists():  # a complete recording belongs to the user, who may have moved it already
         return ""
     with open_recording(path) as recording:

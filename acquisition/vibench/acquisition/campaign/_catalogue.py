@@ -78,7 +78,7 @@ class CatalogueEntry:
 
 
 def place_below(folder: Path, path: Path) -> str:
-    """Say where a recording lies; of a name that is no text, as much as can be said."""
+    """Return where a recording lies; of a name that is no text, as much as can be said."""
     return os.fsencode(path.relative_to(folder).as_posix()).decode(errors="replace")
 
 
@@ -136,7 +136,7 @@ def _band(excitation: dict[str, Any]) -> tuple[float | None, float | None]:
 
 
 def _number(value: object) -> float | None:
-    """Give a number that a plan says, whatever version wrote it; None for anything else."""
+    """Return a number that a plan says, whatever version wrote it; None for anything else."""
     try:
         return float(value) if isinstance(value, int | float) else None
     except OverflowError:
@@ -258,12 +258,12 @@ def _update(folder: Path, connection: sqlite3.Connection) -> None:
 
 
 def _stamp(found: os.stat_result) -> str:
-    """Give what differs after any write: no program sets back the time that the file system noted."""
+    """Return what differs after any write: no program sets back the time that the file system noted."""
     return f"{found.st_ino} {found.st_size} {found.st_mtime_ns} {found.st_ctime_ns}"
 
 
 def recordings_below(folder: Path) -> Iterator[Path]:
-    """Give every recording of a folder and the folders in it, finished or not."""
+    """Yield every recording of a folder and the folders in it, finished or not."""
     yield from sorted(folder.rglob(f"*{SUFFIX}"))
     yield from sorted(folder.rglob(f"*{SUFFIX}{PART_SUFFIX}"))
 

@@ -158,7 +158,7 @@ def require_all_within_limits(points: tuple[Point, ...], bench: Bench) -> None:
 def planned_recordings(
     campaign: Campaign, folder: Path, existing: ExistingRecordings
 ) -> tuple[PlannedRecording, ...]:
-    """Say which recordings are to be made and which are there; touches nothing.
+    """Return which recordings are to be made and which are there; touches nothing.
 
     Raises
     ------

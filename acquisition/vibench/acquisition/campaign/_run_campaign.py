@@ -466,5 +466,5 @@ def estimate_campaign(
 
 
 def _existing_part(folder: Path) -> Path:
-    """Give the folder, or the nearest one above it that exists already."""
+    """Return the folder, or the nearest one above it that exists already."""
     return next(each for each in (folder.resolve(), *folder.resolve().parents) if each.exists())

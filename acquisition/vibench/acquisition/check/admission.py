@@ -53,7 +53,7 @@ def archive_path(rig_name: str, *, passed: bool = False) -> Path:
 
 
 def last_check(rig_name: str) -> CheckResult | None:
-    """Give the last check of a rig; None when there is none, or none that this version can read.
+    """Return the last check of a rig; None when there is none, or none that this version can read.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def last_check(rig_name: str) -> CheckResult | None:
 
 
 def last_passed(rig: Rig) -> CheckResult | None:
-    """Give the last check of a rig, as it is configured now, that did not fail; None when there is none."""
+    """Return the last check of a rig, as it is configured now, that did not fail; None when there is none."""
     for each in (_read(archive_path(rig.name, passed=True)), last_check(rig.name)):
         if each and each.verdict is not Verdict.FAIL and each.rig_digest == rig_digest(rig):
             return each
@@ -268,7 +268,7 @@ def require_on_record(bench: Bench, clock: Clock = utc_now) -> None:
 
 
 def why_not(last: CheckResult | None, rig: Rig, now: datetime) -> str | None:
-    """Say why a check does not hold for a rig, in one clause; None when it does."""
+    """Return why a check does not hold for a rig, in one clause; None when it does."""
     if last is None:
         return f"the bench {rig.name!r} was never checked on this account"
     when = f"the last check of {rig.name!r}, at {last.checked:%Y-%m-%d %H:%M %Z},"
@@ -291,7 +291,7 @@ def _passed(result: CheckResult) -> CheckResult:
 
 
 def _output_after(result: CheckResult) -> str:
-    """Say whether the output is off, as far as the check has measured it."""
+    """Return whether the output is off, as far as the check has measured it."""
     left = next((each for each in result.findings if each.name == DRIVE_LEFT), None)
     if left is None or left.verdict is Verdict.FAIL:
         return "THE OUTPUT MAY STILL BE ON: switch the amplifier off by hand,"

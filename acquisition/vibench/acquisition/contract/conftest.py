@@ -46,7 +46,7 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Give a bench for each kind of plug-in that bears the name, or refuse what no test could use."""
+    """Return a bench for each kind of plug-in that bears the name, or refuse what no test could use."""
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
@@ -79,7 +79,7 @@ def pytest_collection_modifyitems(config: pytest.Config) -> None:
 
 @pytest.fixture(scope="module")
 def rig(request: pytest.FixtureRequest) -> Rig:
-    """Give the bench's configuration; the module under way says of which kind its instrument is."""
+    """Return the bench's configuration; the module under way says of which kind its instrument is."""
     name, kind = request.config.getoption("--vibench-instrument"), request.module.KIND
     rigs = request.config.stash[_RIGS]
     if kind not in rigs:

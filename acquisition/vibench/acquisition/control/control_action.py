@@ -72,7 +72,7 @@ class MeasuredLevel:
     uncertainty: float
 
     def held(self, target: float, tolerance: float) -> Held:
-        """Say whether it lies within a share of ``target``."""
+        """Return whether it lies within a share of ``target``."""
         return Held.WITHIN if abs(self.amplitude / target - 1) <= tolerance else Held.OUTSIDE
 
 
@@ -101,7 +101,7 @@ class LevelControl:
     """Smallest setting that the generator takes [V]."""
 
     def next_vpp(self, setting_vpp: float, measured: MeasuredLevel, target: float) -> float:
-        """Give the next setting; the same one when the level is held, or the error may be chance [V]."""
+        """Return the next setting; the same one when the level is held, or the error may be chance [V]."""
         if measured.amplitude <= 0.0:
             return setting_vpp
         error = abs(measured.amplitude / target - 1)

@@ -36,7 +36,7 @@ class FeedbackChannels:
     sample_rate_hz: float
 
     def rows(self, samples: PhaseSamples) -> tuple[Samples, Samples, Samples]:
-        """Give drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,).
+        """Return drive [V], base acceleration [m/s2] and m0 velocity [m/s], each of shape (samples,).
 
         Where the vibrometer lost its light the motion is bridged.
         """

@@ -93,14 +93,14 @@ class PhaseLaw:
         return error_rad, max(left, bends)
 
     def next_hz(self, frequency_hz: float, base: float) -> float:
-        """Give the next frequency, within the plan's band; the base will move with ``base`` [m/s2]."""
+        """Return the next frequency, within the plan's band; the base will move with ``base`` [m/s2]."""
         foreseen_hz = self._bend_hz * (1.0 - self._kept(frequency_hz)) * log(base / self._grown)
         widest_hz = self._plan.widest_step_hz
         step_hz = min(max(foreseen_hz + self._off_hz(frequency_hz), -widest_hz), widest_hz)
         return min(max(frequency_hz + step_hz, self._plan.low_hz), self._plan.high_hz)
 
     def learnt(self, found: SettledState, error_rad: float) -> LearntMode:
-        """Give the half-width that explains how the phase drifted from look to look, and the bend.
+        """Return the half-width that explains how the phase drifted from look to look, and the bend.
 
         Where nothing near the half-width before explains it, the motion is another one: it stays.
         """
@@ -132,7 +132,7 @@ class PhaseLaw:
         return LearntMode(self._mode.narrowest_hz, width_hz, bend_hz, steeper_hz)
 
     def _off_hz(self, frequency_hz: float) -> float:
-        """Give how far the frequency goes for what the newest looks show of the phase."""
+        """Return how far the frequency goes for what the newest looks show of the phase."""
         if not self._looks:
             return 0.0
         error_rad = self._looks[-1][1]
@@ -144,7 +144,7 @@ class PhaseLaw:
         return self._gain * error_rad * self._mode.half_width_hz + _GAIN * drifted_hz
 
     def _kept(self, frequency_hz: float) -> float:
-        """Give the share of a motion that the mode has not forgotten after a look."""
+        """Return the share of a motion that the mode has not forgotten after a look."""
         return exp(-2 * pi * self._mode.half_width_hz * self._turns / frequency_hz)
 
 
@@ -196,7 +196,7 @@ class PhaseSearch:
     """Whether the phase goes as that of a linear mode; of another its slope is known close by alone."""
 
     def next_hz(self) -> float:
-        """Give the next frequency to try, after at least one."""
+        """Return the next frequency to try, after at least one."""
         last = self.tries[-1]
         if len(self.tries) == 1:
             step_hz = 0.5 * self.widest_step_hz

@@ -177,7 +177,7 @@ def _locked(
 
 
 def _first_change(loop: SineLoop, level: BaseLevel, last: TrackedPlace) -> float:
-    """Give the factor by which the setting changes at first when the level does.
+    """Return the factor by which the setting changes at first when the level does.
 
     A specimen that holds a light table back to a share of its motion does so only when it has grown: at once
     the base moves by the whole change of the setting, over that share.
@@ -289,7 +289,7 @@ def _is_there(plan: ResonanceTracking, found: SettledState) -> bool:
 
 
 def _open_phase_deg(plan: ResonanceTracking, found: SettledState) -> float:
-    """Give what both sensors' phases and sensitivities leave open of the phase [degrees].
+    """Return what both sensors' phases and sensitivities leave open of the phase [degrees].
 
     Of a super- or subharmonic also what its motion may have to go still; a subharmonic one creeps, too slowly
     to be seen from one look to the next, so that all counts which passes for settled.

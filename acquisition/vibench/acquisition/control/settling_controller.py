@@ -179,7 +179,7 @@ class SettlingController:
         return measured_level(periods.base[periods.count // 2 :])
 
     def prompt_vpp(self, measured: MeasuredLevel, frequency_hz: float) -> float:
-        """Give the setting that brings a motion without scatter to its level at another frequency [V]."""
+        """Return the setting that brings a motion without scatter to its level at another frequency [V]."""
         assert self.level is not None
         control = LevelControl(self.level, self.loop.most_vpp, self.loop.least_vpp)
         seen = MeasuredLevel(measured.amplitude, 0.0)
@@ -188,7 +188,7 @@ class SettlingController:
         return float(now_vpp * (next_vpp / now_vpp) ** _PROMPT)
 
     def held(self, measured: MeasuredLevel) -> Held:
-        """Say whether a measured level is the one to be held."""
+        """Return whether a measured level is the one to be held."""
         if self.level is None:
             return Held.OPEN
         return measured.held(self._target, self.level.tolerance)

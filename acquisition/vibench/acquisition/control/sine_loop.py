@@ -69,7 +69,7 @@ class GainEstimator:
 
     @property
     def level(self) -> float:
-        """Give the mean amplitude over the track, as a share of what should be held."""
+        """Return the mean amplitude over the track, as a share of what should be held."""
         if not self._answers:
             return 1.0
         return float(abs(np.mean([each.level for each in self._answers])))
@@ -268,7 +268,7 @@ def followed(loop: SineLoop, level: BaseLevel | None, estimator: GainEstimator) 
 
 
 def _modelled_vpp(loop: SineLoop, level: BaseLevel) -> float:
-    """Give the setting that the bare table needs for the level at the frequency of now [V]."""
+    """Return the setting that the bare table needs for the level at the frequency of now [V]."""
     return _bare_vpp(loop, level, loop.setting.frequency_hz)
 
 
@@ -326,7 +326,7 @@ def _brought(loop: SineLoop, plan: HeldResponse) -> Controller[None]:
 
 
 def response_of(loop: SineLoop, plan: HeldResponse) -> tuple[float, float, float]:
-    """Give the response [m], m0 over base, and the base's acceleration [m/s2]: amplitudes, newer half."""
+    """Return the response [m], m0 over base, and the base's acceleration [m/s2]: amplitudes, newer half."""
     periods, frequency_hz = loop.periods, loop.setting.frequency_hz
     newer = slice(periods.count // 2, None)
     base, response = periods.base[newer], periods.response[newer, 1]

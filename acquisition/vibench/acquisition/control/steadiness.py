@@ -55,7 +55,7 @@ class DriveClock:
         self._draw_line()
 
     def starts_s(self, first_s: float, last_s: float) -> Samples:
-        """Give the times between two times at which the drive rises through zero [s]."""
+        """Return the times between two times at which the drive rises through zero [s]."""
         first = np.ceil(self.frequency_hz * first_s + self.phase_cycles - 1e-6)
         last = np.floor(self.frequency_hz * last_s + self.phase_cycles)
         return np.asarray((np.arange(first, last + 1) - self.phase_cycles) / self.frequency_hz)
@@ -94,7 +94,7 @@ class Periods:
         return len(self.base)
 
     def last(self, count: int) -> "Periods":
-        """Give the newest ``count`` periods."""
+        """Return the newest ``count`` periods."""
         return Periods(self.base[-count:], self.response[-count:])
 
 
@@ -138,7 +138,7 @@ class Stroboscope:
         self._keep_from(starts_s[-1])
 
     def periods(self) -> Periods:
-        """Give all periods so far."""
+        """Return all periods so far."""
         if not self._base:
             return Periods(np.empty(0, np.complex128), np.empty((0, ORDERS), np.complex128))
         return Periods(np.concatenate(self._base), np.concatenate(self._response))
@@ -150,7 +150,7 @@ class Stroboscope:
 
     @staticmethod
     def noise_of(signal: Samples, frequency_hz: float, sample_rate_hz: float) -> float:
-        """Give the rms that a channel in silence, shape (samples,), shows in the orders of a frequency."""
+        """Return the rms that a channel in silence, shape (samples,), shows in the orders of a frequency."""
         turns = frequency_hz / sample_rate_hz
         count = int((len(signal) - 1) * turns)
         if count < 1:
@@ -333,7 +333,7 @@ def _repeats(figures: Judgement, tolerance: float) -> bool:
 
 
 def _allowed(figures: Judgement, tolerance: float) -> float:
-    """Give the scatter up to which a motion repeats as far as can be seen."""
+    """Return the scatter up to which a motion repeats as far as can be seen."""
     return hypot(tolerance, _NOISE_MARGIN * figures.noise)
 
 

@@ -48,7 +48,7 @@ class DaqmxSession:
         return "this computer" if self.server is None else f"the device server at {self.server}"
 
     def system(self) -> System:
-        """Give access to devices and driver version."""
+        """Return access to devices and driver version."""
         return System.local() if self.options is None else System.remote(self.options)
 
     def close(self) -> None:

@@ -350,7 +350,7 @@ def _require_calibration(rig: Rig) -> None:
 
 
 def _input(channel: Channel, rig: Rig) -> int:
-    """Give the number of a card's input; raises ConfigurationError for what no card can do."""
+    """Return the number of a card's input; raises ConfigurationError for what no card can do."""
     name = channel.physical.rpartition("/")[2]
     full_scale_v = float(rig.daq.options["input_full_scale_v"])
     if (
@@ -368,7 +368,7 @@ def _input(channel: Channel, rig: Rig) -> int:
 
 
 def _number(name: str, side: str) -> int:
-    """Give the number of an input or output, counted from 0."""
+    """Return the number of an input or output, counted from 0."""
     number = name.removeprefix(side)
     if number == name or not number.isdecimal():
         raise ConfigurationError(

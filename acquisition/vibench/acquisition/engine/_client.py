@@ -123,7 +123,7 @@ def the_engine(pid: int | None) -> Announcement:
 
 
 def programs_to_stop(pid: int | None) -> tuple[Program, ...]:
-    """Give what a stop is meant for: engines, and scripts and checks that drive a bench themselves.
+    """Return what a stop is meant for: engines, and scripts and checks that drive a bench themselves.
 
     Those of other containers on this computer are among them; what is left in the state folder reaches them.
 

@@ -35,7 +35,7 @@ from ._verbs import CampaignRequest
 
 
 def bench_facts(bench: Bench) -> BenchFacts:
-    """Say which bench is open."""
+    """Return which bench is open."""
     return BenchFacts(
         rig_name=bench.rig.name,
         is_simulated=bench.rig.virtual is not None,

@@ -96,7 +96,7 @@ class SampleBuffer:
                 self._blocks.popleft()
 
     def since(self, sample: int, most: int) -> SampleSlice:
-        """Give what is held from ``sample`` on, the newest ``most`` of it."""
+        """Return what is held from ``sample`` on, the newest ``most`` of it."""
         with self._lock:
             blocks = tuple(self._blocks)
             end, run_id, rate_hz, channels = self._end, self._run_id, self._rate_hz, self._channels
@@ -197,7 +197,7 @@ class PublishedState:
         return self._status.state
 
     def status(self) -> EngineStatus:
-        """Give the newest of everything but the samples."""
+        """Return the newest of everything but the samples."""
         status = self._status
         armed = status.armed
         if armed is not None:
@@ -346,7 +346,7 @@ def _queued(campaign: Campaign) -> tuple[RowStatus, ...]:
 
 
 def levels_of(block: Block, channels: tuple[ChannelFacts, ...]) -> tuple[ChannelLevel, ...]:
-    """Say how far each channel was driven, of its full scale."""
+    """Return how far each channel was driven, of its full scale."""
     peaks = np.max(np.abs(block.volts), axis=1)
     rms = np.sqrt(np.mean(block.volts**2, axis=1))
     return tuple(

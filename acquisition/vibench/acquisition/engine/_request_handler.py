@@ -169,18 +169,18 @@ class RequestHandler:
         self._still_s = still_s
 
     def status(self) -> EngineStatus:
-        """Say where the engine stands."""
+        """Return where the engine stands."""
         status = self._engine.published.status()
         is_left_alone = self._is_orphan and not self._is_looked_after
         return status.model_copy(update={"is_left_alone": is_left_alone}) if is_left_alone else status
 
     def status_since(self, known_rows: int = -1) -> EngineStatus:
-        """Say where the engine stands, and leave out rows that are known."""
+        """Return where the engine stands, and leave out rows that are known."""
         status = self.status()
         return status.model_copy(update={"rows": ()}) if status.rows_number == known_rows else status
 
     def look(self, since_sample: int = 0, *, most: int) -> SampleSlice:
-        """Give the newest samples of the run."""
+        """Return the newest samples of the run."""
         return self._engine.published.sample_buffer.since(since_sample, most)
 
     def open(self, rig: Rig, confirmations: KnobSheet | None = None) -> None:
@@ -255,7 +255,7 @@ class RequestHandler:
         self._engine.switch.tell_change(text)
 
     def open_rig(self) -> Rig:
-        """Give the configuration of the open bench."""
+        """Return the configuration of the open bench."""
         rig = self._engine.rig
         if rig is None:
             raise EngineError(
@@ -264,7 +264,7 @@ class RequestHandler:
         return rig
 
     def carried_request(self) -> CampaignRequest:
-        """Give the campaign that was started last, and how."""
+        """Return the campaign that was started last, and how."""
         if self._carried is None:
             raise EngineError("nothing was started by a request to this engine; arm and start a campaign")
         return self._carried

@@ -293,7 +293,7 @@ class TwinProcess:
                     process.stderr.close()
 
     def last_words(self) -> str | None:
-        """Say why it has ended by itself, once; None while it runs or is off."""
+        """Return why it has ended by itself, once; None while it runs or is off."""
         process = self._process
         if process is None or process.poll() is None:
             return None

@@ -236,12 +236,12 @@ class EngineVerbs:
 
     @verb("rig", RIG)
     def open_rig(self) -> Rig:
-        """Give the configuration of the open bench."""
+        """Return the configuration of the open bench."""
         raise NotImplementedError
 
     @verb("request", REQUESTED)
     def carried_request(self) -> CampaignRequest:
-        """Give the campaign that was started last, and how: for a viewer that did not arm it."""
+        """Return the campaign that was started last, and how: for a viewer that did not arm it."""
         raise NotImplementedError
 
     @verb("twin", DONE)
@@ -263,7 +263,7 @@ class EngineVerbs:
 
     @verb("look", SAMPLES)
     def look(self, since_sample: NonNegativeInt = 0, *, most: PositiveInt) -> SampleSlice:
-        """Give the newest samples of the run: from ``since_sample`` on, at most ``most`` a channel."""
+        """Return the newest samples of the run: from ``since_sample`` on, at most ``most`` a channel."""
         raise NotImplementedError
 
     @verb("shutdown", DONE)

@@ -62,7 +62,7 @@ def _of_packages() -> Iterator[type[AbstractExcitation]]:
 
 
 def _words(plan: type[AbstractExcitation]) -> tuple[str, ...]:
-    """Give what a file may give as ``kind``, earlier words too."""
+    """Return what a file may give as ``kind``, earlier words too."""
     kind = plan.model_fields.get("kind")
     words = () if kind is None else get_args(kind.annotation)
     return words if kind is not None and kind.default in words else ()
@@ -149,7 +149,7 @@ def present_word(word: str) -> str:
 def rows_by_kind(
     of_family: Mapping[Family, Row], of_kind: Mapping[str, Row], of_packages: PlugInKind | None = None
 ) -> Mapping[str, Row]:
-    """Give every kind the row of its family, or its own where it has one.
+    """Return every kind the row of its family, or its own where it has one.
 
     Parameters
     ----------

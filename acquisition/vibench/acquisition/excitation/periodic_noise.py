@@ -41,7 +41,7 @@ class BandNoise(AbstractExcitation):
         return self
 
     def level_at(self, frequency_hz: float) -> RmsSetting:
-        """Give the setting of the whole band."""
+        """Return the setting of the whole band."""
         del frequency_hz
         return RmsSetting()
 

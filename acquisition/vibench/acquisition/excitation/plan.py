@@ -151,7 +151,7 @@ class LeadIn(FrozenModel):
 
 
 def around(frequency_hz: float) -> tuple[float, float]:
-    """Give the band in which a single sine is looked at: an octave to either side [Hz]."""
+    """Return the band in which a single sine is looked at: an octave to either side [Hz]."""
     return 0.5 * frequency_hz, 2 * frequency_hz
 
 
@@ -194,7 +194,7 @@ class AbstractExcitation(FrozenModel, ABC):
         return f"{self.amplitude_vpp:g} Vpp"
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Say what decides the motion of the base while a frequency of the band is played: the setting."""
+        """Return what decides the motion of the base while a frequency of the band is played: the setting."""
         del frequency_hz
         return RelativeSetting(1.0)
 
@@ -234,7 +234,7 @@ class AbstractExcitation(FrozenModel, ABC):
         return 0.0
 
     def turned(self, direction: Direction) -> Self | None:
-        """Give the same in a direction; None where the excitation has none of its own, or not this one."""
+        """Return the same in a direction; None where the excitation has none of its own, or not this one."""
         del direction
         return None
 
@@ -313,12 +313,12 @@ class AbstractFeedback(AbstractExcitation):
         return f"base held at {', '.join(words)}, at most {most}" if words else most
 
     def level_at(self, frequency_hz: float) -> LevelAtBase:
-        """Give the highest level that is held; without one the setting is played."""
+        """Return the highest level that is held; without one the setting is played."""
         accelerations = [level.acceleration_at(frequency_hz) for level in self.held_levels]
         return HeldAcceleration(max(accelerations)) if accelerations else RelativeSetting(1.0)
 
     def held_accelerations(self) -> Iterator[tuple[float, float]]:
-        """Give the highest level at every sine that it is expected to play."""
+        """Yield the highest level at every sine that it is expected to play."""
         for step in self.steps():
             match step.play:
                 case Tone(frequency_hz):

@@ -101,7 +101,7 @@ class ResonanceTracking(AbstractFeedback):
         return self.harmonic == self.subharmonic == 1
 
     def motion(self, harmonics: Sequence[complex]) -> complex:
-        """Give the motion whose phase counts, from harmonics of m0 over the base, the first one first.
+        """Return the motion whose phase counts, from harmonics of m0 over the base, the first one first.
 
         The first one is that of m0's own period, which a subharmonic motion has several drives long.
         """

@@ -123,7 +123,7 @@ class MovingSine(AbstractExcitation):
         return Sweep(self.start_hz, self.stop_hz, self.duration_s, self.spacing)
 
     def mean_steps(self) -> Iterator[tuple[float, float]]:
-        """Give mean frequency [Hz] and duration [s] of each step, in the order of time."""
+        """Yield mean frequency [Hz] and duration [s] of each step, in the order of time."""
         # 1e-9 keeps a duration that is a whole number of steps, but for rounding, from growing a sliver.
         count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
         for number in range(count):
@@ -177,7 +177,7 @@ class SineSweep(MovingSine):
         return float((frequency_hz / self.highest_frequency_hz) ** self.hold.power)
 
     def level_at(self, frequency_hz: float) -> RelativeSetting:
-        """Give the setting, as it follows the frequency."""
+        """Return the setting, as it follows the frequency."""
         return RelativeSetting(self.level(frequency_hz))
 
     @property

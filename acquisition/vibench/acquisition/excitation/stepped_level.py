@@ -70,7 +70,7 @@ class SteppedLevel(FixedSine):
         return self._steps() * (self.settle_s + self.record_s)
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give each way through the levels: its direction, and its levels in the order played [V]."""
+        """Yield each way through the levels: its direction, and its levels in the order played [V]."""
         return self.direction.ways(self.rising_vpp)
 
     def steps(self) -> Iterator[Step]:

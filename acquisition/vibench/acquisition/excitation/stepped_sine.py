@@ -106,7 +106,7 @@ class FrequencySteps(AbstractExcitation):
         return self.rising_hz[-1]
 
     def passes(self) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give each way through the list: its direction, and its frequencies in the order played [Hz]."""
+        """Yield each way through the list: its direction, and its frequencies in the order played [Hz]."""
         return self.direction.ways(self.rising_hz)
 
 

@@ -103,7 +103,7 @@ class Direction(StrEnum):
     DOWN_THEN_UP = "down_then_up"
 
     def ways(self, rising: tuple[float, ...]) -> Iterator[tuple[str, tuple[float, ...]]]:
-        """Give each way through what rises: ``"up"`` or ``"down"``, and its values in the order played."""
+        """Yield each way through what rises: ``"up"`` or ``"down"``, and its values in the order played."""
         up = (Direction.UP.value, rising)
         down = (Direction.DOWN.value, rising[::-1])
         match self:

@@ -94,7 +94,7 @@ _CHANNEL = "daq.channels."
 
 
 def value_in(text: str, key: str) -> str:
-    """Give what the template holds, as it is written; empty where it says nothing of the key."""
+    """Return what the template holds, as it is written; empty where it says nothing of the key."""
     found = _place(text, key)
     return "" if found is None else found.group("value")
 
@@ -215,7 +215,7 @@ _USB = re.compile(r"USB\d*::(0x[0-9a-f]+|\d+)::(0x[0-9a-f]+|\d+)::", re.IGNORECA
 
 
 def found_choices(question: Question, seen: InstrumentList) -> tuple[str, ...]:
-    """Give what the computer sees for a question."""
+    """Return what the computer sees for a question."""
     match question.found:
         case Found.GENERATORS:
             return seen.visa_resources

@@ -11,7 +11,7 @@ Choice = TypeVar("Choice", bound=StrEnum)
 
 
 def chosen(kind: type[Choice], given: Choice | str) -> Choice:
-    """Give the member that was given, or whose word was; an unknown word raises ConfigurationError.
+    """Return the member that was given, or whose word was; an unknown word raises ConfigurationError.
 
     >>> from enum import StrEnum
     >>> Ground = StrEnum("Ground", ["SAND", "CLAY"])

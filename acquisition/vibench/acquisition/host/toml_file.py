@@ -123,7 +123,7 @@ def complaints(error: ValidationError, content: object, within: Place = ()) -> s
 
 
 def _faults(error: ValidationError, content: object) -> list[Any]:
-    """Give what is wrong, once: of a key that may hold several kinds of value, for the kind that was meant.
+    """Return what is wrong, once: of a key that may hold several kinds of value, for the kind that was meant.
 
     A value that would be derived from a key with a fault is no fault of its own, nor is a list too short
     without an item with a fault.
@@ -144,14 +144,14 @@ def _faults(error: ValidationError, content: object) -> list[Any]:
 
 
 def _of_the_nearest(kinds: Sequence[list[tuple[Any, Any]]]) -> Iterator[Any]:
-    """Give the faults of one kind, by the keys of the file; a single kind is one that the file names."""
+    """Yield the faults of one kind, by the keys of the file; a single kind is one that the file names."""
     if len(kinds) == 1:
         return (each for each, _ in kinds[0])
     return (by_keys for _, by_keys in max(kinds, key=_nearness))
 
 
 def _of_the_file(fault: Any, content: object) -> list[bool]:
-    """Say which parts of a fault's place are keys of the file; the rest are kinds of value.
+    """Return which parts of a fault's place are keys of the file; the rest are kinds of value.
 
     pydantic names a kind after the key that may hold several: ``frequency_hz``, ``Range``, ``step``. A key
     of the user's own may have the same name.
@@ -171,7 +171,7 @@ def _of_the_file(fault: Any, content: object) -> list[bool]:
 
 
 def _nearness(faults: Sequence[tuple[Any, Any]]) -> tuple[int, bool]:
-    """Say how near a value comes to a kind: a fault within it, or in its size, is nearer than its type."""
+    """Return how near a value comes to a kind: a fault within it, or in its size, is nearer than its type."""
     return max((len(each["loc"]), not each["type"].endswith("_type")) for each, _ in faults)
 
 

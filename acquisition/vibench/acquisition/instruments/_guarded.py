@@ -200,7 +200,7 @@ class Guarded:
         return self._let_through("__call__")(*given)
 
     def bare(self) -> Any:
-        """Give what is guarded."""
+        """Return what is guarded."""
         return self._held
 
     def _let_through(self, member: str) -> Any:
@@ -260,7 +260,7 @@ def _taken_part(name: str, hint: Any, value: object) -> Any:
 
 @cache
 def _promised(promise: type) -> dict[str, Any]:
-    """Give what each member of a protocol returns."""
+    """Return what each member of a protocol returns."""
     members = {name: getattr(promise, name) for name in dir(promise) if name == "__call__" or name[0] != "_"}
     functions = {name: each.fget if isinstance(each, property) else each for name, each in members.items()}
     return {name: _hints(each).get("return", Any) for name, each in functions.items()}
@@ -281,5 +281,5 @@ def _adapter(hint: Any) -> TypeAdapter[Any]:
 
 
 def _bare(given: Any) -> Any:
-    """Give an instrument to its own package as it is."""
+    """Return an instrument to its own package as it is."""
     return given.bare() if isinstance(given, Guarded) else given

@@ -120,7 +120,7 @@ class Campaign(FrozenModel):
 
 
 def played_alike(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    """Give the first of all points that are played alike: what limits say of it holds for the others."""
+    """Return the first of all points that are played alike: what limits say of it holds for the others."""
     first: dict[str, Point] = {}
     for point in points:
         first.setdefault(point.measurement.model_dump_json(exclude={"name", "repeats"}), point)
@@ -150,7 +150,7 @@ def _names(measurement: Measurement) -> tuple[str, ...]:
 
 
 def _listed(content: Mapping[Any, Any], key: str) -> list[Any]:
-    """Give a list as it stands; what is none is left for the validation to refuse."""
+    """Return a list as it stands; what is none is left for the validation to refuse."""
     given = content.get(key, [])
     return list(given) if isinstance(given, list | tuple) else [given]
 
@@ -169,7 +169,7 @@ def _filled_sweep(sweep: object, defaults: Mapping[str, Any]) -> object:
 
 
 def _of_kind(defaults: Mapping[str, Any], kind: object) -> Mapping[str, Any]:
-    """Give what excitations of a kind share; ValueError when it is no table."""
+    """Return what excitations of a kind share; ValueError when it is no table."""
     match defaults.get(present_word(str(kind)), {}):
         case dict(shared):
             return shared

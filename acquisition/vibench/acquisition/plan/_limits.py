@@ -424,7 +424,7 @@ def check_phases(measurement: Measurement, rig: Rig) -> tuple[Phase, Phase, Phas
 def expected_under_check(
     rig: Rig, terminal_v: float, quantity: BaseQuantity = BaseQuantity.ACCELERATION
 ) -> ComplexArray:
-    """Give what a check may find of a quantity, as phasors over the voltage's phase; shape (n,).
+    """Return what a check may find of a quantity, as phasors over the voltage's phase; shape (n,).
 
     One for each of some specimens whose resonances lie up to 3 % elsewhere; where p comes near a stop all the
     same, also with m1 held to m2.
@@ -446,7 +446,7 @@ def expected_under_check(
 
 
 def nearest_expected(measured: float, expected: ComplexArray) -> float:
-    """Give the amplitude among what is expected that lies nearest to a measured one [m/s2].
+    """Return the amplitude among what is expected that lies nearest to a measured one [m/s2].
 
     Parameters
     ----------

@@ -174,7 +174,7 @@ def _of_source(source: SampleSource, transfer: Transfer) -> Load:
 def needed_vpp(
     rig: Rig, acceleration: float, frequency_hz: float, on_table: OnTable = OnTable.SPECIMEN
 ) -> float:
-    """Give the setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
+    """Return the setting, peak to peak [V], at which the base's acceleration has an amplitude [m/s2].
 
     Parameters
     ----------

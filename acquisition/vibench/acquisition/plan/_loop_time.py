@@ -10,7 +10,7 @@ _COMMANDS = 2
 
 
 def look_s(frequency_hz: float) -> float:
-    """Give the time over which the feedback looks at a motion before it acts [s]."""
+    """Return the time over which the feedback looks at a motion before it acts [s]."""
     return max(LOOK_S, LOOK_PERIODS / frequency_hz)
 
 

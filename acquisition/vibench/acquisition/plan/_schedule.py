@@ -306,7 +306,7 @@ class DriveSource(StrEnum):
 
 
 def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Say what plays a measurement on a rig; a stream needs an output, also where there is none."""
+    """Return what plays a measurement on a rig; a stream needs an output, also where there is none."""
     use = OutputUse.STREAMS if rig.daq.output is None else rig.daq.output.plays
     drive_sources = {_source_of(step.play, use) for step in measurement.excitation.steps()}
     others = (DriveSource.CONTROLLER, DriveSource.OUTPUT)
@@ -314,7 +314,7 @@ def drive_source_of(measurement: Measurement, rig: Rig) -> DriveSource:
 
 
 def require_played(measurement: Measurement, rig: Rig) -> DriveSource:
-    """Give what plays a measurement on a rig; raises ConfigurationError where the rig has none."""
+    """Return what plays a measurement on a rig; raises ConfigurationError where the rig has none."""
     source = drive_source_of(measurement, rig)
     match source:
         case DriveSource.CONTROLLER if rig.controller is None:
@@ -336,7 +336,7 @@ LEAST_SHARE = 1e-4
 
 
 def lowest_setting_vpp(measurement: Measurement, rig: Rig) -> float:
-    """Give the least setting of what plays a measurement, peak to peak [V]."""
+    """Return the least setting of what plays a measurement, peak to peak [V]."""
     if rig.controller is not None and drive_source_of(measurement, rig) is DriveSource.CONTROLLER:
         return LEAST_SHARE * 2 * rig.controller.limit_v
     output = rig.daq.output

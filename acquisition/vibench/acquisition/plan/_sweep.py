@@ -78,7 +78,7 @@ Values: TypeAlias = Annotated[tuple[PositiveFloat, ...], Field(min_length=1, max
 
 
 def values_of(given: Values) -> tuple[float, ...]:
-    """Give the values of an axis: a range's rising, a list's as they stand."""
+    """Return the values of an axis: a range's rising, a list's as they stand."""
     return given.values if isinstance(given, Range) else given
 
 

@@ -206,7 +206,7 @@ def _roughness(velocity: Samples, dropout: Dropout, before: int, after: int) -> 
 
 
 def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
-    """Give the velocity, shape (samples,), with what a linear prediction makes likeliest in drop-outs.
+    """Return the velocity, shape (samples,), with what a linear prediction makes likeliest in drop-outs.
 
     Janssen, Veldhuis and Vries 1986, IEEE Trans. ASSP 34, 317-330: the unknown samples with the smallest
     prediction error, for a predictor from the samples about them.
@@ -231,7 +231,7 @@ def bridged(velocity: Samples, dropouts: tuple[Dropout, ...]) -> Samples:
 
 
 def _together(dropouts: tuple[Dropout, ...], samples: int) -> Iterator[tuple[int, int, int]]:
-    """Give begin and end of drop-outs that lie close together, and where the next begin."""
+    """Yield begin and end of drop-outs that lie close together, and where the next begin."""
     groups: list[list[Dropout]] = []
     for each in dropouts:
         is_near = groups and each.first - groups[-1][-1].stop < _CONTEXT
@@ -277,7 +277,7 @@ class BridgedChannel:
     role: str
 
     def read(self, start: int, stop: int) -> Samples:
-        """Give velocities [m/s], shape (samples,); lost samples are NaN."""
+        """Return velocities [m/s], shape (samples,); lost samples are NaN."""
         values = self.recording.read(self.role, start, stop)
         if not self.between(start, stop):
             return values
@@ -295,7 +295,7 @@ class BridgedChannel:
         return values
 
     def between(self, start: int, stop: int) -> tuple[Dropout, ...]:
-        """Give the drop-outs that reach into these samples."""
+        """Return the drop-outs that reach into these samples."""
         rate = self.recording.sample_rate_hz
         if rate < LOWEST_RATE_HZ:
             return ()

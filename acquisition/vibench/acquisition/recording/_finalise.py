@@ -83,7 +83,7 @@ def _physical(overview: CountOverview, channel: dict[str, str | int | float]) ->
 
 
 def _time_axis(file: h5py.File, view: h5py.Group, bins: int) -> h5py.Dataset:
-    """Give the one dataset of times, which each channel's group has under its own name."""
+    """Return the one dataset of times, which each channel's group has under its own name."""
     for data in view.values():
         if layout.TIME in data:
             return data[layout.TIME]
@@ -186,7 +186,7 @@ def finalise(part: Path, key: SealKey | None, written: Mapping[str, str] | None 
 
 
 def whereabouts(part: Path, error: Exception) -> str:
-    """Say where the committed samples are after an error of the disk, and what to do."""
+    """Return where the committed samples are after an error of the disk, and what to do."""
     try:
         is_there = part.exists()
     except OSError:  # the folder does not answer

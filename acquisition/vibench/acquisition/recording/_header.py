@@ -308,7 +308,7 @@ def _require_json_object(name: str, text: str) -> None:
 
 
 def coupling_cut_hz(coupling: str) -> float:
-    """Give the -3 dB of a converter's coupling, first order [Hz].
+    """Return the -3 dB of a converter's coupling, first order [Hz].
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ class OverviewSums:
         self._high.append(found.high)
 
     def overview(self) -> CountOverview:
-        """Give the extremes of everything taken."""
+        """Return the extremes of everything taken."""
         nothing = [np.empty(0, dtype=layout.COUNT_DTYPE)]
         return CountOverview(np.concatenate(self._low or nothing), np.concatenate(self._high or nothing))
 

@@ -82,7 +82,7 @@ def open_hdf5(path: Path) -> h5py.File:
 
 
 def name_now(path: Path) -> Path:
-    """Give the name that a recording has by now: one that was growing a moment ago may be finished."""
+    """Return the name that a recording has by now: one that was growing a moment ago may be finished."""
     if path.suffix != layout.PART_SUFFIX or path.exists():
         return path
     final = path.with_suffix("")
@@ -249,7 +249,7 @@ class Recording(RecordingDescription):
         return np.arange(begin, end) / self.sample_rate_hz
 
     def read(self, role: str, start: int = 0, stop: int | None = None) -> Samples:
-        """Give samples ``start`` to ``stop`` (exclusive) in the channel's physical unit; lost ones are NaN.
+        """Return samples ``start`` to ``stop`` (exclusive) in the channel's physical unit; lost ones are NaN.
 
         Raises
         ------
@@ -265,7 +265,7 @@ class Recording(RecordingDescription):
         return values
 
     def read_counts(self, role: str, start: int = 0, stop: int | None = None) -> Counts:
-        """Give the converter's own counts, int32."""
+        """Return the converter's own counts, int32."""
         self.channel(role)
         begin, end = self._range(start, stop)
         try:
@@ -278,7 +278,7 @@ class Recording(RecordingDescription):
             ) from error
 
     def read_overview(self, role: str) -> CountOverview | None:
-        """Give the extremes of every 128 counts, as they were kept; None where the file has none."""
+        """Return the extremes of every 128 counts, as they were kept; None where the file has none."""
         return read_overview(self._open.file, self.channel(role).role, self.samples)
 
     def blocks(
@@ -527,7 +527,7 @@ def _require_channel(file: h5py.File, role: str, samples: int, growth: Growth) -
 
 
 def _growing(handle: OpenRecording) -> dict[str, object]:
-    """Say how a ``.part`` stands: it says "recording" until its end, which a dead program never wrote."""
+    """Return how a ``.part`` stands: it says "recording" until its end, which a dead program never wrote."""
     file = handle.file
     state, reason = tables.ending(file)
     if state is RecordingState.RECORDING and not is_being_recorded(handle.path):

@@ -86,7 +86,7 @@ def write_result(
 
 
 def result_groups(file: h5py.File) -> dict[str, h5py.Group]:
-    """Give the group of every result, by name; RecordingError where something else stands."""
+    """Return the group of every result, by name; RecordingError where something else stands."""
     try:
         results = file.get(layout.RESULTS)
         found = {} if results is None else dict(results.items())

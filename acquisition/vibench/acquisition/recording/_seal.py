@@ -211,7 +211,7 @@ def check_result(group: h5py.Group, key: SealKey | None) -> SealCheck:
 
 
 def _pieces(dataset: h5py.Dataset) -> Iterator[NDArray[Any]]:
-    """Give a dataset's data in pieces, in the order in which it is hashed."""
+    """Yield a dataset's data in pieces, in the order in which it is hashed."""
     if dataset.ndim != 1:
         if dataset.nbytes > LARGEST_TABLE_BYTES:  # of a small file, compressed
             raise RecordingError(f"{dataset.name} holds {dataset.nbytes:.2g} bytes, which no result has")
@@ -455,7 +455,7 @@ class CheckedCounts:
         self._last: dict[str, tuple[int, Counts]] = {}
 
     def read(self, seal: str, dataset: h5py.Dataset, begin: int, end: int) -> Counts:
-        """Give a range of a channel; raises ValueError where it is not what was checked."""
+        """Return a range of a channel; raises ValueError where it is not what was checked."""
         known = _KNOWN.get(seal)
         if known is None:
             return np.asarray(dataset[begin:end], dtype=np.int32)

@@ -121,7 +121,7 @@ def _column(group: h5py.Group, table: Table, column: Column) -> h5py.Dataset:
 
 
 def first_number(group: h5py.Group, name: str) -> int:
-    """Give the whole number of a dataset of one; RecordingError where something else stands."""
+    """Return the whole number of a dataset of one; RecordingError where something else stands."""
     dataset = group.get(name)
     if not isinstance(dataset, h5py.Dataset) or dataset.shape != (1,) or dataset.dtype.kind != "i":
         raise RecordingError(f"{group.name}/{name} is no whole number")

@@ -154,14 +154,14 @@ def level_error(frequency_hz: float, grid_rate_hz: float) -> float:
 
 
 def highest_carried_hz(grid_rate_hz: float) -> float | None:
-    """Give the frequency up to which levels are right on a grid; None on the usual one, which takes all."""
+    """Return the frequency up to which levels are right on a grid; None on the usual one, which takes all."""
     if grid_rate_hz >= USUAL_GRID_RATE_HZ:
         return None
     return grid_rate_hz / pi * sqrt(LARGEST_LEVEL_ERROR / _MEASURED)
 
 
 def fastest_sample_rate_hz(grid_rate_hz: float) -> float | None:
-    """Give the fastest rate that a converter can have on a grid; None on the usual one, which takes all."""
+    """Return the fastest rate that a converter can have on a grid; None on the usual one, which takes all."""
     return None if grid_rate_hz >= USUAL_GRID_RATE_HZ else grid_rate_hz / STEPS_PER_SAMPLE
 
 

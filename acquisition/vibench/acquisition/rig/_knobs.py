@@ -23,7 +23,7 @@ class Sensor(Protocol):
     """What an entry point of ``vibench.sensors`` is: it tells the facts, and may ask its instrument."""
 
     def __call__(self, rig: Rig, config: ChannelConfig, /) -> SensorFacts:
-        """Give the facts of the sensor in front of an input."""
+        """Return the facts of the sensor in front of an input."""
 
 
 _USUAL: Mapping[Role, str] = MappingProxyType(
@@ -50,7 +50,7 @@ def sensor_name(config: ChannelConfig) -> str:
 
 
 def sensor_of(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Give the facts of the sensor in front of an input.
+    """Return the facts of the sensor in front of an input.
 
     Raises ConfigurationError when no package offers it, or it measures something else than the role records;
     BrokenPromise when it is somebody else's, and fails or tells what no sensor can be.
@@ -76,7 +76,7 @@ def wire(rig: Rig, config: ChannelConfig) -> SensorFacts:
 
 
 def accelerometer(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Give the accelerometer of the hardware configuration."""
+    """Return the accelerometer of the hardware configuration."""
     del config
     a = rig.accelerometer
     per_volt = 1 / a.sensitivity_v_per_m_per_s2
@@ -86,7 +86,7 @@ def accelerometer(rig: Rig, config: ChannelConfig) -> SensorFacts:
 
 
 def vibrometer(rig: Rig, config: ChannelConfig) -> SensorFacts:
-    """Give the vibrometer of the hardware configuration."""
+    """Return the vibrometer of the hardware configuration."""
     del config
     v = rig.vibrometer
     per_volt, name = v.range_mm_per_s_per_v * 1e-3, f"{v.model} {v.decoder}"

@@ -86,7 +86,7 @@ class GeneratorDriver(Protocol):
     """What an entry point of ``vibench.generators`` is: a class, mostly, with both as class methods."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Say what the generator can do with this configuration; nothing is opened."""
+        """Yield what the generator can do with this configuration; nothing is opened."""
 
     def open(self, config: GeneratorConfig) -> FunctionGenerator:
         """Open a generator, its output off, at its smallest amplitude.

@@ -80,7 +80,7 @@ class RigModel:
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).per_volt)
 
     def stuck_transfer(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
-        """Give `transfer` while the stops hold m1 to m2."""
+        """Return `transfer` while the stops hold m1 to m2."""
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).stuck)
 
     def lever(self, quantity: BaseQuantity, frequency_hz: ArrayLike) -> ComplexArray:
@@ -94,7 +94,7 @@ class RigModel:
         return self._of(quantity, frequency_hz, self._motion(frequency_hz).under(terminal_v, self.gap_m))
 
     def volts_for(self, acceleration: ArrayLike, frequency_hz: ArrayLike) -> NDArray[np.float64]:
-        """Give the peak at the terminal [V] that holds the table's acceleration [m/s2], shape (n,)."""
+        """Return the peak at the terminal [V] that holds the table's acceleration [m/s2], shape (n,)."""
         hz = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
         base_m = np.asarray(acceleration, dtype=np.float64) / (2 * np.pi * hz) ** 2
         return self._motion(hz).volts_for(base_m, self.gap_m)
@@ -148,7 +148,7 @@ def specimen_of(rig: Rig) -> Specimen:
 
 
 def amplifier_of(rig: Rig) -> Amplifier:
-    """Give the numbers of a rig's amplifier that the simulated table is driven with."""
+    """Return the numbers of a rig's amplifier that the simulated table is driven with."""
     amplifier = rig.amplifier
     return Amplifier(
         gain=amplifier.gain,
@@ -160,7 +160,7 @@ def amplifier_of(rig: Rig) -> Amplifier:
 
 
 def shaker_of(rig: Rig) -> Shaker:
-    """Give the numbers of a rig's shaker, its fixture included."""
+    """Return the numbers of a rig's shaker, its fixture included."""
     shaker = rig.shaker
     return Shaker(
         moving_mass_kg=suspended_mass_kg(shaker),

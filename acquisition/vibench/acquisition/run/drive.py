@@ -85,7 +85,7 @@ def drive_for(bench: Bench, measurement: Measurement) -> Drive:
 
 
 def _dead_man(bench: Bench, measurement: Measurement) -> DeadMan | None:
-    """Give the dead man that the configuration asks for; raises ConfigurationError where it cannot be."""
+    """Return the dead man that the configuration asks for; raises ConfigurationError where it cannot be."""
     longest_s = bench.rig.generator.dead_man_s
     if longest_s is None:
         return None

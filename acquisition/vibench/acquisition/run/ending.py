@@ -69,7 +69,7 @@ class Ending:
         self.state = RunState.FAILED
 
     def outcome(self, path: Path) -> Outcome:
-        """Tell how it ended."""
+        """Return how it ended."""
         return Outcome(self.state, self.reason, path, self._cause)
 
     def leave(self, guard: DriveGuard, digitizer: Digitizer, sink: RecordingWriter) -> None:

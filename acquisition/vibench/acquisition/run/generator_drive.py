@@ -115,7 +115,7 @@ class GeneratorDrive:
         """Nothing to prepare."""
 
     def perform(self, phase: Phase) -> Iterator[float]:
-        """Give the commands of a phase; between them, yield how long to read until the next one [s]."""
+        """Yield the commands of a phase; between them, yield how long to read until the next one [s]."""
         match phase.state:
             case RunState.CHECKING | RunState.ARMED:
                 self._sound(phase.play)

@@ -77,7 +77,7 @@ class SpecimenTracker:
         self._to_displacement = _integrator(sample_rate_hz)
 
     def follow(self, mass_velocity: Samples, base_velocity: Samples, is_blind: NDArray[np.bool_]) -> Samples:
-        """Give the displacement of the mass relative to the base [m] for the next velocities [m/s].
+        """Return the displacement of the mass relative to the base [m] for the next velocities [m/s].
 
         Where the vibrometer is past its range (``is_blind``) it shows no motion, and none is assumed.
         """

@@ -88,7 +88,7 @@ class GlideWatch:
         self._last_hz = frequency_hz
 
     def _rises(self, block: Block, frequency_hz: float) -> Samples:
-        """Give the times at which the drive rises through zero [s]; noise around zero makes none."""
+        """Return the times at which the drive rises through zero [s]; noise around zero makes none."""
         volts, rate_hz = block.volts[self._row], self.sample_rate_hz
         low, high = float(volts.min()), float(volts.max())
         if volts.size * frequency_hz >= rate_hz:
@@ -245,7 +245,7 @@ class PhaseRunner:
             self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
     def _heard(self, phase: Phase) -> Heard | None:
-        """Give what takes the blocks of a phase whose drive is held against the plan."""
+        """Return what takes the blocks of a phase whose drive is held against the plan."""
         if not self._may_glide(phase):
             return None
         return SweepWatch(self._glide, phase.play) if isinstance(phase.play, Sweep) else []
@@ -266,7 +266,7 @@ class PhaseRunner:
         return _Pace.AFTER_THE_COMMAND
 
     def _made_up(self, phase: Phase, late_s: float) -> Phase:
-        """Give the phase with the frequency that makes up, within its step, for the cycles lost before it.
+        """Return the phase with the frequency that makes up, within its step, for the cycles lost before it.
 
         While a command is late the former tone plays on: the drive falls behind its plan by the difference
         of the two frequencies times that. What a step cannot make up is left to the next.

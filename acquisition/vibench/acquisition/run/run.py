@@ -79,12 +79,12 @@ def _commands_of_a_step(measurement: Measurement) -> int:
 
 
 def _rounded_up(step_s: float) -> float:
-    """Give a hundredth of a second more, at most."""
+    """Return a hundredth of a second more, at most."""
     return -(-step_s // 0.01) * 0.01
 
 
 def controller_for(bench: Bench, measurement: Measurement) -> Controller[None] | None:
-    """Give the feedback controller of a measurement; None for one whose course is known.
+    """Return the feedback controller of a measurement; None for one whose course is known.
 
     Raises ConfigurationError when the bench cannot do it: before anything plays.
     """
@@ -118,7 +118,7 @@ def run_header(bench: Bench, measurement: Measurement, planned_s: float) -> Reco
 
 
 def _origin(bench: Bench) -> Origin:
-    """Say where samples come from: simulated where the rig is, or an instrument knows that its own are."""
+    """Return where samples come from: simulated where the rig is, or an instrument knows that its own are."""
     told = {identity.origin for identity in bench.identities.values()}
     simulated = bench.rig.virtual is not None or Origin.SIMULATED.value in told
     return Origin.SIMULATED if simulated else Origin.REAL

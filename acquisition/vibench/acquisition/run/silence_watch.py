@@ -221,7 +221,7 @@ class SilenceWatch:
         return self._residue_v <= self._silent_v
 
     def text(self) -> str:
-        """Say how long it took."""
+        """Return how long it took."""
         took_s = (self._last_loud + 1 - self._begin) / self._sample_rate_hz
         if self.is_silent:
             return f"{took_s:.3f} s from the stop being seen to measured silence ({self._residue_v:.2g} V)"

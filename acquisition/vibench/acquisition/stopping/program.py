@@ -34,7 +34,7 @@ SILENT_REASON = "a stop that was left in the state folder"
 
 
 def engines_folder() -> Path:
-    """Give the folder in which programs are announced and stops are put down; nobody else's business."""
+    """Return the folder in which programs are announced and stops are put down; nobody else's business."""
     folder = state_folder() / "engines"
     folder.mkdir(mode=0o700, exist_ok=True)
     if S_IMODE(folder.stat().st_mode) != 0o700:
@@ -187,7 +187,7 @@ AnyProgram = TypeVar("AnyProgram", bound=Program)
 
 
 def facts_of_this_process(what: str) -> dict[str, object]:
-    """Give what a program says of itself."""
+    """Return what a program says of itself."""
     pid = os.getpid()
     return {
         "pid": pid,

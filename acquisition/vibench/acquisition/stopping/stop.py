@@ -132,7 +132,7 @@ class StopSwitch:
         self._marks.append(text)
 
     def take_marks(self) -> Iterator[str]:
-        """Give each mark once, oldest first."""
+        """Yield each mark once, oldest first."""
         while self._marks:
             yield self._marks.popleft()
 
@@ -141,12 +141,12 @@ class StopSwitch:
         self._changes.append(text)
 
     def take_changes(self) -> Iterator[str]:
-        """Give each change once, oldest first."""
+        """Yield each change once, oldest first."""
         while self._changes:
             yield self._changes.popleft()
 
     def harder_than(self, level: StopLevel) -> StopRequest | None:
-        """Give a request that is harder than ``level``, if there is one."""
+        """Return a request that is harder than ``level``, if there is one."""
         request = self.request
         return request if request is not None and request.level.is_harder_than(level) else None
 
