@@ -30,7 +30,7 @@ class Editor(Protocol):
         """What is wrong before the plan is even asked."""
 
     def content(self) -> Any:
-        """Say what a file would say; None for nothing."""
+        """Return what a file would say; None for nothing."""
 
     def show_content(self, content: Any) -> None:
         """Show what a file says."""
@@ -56,7 +56,7 @@ class QuantityEditor:
         return self._edit.complaint
 
     def content(self) -> float | int | None:
-        """Give the number."""
+        """Return the number."""
         return self._edit.value()
 
     def show_content(self, content: Any) -> None:
@@ -124,7 +124,7 @@ class ChoiceEditor:
         self.widget = self._box
 
     def content(self) -> Any:
-        """Give the chosen value."""
+        """Return the chosen value."""
         return self._box.currentData()
 
     def show_content(self, content: Any) -> None:
@@ -163,7 +163,7 @@ class TextEditor:
         self.widget = self._line
 
     def content(self) -> str:
-        """Give the text."""
+        """Return the text."""
         return self._line.text()
 
     def show_content(self, content: Any) -> None:
@@ -191,7 +191,7 @@ class SuggestionEditor:
         self.widget = self._box
 
     def content(self) -> str:
-        """Give the text."""
+        """Return the text."""
         return self._box.currentText()
 
     def show_content(self, content: Any) -> None:
@@ -228,7 +228,7 @@ class ListEditor:
         return self._complaint
 
     def content(self) -> Any:
-        """Give the values."""
+        """Return the values."""
         self._complaint, text = "", self._line.text()
         if text == self._shown[0]:
             return self._shown[1]

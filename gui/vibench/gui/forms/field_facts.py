@@ -73,7 +73,7 @@ class FieldFacts:
 
 
 def field_facts(model: type[BaseModel], name: str, field: FieldInfo) -> FieldFacts:
-    """Say what a form must know of a field."""
+    """Return what a form must know of a field."""
     suffix, unit = next(((s, u) for s, u in _ENDINGS if name.endswith(s)), ("", ""))
     words = name.removesuffix(suffix).replace("_", " ")
     return FieldFacts(

@@ -37,7 +37,7 @@ class _Row:
 
 
 def complaints_of(error: ValidationError) -> dict[Loc, str]:
-    """Give what a model refuses, place by place, without what only follows from something else."""
+    """Return what a model refuses, place by place, without what only follows from something else."""
     return {
         detail["loc"]: detail["msg"].removeprefix("Value error, ")
         for detail in error.errors()
@@ -77,7 +77,7 @@ class ModelForm(QWidget):
         return {name: row.editor for name, row in self._rows.items()}
 
     def content(self) -> dict[str, Any]:
-        """Say what a file would say; what is not given is left out, or None where that has a meaning."""
+        """Return what a file would say; what is not given is left out, or None where that has a meaning."""
         given = {name: row.editor.content() for name, row in self._rows.items()}
         said = {
             name: value
@@ -204,7 +204,7 @@ class GroupEditor:
         return ""
 
     def content(self) -> Any:
-        """Say what a file would say."""
+        """Return what a file would say."""
         return self._form.content()
 
     def show_content(self, content: Any) -> None:
@@ -274,7 +274,7 @@ class OptionalGroupEditor(GroupEditor):
         self._form.hide()
 
     def content(self) -> Any:
-        """Say what a file would say, None when it is not there."""
+        """Return what a file would say, None when it is not there."""
         return super().content() if self._there.isChecked() else None
 
     def show_content(self, content: Any) -> None:
@@ -303,7 +303,7 @@ def _kind_of(model: type[BaseModel]) -> str:
 
 
 def _may_be_emptied(field: FieldInfo) -> bool:
-    """Say whether an empty field means something else than the default."""
+    """Return whether an empty field means something else than the default."""
     return unwrapped(field.annotation)[1] and not field.is_required() and _default(field) is not None
 
 

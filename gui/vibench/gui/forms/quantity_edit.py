@@ -34,7 +34,7 @@ def quantity_text(value: float, unit: str) -> str:
 
 
 def unit_of(text: str, unit: str) -> str:
-    """Give the unit that a text of a field shows; that of an empty field where it shows none."""
+    """Return the unit that a text of a field shows; that of an empty field where it shows none."""
     match = _NUMBER.match(text)
     return (match[2] if match else "") or UNITS.in_field(unit)
 
@@ -114,7 +114,7 @@ class QuantityEdit(QAbstractSpinBox):
         return self._complaint
 
     def value(self) -> float | int | None:
-        """Give the number, None when the field is empty."""
+        """Return the number, None when the field is empty."""
         return self._value
 
     def set_value(self, value: float | int | None) -> None:

@@ -51,7 +51,7 @@ class Settings:
         return value if isinstance(value, str) and value else otherwise
 
     def number(self, key: Remembered, otherwise: float, low: float, high: float) -> float:
-        """Give a number that was kept, between its bounds; ``otherwise`` where it is none."""
+        """Return a number that was kept, between its bounds; ``otherwise`` where it is none."""
         try:
             return min(max(float(self.text(key)), low), high)
         except ValueError:

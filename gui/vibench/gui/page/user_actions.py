@@ -106,7 +106,7 @@ class UserActions(QObject):
             self._context.bridge.stop(StopLevel.HOLD, "held by the operator, in the window")
 
     def _may(self, verb: str, *states: EngineState) -> bool:
-        """Say what stands in the way of an order, if anything does: the engine would refuse it in red."""
+        """Return what stands in the way of an order, if anything does: the engine would refuse it in red."""
         bridge = self._context.bridge
         if bridge.is_ordering:
             self._warn(f"Cannot {verb} yet: {_BUSY}.", "Try again when the state above has changed.")
@@ -146,7 +146,7 @@ _NEXT = {
 
 
 def free_name(folder: Path, measurement: Measurement) -> str:
-    """Give a test a number, so that nothing of that name lies in the folder: ``dwell_003``."""
+    """Return a test a number, so that nothing of that name lies in the folder: ``dwell_003``."""
     stem = measurement.name[:LONGEST_NAME]
     number = 1
     while any(folder.glob(f"{stem}_{number:03}*")):

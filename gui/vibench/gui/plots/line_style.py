@@ -57,7 +57,7 @@ _LONG = [9.0, 4.0]
 
 
 def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
-    """Give a pen of a colour and a width, with these dashes."""
+    """Return a pen of a colour and a width, with these dashes."""
     pen: QPen = pg.mkPen(colour, width=width, style=dash.value)
     if dash is Dash.LONG:
         pen.setDashPattern(_LONG)
@@ -65,12 +65,12 @@ def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
 
 
 def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Give the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
+    """Return the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
     return dashed_pen(line_style.colour(theme), ratio, line_style.dash)
 
 
 def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Give the pen of a curve, one pixel of the screen wide; `LogicalLine` draws it wider.
+    """Return the pen of a curve, one pixel of the screen wide; `LogicalLine` draws it wider.
 
     Its dashes are as long on a fine screen as on a coarse one.
     """
@@ -81,7 +81,7 @@ def curve_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
 
 
 def shade_of(line_style: LineStyle, theme: Theme) -> QColor:
-    """Give the colour of an area."""
+    """Return the colour of an area."""
     colour: QColor = pg.mkColor(line_style.colour(theme))
     colour.setAlphaF(line_style.filled or 0.25)
     return colour
@@ -136,7 +136,7 @@ class Band:
         self.item.setData(np.concatenate((x[there], x[back])), np.concatenate((below[there], above[back])))
 
     def at(self, across: float) -> tuple[float, float] | None:
-        """Give the bounds at the place that is nearest; None where there are none."""
+        """Return the bounds at the place that is nearest; None where there are none."""
         x, below, above = self._edges
         if x.size == 0:
             return None

@@ -29,7 +29,7 @@ Range = tuple[float, float]
 
 
 def steady_range(shown: Range, data: Range) -> Range | None:
-    """Give the range to change to, or None while the data is inside and fills enough of what is shown."""
+    """Return the range to change to, or None while the data is inside and fills enough of what is shown."""
     low, high = data
     size = high - low
     is_inside = shown[0] <= low and high <= shown[1]

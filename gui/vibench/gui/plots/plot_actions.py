@@ -75,7 +75,7 @@ def write_plot(plot: "Plot", path: Path) -> None:
 
 
 def numbers_of(plot: "Plot", separator: str) -> str:
-    """Give what is drawn as rows of curve, place across and value, in the units of the axes."""
+    """Return what is drawn as rows of curve, place across and value, in the units of the axes."""
     across, up = plot.across.axis, plot.up.axis
     rows = [separator.join(("Curve", across.text, up.text))]
     for number, (name, item) in enumerate(plot.named_curves):

@@ -73,7 +73,7 @@ def boxed(title: str, *parts: Part) -> QGroupBox:
 
 
 def title_of(page: str) -> QLabel:
-    """Give the title of a page."""
+    """Return the title of a page."""
     title = QLabel(page)
     title.setProperty("rank", "title")
     return title
@@ -203,7 +203,7 @@ class ProgressBar(QProgressBar):
     """A bar whose words end in dots where they find no room; the tooltip says them whole."""
 
     def text(self) -> str:
-        """Give as many of the words as fit."""
+        """Return as many of the words as fit."""
         whole = super().text()
         room = self.width() - self.fontMetrics().averageCharWidth()
         shown = self.fontMetrics().elidedText(whole, Qt.TextElideMode.ElideRight, room)

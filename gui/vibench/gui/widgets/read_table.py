@@ -22,12 +22,12 @@ def offer_copies(table: QTableView) -> None:
 
 
 def chosen_text(table: QTableView) -> str:
-    """Give the chosen cells, rows by lines; everything while nothing is chosen."""
+    """Return the chosen cells, rows by lines; everything while nothing is chosen."""
     return _lines(table.selectionModel().selectedIndexes()) or whole_text(table.model())
 
 
 def whole_text(model: QAbstractItemModel) -> str:
-    """Give the headings and all cells."""
+    """Return the headings and all cells."""
     rows, columns = range(model.rowCount()), range(model.columnCount())
     headings = (str(model.headerData(column, Qt.Orientation.Horizontal) or "") for column in columns)
     return "\t".join(headings) + "\n" + _lines(model.index(row, column) for row in rows for column in columns)

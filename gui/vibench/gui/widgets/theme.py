@@ -125,7 +125,7 @@ def palette(theme: Theme) -> QPalette:
 
 
 def style_sheet(theme: Theme) -> str:
-    """Say what the palette cannot: panels, rail, banner; sizes follow the font.
+    """Return what the palette cannot: panels, rail, banner; sizes follow the font.
 
     A table shows its focus by its frame: the style's own veil over a cell would dim the letters in it.
     """

@@ -108,18 +108,18 @@ class DisplayUnits:
                     listener()
 
     def on_axis(self, unit: str) -> ShownUnit:
-        """Give the unit of an axis, or of a column: one for small values and large ones."""
+        """Return the unit of an axis, or of a column: one for small values and large ones."""
         si = plain_unit(unit)
         name = self._chosen.get(si, si)
         return _shown(si, "µm" if name == AUTOMATIC else name)
 
     def of(self, unit: str, value: float) -> ShownUnit:
-        """Give the unit in which a field writes a value of this size."""
+        """Return the unit in which a field writes a value of this size."""
         name = self._chosen.get(unit, AUTOMATIC)
         return fitted_unit(unit, value) if name == AUTOMATIC else _shown(unit, name)
 
     def in_field(self, unit: str) -> str:
-        """Give the unit of a plain number that is typed into an empty field of this SI unit."""
+        """Return the unit of a plain number that is typed into an empty field of this SI unit."""
         return self.on_axis(unit).name
 
     def told(self, sentence: str) -> str:
@@ -196,7 +196,7 @@ class SentenceLabel(QLabel):
         self._tell()
 
     def text(self) -> str:
-        """Give what is shown."""
+        """Return what is shown."""
         return super().text().replace(_BREAK, "")
 
     def _tell(self) -> None:

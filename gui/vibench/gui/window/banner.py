@@ -64,11 +64,11 @@ class StatusLine(QFrame):
         frames.setMinimumWidth(frames.fontMetrics().horizontalAdvance("00 fps, latency 0000 ms "))
 
     def text_of(self, field: str) -> str:
-        """Give what a field shows."""
+        """Return what a field shows."""
         return self._labels[StatusField(field)].text()
 
     def tip_of(self, field: str) -> str:
-        """Give what is said more of it."""
+        """Return what is said more of it."""
         return self._labels[StatusField(field)].toolTip()
 
     def explain(self, field: StatusField, text: str) -> None:
@@ -214,7 +214,7 @@ ORDERED = "The last order is being carried out: limits, folder and instruments a
 
 
 def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicator:  # noqa: FBT001 - a fact
-    """Give the state a symbol, a word and what changes in it."""
+    """Return the state a symbol, a word and what changes in it."""
     if status is None:
         return OPENING if is_ordering else CLOSED
     if is_ordering and status.state in (EngineState.READY, EngineState.ARMED):
@@ -223,7 +223,7 @@ def indicator_of(status: EngineStatus | None, is_ordering: bool) -> StateIndicat
 
 
 def _detail(status: EngineStatus) -> str:
-    """Say what changes while the state stays."""
+    """Return what changes while the state stays."""
     match status.state:
         case EngineState.READY if status.bench is not None:
             return (
@@ -240,7 +240,7 @@ def _detail(status: EngineStatus) -> str:
 
 
 def run_text(run: RunStatus | None) -> str:
-    """Say where a run stands."""
+    """Return where a run stands."""
     if run is None:
         return "Beginning"
     parts = [f"{run.name} ({run.number} of {run.count})" if run.count > 1 else run.name]

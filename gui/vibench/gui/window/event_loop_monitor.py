@@ -89,7 +89,7 @@ class EventLoopMonitor(QObject):
 
     @property
     def text(self) -> str:
-        """Say what was noted, the newest first."""
+        """Return what was noted, the newest first."""
         said = [f"Longest wait for the window in the last {SPAN_S:.0f} s: {1e3 * self.longest_s:.0f} ms."]
         said += [
             f"{each.at:%H:%M:%S}  {each.about}: {1e3 * each.own_s:.0f} ms" for each in reversed(self._noted)

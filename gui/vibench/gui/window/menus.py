@@ -162,7 +162,7 @@ def show_manual(parent: QWidget) -> Reader:
 
 
 def installation_text() -> str:
-    """Give what `vibench doctor` says."""
+    """Return what `vibench doctor` says."""
     asked = [sys.executable, "-m", "vibench.cli", "doctor"]
     told = subprocess.run(  # noqa: S603 - this interpreter, and our own package
         asked, capture_output=True, text=True, check=False, timeout=LONGEST_S
@@ -171,7 +171,7 @@ def installation_text() -> str:
 
 
 def show_about(parent: QWidget, context: AppContext) -> Reader:
-    """Say what this installation consists of, for a question to others."""
+    """Return what this installation consists of, for a question to others."""
     reader = Reader("About vibench", parent)
     reader.browser.setPlainText("looking at this installation…")
 
@@ -285,7 +285,7 @@ def key_text(actions: tuple[MenuAction, ...]) -> str:
 def menu_actions(
     window: QMainWindow, target: MenuTarget, context: AppContext, actions: UserActions, pages: tuple[str, ...]
 ) -> tuple[MenuAction, ...]:
-    """Give every action, menu by menu."""
+    """Return every action, menu by menu."""
     return (
         MenuAction("&File", "&Open…", lambda: _open(window, target, context), "Ctrl+O", "open any file"),
         MenuAction("&File", "Recordings &folder…", lambda: choose_folder(window, context)),

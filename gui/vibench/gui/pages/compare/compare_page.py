@@ -70,7 +70,7 @@ class AnalysisPanel(QGroupBox):
         self.show_progress(0, 0)
 
     def options(self) -> AnalysisOptions | None:
-        """Give the options; None while they are not allowed, which the form then says."""
+        """Return the options; None while they are not allowed, which the form then says."""
         return self.form.value
 
     def show_progress(self, done: int, asked: int) -> None:

@@ -405,12 +405,12 @@ class PairBox(QGroupBox):
             box.blockSignals(blocked)
 
     def pair(self) -> tuple[Curve, Curve] | None:
-        """Give the curve and its reference, if both are chosen and differ."""
+        """Return the curve and its reference, if both are chosen and differ."""
         curve, reference = (self._curves.get(box.currentText()) for box in (self._curve, self._reference))
         return None if curve is None or reference is None or curve is reference else (curve, reference)
 
     def difference(self) -> CurveDifference | None:
-        """Give how far they differ, and say it; None where nothing can be compared."""
+        """Return how far they differ, and say it; None where nothing can be compared."""
         pair = self.pair()
         self._said.setText("")
         if pair is None:

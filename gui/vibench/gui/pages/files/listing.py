@@ -113,7 +113,7 @@ def noted(path: Path, text: str) -> Path:
 
 
 def notes_of(recording: Recording) -> tuple[str, ...]:
-    """Give the notes of the plan and those that were added, the oldest first."""
+    """Return the notes of the plan and those that were added, the oldest first."""
     plan = str(recording.plan.get("notes", ""))
     has_more = any(name.startswith(NOTE) for name in recording.result_names)
     added = sorted(recording.results.values(), key=lambda each: each.saved_utc) if has_more else []

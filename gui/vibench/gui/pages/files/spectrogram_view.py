@@ -341,7 +341,7 @@ class _Image:
         self._plot.viewport().update()
 
     def _level_at(self, across: float, up: float) -> str:
-        """Give the level of the pixel at a place, as it is drawn."""
+        """Return the level of the pixel at a place, as it is drawn."""
         if self.item.image is None:
             return ""
         place = self.item.mapFromParent(QPointF(across, up))

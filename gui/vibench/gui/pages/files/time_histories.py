@@ -172,7 +172,7 @@ class RecordingTimeHistories(QWidget):
         event.accept()
 
     def _history_of(self, channel: ChannelHeader) -> _TimeHistory:
-        """Give the plot of a channel, as it was left by another recording, or a new one."""
+        """Return the plot of a channel, as it was left by another recording, or a new one."""
         kind = (channel.role, channel.unit)
         if kind not in self._kept:
             up = PlotAxis("", plain_unit(channel.unit))

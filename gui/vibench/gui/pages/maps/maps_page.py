@@ -398,7 +398,7 @@ class MapsPage(Page):
 
 
 def _legend_entry(name: str, colour: str) -> str:
-    """Give a framed square, for some colours are those of the page, and a name that is never broken."""
+    """Return a framed square, for some colours are those of the page, and a name that is never broken."""
     unbroken = name.replace(" ", "&nbsp;").replace("-", "&#8209;")
     return f'<span style="background:{colour}; color:#808080">☐</span>&nbsp;{unbroken}&nbsp;&nbsp;'
 

@@ -189,7 +189,7 @@ class KnobSheetForm(QGroupBox):
         self.setVisible(bool(knobs))
 
     def sheet(self) -> KnobSheet | None:
-        """Say what was confirmed; None while a knob or the name is missing."""
+        """Return what was confirmed; None while a knob or the name is missing."""
         operator = self._operator.text().strip()
         if not self._ticks or not operator or not all(tick.isChecked() for tick in self.ticks):
             return None
@@ -223,7 +223,7 @@ def measured_text(finding: Finding) -> str:
 
 
 def expected_text(finding: Finding) -> str:
-    """Say what was expected, and what to do where it was not found."""
+    """Return what was expected, and what to do where it was not found."""
     advice = finding.advice
     return f"{finding.expected}. {advice[0].upper()}{advice[1:]}" if advice else finding.expected
 

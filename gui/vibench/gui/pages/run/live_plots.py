@@ -112,7 +112,7 @@ def channel_word(role: str) -> str:
 
 
 def channel_axis(role: str, unit: str) -> PlotAxis:
-    """Give a channel's axis: its word, in the unit that is shown."""
+    """Return a channel's axis: its word, in the unit that is shown."""
     return PlotAxis(channel_word(role), plain_unit(unit), short=_SHORT.get(role, channel_word(role)))
 
 

@@ -287,7 +287,7 @@ _SHOWN = {
 
 
 def summary_text(seen: MeasurementPreview, refusal: str = "") -> str:
-    """Say what is played; then peak stroke, acceleration, force and volts beside their limits, time, size.
+    """Return what is played; then peak stroke, acceleration, force and volts beside their limits, time, size.
 
     ``refusal`` is why a fast loop would not hold it.
     """
