@@ -56,7 +56,7 @@ def nearest_neighbours(points: Reals, apart: int, last: int, floor: float = 0.0)
     points
         Shape (n, dimensions).
     apart
-        Theiler's window: points less than so many steps apart in time are no neighbours, since one
+        Theiler's window: points less than this many steps apart in time are no neighbours, since one
         is merely the other a little later (Theiler, Phys. Rev. A 34 (1986) 2427).
     last
         Only points before this index take part, so that both can be followed beyond it.
@@ -102,7 +102,7 @@ def neighbours_apart(points: Reals, apart: int, count: int) -> tuple[Integers, F
 _SATURATION = 0.25
 """Distances beyond this part of the typical one feel the size of the attractor, not its stretching."""
 _ABOVE_NOISE = 3.0
-"""Distances below so many times the noise are made by it."""
+"""Distances below this many times the noise are made by it."""
 _SHORTEST_FIT = 3
 """Steps a line needs to be a statement."""
 _BLOCKS = 10
@@ -148,7 +148,7 @@ def divergence(points: Reals, *, steps: int = 20, apart: int = 1, noise: float =
     steps
         How long pairs are followed.
     apart
-        Neighbours are at least so many steps apart in time.
+        Neighbours are at least this many steps apart in time.
     noise
         Standard deviation of the noise on one coordinate, in the coordinates' unit.
 

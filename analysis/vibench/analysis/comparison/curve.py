@@ -1,4 +1,4 @@
-"""A curve that can be laid over others: motion of m0 over motion of the base, against frequency.
+"""A curve that can be overlaid on others: motion of m0 over motion of the base, against frequency.
 
 Transmissions of noise, Responses I and II of sweeps, steps and dwells, and predictions of them all are
 ratios of displacements, so they share one axis. What each of them is stands in its name: a transmission
@@ -81,7 +81,7 @@ class Curve(Labelled):
         return np.asarray(self.magnitude * np.exp(self._reach))
 
     def band(self, columns: int) -> tuple[Reals, Reals, Reals]:
-        """Give frequencies, lowest and highest bounds in at most so many columns: areas are slow to draw."""
+        """Return frequencies, lowest and highest bounds in at most ``columns``: areas are slow to draw."""
         starts = column_starts(self.frequency_hz.size, columns)
         low, _ = envelope(self.lower, columns)
         _, high = envelope(self.upper, columns)
@@ -183,9 +183,9 @@ def _reading(curve: Curve, frequency_hz: "np.ndarray[tuple[int], np.dtype[np.flo
 _LEAST_RISE_DB = 3.0
 """A peak stands above the valley beside it by at least so much ..."""
 _LEAST_RISE_SD = 8.0
-"""... and by so many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
+"""... and by this many standard deviations: the ends of a thousand points of noise are 6.5 apart."""
 _CROWDS = ((1, 5.0), (2, 13.0), (3, 24.0))
-"""Chaotic motion makes many peaks: one with so many others within so many half widths is no mode."""
+"""Chaotic motion makes many peaks: one with this many others within this many half widths is no mode."""
 _CROWD_RISE = 0.3
 """Others count that rise by this share of what a peak must rise by."""
 _USUAL_HALF_WIDTH = 0.01

@@ -94,7 +94,7 @@ def _responses(
 
 
 class Model(StrEnum):
-    """Whether the model is laid over measurements."""
+    """Whether the model is overlaid on measurements."""
 
     LEFT_OUT = "left out"
     UNDER_VOLTAGE = "under the recorded voltage"

@@ -85,7 +85,7 @@ class ChainRequest(SpecimenChoice):
         return Chain((self.shaken, *(each.specimen(*changed) for each in self.others)))
 
     def chain(self, cells: int) -> Chain:
-        """Build a chain of so many cells."""
+        """Build a chain of this many cells."""
         return Chain(tuple(islice(cycle(self.unit.cells), cells)))
 
     @property

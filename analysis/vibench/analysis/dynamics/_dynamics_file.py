@@ -131,7 +131,7 @@ def read_diagram(path: Path) -> BranchDiagram:
 
 
 def branch_curves(path: Path) -> tuple[Curve, ...]:
-    """Read the curves of branches, to be laid over recordings.
+    """Read the curves of branches, to be overlaid on recordings.
 
     Raises
     ------

@@ -22,7 +22,7 @@ MOTION_CLASSES = (
     ("chaotic", "#d55e00"),
     ("undecided", "#9a9a9a"),
 )
-"""How the motions of a map are told apart, and their colours."""
+"""How the motions of a map are distinguished, and their colours."""
 NO_NUMBERS = ("name", "about", "sources")
 """Keys of a specimen that change no motion."""
 

@@ -17,7 +17,7 @@ MOST_POINTS = 20_000
 LONGEST_S = 1e5
 """Of an average: its intervals are kept, some hundreds of megabytes of them."""
 ROUNDING = 1e-9
-"""A step that fits into the range but for rounding fits."""
+"""A step that fits into the range except for rounding fits."""
 ELASTIC = ("hertz", "linear", "linear_gap", "power")
 """Kinds of contact that take no energy: there the exponents add up to what the dampers take."""
 

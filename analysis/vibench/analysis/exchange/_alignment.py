@@ -410,7 +410,7 @@ def _rate_hz(channels: Sequence[SourceChannel], mapping: ImportMapping, path: Pa
 
 
 def _same(rates_hz: Sequence[float], samples: int) -> bool:
-    """Return whether channels of these rates stay together over so many samples."""
+    """Return whether channels of these rates stay together over this many samples."""
     return all(
         (high / low - 1) * samples <= _APART for low, high in pairwise((*rates_hz[:1], *rates_hz[-1:]))
     )

@@ -41,7 +41,7 @@ def write_csv_samples(excerpt: Excerpt, path: Path, observer: TransferObserver =
 
 
 LONGEST_HEAD = 200
-"""Lines in which the numbers must have begun."""
+"""Lines in which the numbers must have started."""
 DELIMITERS = (";", "\t", ",", None)
 """In the order in which they are tried; None stands for blanks. A comma beside another is a decimal one."""
 UNIT = re.compile(r"[\[(]([^\[\]()]*)[\])]\s*$")

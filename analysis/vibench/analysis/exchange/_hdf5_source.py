@@ -22,7 +22,7 @@ FEWEST_SAMPLES = 2
 TRUNCATED = re.compile(r"truncated file: eof = (\d+),.* stored_eof = (\d+)")
 """What HDF5 says of a file that lost its end."""
 EXACT_KINDS = {"i": 4, "u": 2}
-"""Integers of at most so many bytes fit the recording's own."""
+"""Integers of at most this many bytes fit the recording's own."""
 
 
 Facts = tuple[tuple[str, Any], ...]

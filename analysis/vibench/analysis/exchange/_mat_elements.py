@@ -13,7 +13,7 @@ MATRIX, COMPRESSED = 14, 15
 PLAIN = frozenset({*range(1, 8), 9, 12, 13, 16, 17, 18})
 """Types of numbers and of text."""
 SMALL_BYTES = 4
-"""An element of up to so many bytes may lie in its tag."""
+"""An element of up to this many bytes may lie in its tag."""
 DEEPEST = 30
 """Cells in structs in cells: more is nothing that anybody measured."""
 LARGEST_BYTES = 2**31

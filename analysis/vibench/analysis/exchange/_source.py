@@ -1,4 +1,4 @@
-"""What an import asks of a file, whoever wrote it: its channels, and their numbers in any stretch."""
+"""Sources of an import: the channels of a file, and their samples in any range."""
 
 import re
 import struct

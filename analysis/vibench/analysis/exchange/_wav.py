@@ -76,7 +76,7 @@ class WavSource:
     """Channels named ``"1"``, ``"2"``, ..."""
 
     data: NDArray[Any]
-    """Shape (samples, channels); on disk until it is read, but for 24 bits."""
+    """Shape (samples, channels); on disk until it is read, except for 24 bits."""
     channels: tuple[SourceChannel, ...]
 
     def read(self, channel: SourceChannel, start: int, stop: int) -> Reals:

@@ -1,4 +1,4 @@
-"""Curves laid over one another, as they are compared in the window, for paper: always light."""
+"""Curves overlaid on one another, as they are compared in the window, for paper: always light."""
 
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias

@@ -58,7 +58,7 @@ def excitation_figure(measurement: Measurement) -> DrawnFigure:
 
 
 def _largest_lines(seen: SignalPreview) -> tuple[Reals, Reals]:
-    """Frequency and size of the largest line in each of at most so many columns, above 0 Hz."""
+    """Frequency and size of the largest line in each of at most this many columns, above 0 Hz."""
     frequency_hz, size = seen.frequency_hz[1:], seen.spectrum_v[1:]
     width = -(-size.size // _COLUMNS)
     starts = np.arange(0, size.size, width)

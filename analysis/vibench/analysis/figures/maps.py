@@ -63,9 +63,9 @@ def map_figure(
         One of `SHOWN`, beside the kinds of motion. When None, Response I, and of a basin map how long each
         start was followed.
     diagram
-        Branches that are laid over a diagram along one quantity.
+        Branches that are overlaid on a diagram along one quantity.
     levels
-        Of recordings, laid over a map of frequency and amplitude as lines.
+        Of recordings, overlaid on a map of frequency and amplitude as lines.
 
     """
     with styled():

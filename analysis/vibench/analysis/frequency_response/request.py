@@ -192,7 +192,7 @@ class FrequencyResponseRequest:
         )
 
     def segment_samples(self, samples: int, sample_rate_hz: float) -> int:
-        """Choose the length of a segment for a record of so many samples.
+        """Choose the length of a segment for a record of this many samples.
 
         Raises
         ------
@@ -221,7 +221,7 @@ class FrequencyResponseRequest:
 
 
 def longest_segment(samples: int, averages: float, window: Window, overlap: float) -> int:
-    """Return the longest segment that still leaves so many independent averages of a whole record.
+    """Return the longest segment that still leaves this many independent averages of a whole record.
 
     K segments are worth at least K / (1 + 2 sum_j rho_j^2) (see `effective_averages`), and N samples hold
     K segments of N / (1 + (K - 1) (1 - overlap)).

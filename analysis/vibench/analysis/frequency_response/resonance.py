@@ -21,11 +21,11 @@ from .modal_fit import (
 from .results import FrequencyResponse
 
 _REACH_BANDWIDTHS = 2.0
-"""The fit uses lines within so many half-power bandwidths of the peak."""
+"""The fit uses lines within this many half-power bandwidths of the peak."""
 _LEAST_LINES = 8
 """Two pole and at most ten linear parameters need more reals than that: eight lines are sixteen."""
 _LEAST_RISE = 3.0
-"""A peak stands above the valley beside it by at least so many standard deviations of the difference."""
+"""A peak stands above the valley beside it by at least this many standard deviations of the difference."""
 _MOST_MODES = 3
 """Taken for one peak."""
 _APART = (0.5, 1.5)
@@ -204,7 +204,7 @@ def _powers(centre_hz: float, degree: int) -> Background:
 
 
 def _split(poles: Reals, modes: int) -> Iterator[Reals]:
-    """Start so many poles where one was: side by side, closer and farther, each narrower than it."""
+    """Start this many poles where one was: side by side, closer and farther, each narrower than it."""
     ((log_frequency, log_damping),) = poles
     if modes == 1:
         yield poles.ravel()

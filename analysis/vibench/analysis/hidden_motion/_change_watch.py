@@ -35,7 +35,7 @@ THRESHOLD = math.log(FALSE_ALARM_S / BLOCK_S)
 _CALIBRATING = 20
 """Blocks of a motion whose usual level is not kept yet."""
 _LARGER, _SCATTERS = 1.5, 8.0
-"""A block lies out above so many times the usual level, and so many of its standard deviations above it."""
+"""A block is out if it exceeds this multiple of the usual level, and this number of deviations above it."""
 _FOLDER = "hidden_motion"
 _HASH_DIGITS = 16
 

@@ -152,7 +152,7 @@ def _runs(marks: Flags) -> Iterator[tuple[int, int]]:
 
 
 def _impacts(latent: LatentMotion, sample_rate_hz: float) -> Reals:
-    """Return an impact for every window whose impulse is told from nothing, shape (impacts, 7)."""
+    """Return an impact for every window with a significant impulse, shape (impacts, 7)."""
     smoothed, rows = latent.smoothed, []
     force, moved, rate = smoothed.forces[:, 0], smoothed.p, smoothed.rate
     # Held over the step that ends at a sample: its middle lies half a sample earlier.
@@ -372,7 +372,7 @@ def _residuals(tracked: TrackedSpecimen, motion: PreparedMotion, latent: Sequenc
 
 _COLUMNS = 7
 _MOST_STEPS = 400
-"""A contact that lasts so many samples is no collision: m1 has come to rest on the stop."""
+"""A contact that lasts this many samples is no collision: m1 has come to rest on the stop."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,7 +51,7 @@ _LOST = (
     "described (m0, m2, k1, the kind of contact) may be otherwise"
 )
 _SCHEDULE = ((0.1, 3.0), (math.inf, 1.0))
-"""Until so much motion was tracked the variance of the velocity is taken as so many times larger."""
+"""Until so much motion was tracked the variance of the velocity is taken as this many times larger."""
 _LEAST_OF_START = 0.05
 """No parameter falls below this part of what it began with: none of them can be negative, but the loss,
 whose error goes both ways around none."""

@@ -115,7 +115,7 @@ class Filtered:
 
     @classmethod
     def room(cls, first: int, count: int) -> "Filtered":
-        """Make room for so many samples."""
+        """Make room for this many samples."""
         shapes = (STATES,), (STATES, STATES), (2,), (), (STATES, STATES), ()
         return cls(first, *(np.empty((count, *shape)) for shape in shapes))
 

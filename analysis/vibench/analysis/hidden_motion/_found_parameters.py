@@ -65,7 +65,7 @@ _CLAIMED = {
     Hidden.LOSS: 0.5,
 }
 """Part of the standard deviation that a filter claims which its errors have; parameters that wander look
-less certain than they are. Found on 31 random rigs; held against others by the slow tests."""
+less certain than they are. Found on 31 random rigs; checked against others by the slow tests."""
 _STARTS_APART = 0.3
 """Prior standard deviations by which restarts begin elsewhere: what is not forgotten shows as scatter."""
 
@@ -174,7 +174,7 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
 
 
 def _with_gaps_moved(start: TrackedSpecimen, near: Mapping[Hidden, float], shift: float) -> TrackedSpecimen:
-    """Move both gaps by so many standard deviations: without a contact model they err together."""
+    """Move both gaps by this many standard deviations: without a contact model they err together."""
     gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
     return with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
 
@@ -188,7 +188,7 @@ def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estima
 def _refined(
     described: TrackedSpecimen, motion: PreparedMotion, start: TrackedSpecimen, near: Mapping[Hidden, float]
 ) -> FoundSpecimen | str:
-    """Find parameters near a start, and again from where they are told to be while that is elsewhere."""
+    """Find parameters near a start, and again from the result while it moves."""
     wanted = tuple(near)
     for _ in range(_ROUNDS):
         good = _restarts(motion, start, near)
@@ -300,7 +300,7 @@ def _freed(found: Estimate, centre: Reals, wide: Reals) -> tuple[Reals, Reals, R
     moved = freed @ (inverse @ found.moved + pull)
     variance = np.diag(freed)
     # A parameter that wanders is better known than it claims once wandering is all that it does not know;
-    # one that is hardly told claims what is true, and is told worse by what wandering adds.
+    # one that is hardly determined states honest bounds, which wandering would widen.
     wandering = found.wandered / (found.wandered + np.diag(found.covariance))
     part = np.array([_CLAIMED.get(each, 1.0) for each in found.wanted])
     likely = variance * (1.0 - (1.0 - part**2) * wandering) + (found.wandered * variance * moved) ** 2

@@ -34,7 +34,7 @@ from ._tracking_model import TrackedSpecimen, tracked_specimen
 
 MICRO = 1e6
 _LEAST_HELD = 0.95
-"""Share of the motion, once a track was begun, that numbers which are right lose none of."""
+"""Share of the motion, once a track was started, that numbers which are right lose none of."""
 _HIGHEST_LEVEL = 1.25
 """Mean squared innovation in flight above which the specimen is another than the filter's; 0.8 to 1.1 with
 the right one."""

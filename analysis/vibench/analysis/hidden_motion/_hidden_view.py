@@ -19,7 +19,7 @@ LONGEST_VIEW_S = 2.0
 _NUMBERS_SHOWN = 3
 """Gaps and m1."""
 _LEAD_S = 0.15
-"""Before and behind what is shown, so that a track has begun and its end is smoothed."""
+"""Before and behind what is shown, so that a track has started and its end is smoothed."""
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ _MEDIAN_OF_SQUARE = 0.455
 """Of a normal variable's square."""
 _RERUNS = 3
 _START_UP_S = 4e-3
-"""Innovations of a filter that has just begun are not judged."""
+"""Innovations of a filter that has just started are not judged."""
 _START_SD = (1e-4, 0.3, 1.0, 0.5)
 """Of displacements, velocities, W and B, when nothing is known yet."""
 

@@ -70,7 +70,7 @@ _LOOKED_S = 0.25
 _FIND_S = 2.4
 """Of motion that numbers are found in."""
 _PATIENCE = 2.0
-"""After numbers were not found so many times as long is waited."""
+"""After numbers were not found this many times as long is waited."""
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.05, 0.4
 """Between two attempts at a motion that does not fit."""
 _CLIPPED = 25.0
@@ -205,7 +205,7 @@ class LiveTwin:
     def take(
         self, first_sample: int, acceleration: Reals, velocity: Reals, frequency_hz: float | None = None
     ) -> tuple[str, ...]:
-        """Take the next samples, as recorded in channel units; after a hole all begins anew.
+        """Take the next samples, as recorded in channel units; after a hole all begins again.
 
         Parameters
         ----------

@@ -184,7 +184,7 @@ def _require_finite(lost: int) -> None:
 
 
 def require_channels(name: str, roles: Collection[str]) -> None:
-    """Raise UnusableData where a recording, or a bench, lacks what the hidden motion is told from."""
+    """Raise UnusableData where a recording, or a bench, lacks what the hidden motion is estimated from."""
     missing = [role for role in (BASE, RESPONSE) if role not in roles]
     if missing:
         raise UnusableData(

@@ -24,11 +24,11 @@ from ._prepared_motion import PreparedMotion
 ACQUISITION_S = 0.06
 """Of motion that a track begins with."""
 _WORST_MISFIT = 3.0
-"""Of an acquisition; a model that explains less is not begun with."""
+"""Of an acquisition; a model that explains less is not started with."""
 _ACQUIRED_EXCESS = 4.0
 """Factor on the covariance of what was acquired: the same samples are used again by the filter."""
 _FLIGHT_MARGIN_S = 8e-5
-"""Of flight on either side of the sample that is begun with."""
+"""Of flight on either side of the sample that is started with."""
 _PIECE_S = 0.25
 """Filtered and smoothed at a time."""
 _OVERLAP_S = 0.02
@@ -87,7 +87,7 @@ def acquire(model: MotionModel, motion: PreparedMotion, first: int) -> FilterSta
 
 
 def _calmest(model: MotionModel, smoothed: Smoothed, is_open: Flags, sample_rate_hz: float) -> int | None:
-    """Choose the flight sample of the middle third whose p is told best."""
+    """Choose the flight sample of the middle third whose p is known best."""
     count = is_open.size
     margin = max(1, round(_FLIGHT_MARGIN_S * sample_rate_hz))
     near = np.convolve(is_open, np.ones(2 * margin + 1), "same") > 0.5

@@ -4,9 +4,9 @@ m1 and m2 strike each other; their jump in velocity reaches m0 through springs a
 contact its acceleration steps, and changes its slope. The shape of that kink is the same for every
 impact, and the smooth motion between impacts is far slower. So the smooth motion is taken away by a
 sixth difference, the kinks are looked for by their shape, and the strongest is taken away first, then
-the next one, until only noise is left: neighbours a tenth of a millisecond apart are told from one another.
+the next one, until only noise is left: neighbours a tenth of a millisecond apart are distinguished.
 
-Held against simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py), 88 to
+Checked against simulated motions with the noise of the virtual rig (benchmarks/impact_counter.py), 88 to
 99 % of the impacts are counted where there are 330 to 1800 a second, and none where there are none.
 What is lost is weak: grazing contacts, which change m0's motion less than the noise does, are not seen.
 """
@@ -73,7 +73,7 @@ class ImpactCounter:
 
     def _add_piece(self, velocity: Values | Reals) -> int:
         data = np.concatenate((self._carry, np.asarray(velocity, dtype=np.float64)))
-        # A kink is told from its neighbours' rests, so what surrounds it must be there.
+        # A kink is separated from what its neighbours leave, so its surroundings must be there.
         fresh = data.size - (self._finder.size - 1) - 2 * self._reach
         if fresh < self._least_fresh:
             self._carry = data

@@ -111,13 +111,13 @@ def zigzag(low: Reals, high: Reals) -> Reals:
 
 
 LEGIBLE_COLUMNS = 6.0
-"""A period of so many columns is seen as a wave."""
+"""A period of this many columns is seen as a wave."""
 _MARGIN = 1.25
 """Periods around a column: those of a sweep are not all alike."""
 _CLEAR = 0.25
 """Share of the usual height that a sample must be away from the middle to tell its side."""
 _BLOCKS, _LEAST_COLUMNS = 32, 24
-"""Periods are counted in so many stretches, each of so many columns or more."""
+"""Periods are counted in this many stretches, each of this many columns or more."""
 
 
 def outline(samples: Samples, columns: int) -> tuple[Samples, Samples]:
@@ -173,7 +173,7 @@ def reach_of(periods: Reals, borders: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def period_of(samples: Samples, low: Samples, high: Samples) -> float:
-    """Measure a period in columns; infinite where the signal never goes there and back.
+    """Measure a period in columns; infinite where the signal never goes up and down.
 
     Noise around the middle does not count.
     """
@@ -188,7 +188,7 @@ def period_of(samples: Samples, low: Samples, high: Samples) -> float:
 
 
 def widened(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samples, Samples]:
-    """Return every column the extremes of so many columns around it."""
+    """Return every column the extremes of this many columns around it."""
     lowest, highest = low.copy(), high.copy()
     for each in np.unique(reach[reach > 1]):
         here = reach == each
@@ -198,7 +198,7 @@ def widened(low: Samples, high: Samples, reach: NDArray[np.int64]) -> tuple[Samp
 
 
 def _widened(edge: Samples, reach: int, extreme: np.ufunc) -> Samples:
-    """Return every column the extreme of so many columns around it."""
+    """Return every column the extreme of this many columns around it."""
     before, found = (reach - 1) // 2, edge.copy()
     padded = np.pad(edge, (before, reach - 1 - before), mode="edge")
     for shift in range(reach):
@@ -218,7 +218,7 @@ _COARSER = 16
 _LEAST_BINS = 20_000
 """A level with fewer bins than this needs no coarser one: reducing it takes a tenth of a millisecond."""
 _STRETCHES, _LOOKED_AT, _MOST_LOOKED_AT = 8, 16, 65_536
-"""Where periods are counted in a long recording: so many places, each of so many columns, no more samples."""
+"""Where periods are counted in a long recording: number of places, columns of each, most samples."""
 _PIECE_SAMPLES = 20 * CHUNK_SAMPLES
 
 Counts = NDArray[np.int32]
@@ -261,7 +261,7 @@ class RecordingOverview:
     """By role; fine to coarse."""
 
     def picture(self, roles: Sequence[str], start: int, stop: int, columns: int) -> Picture:
-        """Draw samples ``start`` to ``stop`` (exclusive) of some channels, about so many columns wide.
+        """Draw samples ``start`` to ``stop`` (exclusive) of some channels, about this many columns wide.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""The newest samples of a run, as they come in from whoever records."""
+"""Ring buffer of the newest samples of a run."""
 
 from dataclasses import dataclass
 
@@ -72,7 +72,7 @@ class Ring:
         self._next = first_sample + values.shape[1]
 
     def newest(self, samples: int) -> RingWindow:
-        """Return so many of the newest samples, fewer when there are not so many."""
+        """Return this many of the newest samples, or all that there are."""
         count = min(max(samples, 0), self.held)
         end = self._next % self._capacity + self._capacity
         return RingWindow(self._next - count, self._values[:, end - count : end])

@@ -50,9 +50,9 @@ class PlayedVoltage:
 
     The converter's noise did not shake the table: simulated under the voltage as recorded, with as much added
     for what is not known of it, a weak motion is lifted twice too much by noise. Frame by frame and line by
-    line the part that is likely stays (Wiener's filter; all of what surely is no noise), and what that leaves
-    open is drawn: draws scatter as far as the voltage is not known, and their power is that of the recording
-    less the converter's.
+    line the part that is likely stays (Wiener's filter; all of what certainly is no noise), and what that
+    leaves open is drawn: draws scatter as far as the voltage is not known, and their power is that of the
+    recording less the converter's.
     """
 
     def __init__(self, volts: Reals, converter_rms_v: float) -> None:
@@ -107,7 +107,7 @@ class PlayedVoltage:
     def _through(self, change: Callable[[Complexes], Complexes], following: Callable[[int], Reals]) -> Reals:
         """Change the lines of frames, shape (frames, lines) in batches.
 
-        ``following`` gives so many further halves of frames, shape (halves, samples).
+        ``following`` gives this many further halves of frames, shape (halves, samples).
         """
         hop = self._hop
         result = np.zeros((self._frames + 1, hop))
@@ -124,7 +124,7 @@ class PlayedVoltage:
 
 
 def above_noise(volts: Reals, rms: float) -> Reals:
-    """Return what surely is voltage and no noise of its channel, which would shake a simulated table."""
+    """Return what certainly is voltage and no noise of its channel, which would shake a simulated table."""
     spectrum = np.fft.rfft(volts)
     spectrum[np.abs(spectrum) ** 2 < _SURELY * volts.size * rms**2] = 0.0
     return np.asarray(np.fft.irfft(spectrum, volts.size))
@@ -136,7 +136,7 @@ _BLOCKS = 200
 _BAND = (0.2, 0.4)
 """Part of the sample rate that shows a channel's own noise: no mode reaches there, and only impacts do."""
 _ALIKE = 6.0
-"""Standard deviations of a block's power, of so many lines, between blocks of one level."""
+"""Standard deviations of a block's power, of this many lines, between blocks of one level."""
 
 
 @dataclass(frozen=True)

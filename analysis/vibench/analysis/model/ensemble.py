@@ -186,7 +186,7 @@ class EnsembleCurve(Labelled):
         away = self._roots - self._mean
         with np.errstate(invalid="ignore", divide="ignore"):
             squares = left * self._sd**2
-            # What is left of the squares without the draw: of a thousandth of a millionth nothing is told.
+            # What is left of the squares without the draw: below 1e-9 it is rounding.
             others = np.maximum(squares - away**2 * self.count / left, 1e-9 * squares)
             found = _deviates(self._roots, self._mean - away / left, np.sqrt(others / (left - 1)), left)
         return np.where(left >= FEWEST_DRAWS, found, np.nan)
@@ -219,7 +219,7 @@ class EnsembleCurve(Labelled):
 
 
 def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
-    """Student's t of one more draw, as a normal deviate; beyond a probability of 1e-300 nothing is told."""
+    """Student's t of one more draw, as a normal deviate; limited at a probability of 1e-300."""
     with np.errstate(invalid="ignore", divide="ignore"):
         deviate = (roots - mean) / (sd * np.sqrt(1 + 1 / np.maximum(count, 1)))
         tail = scipy.stats.t.logsf(np.abs(deviate), np.maximum(count - 1, 1))
@@ -227,7 +227,7 @@ def _deviates(roots: Reals, mean: Reals, sd: Reals, count: Integers) -> Reals:
 
 
 def z_limit(values: int) -> float:
-    """Largest |z| in 99 % of all cases among so many independent normal deviates."""
+    """Largest |z| in 99 % of all cases among this many independent normal deviates."""
     return float(scipy.stats.norm.isf(0.5 * (1 - AGREEMENT ** (1 / max(values, 1)))))
 
 

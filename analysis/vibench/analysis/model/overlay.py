@@ -1,4 +1,4 @@
-"""The simulation laid over a measurement: draws of the same recording, same estimator, and agreement."""
+"""The simulation overlaid on a measurement: draws of the same recording, same estimator, and agreement."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -92,7 +92,7 @@ class Similarity(Labelled):
     high: float
     """95 % interval of the rate, had other frequencies of the same band been chosen."""
     block_points: int
-    """Neighbouring points resemble each other; so many were drawn together for the interval."""
+    """Neighbouring points resemble each other; this many were drawn together for the interval."""
     left_out: int
     """Points where either curve has no value."""
 

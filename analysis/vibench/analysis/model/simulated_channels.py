@@ -100,7 +100,7 @@ class SimulatedChannels:
     velocity: Reals
     """Of m0, shape (samples,) [m/s]."""
     impacts_at_s: tuple[Reals, Reals]
-    """Times since the first sample [s], and contacts begun up to them."""
+    """Times since the first sample [s], and contacts started up to them."""
     response_delay_s: float
     """By how much the response channel lags the base channel."""
     base_acceleration: Reals

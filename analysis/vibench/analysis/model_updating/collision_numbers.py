@@ -66,12 +66,12 @@ class CollisionNumbers:
 
     @property
     def gaps(self) -> tuple[FoundParameter, ...]:
-        """Of the lower and the upper side; empty unless both are told."""
+        """Of the lower and the upper side; empty unless both are determined."""
         found = tuple(each for each in self.told if each.what in _SIDES)
         return found if len(found) == len(_SIDES) else ()
 
     def on(self, specimen: Specimen) -> Specimen:
-        """Return a specimen the gaps that are told; a mean, which is told better, keeps their ratio."""
+        """Return the specimen with the determined gaps; a better known mean keeps their ratio."""
         mean = next((each for each in self.told if each.what is Hidden.MEAN_GAP), None)
         if mean is not None:
             lower, upper = (gap * mean.value / mean.described for gap in specimen.gaps_m)
@@ -90,7 +90,7 @@ class CollisionNumbers:
 
     @property
     def gap_fields(self) -> tuple[str, ...]:
-        """What is told of gaps."""
+        """Sentences on the gaps."""
         return tuple(each.what.value for each in self.told if each.what in (*_SIDES, Hidden.MEAN_GAP))
 
     @property

@@ -21,12 +21,13 @@ _MARGIN = 1.25
 """Of the largest error of a regression, within which a parameter is looked for in the next box."""
 _RIDGES = np.geomspace(1e-4, 1e4, 25)
 _COMPONENTS = 15
-"""Of the statistics' scatter, by which observed ones are held against those of runs."""
+"""Of the statistics' scatter, by which observed ones are checked against those of runs."""
 _FAR = 1.05
-"""Observed statistics so many times as far from the model as those of the furthest run are not its.
+"""Observed statistics this many times as far from the model as those of the furthest run are not its.
 
 Those of the model are further than the furthest of n runs once in n + 1 times at most; a little leeway is for
-what rig and recording differ in besides. It refuses as 1.25 did where runs were held against themselves too.
+what rig and recording differ in besides. It refuses as 1.25 did where runs were also compared with
+themselves.
 """
 
 Runs = Callable[[Reals], Reals]
@@ -114,8 +115,8 @@ def _distance(parameters: Reals, statistics: Reals, observed: Reals) -> float:
     """Return how far observed statistics lie from what parameters give, over the furthest run's own.
 
     Without what the parameters that a regression finds explain, along the largest components of the rest and
-    beyond them. Each run is held against the others, as the observed statistics are against all: a run that
-    had a part in what it is held against would seem nearer than it is, the more so the fewer there are.
+    beyond them. Each run is checked against the others, as the observed statistics are against all: a run
+    that had a part in its own reference would seem nearer than it is, the more so the fewer there are.
 
     Parameters
     ----------

@@ -81,7 +81,7 @@ class Stretch:
 
 
 class Channels(Protocol):
-    """What an estimator needs to know, whoever made the samples."""
+    """Facts that an estimator needs, whatever the source of the samples."""
 
     @property
     def sample_rate_hz(self) -> float:

@@ -27,7 +27,7 @@ from .channel_levels import ChannelLevel, channel_levels
 from .channels import RESPONSE, OnRead, ignore_reading
 
 MOST_BYTES = 1e9
-"""Of memory, for what need not be held against the file's size."""
+"""Of memory, for what need not be checked against the file's size."""
 BYTES_A_SAMPLE = 80
 """Of a stretch that is analysed at once: three channels, and what is made of them."""
 LARGEST_PACKING = 16.0
@@ -120,7 +120,7 @@ class RecordingFacts(RecordingDescription):
 
 
 def recording_facts(recording: Recording, on_read: OnRead = ignore_reading) -> RecordingFacts:
-    """Collect what a recording says about itself; ``on_read`` is told how far its samples are read.
+    """Collect what a recording says about itself; ``on_read`` receives the part of its samples read so far.
 
     Raises UnusableData when it is not as it was sealed, or says of plan or bench what this version does not
     know, and NotEnoughData when it holds no samples.

@@ -398,7 +398,7 @@ def write_report(
     figures_folder
         Where PNG, SVG and CSV of each figure go beside it; None writes none.
     diagrams
-        Branches that are laid over the stepped sines and sweeps.
+        Branches that are overlaid on the stepped sines and sweeps.
     hidden
         Hidden motions of these recordings.
     maps

@@ -128,7 +128,7 @@ class CampaignResults:
     results: tuple[AnyResult, ...]
     failures: tuple[AnalysisFailure, ...]
     model_said: tuple[str, ...] = ()
-    """What is to be known of the model that was laid over: a sentence for each fitted value."""
+    """What is to be known of the model that was overlaid on: a sentence for each fitted value."""
 
     @property
     def facts(self) -> tuple[RecordingFacts, ...]:
@@ -174,7 +174,7 @@ def analyse_files(
     specimen: Specimen | None = None,
     draws: int = DRAWS,
 ) -> CampaignResults:
-    """Analyse recordings one after the other, each with the model laid over it, as `analyse` does.
+    """Analyse recordings one after the other, each with the model overlaid on it, as `analyse` does.
 
     The model is the ``specimen`` given; by default what each recording's bench configuration says. Where one
     describes no shaker, the shaker fitted to the weakest noise among the recordings takes its place.
@@ -186,7 +186,7 @@ def analyse_files(
     name
         What results and report are called.
     simulation
-        What is laid over each, if anything.
+        What is overlaid on each, if anything.
     request
         Estimator, lines and quantities of noise.
     observer
@@ -298,7 +298,7 @@ def result_of(
 
 
 def recordings_in(folder: Path) -> tuple[Path, ...]:
-    """List the recordings in a folder, finished or interrupted, in the order they were begun.
+    """List the recordings in a folder, finished or interrupted, in the order they were started.
 
     Raises
     ------

@@ -48,7 +48,7 @@ def compare_recording(
     Parameters
     ----------
     simulation
-        What is laid over it, if anything.
+        What is overlaid on it, if anything.
 
     Raises
     ------

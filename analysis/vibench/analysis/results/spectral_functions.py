@@ -98,7 +98,7 @@ class _Played:
 
 
 def _played(excerpt: Excerpt) -> _Played:
-    """Find the parts of the plan; a recording in which no part is told is one."""
+    """Find the parts of the plan; a recording without named parts is one."""
     recording = excerpt.recording
     rate = recording.sample_rate_hz
     parts = [(each.label, each.start, each.stop) for each in recording.segments if each.label not in _AROUND]

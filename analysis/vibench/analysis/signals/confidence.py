@@ -93,7 +93,7 @@ def chi_square_of(squared: Reals, n_eff: float) -> Reals:
 
     The two parts of a residual, over a standard deviation from n averages, follow F(2, 2 (n - 1)) and not
     chi square; what exceeds either with the same probability corresponds: nu ln(1 + squared / nu), nu =
-    2 (n - 1). It is twice the negative logarithm of Student's likelihood, but for a factor (nu + 2) / nu.
+    2 (n - 1). It is twice the negative logarithm of Student's likelihood, except for a factor (nu + 2) / nu.
     """
     freedom = max(2 * (n_eff - 1), 1.0)
     return np.asarray(freedom * np.log1p(squared / freedom))

@@ -1,4 +1,4 @@
-"""What each accuracy costs and errs, as docs/accuracy.md has measured it, for whoever chooses one."""
+"""Cost and error of each accuracy, as measured in docs/accuracy.md."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from vibench.sim import Accuracy, PowerLaw
 from .progress import Exponent, SimulationRequest
 
 MACHINE = "one core of a 2-core AMD EPYC"
-"""Where it was measured; `vibench tradeoff` measures it anew on any machine."""
+"""Where it was measured; `vibench tradeoff` measures it again on any machine."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ CHAOS_SCATTER = 0.03
 
 
 def cost_sentences(request: SimulationRequest, cores: int) -> tuple[str, ...]:
-    """Return what a request's accuracy costs and errs, and how long it takes on so many idle cores."""
+    """Return what a request's accuracy costs and errs, and how long it takes on this many idle cores."""
     level = MEASURED[request.accuracy]
     each_s = request.simulated_s / len(request.models)
     laws = [request.specimen_under(model).contact for model in request.models]

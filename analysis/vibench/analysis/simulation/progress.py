@@ -486,7 +486,7 @@ class SimulationProgress:
         return tuple((float(frequency_hz[each[0]]), float(frequency_hz[each[-1]])) for each in groups)
 
     def curves(self) -> tuple[Curve, ...]:
-        """Return Responses I and II of every model, to be laid over recordings."""
+        """Return Responses I and II of every model, to be overlaid on recordings."""
         return tuple(
             Curve(
                 f"model {model}, {1e6 * self._amplitude_m:.4g} µm",

@@ -1,4 +1,4 @@
-"""Simulations for a window: each tells its answer piece by piece, and stops when it is told to."""
+"""Simulations for a window: each sends its answer piece by piece, and stops on request."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 

@@ -246,7 +246,7 @@ class DwellResponse(Labelled):
     noise_source: str
     """What tells that noise, or why it is not determined."""
     rest_bias_i: float
-    """The same lift, if all that does not repeat with the drive were noise; NaN where it is surely more."""
+    """The same lift, if all that does not repeat with the drive were noise; NaN where more moves."""
     rest_error_i: float
     rest_displacement_m: float
     """Root mean square of what does not repeat with the drive [m]."""

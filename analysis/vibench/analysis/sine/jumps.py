@@ -17,7 +17,7 @@ _SIDE = 12
 """Intervals on either side that a straight line is laid through."""
 _SMALLEST_DB = 1.5
 _CLEAR = 8.0
-"""A step of so many standard errors stands out among thousands of candidates even if its errors are rough."""
+"""A step of this many standard errors stands out among thousands of candidates, with rough errors too."""
 _LIKELY = 3.84
 """Twice the log likelihood ratio at 95 % (chi squared, one degree of freedom)."""
 _TRANSITION = 3
@@ -255,7 +255,7 @@ class Hysteresis(Labelled):
     down: Reals
     """Response II."""
     differs: Flags
-    """Where the two lie more than 1.5 dB apart in the mean over two per cent of the band."""
+    """Where the two lie more than 1.5 dB apart on average over two per cent of the band."""
     pairs: tuple[tuple[Jump, Jump], ...]
     """Each jump upwards with the nearest one downwards of the opposite step: (up sweep, down sweep)."""
 

@@ -17,7 +17,7 @@ from .order_tracking import tracked_orders
 _NOISE_NEIGHBOURS = 50
 """Lines on either side whose median is taken as the floor around a peak."""
 _LEAST_RATIO = 5.0
-"""A peak stands at least so many times above that floor."""
+"""A peak stands at least this many times above that floor."""
 _MEDIAN_OF_RAYLEIGH = float(np.sqrt(2 * np.log(2)))
 """Median of the magnitude of complex noise, in standard deviations of one component."""
 
@@ -47,7 +47,7 @@ def peaks(spectrum: AmplitudeSpectrum, *, low_hz: float, high_hz: float, count: 
     low_hz, high_hz
         Where to look; both at least two lines away from 0 and from half the sample rate.
     count
-        At most so many.
+        At most this many.
 
     """
     if spectrum.window is not Window.HANN:

@@ -54,7 +54,7 @@ def simulated_dwell(
 ) -> SimulatedDwell | None:
     """Move amplifier, table and specimen by the plan's voltage, and analyse that like a recording.
 
-    Begun more gently than the generator's staircase begins it, and harder: where both end in one motion, so
+    Started more gently than the generator's staircase begins it, and harder: where both end in one motion, so
     will what is measured. None where a motion is lost, or the window is too short to be analysed.
     """
     per_period = 2 * int(np.ceil(_FINEST_STEP_HZ / at_hz / 2))
@@ -187,7 +187,7 @@ def expected_uncertainty(measurement: Measurement, rig: Rig) -> tuple[Expected, 
     Noise tells frequency, damping and transmissibility at each resonance of the linear specimen; a sine both
     Responses over their window, 5 s or all that is recorded if that is less, whose chance is that of three
     runs of the described rig under its voltage, analysed like a recording; where these settle on different
-    motions nothing is told. Scatter falls with the root of the time. Other kinds of plan give nothing.
+    motions nothing is stated. Scatter falls with the root of the time. Other kinds of plan give nothing.
 
     Parameters
     ----------

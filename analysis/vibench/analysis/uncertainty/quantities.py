@@ -131,7 +131,7 @@ def _amplitude(value_m: float, stated: Stated, scatter: Contribution, where: str
 
 
 def _of_base(sd_m: float, amplitude_m: float) -> Contribution:
-    """Return what the scatter of A0 adds to a maximum that is held against it."""
+    """Return what the scatter of A0 adds to a maximum that is checked against it."""
     return scattered(Cause.NOISE, sd_m, amplitude_m, "scatter of A0")
 
 
