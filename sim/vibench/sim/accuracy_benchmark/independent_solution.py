@@ -2,7 +2,7 @@
 
 scipy's DOP853 (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 2nd ed. 1993, section
 II.10) takes the paper's equations step by step; where m1 touches or leaves a stop, the instant is found and
-the method begins anew, so that no step runs over the kink that would cost its order. It shares no code with
+the method begins again, so that no step runs over the kink that would cost its order. It shares no code with
 the engine, errs by some 1e-12 of (100 um, 0.1 m/s), and is slow: seconds for a second of motion.
 """
 

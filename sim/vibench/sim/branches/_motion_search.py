@@ -154,7 +154,7 @@ def _orbit_from(
 
 
 def settled_orbit(specimen: Specimen, drive: Harmonic, state: Vector, periods: int) -> PeriodicOrbit | None:
-    """Shoot from a state near a motion of so many periods; the motion in its simplest form, None if lost."""
+    """Shoot for a motion of this many periods from a state; its simplest form, or None if lost."""
     lower, upper = specimen.gaps_m
     shapes = [OrbitShape.REPEATED]
     if lower == upper and periods % 2 == 1:

@@ -89,7 +89,7 @@ M = TypeVar("M")
 
 @dataclass(frozen=True, eq=False)
 class BranchStart(Generic[M]):
-    """A motion that a branch may be begun from."""
+    """A motion that a branch may be started from."""
 
     motion: M
     origin: BranchOrigin

@@ -27,7 +27,7 @@ WHOLE_COLLISIONS = 1e-7
 MARKOV_TERMS = 11
 """Taylor coefficients of the chain's answer to a unit impulse in a cell."""
 REACH = MARKOV_TERMS
-"""Cells to either side that hear of it in so many terms."""
+"""Cells to either side that hear of it in this many terms."""
 COLUMNS = 2 * REACH + 1
 CROSS_SHARE = 1.0
 """Part of the tolerance that one cell's force may change another's rate within a window, unseen."""
@@ -82,7 +82,8 @@ def _fastest(chain: Chain, drive: Drive) -> float:
 def markov_between(chain: Chain) -> Table:
     """Taylor coefficients of p of every cell after a unit impulse in a cell nearby.
 
-    Shape (MARKOV_TERMS, 2 REACH + 1, cells): the answer to an impulse so many cells before, none, or behind.
+    Shape (MARKOV_TERMS, 2 REACH + 1, cells): the response to an impulse in an earlier cell, the
+    same, or a later one.
     """
     path, places = _answers(chain, np.ones((chain.size, COLUMNS))), np.arange(chain.size)
     answers = np.zeros((MARKOV_TERMS, COLUMNS, chain.size))

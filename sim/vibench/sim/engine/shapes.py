@@ -22,7 +22,7 @@ POINTS = 16
 TERMS = 8
 """Of the series for all that is slow beside a collision."""
 SOFTEST, HARDEST, SHAPES = -0.3, 0.5, 41
-"""Shapes stand at so many presses, from the first to the last. A press is the acceleration by all other
+"""Shapes stand at this many presses, from the first to the last. A press is the acceleration by all other
 springs, over speed^2 / depth."""
 SPACING = (HARDEST - SOFTEST) / (SHAPES - 1)
 QUADRATURE = 60
@@ -102,7 +102,7 @@ def _misfits(depths: Vector, duration: float, press: float) -> tuple[Vector, Tab
 
 @lru_cache(maxsize=1)
 def collision_shapes() -> tuple[Table, Table]:
-    """Solve the collisions of the row, each begun from the one before."""
+    """Solve the collisions of the row, each started from the one before."""
     shapes, durations = np.zeros((SHAPES, SHAPE_ROWS, POINTS)), np.zeros((SHAPES, 7))
     # Without a press: 2.943 long, and close to half a sine.
     depths, duration = np.sin(math.pi * HEIGHTS), 2.943

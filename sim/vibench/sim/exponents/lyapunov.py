@@ -3,7 +3,7 @@
 One small change of the motion is carried along exactly, through flight and every contact; its growth,
 averaged, is the exponent. What the run ends in decides how it is taken: from the modes if no impact will
 follow, from the multipliers if the motion has become periodic, else as a mean with a standard error that
-knows of the correlation between neighbouring intervals. Chaos that has died out on the way is told apart.
+knows of the correlation between neighbouring intervals. Chaos that has died out on the way is distinguished.
 """
 
 import math

@@ -35,7 +35,7 @@ from ..motion.poincare import smallest_period
 FEWEST_BLOCKS = 16
 """With fewer independent blocks an error is itself known to less than 20 per cent."""
 CONFIDENCE = 0.99
-"""Blocks count as independent unless the test says otherwise this surely."""
+"""Blocks count as independent unless the test says otherwise this certainly."""
 
 
 @dataclass(frozen=True)
@@ -296,7 +296,7 @@ def settling(run: TangentRun, scales: Floats) -> Settling:
 
 
 def _change_of_sign(growth: Floats) -> int | None:
-    """Find where the mean growth falls from surely positive to not positive."""
+    """Find where the mean growth falls from certainly positive to not positive."""
     count = len(growth)
     if count < 2 * FEWEST_INTERVALS or not bool(np.all(np.isfinite(growth))):
         return None

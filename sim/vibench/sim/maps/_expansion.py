@@ -37,7 +37,7 @@ from ._refinement import RefinementPlan, Seen, lattice, plan_refinement
 JUMP = 0.1
 """Responses of neighbours that differ by more, relatively, are looked at more closely."""
 BASIN_JUMP = 2e-3
-"""Where only the start varies, responses of one motion are the same but for what has not settled."""
+"""Where only the start varies, responses of one motion are the same except for what has not settled."""
 NOTHING = -1
 NOBODY = -1
 
@@ -210,7 +210,7 @@ class MapEstimate:
 
     points: int
     coarse_points: int
-    """Of the first lattice: a map has at least so many."""
+    """Of the first lattice: a map has at least this many."""
     work_s: float
     """Of all points on one core, as such points took here lately."""
     longest_work_s: float

@@ -1,6 +1,6 @@
 """Which cells of a map are computed: a coarse lattice first, then only where neighbours differ.
 
-The plan is a pure function of what is known: it is made anew from the coarse lattice on whenever all that it
+The plan is a pure function of what is known: it is made again from the coarse lattice on whenever all that it
 asked for has an answer. So a map that was stopped goes on to the same cells as one that never was.
 """
 
@@ -17,8 +17,8 @@ Codes = NDArray[np.int64]
 Indices = NDArray[np.int64]
 
 AUDITED, AUDITED_SHARE = 400, 0.1
-"""Filled cells that are computed after all, drawn at random: they say how often filling in was wrong. So many
-at most, and this part of them at most."""
+"""Filled cells that are computed after all, drawn at random: they say how often filling in was wrong. This
+many at most, and this part of them at most."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,7 @@ class Audit:
         return wilson_share(self.wrong, self.audited)
 
     def corrected(self, shares: Sequence[Share], cells: int) -> tuple[Share, ...]:
-        """Correct shares of motions in a map of so many cells by how filling in was wrong.
+        """Correct shares of motions in a map of this many cells by how filling in was wrong.
 
         Where motions are mixed finely the commonest is filled in too often. What the audit gains and loses
         each motion is what the other filled cells would, as far as their number tells.
@@ -137,8 +137,8 @@ class MapResults(GridResults[Map]):
         """Number of the motion that each point came to, over all axes; -1 where it is not known.
 
         Points have the same number if they are of one kind and period; motions without impacts have theirs.
-        Where only the start varies the responses of periodic motions are told apart too, so that each number
-        is one attractor; the commonest is 0.
+        Where only the start varies the responses of periodic motions are distinguished too, so that each
+        number is one attractor; the commonest is 0.
         """
         state = self.state.reshape(-1)
         is_known = np.flatnonzero((state == PointState.DONE) | (state == PointState.FILLED))

@@ -40,8 +40,8 @@ from .toml_table import fault_in_words, toml_table
 BASE = "model"
 """Key of the described specimen that a table starts from."""
 FOLDER = "folder"
-"""Key of a validation's context: the folder that a path in ``model`` is relative to, given by whoever reads a
-file. Without it only shipped specimens can be named, so that what stands in a recording opens no file."""
+"""Key of a validation's context: the folder that a path in ``model`` is relative to, given by the reader
+of a file. Without it only shipped specimens can be named, so that a recording opens no other file."""
 SOURCES = "sources"
 SUFFIX = ".toml"
 FORMAT, VERSION = "format_version", 1
@@ -362,7 +362,7 @@ def _shipped() -> Mapping[str, str]:
 
 
 def _laid_over(base: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace what is said anew; the other of two keys that say the same goes, and so do its sources."""
+    """Replace what is said again; the other of two keys that say the same goes, and so do its sources."""
     replaced = {key for pair in ALTERNATIVES if said.keys() & pair for key in pair} | said.keys()
     kept = {key: value for key, value in base.items() if key not in replaced}
     _warn_of_changes(base, {**kept, **said}, said)

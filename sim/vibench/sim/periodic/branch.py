@@ -13,8 +13,8 @@ from ..model.state import Complex, Floats, Vector
 from .continuation import ArcEnd
 
 NEUTRAL = 1e-9
-"""A multiplier no further outside the unit circle than this lies on it, but for rounding: as all do without
-damping, where distances neither grow nor fall."""
+"""A multiplier no further outside the unit circle than this lies on it, except for rounding: as all do
+without damping, where distances neither grow nor fall."""
 
 
 class Parameter(StrEnum):
@@ -88,7 +88,7 @@ class Branch:
     end: ArcEnd
     """Why the branch was left at its last point."""
     begin: ArcEnd | None = None
-    """Why it was left at its first, where it was followed both ways; None where it was begun there."""
+    """Why it was left at its first, where it was followed both ways; None where it was started there."""
 
     @property
     def is_stable(self) -> NDArray[np.bool_]:

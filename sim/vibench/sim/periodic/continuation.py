@@ -86,13 +86,13 @@ LOCATING_ITERATIONS = 40
 LOCATED = 1e-9
 """What is sought (a tangent's component, a multiplier's distance) counts as zero below this."""
 CRAWLING, MOST_CRAWLED = 10.0, 50
-"""A curve that is followed in steps below so many of the shortest, so many in a row, is at a kink."""
+"""A curve that is followed in steps below this many of the shortest, this many in a row, is at a kink."""
 NEAR_START = 0.2
 """A step that passes its start at less than this part of its length is looked at for closing."""
 SAME_POINT = 1e-6
 """Along the curve: closer than that the start has been met again."""
 SHORTEST_BRACKET = 1e-12
-"""Along the curve: closer than that nothing is told apart."""
+"""Along the curve: closer than that nothing is distinguished."""
 
 
 def correct(curve: Curve, guess: Vector, normal: Vector, tolerance: float) -> tuple[Vector, int]:

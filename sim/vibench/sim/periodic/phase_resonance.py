@@ -34,7 +34,7 @@ FREQUENCY_SHARE = 0.1
 FARTHEST = 20.0
 """Units of length from the start, in frequency or level, beyond which an iteration has gone astray."""
 STRAYED = 1e3
-"""A state so many gaps away is none: an iteration that tries it has gone astray. On a hard spring it would
+"""A state this many gaps away is none: an iteration that tries it has gone astray. On a hard spring it would
 swing many millions of times a period, and its run take minutes."""
 SAMPLES = 256
 DIFFERENCE = 1e-6

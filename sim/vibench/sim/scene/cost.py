@@ -24,7 +24,7 @@ from .scene import Scene
 from .solve import InBatches, Question, Solver, settle_scene, solve_scene
 
 MEMORY = 30
-"""So many runs later a run counts for a third of a new one."""
+"""This many runs later a run counts for a third of a new one."""
 FEWEST = 3
 """Runs of a kind without which nothing is said of its scatter."""
 UNKNOWN_FACTOR = 10.0
@@ -116,7 +116,7 @@ class CostLedger:
         return name in self._kinds and self._kinds[name].runs >= FEWEST
 
     def save(self) -> None:
-        """Keep what is new; where the folder cannot be written to, the next process begins anew."""
+        """Keep what is new; where the folder cannot be written to, the next process begins again."""
         with self._lock:
             self._saved_s = time.monotonic()
             if not self._is_new:

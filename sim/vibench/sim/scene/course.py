@@ -49,9 +49,9 @@ class SceneRun:
     ended: str
     """Why it was followed no longer."""
     path: tuple[Stretch, ...]
-    """From its beginning until it had settled, or until a small change had surely grown without end."""
+    """From its beginning until it had settled, or until a small change had certainly grown without end."""
     grew: bool
-    """A small change that was carried along has surely grown without end."""
+    """A small change that was carried along has certainly grown without end."""
     wandered_until_s: float
     """When it was last seen to change from period to period."""
     leaked: Floats = field(default_factory=lambda: np.zeros(4))
@@ -62,7 +62,7 @@ class SceneRun:
 class FixedCourse:
     """A motion at time zero that is followed for a given time and observed at its end.
 
-    It is looked at once a drive period. Where it has not begun to repeat by the time that it should have
+    It is looked at once a drive period. Where it has not started to repeat by the time that it should have
     forgotten its start, a small change is carried along and extremes are kept block by block: a motion that
     never repeats is known only by its growth and its statistics.
     """
@@ -173,13 +173,13 @@ class Lead:
 SLICE_S, SLICE_PERIODS = 0.25, 4
 """Between two looks pass this long and this many drive periods, if the window is not shorter."""
 WINDOWS = 2
-"""A motion that does not repeat is watched for so many windows; the last of them is the one observed."""
+"""A motion that does not repeat is watched for this many windows; the last of them is the one observed."""
 DRIFT_SHARE = 0.25
 """Share of the budget that a slow drift may use: finding its error repeats its path three times."""
 
 
 class SettlingCourse:
-    """A motion at time zero that is followed until it repeats or surely never will, and observed then.
+    """A motion at time zero that is followed until it repeats or certainly never will, and observed then.
 
     A motion that repeats is observed over one of its own periods, which holds all there is to see. One that
     does not is observed over a window once it is certain that it never will. Because chaos can die out, it
@@ -226,7 +226,7 @@ class SettlingCourse:
         return self._in_window * self._slice_periods / self._pace.frequency_hz
 
     def watch(self) -> StatesAlone | None:
-        """Watch it until it repeats or surely never will; returns chaos, or a drift, to be followed on."""
+        """Watch it until it repeats or certainly never will; returns chaos, or a drift, to be followed on."""
         run, pace, in_window = self._run, self._pace, self._in_window
         early, late, starts = self.way.path, list[Stretch](), list[FollowedRun]()
         if self.way.repeats is not None:

@@ -40,7 +40,7 @@ HERTZ_IMPACT, LINEAR_IMPACT = 0.9e-6, 2.5e-6
 HERTZ_TANGENT, TANGENT = 4.0, 1.6
 """With a small change carried along; a collision is then resolved step by step."""
 STRICT_TOLERANCE, STRICT = 1e-8, 5.0
-"""Below this tolerance contacts cost so many times more."""
+"""Below this tolerance contacts cost this many times more."""
 STEP = 1e-9
 """Seconds for a step of flight, at least: what counts where a mode is far faster than those of the paper."""
 
@@ -48,7 +48,7 @@ STEP = 1e-9
 def nominal_cost_s(
     contact: ContactLaw, tolerance: float, length_s: float, impacts: int, changes: int, steps: int
 ) -> float:
-    """Return the processor time for a stretch of motion with so many impacts, small changes and steps."""
+    """Return the processor time for a stretch of motion with this many impacts, small changes and steps."""
     strict = STRICT if tolerance < STRICT_TOLERANCE else 1.0
     match contact:
         case PowerLaw():
@@ -150,7 +150,7 @@ class FollowedRun:
         return twin
 
     def pass_over(self, drive_periods: int) -> None:
-        """Let so many drive periods pass in which the motion comes back to its state."""
+        """Let this many drive periods pass in which the motion comes back to its state."""
         self._run.pass_over(drive_periods / self.drive.frequency_hz)
 
     @property
@@ -277,7 +277,7 @@ whether or not a stretch precedes the first."""
 
 @dataclass(frozen=True)
 class Block:
-    """What was seen in a part of a motion that holds whole drive periods, but for what precedes the first."""
+    """What was seen in the whole drive periods of a part of a motion."""
 
     peak_x_m: float
     """Largest abs(x)."""
@@ -296,7 +296,7 @@ class ObservedWindow:
     stretches: tuple[Stretch, ...]
     """The parts it was followed in."""
     blocks: tuple[Block, ...]
-    """Equal parts, but for a drive period."""
+    """Equal parts, except for a drive period."""
     line_periods: int
     """The lines, over this many whole drive periods before the end: the most that the window holds, of the
     motion's own periods where it has one."""
@@ -356,8 +356,8 @@ def observe_window(
     """Follow a motion through a window that begins now and holds a drive period or more, and observe it.
 
     A motion that repeats after ``cycle`` drive periods has its lines taken over a whole multiple of them, as
-    far as the window holds one: over other lengths its other lines leak in. Where ``is_chaos`` says of the
-    first parts that they surely are, a small change is not carried through the middle, only at the end again.
+    far as the window holds one: over other lengths its other lines leak in. Where ``is_chaos`` is
+    certain of the first parts, a small change is not carried through the middle, only at the end again.
     """
     begins, start_s, frequency = run.apart(), run.time_s, run.drive.frequency_hz
     end_s = start_s + window_s

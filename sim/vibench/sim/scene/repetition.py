@@ -29,14 +29,14 @@ NEARLY = 0.01
 TINY = 1e-300
 """Size of a motion that has none."""
 DISTINCT = 20.0
-"""A motion of several periods differs from one of fewer by so many tolerances; one that differs by less may
+"""A motion of several periods differs from one of fewer by this many tolerances; one that differs by less may
 be settling down to it still."""
 CERTAIN_GROWTH = 12.0
 """A small change has grown by e^12 = 160 000: more than shear makes of it."""
 NEUTRAL = 0.1
 """Growth per forgetting time that counts as none: the specimen's own damping has -1."""
 DRIFT_PARTS = 6
-"""A motion drifts whose changes grow or shrink over so many parts in turn: by chance in 2 cases of 720."""
+"""A motion drifts whose changes grow or shrink over this many parts in turn: by chance in 2 cases of 720."""
 FEWEST_NEUTRAL = 8.0
 """Forgetting times that a motion must neither grow nor die to be called quasi-periodic."""
 
@@ -66,7 +66,7 @@ class Growth:
 
     @property
     def is_certain(self) -> bool:
-        """A small change has surely grown."""
+        """A small change has certainly grown."""
         return self.total > CERTAIN_GROWTH
 
     @property

@@ -34,8 +34,8 @@ class WindowScatter:
     @property
     def between_runs(self) -> float:
         """Two runs differ by less in 19 cases of 20, if the extremes were normal: sqrt(2) deviations of
-        Student's t for so many blocks. Measured in seven chaotic regimes of five laws at three durations, 40
-        runs each: 85 to 99.7 % of the pairs.
+        Student's t for this many blocks. Measured in seven chaotic regimes of five laws at three durations,
+        40 runs each: 85 to 99.7 % of the pairs.
         """
         return math.sqrt(2.0) * student_quantile(self.blocks - 1, COVERED) * self.relative
 

@@ -20,7 +20,7 @@ BUDGET_S = 1.0
 """What a scene may cost on top of its own run."""
 CLEAR, FEWEST, MOST = 8, 16, 64
 """Starts that are followed, that which was asked for among them: the first where all of them settled on one
-motion, or chaos surely lasts; the last where they came to more than one motion, and the budget allows."""
+motion, or chaos certainly lasts; the last where they came to more than one motion, and the budget allows."""
 
 
 class Observable(StrEnum):
@@ -39,7 +39,7 @@ class Observable(StrEnum):
 
 
 MOST_PERIODS = 1e12
-"""After so many drive periods a double tells times apart to a ten-thousandth of one."""
+"""After this many drive periods a double tells times apart to a ten-thousandth of one."""
 
 
 @dataclass(frozen=True)

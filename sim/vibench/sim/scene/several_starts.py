@@ -41,7 +41,7 @@ LEAST_S = 1e-3
 TOO_FEW = 4
 """Fewer starts say nothing."""
 LASTING_S = 300.0
-"""Chaos counts as lasting when its mean lifetime is surely longer: ten times the paper's run."""
+"""Chaos counts as lasting when its mean lifetime is certainly longer: ten times the paper's run."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,8 +162,8 @@ class SeveralStarts:
         """How often chaos died out; None where no motion wandered long enough to tell.
 
         A motion that wanders when it should have been on its attractor is taken to be chaotic from there on:
-        until it is known to have settled, or as long as a small change surely grows. Any other may have left
-        chaos already, as long ago as it takes to be seen to repeat.
+        until it is known to have settled, or as long as a small change certainly grows. Any other may have
+        left chaos already, as long ago as it takes to be seen to repeat.
         """
         known = [
             (each.wandered_until_s, each.period is not None, each.motion is MotionKind.CHAOTIC)
@@ -219,7 +219,7 @@ class SeveralStarts:
 
     @property
     def _is_lasting(self) -> bool:
-        """No start has settled, in so long a time that chaos surely lasts."""
+        """No start has settled, in so long a time that chaos certainly lasts."""
         escape = self.escape
         return not self._has_settled and escape is not None and escape.lifetime_above_s > LASTING_S
 
@@ -247,7 +247,7 @@ class SeveralStarts:
 
     @property
     def _lasting_after_s(self) -> float:
-        """How much longer all starts together are followed until chaos surely lasts, if none settles."""
+        """How much longer all starts together are followed until chaos certainly lasts, if none settles."""
         escape = self.escape
         if escape is None or self._has_settled:
             return math.inf
@@ -273,7 +273,7 @@ class SeveralStarts:
 SAME = 1e-3
 """Relative difference of responses up to which two motions are the same."""
 APART = 2.0
-"""Two windows of chaos differ by more than so many times what 19 in 20 do only if they are of two motions."""
+"""Two windows of chaos belong to two motions if they differ by this multiple of what 19 in 20 do."""
 
 
 CLEAREST = (MotionKind.PERIODIC, MotionKind.QUASI_PERIODIC, MotionKind.CHAOTIC)
@@ -297,7 +297,7 @@ def kind_among(group: Sequence[ReachedMotion], forgetting_s: float) -> MotionKin
     """Name the kind of a motion that several starts came to.
 
     Chaos that is weak, or comes in bursts, leaves most starts calm for as long as they are watched: where a
-    small change has surely grown from one of them, the growth from all together tells.
+    small change has certainly grown from one of them, the growth from all together tells.
     """
     kinds = [each.motion for each in group if each.motion in CLEAREST]
     if group[0].period is None and any(each.growth.is_certain for each in group):
@@ -338,7 +338,7 @@ def is_same(one: ReachedMotion, other: ReachedMotion) -> bool:
 PENDING = (MotionKind.CHAOTIC_SO_FAR, MotionKind.UNDECIDED)
 """Motions that may still come to another."""
 FEWEST_DRAWS = 3
-"""Draws of one motion that its scatter is told from."""
+"""Draws of one motion from which its scatter is estimated."""
 
 ErrorOf = Callable[[ReachedMotion], float | None]
 """Gives the relative error of the responses of a motion."""
@@ -404,7 +404,7 @@ def counts_of(kinds: Sequence[MotionKind], starts: Sequence[int]) -> list[Count]
 
 
 def lasting(motion: MotionKind, escape: EscapeRate | None) -> MotionKind:
-    """Call chaos so only where none of it died out, and it surely lasts."""
+    """Call chaos so only where none of it died out, and it certainly lasts."""
     if motion is not MotionKind.CHAOTIC:
         return motion
     lasts = escape is not None and escape.escapes == 0 and escape.lifetime_above_s > LASTING_S

@@ -200,7 +200,7 @@ def _counted(taken_s: list[float], places: Collection[int]) -> Iterator[None]:
 def solve_ensemble(
     scene: Scene, starts: int = FEWEST, seed: int = SEED, budget_s: float = math.inf
 ) -> Ensemble | None:
-    """Follow a scene from so many starts a millionth of the gap apart, whether or not its own is forgotten.
+    """Follow a scene from this many starts a millionth of the gap apart, whether or not its own is forgotten.
 
     `solve_scene` does so by itself where the start is forgotten, with as few starts as tell the motions
     apart; more of them give narrower intervals, and another seed another draw.

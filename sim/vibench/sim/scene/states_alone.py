@@ -166,7 +166,7 @@ AUTOMATIC_S = 10.0
 
 
 def batches_are_worth_it(motions: int, duration: FixedDuration | AutomaticDuration) -> bool:
-    """Whether so many motions of one specimen are followed in less time in batches than one after the other.
+    """Whether batches follow this many motions of one specimen faster than the scalar engine.
 
     It hangs on what is asked for and on the processor, and not on what runs took lately: who asks twice has
     the same answer twice.
@@ -213,7 +213,7 @@ def _follow_rounds(group: Sequence[StatesAlone]) -> None:
 
 
 def _round(ready: Sequence[tuple[StatesAlone, int]]) -> list[StatesAlone]:
-    """Follow motions in a batch, each for so many drive periods; gives those that are to be followed on."""
+    """Follow motions in a batch, each for this many drive periods; gives those that are to be followed on."""
     found = follow_together([each.run for each, _ in ready], [periods for _, periods in ready])
     # One that the batch has lost is where it was, and followed by itself.
     return [

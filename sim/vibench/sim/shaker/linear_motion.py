@@ -16,7 +16,7 @@ from .loaded_shaker import Amplifier, FloatArray, Shaker
 
 ComplexArray = NDArray[np.complex128]
 SINE_COLUMNS = ("voltage", "current", "base", "m0", "p")
-"""Phasors at the coil [V, A] and of displacements [m], absolute but for p; time goes as exp(+i w t)."""
+"""Phasors at the coil [V, A] and of displacements [m], absolute except for p; time goes as exp(+i w t)."""
 _VOLTAGE, _CURRENT, _BASE, _M0, _P = range(len(SINE_COLUMNS))
 
 

@@ -141,7 +141,7 @@ class ShakenMotion:
 
     @classmethod
     def of(cls, count: int, end_rows: int) -> Self:
-        """Make room for so many steps, and for the ends of the first of them."""
+        """Make room for this many steps, and for the ends of the first of them."""
         ends = np.empty((end_rows, len(MOTION_COLUMNS)))
         return cls(np.empty(count), np.empty(count), np.empty(count), ends)
 
@@ -210,7 +210,7 @@ class LoadedShaker:
 
     @property
     def impacts(self) -> int:
-        """Contacts begun since the start."""
+        """Contacts started since the start."""
         return int(self.structure["impacts"])
 
     @property

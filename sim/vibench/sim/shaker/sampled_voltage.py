@@ -21,7 +21,7 @@ Gain = Callable[[FloatArray], ComplexArray]
 """Complex gain of a sensor over frequency [Hz], shape kept."""
 
 FINEST_STEP_HZ = 5e4
-"""The steps are at least so many a second: 600 Hz then errs by 5e-4 of the specimen's push on the table."""
+"""The steps are at least this many a second: 600 Hz then errs by 5e-4 of the specimen's push on the table."""
 _PASS_PART = 0.45
 """Of the sample rate: passed whole; from there a cosine edge to half the rate, as behind a converter."""
 _MARGIN = 2048
@@ -64,7 +64,7 @@ class SampledMotion:
     impact_times_s: FloatArray
     """Ends of blocks of 20 ms, shape (blocks + 1,), from 0."""
     impacts: NDArray[np.int64]
-    """Contacts begun up to them, shape (blocks + 1,)."""
+    """Contacts started up to them, shape (blocks + 1,)."""
 
 
 def follow_voltage(
@@ -165,7 +165,7 @@ class _Resampling:
         return np.asarray(fft.irfft(spectrum, size, overwrite_x=True)[_MARGIN : _MARGIN + count])
 
     def _weights_of(self, size: int, gain: Gain | None) -> FloatArray | ComplexArray:
-        """Give what the lines of so many samples are multiplied by, to steps or from them behind a sensor."""
+        """Return the factors of the lines of ``samples`` samples, to steps or from them behind a sensor."""
         known = self._weights.get((size, gain))
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)

@@ -151,7 +151,7 @@ class ClusterExecutor:
 
 def _connected(address: str, patience_s: float) -> Client:
     try:
-        # Asked first: a client that was begun with an address of another form cannot be closed again.
+        # Asked first: a client that was started with an address of another form cannot be closed again.
         get_address_host_port(address)
         return Client(address, timeout=patience_s, set_as_default=False)
     except (OSError, ValueError) as error:

@@ -46,8 +46,8 @@ _LONGEST_LOOK_S, _BETWEEN_TRIES_S = 2.0, 0.02
 def sole_writer(path: Path) -> OpenFile:
     """Open a file to write, and mark it so for as long as it is open.
 
-    Whoever looks at an answer has the file open for a moment: that is waited for. Raises StudyError when
-    another process has it open for longer, as whoever writes it has, or it cannot be opened.
+    Anyone who looks at an answer has the file open for a moment: that is waited for. Raises StudyError when
+    another process has it open for longer, as its writer has, or it cannot be opened.
     """
     try:
         file = OpenFile(path)
@@ -177,7 +177,7 @@ def _scale(file: h5py.File, axis: StudyAxis) -> h5py.Dataset:
 
 
 def _numbered(column: Column) -> StudyAxis:
-    """Return the axis of a column whose components are told by their number."""
+    """Return the axis of a column whose components are numbered."""
     return StudyAxis(column.along, tuple(float(k) for k in range(column.components)), "1", column.along)
 
 

@@ -250,7 +250,7 @@ def solve_study(
         The file that keeps the answers, ``NAME.h5``; in memory alone when None.
     existing
         Whether a file that is there is refused or resumed. Resuming computes what is missing; a file that
-        is not there is begun.
+        is not there is started.
     workers
         Threads of this process; one for each processor when None.
     cluster

@@ -299,7 +299,7 @@ def continued_from(frequency_hz: float) -> str:
 
 
 OTHER_STARTS = 8
-"""What a point counts for whose start may be forgotten: then so many are followed at least."""
+"""What a point counts for whose start may be forgotten: then this many are followed at least."""
 
 
 def study_solver(study: Study) -> Solver:
