@@ -330,7 +330,7 @@ def _read_raw(system: DaqmxSystem, request: Any) -> Fields:
 
 
 def _binary_reader(bits: int) -> Call:
-    """Return the call that reads unscaled samples of so many bits."""
+    """Return the call that reads unscaled samples of this many bits."""
 
     def read_binary(system: DaqmxSystem, request: Any) -> Fields:
         task = task_of(system, request)

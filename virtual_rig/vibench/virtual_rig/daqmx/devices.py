@@ -222,7 +222,7 @@ class Catalogue:
 
 
 def catalogue_with(product_type: str, name: str) -> Catalogue:
-    """Return the default system, in which the device of that product bears that name.
+    """Return the default system, in which the device of that product has that name.
 
     Raises ConfigurationError when there is no such product, or the name is taken by another one.
     """

@@ -98,7 +98,7 @@ class Generation:
         return self.buffer.size - (self.buffer.written - self._fetched)
 
     def time_of_room(self, samples: int) -> float:
-        """Rig time at which there is room for so many samples [s]."""
+        """Rig time at which there is room for this many samples [s]."""
         left = self.buffer.written + samples - self.buffer.size - self._most_in_memory
         return self.time_of(max(0, left)) - LEAD_S
 

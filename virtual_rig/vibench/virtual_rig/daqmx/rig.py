@@ -258,7 +258,7 @@ class WallPace:
                 try:
                     behind_s = self._step(rig)
                 except AcquisitionError:
-                    return  # the world stands still; whoever asks is told
+                    return  # the world stands still; the next call reports it
             pause_s = YIELD_S if behind_s > 0 else TICK_S
 
     def _step(self, rig: "Rig") -> float:

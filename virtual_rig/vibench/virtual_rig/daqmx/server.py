@@ -67,7 +67,7 @@ _NO_LIMIT = -1
 _OPTIONS = (
     ("grpc.max_receive_message_length", LONGEST_REQUEST_BYTES),
     ("grpc.max_send_message_length", _NO_LIMIT),
-    ("grpc.so_reuseport", 0),  # a second server on the same port is an error, not a lottery
+    ("grpc.so_reuseport", 0),  # a second server on the same port is an error, not a matter of chance
 )
 
 Handler = Callable[[Any, grpc.ServicerContext], Any]
@@ -171,7 +171,7 @@ class DaqServer:
         with self._rig.changed:
             self._system.reset()
         self._server.stop(grace=None).wait()
-        with self._rig.changed:  # a call that was still under way may have made and begun another task
+        with self._rig.changed:  # a call that was still under way may have made and started another task
             self._system.reset()
         self._pace.close()
         self._workers.shutdown(wait=True)

@@ -222,7 +222,7 @@ class Task:
             self.state = TaskState.UNVERIFIED
 
     def add(self, channel: Channel) -> None:
-        """Add a channel; a task has one direction and, but for a chassis, one device."""
+        """Add a channel; a task has one direction and, except for a chassis, one device."""
         self.require_stopped()
         if any(other.name.lower() == channel.name.lower() for other in self.channels):
             raise DaqmxRefusal(DAQmxErrors.VIRTUAL_CHAN_NAME_USED, f"Channel: {channel.name}")

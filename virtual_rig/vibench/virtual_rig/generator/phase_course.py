@@ -19,7 +19,7 @@ UHZ_PER_HZ = 1_000_000
 CURVATURE_TOLERANCE_CYCLES = 1e-6
 """How far the phase inside a piece may bend away from a straight line."""
 FINEST_SPLIT = 256
-"""At most so many pieces of one interval; only sweeps above some 1e9 Hz/s would need more."""
+"""At most this many pieces of one interval; only sweeps above some 1e9 Hz/s would need more."""
 NO_TIMES: Samples = np.empty(0)
 
 

@@ -68,7 +68,7 @@ def number(
     scale: Callable[[ChannelSettings], float] = lambda _: 1.0,
     largest: float = math.nan,
 ) -> Command:
-    """Return the row of a number: a ``field`` of the settings, in ``units``, kept to so many ``decimals``.
+    """Return the row of a number: a ``field`` of the settings, in ``units``, kept to this many ``decimals``.
 
     ``scale`` is the displayed number over the field's. A number of ``INFINITE`` sets ``largest``, if given.
     """

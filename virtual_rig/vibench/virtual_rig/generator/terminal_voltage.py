@@ -93,7 +93,7 @@ class Table:
     """A waveform memory played with a zero-order hold: each point lasts 1/N of the cycle.
 
     Codes from 0 to ``top_code`` span -1..1. The integral is a cumulative sum of whole numbers, so means are
-    exact but for one rounding.
+    exact except for one rounding.
     """
 
     codes: Codes
@@ -282,7 +282,7 @@ class Timeline:
         weights = np.diff(local) / self._interval_s
         means = signal.means(own) if len(cuts) == 0 else _mean_over_pieces(signal, own, cuts)
         volts = np.zeros(len(edges_s) - 1)
-        # Noise in the mean over one interval: density times the bandwidth 1/(2 interval).
+        # Noise on average over one interval: density times the bandwidth 1/(2 interval).
         rms_v = self.terminal.noise_v_per_rt_hz / np.sqrt(2 * self._interval_s)
         volts[first:last] = weights * means + np.sqrt(weights) * rms_v * noise[first:last]
         return volts

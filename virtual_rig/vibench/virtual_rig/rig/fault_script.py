@@ -123,7 +123,7 @@ class RigFaults:
         return self._in_force(*(Fault(call, code, from_s=from_s) for call in _READS))
 
     def reserve_device(self) -> Heal:
-        """Let another program hold the converter: whoever sets up or starts a task is refused."""
+        """Let another program hold the converter: anyone who sets up or starts a task is refused."""
         code = DAQmxErrors.PAL_RESOURCE_RESERVED.value
         return self._in_force(*(Fault(call, code) for call in _RESERVING))
 
@@ -409,7 +409,7 @@ def load_fault_script(path: Path | str) -> FaultScript:
 
 @dataclass(frozen=True)
 class PlayedFault:
-    """One fault that has begun."""
+    """One fault that has started."""
 
     fault: str
     began_s: float

@@ -61,7 +61,7 @@ class VirtualRig:
         ``"host:port"`` to serve on; port 0 takes a free one. Loopback by default; anywhere else, every call
         must carry `token`.
     quirks, panel
-        Habits of the generator's firmware, and what only its front panel can set: a load that is told
+        Habits of the generator's firmware, and what only its front panel can set: a load that is set
         to be 50 ohm there, and cannot be set remotely, doubles the voltage at the amplifier.
     scpi_port
         Of `socket_resource`; 0 takes a free one.

@@ -8,7 +8,7 @@ from .time_grid import USUAL_GRID, FloatArray, TimeGrid
 class AnalogueOutput:
     """A queue of samples, played at their own rate on the world's grid; at zero when it is empty.
 
-    The voltage is exact in the mean over every step, whatever the rate. A converter with an
+    The voltage is exact on average over every step, whatever the rate. A converter with an
     interpolating output filter would show weaker images than this plain hold.
     """
 

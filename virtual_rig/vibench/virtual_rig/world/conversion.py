@@ -42,7 +42,7 @@ _DROOP_FIT_POINTS = 200
 _PHASES_PER_SAMPLE = 512
 """Rows of the table per output sample: linear interpolation between them is 110 dB below the signal."""
 _LANES = 8
-"""The native engine takes weights in so many at a time."""
+"""The native engine takes weights in this many at a time."""
 
 EARLIEST_STEPS = -4.0
 """A channel may be this much early without the filter needing the future."""
