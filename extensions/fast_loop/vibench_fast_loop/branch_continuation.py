@@ -20,7 +20,7 @@ _BEFORE = 60
 class BranchContinuation(AbstractFeedback):
     """Control-based continuation: the motions under one level of the base, along frequency, through folds.
 
-    A real-time controller damps the motion between m1 and m2 by what it samples; what it is told besides is a
+    A real-time controller damps the motion between m1 and m2 by what it samples; it also plays a
     Fourier series. Pseudo-arclength goes along the frequency and the first coefficient; the others are such
     that the base moves as a sine, so that the motion is one of the specimen under that sine, and the control
     takes no part in it (Sieber and Krauskopf, Nonlinear Dyn. 51 (2008) 365; Renson and others, J. Sound Vib.
@@ -33,20 +33,20 @@ class BranchContinuation(AbstractFeedback):
     base_level: BaseLevel
     """Level of the base, at every point."""
     start_hz: FrequencyHz
-    """Where the branch is begun, from rest [Hz]."""
+    """Where the branch is started, from rest [Hz]."""
     low_hz: FrequencyHz
     """The branch is left where its frequency falls below [Hz]."""
     high_hz: FrequencyHz
     """The branch is left where its frequency rises above [Hz]."""
     begin: Literal["up", "down"] = "up"
-    """Which way it is begun."""
+    """Which way it is started."""
     begin_from: Literal["rest", "above"] = "rest"
     """From which side the level is met at the start: from rest, or from three times what the model without
     stops asks for, which is where motions with impacts are found."""
     step_hz: PositiveFloat = 1.0
     """Longest step from point to point [Hz]; shorter in folds and where points are hard to find."""
     most_points: int = Field(default=60, ge=1, le=1000)
-    """It ends after so many."""
+    """It ends after this many."""
     harmonics: int = Field(default=5, ge=3, le=15)
     """Up to this harmonic the base is made a sine."""
     tolerance: Share = 0.004
@@ -60,7 +60,7 @@ class BranchContinuation(AbstractFeedback):
     """Time recorded at each point [s]."""
     perturbation: float = Field(default=0.0, ge=0, le=0.1)
     """Rms change of the fundamentals of base and m0, over themselves, the larger of both, by which the
-    stability of each point is told: 0.02 where noise is low; 0 for none."""
+    stability of each point is measured: 0.02 where noise is low; 0 for none."""
     perturbed_periods: int = Field(default=200, ge=100, le=5000)
     """Periods of those changes at each point; a few more go before, to find their size."""
 

@@ -30,7 +30,7 @@ tolerance, and that of m0 this part of itself;"""
 _ROUGHLY = 0.15
 """far from the level this part of the way there will do for the base."""
 _DRIFT = 3.0
-"""A first half that differs from the second by so many standard errors had not settled."""
+"""A first half that differs from the second by this many standard errors had not settled."""
 _REMEMBERED = 0.8
 """What the scatter in a look weighs in the next one: the few blocks of one look may agree by chance."""
 
@@ -72,7 +72,7 @@ class BranchPlayer:
         """Of deviations of blocks from their means in earlier looks, and how many there were."""
 
     def tone(self, setting: LoopSetting, glide_s: float = _GLIDE_S) -> ProgramTone:
-        """Return what the controller is told."""
+        """Return the program of the controller."""
         program = LoopProgram(
             frequency_hz=setting.frequency_hz,
             reference_v=tuple((float(each.real), float(each.imag)) for each in setting.reference_v),

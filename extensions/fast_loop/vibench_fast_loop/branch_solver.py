@@ -22,13 +22,13 @@ _RATIO = 2
 _NEW = 0.3
 """Part of a step that must have been gone for a point to be a new one."""
 _CHORD, _CHORD_ERRORS = 0.1, 20.0
-"""Points give a direction when they lie so many steps apart (what the tolerance moves a point by counts less
-beside that) and so many of their standard errors."""
+"""Points give a direction when they lie this many steps apart (what the tolerance moves a point by counts
+less beside that) and this many of their standard errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class LoopSetting:
-    """What a controller is told: the unknowns of the equations."""
+    """Program of a controller: the unknowns of the equations."""
 
     frequency_hz: float
     reference_v: Coefficients

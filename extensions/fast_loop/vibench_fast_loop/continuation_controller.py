@@ -52,7 +52,7 @@ _NEAR = 0.3
 _SHORTEST_STEP = 1 / 64
 """Of the plan's step."""
 _GROWTH, _EASY = 1.5, 3
-"""A step grows by this factor where a point took so many tries or fewer."""
+"""A step grows by this factor where a point took this many tries or fewer."""
 _PROBE, _PROBE_HARMONIC = -0.05, 0.02
 """Changes by which unknowns are probed: two in steps, harmonics over the level."""
 _BELOW = 5.0
@@ -158,7 +158,7 @@ def _begun(player: BranchPlayer, solver: BranchSolver) -> Controller[tuple[Seen,
 
 
 def _probed(player: BranchPlayer, solver: BranchSolver, last: Seen, columns: int) -> Controller[None]:
-    """Go back to the last point, and learn anew what the first of the unknowns do, each alone.
+    """Go back to the last point, and learn again what the first of the unknowns do, each alone.
 
     Frequency and first coefficient are what usually changed. What is believed of the harmonics was learnt
     on the way, from changes of all at once, and can leave equations that near a fold have no solution.
@@ -236,7 +236,7 @@ _CHANGED = (0, 2)
 _FIRST_SIZE, _MOST_SIZE = 0.002, 0.05
 """Of the first coefficient: the change of the trial, and the largest."""
 _SAME, _ERRORS = 0.01, 3.0
-"""A motion that differs by this part, and so many standard errors, from what it was is another one."""
+"""A motion that differs by this part, and this many standard errors, from what it was is another one."""
 _NEVER = 1e-9
 
 

@@ -209,7 +209,7 @@ def branch_hold(
         From which side the level is met there: from rest, or from three times the level, which is where
         motions with impacts are found; where there are no stops, from rest.
     way
-        Which way the branch is begun.
+        Which way the branch is started.
     allowed
         Multiplier up to which a motion counts as held.
 

@@ -136,7 +136,7 @@ def _weighed(plant: SampledPlant, weights: LawWeights) -> _Weighed:
 
 
 def _expected_cost(problem: _Weighed, law: LinearLaw) -> float:
-    """Return what motion and volts cost a sample in the mean, under noise; infinite where they grow."""
+    """Return what motion and volts cost a sample on average, under noise; infinite where they grow."""
     answer = np.hstack([law.direct @ problem.shown, law.output])[0]
     own = len(problem.step)
     closed = np.vstack([np.zeros((own, len(answer))), np.hstack([law.inlet @ problem.shown, law.step])])

@@ -40,7 +40,7 @@ class LoopDrive:
 
     @property
     def setting_vpp(self) -> float:
-        """Twice the fundamental that it is told [V]; 0 in silence."""
+        """Twice the fundamental of its program [V]; 0 in silence."""
         return 0.0 if self._program is None else 2 * abs(complex(*self._program.reference_v[0]))
 
     @property

@@ -52,7 +52,7 @@ class SampledPlant:
     specimen: Specimen
     timing: LoopTiming
     stiffness: float = 0.0
-    """Added to the spring between m1 and m2: what a motion makes of the stops in the mean [N/m]."""
+    """Added to the spring between m1 and m2: what a motion makes of the stops on average [N/m]."""
 
     @cached_property
     def equations(self) -> tuple[Table, Vector]:

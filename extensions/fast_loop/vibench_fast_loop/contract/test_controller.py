@@ -1,4 +1,4 @@
-"""What every real-time controller must do: play what it is told, say what it saw, end by itself."""
+"""What every real-time controller must do: play its program, report its inputs, end by itself."""
 
 from collections.abc import Sequence
 from typing import cast
