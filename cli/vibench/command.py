@@ -83,7 +83,7 @@ def stopped(level: str, reason: str, pid: str) -> int | None:
     killed = [each for each in programs if not each.is_alive]
     for each in killed:
         print(f"error: {names[each.path]}, was killed. {SWITCH_OFF}.", file=sys.stderr)  # noqa: T201
-        os.unlink(each.path)  # noqa: PTH108 - whoever stopped was told
+        os.unlink(each.path)  # noqa: PTH108 - the caller of the stop was informed
     return 1 if killed else 0
 
 

@@ -236,7 +236,7 @@ class LogLevel(StrEnum):
     INFO = "info"
     """What is noted in recordings, too."""
     DEBUG = "debug"
-    """What instruments are told and answer, too."""
+    """Messages to instruments and their replies, too."""
 
 
 class OneLine(logging.Formatter):
@@ -248,7 +248,7 @@ class OneLine(logging.Formatter):
 
 
 class LogBeside(logging.StreamHandler[TextIO]):
-    """Writes beside whoever logs: a terminal that is held up, a pipe that nobody reads, hold up no run."""
+    """Writes log lines in a thread, so that a suspended terminal or an unread pipe delays no run."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -310,7 +310,7 @@ def main() -> None:
         complain(OSError(f"{name} holds bytes that are no text; rename the file or folder"))
         sys.exit(ExitCode.FAILED)
     except (OSError, MemoryError, ImportError, RuntimeError, SystemError) as error:
-        # Whoever looks at a path first meets it: here is the one place that all paths have behind them.
+        # Anyone who looks at a path first meets it: here is the one place that all paths have behind them.
         sentence = _shortage(error) or _disk_trouble(error)
         if not sentence:
             raise

@@ -45,7 +45,7 @@ from .specimen_option import SpecimenOption, described
 
 
 class DrivenBy(StrEnum):
-    """What moves the simulation that is laid over a measurement."""
+    """What moves the simulation that is overlaid on a measurement."""
 
     VOLTAGE = "voltage"
     BASE = "base"

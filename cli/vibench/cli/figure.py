@@ -48,7 +48,7 @@ def figure(
         leave_output_to_json()
     options = FigureOptions(damping_time_s=damping_time, gap_m=gap, accuracy=accuracy, grid=grid)
     numbers = _numbers(number)
-    # Whoever asks for all of them learns before the first what one of them cannot be drawn with.
+    # Anyone who asks for all of them learns before the first what one of them cannot be drawn with.
     asked = {each: paper_figure(each).studies(options) for each in numbers if each in FILES}
     room_for_folder(out)
     experiment = _experiment(recordings, [each for each in numbers if each in EXPERIMENT])

@@ -103,7 +103,7 @@ def _duration(seconds: float) -> str:
 
 @contextmanager
 def transfer_bar(what: str, values: int) -> Iterator[Callable[[int], None]]:
-    """Show the bar while inside; what it gives is told how many values came since the last call."""
+    """Show a progress bar; yields the callback that takes the number of new values."""
     columns = (words("{task.description}"), BarColumn(bar_width=30), TaskProgressColumn())
     with shown(Bars(*columns, TimeRemainingColumn(), console=errors)) as bars:
         bar = bars.add_task(what, total=values)

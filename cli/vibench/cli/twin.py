@@ -50,7 +50,7 @@ LATEST_S = 3.0
 SHOWN_S = 0.05
 SHOWN_POINTS = 320
 _WORTH_OF_GAP = 0.25
-"""A forecast is told as long as its usual error is below this part of the smaller gap."""
+"""A forecast is shown while its usual error is below this part of the smaller gap."""
 
 
 @dataclass
@@ -115,7 +115,7 @@ class _Following:
         self.client.tell_twin(self._told(piece.sample_rate_hz))
 
     def _keep_baseline(self) -> None:
-        """Keep numbers and usual level when both are known: what comes after is held against them."""
+        """Keep numbers and usual level when both are known: what comes after is checked against them."""
         live, watch = self.live, self.live.watch
         if self.is_kept or watch.usual is None or watch.has_changed or not live.known:
             return

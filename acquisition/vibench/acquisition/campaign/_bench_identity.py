@@ -1,4 +1,4 @@
-"""Which bench a campaign was begun on: its configuration, its instruments, and its knobs."""
+"""Which bench a campaign was started on: its configuration, its instruments, and its knobs."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Self

@@ -183,7 +183,7 @@ class Refresh(StrEnum):
 def list_recordings(folder: Path, refresh: Refresh | str = Refresh.CHANGED) -> tuple[CatalogueEntry, ...]:
     """List the recordings of a folder, the oldest first, and bring its catalogue up to date.
 
-    In a folder that may not be written the list is made anew each time.
+    In a folder that may not be written the list is made again each time.
 
     Raises
     ------

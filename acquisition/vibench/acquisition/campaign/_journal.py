@@ -101,7 +101,7 @@ class AfterFailure(StrEnum):
 
 
 class ChangedBench(StrEnum):
-    """What to do when a campaign is resumed on another bench than it was begun on."""
+    """What to do when a campaign is resumed on another bench than it was started on."""
 
     REFUSE = "refuse"
     ACCEPT = "accept"
@@ -154,7 +154,7 @@ class DonePoint:
 
 @dataclass(frozen=True)
 class Finished:
-    """What a callback is told when a point is done: the point, and all that are."""
+    """Arguments of a callback when a point is done: the point, and all points done."""
 
     point: DonePoint
     done: tuple[DonePoint, ...]
@@ -416,13 +416,13 @@ class Journal(ClosedOnLeaving):
 
     @property
     def campaign(self) -> Campaign:
-        """The plan it was begun with."""
+        """The plan it was started with."""
         with sentences(self.path):
             return Campaign.model_validate_json(self._fact("plan_json"))
 
     @property
     def bench(self) -> BenchIdentity:
-        """The bench it was begun on, or the one accepted since."""
+        """The bench it was started on, or the one accepted since."""
         command = "SELECT identity_json FROM benches ORDER BY rowid DESC"
         with sentences(self.path):
             (identity,) = self._connection.execute(command).fetchone()

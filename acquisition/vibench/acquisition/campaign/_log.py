@@ -117,7 +117,7 @@ LEFT_ALONE_S = 1.0
 class StatusLine(ClosedOnLeaving):
     """Appends a line whenever something happens, and every few seconds while a point runs.
 
-    Whoever plays does not wait for it: a folder that hangs would leave the drive on.
+    The player does not wait for it: a folder that hangs would leave the drive on.
     """
 
     def __init__(
@@ -260,7 +260,7 @@ class CommandMessenger:
 
     @classmethod
     def of(cls, command: str) -> "CommandMessenger":
-        """Take a command line apart, as a shell would, but for variables, wildcards and pipes.
+        """Take a command line apart, as a shell would, except for variables, wildcards and pipes.
 
         Raises
         ------

@@ -188,11 +188,11 @@ def opened_journal(
     changed: ChangedBench,
     stop: StopSwitch,
 ) -> Journal:
-    """Begin a journal, or open the one that the campaign was begun with and bring it up to date.
+    """Begin a journal, or open the one that the campaign was started with and bring it up to date.
 
     Raises RecordingError when the folder holds recordings of the campaign and ``existing`` refuses that, or
     the journal belongs to another plan, and CheckFailed when the bench is another one than the campaign was
-    begun on and ``changed`` refuses that.
+    started on and ``changed`` refuses that.
     """
     path = journal_path(folder, campaign.name)
     identity = BenchIdentity.of(bench)

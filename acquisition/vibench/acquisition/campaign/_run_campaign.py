@@ -214,7 +214,7 @@ def run_campaign(
 ) -> tuple[PointResult, ...]:
     """Make every recording of ``campaign`` in ``folder``, in order, on an open bench.
 
-    All points are held against the limits of the rig before the first one begins. What was done, what
+    All points are checked against the limits of the rig before the first one begins. What was done, what
     failed and why stands in the campaign's journal, so that a campaign that was killed goes on with
     ``existing="resume"`` at its first unfinished point. Ctrl-C ends the running measurement softly, and
     the campaign with it.
@@ -225,7 +225,7 @@ def run_campaign(
         On what, what, and where to.
     existing, after_failure, changed_bench
         What to do about recordings that are there, about a point whose attempts are used up, and about
-        another bench than the campaign was begun on; members of the enums or their words.
+        another bench than the campaign was started on; members of the enums or their words.
     on_progress, on_result, on_event
         Called after every block, after every recording, and whenever something happens.
     switch

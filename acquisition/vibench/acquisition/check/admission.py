@@ -80,7 +80,7 @@ def _read(path: Path) -> CheckResult | None:
 
 
 def keep(result: CheckResult) -> Path:
-    """Keep a result in the place of the last one; whoever reads meanwhile finds one of the two, whole.
+    """Replace the last result; a reader finds either of the two, complete.
 
     Raises RecordingError when the state folder cannot be written.
     """
@@ -118,7 +118,7 @@ _ADVICE = (
 def drift(now: BenchReport, last: CheckResult, at: datetime) -> tuple[Finding, ...]:
     """Compare every level of a check with the same of the last one.
 
-    The sine is equally loud in both, since the configuration is the same: whoever calls has seen to that.
+    The sine is equally loud in both, since the configuration is the same (the caller ensures that).
     """
     before = {finding.name: finding for finding in last.findings}
     since = f"since {ago(at - last.checked)}"

@@ -46,7 +46,7 @@ def chosen_rig(name: str, given: str | None, kind: PlugInKind) -> Rig | None:
 
 
 def chosen_rigs(name: str | None, given: str | None) -> dict[PlugInKind, Rig | None]:
-    """Return a bench for each kind of plug-in that bears the name, or refuse what no test could use."""
+    """Return a bench for each kind of plug-in that has the name, or refuse what no test could use."""
     if name is None:
         raise pytest.UsageError(
             "--vibench-instrument NAME is missing: the name of an entry point, such as afg1022x"
@@ -92,7 +92,7 @@ def rig(request: pytest.FixtureRequest) -> Rig:
 
 @pytest.fixture
 def bench(rig: Rig) -> Iterator[Bench]:
-    """Open the bench anew for every test; who runs this has looked at its knobs."""
+    """Open the bench again for every test; who runs this has looked at its knobs."""
     with open_bench(rig, calibration=CalibrationRule.WAIVED) as opened:
         yield opened
 

@@ -43,7 +43,7 @@ SILENCE = PhaseSamples(0, np.empty((0, 0)))
 
 
 def phase_samples(blocks: Sequence[Block]) -> PhaseSamples:
-    """Join the blocks of a phase; one before which samples are missing (the run was held) begins anew."""
+    """Join the blocks of a phase; one before which samples are missing (the run was held) begins again."""
     if not blocks:
         return SILENCE
     joined: list[Block] = []

@@ -48,7 +48,7 @@ class FeedbackChannels:
         )
 
     def stroboscope(self, near_hz: float, drives: int = 1) -> Stroboscope:
-        """Begin to look once a period of the motion, which is so many of the drive."""
+        """Begin to look once a period of the motion, which is this many of the drive."""
         return Stroboscope(near_hz, self.sample_rate_hz, drives)
 
     def transmissibility(
@@ -99,11 +99,11 @@ def _row(channels: tuple[Channel, ...], role: Role) -> int:
 
 
 _REMEMBERED_S = 0.1
-"""Of what was handed on: a drop-out is told, and bridged, by the motion before it."""
+"""Length of the last samples kept: a drop-out is recognised and bridged by the motion before it."""
 
 
 class BridgedRows:
-    """Hands samples on, but for what may be the beginning of a drop-out: that waits for the next ones."""
+    """Hands samples on, except for what may be the beginning of a drop-out: that waits for the next ones."""
 
     def __init__(self, sample_rate_hz: float) -> None:
         self._rate_hz = sample_rate_hz

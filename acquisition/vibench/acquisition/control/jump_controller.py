@@ -45,7 +45,7 @@ def decay_motion(loop: SineLoop) -> Controller[None]:
 
 
 _MOST_BRACKETS = 4
-"""How often the search begins anew where the motion left its branch earlier than the last time."""
+"""How often the search begins again where the motion left its branch earlier than the last time."""
 
 
 class _Return(Enum):
@@ -95,7 +95,7 @@ class _JumpSearch:
 
 @dataclass(frozen=True)
 class Arrival:
-    """Where a search has ended, at the frequency it was begun for."""
+    """Where a search has ended, at the frequency it was started for."""
 
     point: SettledPoint
     branch: JumpSide

@@ -1,4 +1,4 @@
-"""Noise equalised at the base: the gain of every line measured, and the drive made anew from it."""
+"""Noise equalised at the base: the gain of every line measured, and the drive made again from it."""
 
 from dataclasses import dataclass
 from math import log10, sqrt

@@ -56,8 +56,8 @@ class PhaseLaw:
     frequency, r that of the resonance, e the error of the phase in radians, and h = 2 pi L w what the mode
     forgets in it, w its half-width. The frequency moves by g times what this says of r - f: the error falls
     by the share g at every look. Where it does not, its own part in that, ``g w e``, grows. Of the n-th
-    harmonic r and w are taken at the drive, and L is n times as long. Of a subharmonic e is that of so many
-    times its phase, r and w are taken at the drive as well, and a look has so many times the drives.
+    harmonic r and w are taken at the drive, and L is n times as long. Of a subharmonic e is that of this many
+    times its phase, r and w are taken at the drive as well, and a look has this many times the drives.
 
     A bent resonance moves while the motion grows to its new level. The level that the motion has grown to
     follows the base as fast as the mode forgets; r moves with its logarithm, as the levels before tell, and

@@ -41,7 +41,7 @@ class LocatedJump:
 
 
 Seek = Generator[float, SettledPoint, LocatedJump]
-"""Asks for a frequency to be reached on the branch before the jump, and is told what was found there."""
+"""Yields a frequency to be reached on the branch before the jump, and receives what was found there."""
 
 
 def located(before: SettledPoint, after: SettledPoint, resolution_hz: float) -> Seek:

@@ -164,7 +164,7 @@ class SineLoop:
         return min(max(setting_vpp, self.least_vpp), self.most_vpp)
 
     def forget(self) -> None:
-        """Look anew from the next move on."""
+        """Look again from the next move on."""
         self._scope.forget()
 
     def note(self, note: FeedbackNote) -> None:

@@ -25,7 +25,7 @@ class DriveClock:
 
     Generator and converter have clocks of their own: some ten parts in a million between them, a
     tenth of a turn after 40 s at 260 Hz. What was commanded therefore tells the frequency only
-    roughly; the phase of every block is fitted anew, and the line through them is the frequency.
+    roughly; the phase of every block is fitted again, and the line through them is the frequency.
     """
 
     def __init__(self, near_hz: float, sample_rate_hz: float) -> None:
@@ -144,7 +144,7 @@ class Stroboscope:
         return Periods(np.concatenate(self._base), np.concatenate(self._response))
 
     def forget(self) -> None:
-        """Begin anew with the next period: what was played has changed."""
+        """Begin again with the next period: what was played has changed."""
         self._base.clear()
         self._response.clear()
 
@@ -274,7 +274,7 @@ def judged(points: Phasors, rule: Settling, noise: float = 0.0) -> Judgement:
 
 
 def in_drives(found: Judgement, points: Phasors, drives: int, noise: float) -> Judgement:
-    """Count the period in drives, of which each of the ``points`` is so many long.
+    """Count the period in drives, of which each of the ``points`` is this many long.
 
     A motion that repeats after one drive has nothing but noise at the orders in between, however weak a
     subharmonic may be beside the rest. A hum that silence shows as well is noise.

@@ -225,7 +225,7 @@ class DaqmxDigitizer:
     def read(self, samples: int) -> Block:
         """Wait for the next ``samples`` of every channel and hand them over.
 
-        After a failure the run cannot go on, since its place in time is lost: stop, and start anew.
+        After a failure the run cannot go on, since its place in time is lost: stop, and start again.
 
         Raises
         ------

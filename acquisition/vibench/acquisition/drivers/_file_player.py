@@ -122,7 +122,7 @@ class FilePlayer:
 
     @property
     def waiting_samples(self) -> int:
-        """None: a recording is as fast as whoever reads it."""
+        """None: a recording is as fast as its reader."""
         return 0
 
     def stop(self) -> None:

@@ -53,7 +53,7 @@ class GeneratorModel:
     """Longest sweep that it makes by itself; 0 where its sweep time is no remote command."""
 
     def describe(self, config: GeneratorConfig) -> GeneratorDescription:
-        """Describe what it can do into the load that it is told to expect."""
+        """Return what the generator can do into the load that is set."""
         lowest, highest = (limit * config.shown_fraction for limit in self.open_range_vpp)
         sine_hz = self.highest_hz[Shape.SINE]
         return GeneratorDescription(

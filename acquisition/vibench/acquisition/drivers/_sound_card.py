@@ -2,7 +2,7 @@
 
 A sound card tells no volts and passes no constant: both are measured once and written in ``daq.options``
 (docs/instruments.md), and without them nothing opens. Inputs and output are one stream, so that they begin
-together but for the card's own delay.
+together except for the card's own delay.
 """
 
 from collections import deque

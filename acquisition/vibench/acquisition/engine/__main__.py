@@ -59,7 +59,7 @@ def _heed_signals(handler: RequestHandler) -> None:
 
 
 def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
-    """End an engine that does nothing when whoever started it has gone away: it may hold a bench."""
+    """End an engine that does nothing when the program that started it has gone away: it may hold a bench."""
 
     def look() -> None:
         pause = Event()
@@ -71,7 +71,7 @@ def _end_when_forgotten(handler: RequestHandler, after_s: float) -> None:
 
 
 def _follow_parent(handler: RequestHandler) -> None:
-    """End with whoever started the engine, or after what was left alone; its input is a pipe from there."""
+    """End with the program that started the engine (at the other end of the input), or after its last job."""
     # Not through sys.stdin: a buffer that a thread waits in cannot be torn down at the process's end.
     while os.read(sys.stdin.fileno(), 4096):
         pass

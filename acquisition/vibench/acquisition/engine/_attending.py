@@ -16,7 +16,7 @@ from time import monotonic
 from ._wire import ANSWERS, Message, receive, send
 
 BEAT_S = 0.04
-"""How often the engine is told that the program is there [s]."""
+"""Interval of the program's heartbeats to the engine [s]."""
 STOPPED = ("T", "t", "Z", "X")
 """States of a Linux process that does nothing until somebody else makes it, or never again."""
 LEAST_OWN = 0.25
@@ -24,7 +24,7 @@ LEAST_OWN = 0.25
 
 
 class _Program:
-    """Whoever started this process, as far as it can be seen from here: better where there is ``/proc``."""
+    """The program that started this process, as far as it can be seen: better where there is ``/proc``."""
 
     def __init__(self) -> None:
         self._folder = Path(f"/proc/{os.getppid()}")

@@ -51,7 +51,7 @@ def armed_plan(bench: Bench, request: CampaignRequest, supervision: Supervision)
     checks: list[tuple[str, LimitCheck]] = []
     campaign, folder = request.campaign, request.folder
     points = campaign.points()
-    # What is played alike is judged once, or a long campaign would keep whoever asks waiting.
+    # Equal plans are checked once: a long campaign would otherwise keep viewers waiting.
     for point in played_alike(points):
         checks += [(point.name, check) for check in require_within_limits(point.measurement, bench.rig)]
         drive_for(bench, point.measurement)  # refuses what nothing on this bench can play
@@ -111,7 +111,7 @@ def confirmed_by(sheet: KnobSheet | None) -> Confirm:
 STALL_S = 0.2
 """A look after this process's own viewers that comes so late tells of a stall of this process [s]."""
 LATE_FACTOR = 4.0
-"""A viewer is given so many times what this process itself comes late: it shares the computer."""
+"""A viewer is given this many times what this process itself comes late: it shares the computer."""
 TAKEN_OVER_S = 2.0
 """An engine without parent is somebody's who has asked so lately: a window asks 25 times a second [s]."""
 FORGETTING = 0.995
@@ -122,7 +122,7 @@ class RequestHandler:
     """Takes what is asked of an engine.
 
     It answers from what is known, puts a job into the engine's queue or presses its switch. `carry_out` is
-    the way in for whoever asks: it raises `EngineError` with one sentence when the engine's state does not
+    the way in for requests: it raises `EngineError` with one sentence when the engine's state does not
     permit what was asked. Each verb has a method here, with the parameters of `EngineVerbs`.
     """
 
@@ -146,7 +146,7 @@ class RequestHandler:
             return method(**arguments)
         with self._asking:
             state = self._engine.published.state
-            # Whoever has seen that the bench is closed may open it, though its closing has not returned yet.
+            # A viewer that has seen the bench closed may open it, though its closing has not returned yet.
             if self._is_ending or (self._is_closing and state is not EngineState.CLOSED):
                 raise EngineError(
                     f"the bench is being closed, and the engine cannot {verb.word} meanwhile; "
@@ -161,7 +161,7 @@ class RequestHandler:
             return method(**arguments)
 
     def note_presence(self) -> None:
-        """Note that somebody is there; whoever checks, arms or starts is, though no attendant beats yet."""
+        """Note that somebody is there: a viewer that checks, arms or starts, before any attendant beats."""
         self._last_request_s = monotonic()
 
     def beat(self, still_s: float = 0.0) -> None:
@@ -289,7 +289,7 @@ class RequestHandler:
         engine, now_s = self._engine, monotonic()
         since_s, self._last_round_s = now_s - self._last_round_s, now_s
         self._late_s = max(FORGETTING * self._late_s, min(since_s, STALL_S) - INTERVAL_S)
-        if since_s > STALL_S:  # whoever asked while this process did not run is not to blame
+        if since_s > STALL_S:  # the viewer that asked while this process did not run is not to blame
             self._last_request_s += since_s
         engine.look_after_twin()
         if engine.published.state is EngineState.ARMED and now_s - self._armed_s > ARMED_S:
@@ -313,13 +313,13 @@ class RequestHandler:
 
     @property
     def outlives_its_parent(self) -> bool:
-        """Whether there is something to do once whoever started the engine has ended.
+        """Whether there is something to do once the program that started the engine has ended.
 
         That is what was left alone; then, as long as somebody who has taken the engine over looks after it.
         """
         if self.goes_on_alone and not self._is_orphan:
             self._is_orphan = True
-            self._last_request_s = monotonic() - TAKEN_OVER_S  # whoever asked until now has gone
+            self._last_request_s = monotonic() - TAKEN_OVER_S  # the viewer that asked until now has gone
         return self.goes_on_alone or (self._is_orphan and self._is_looked_after)
 
     @property

@@ -46,7 +46,7 @@ class AdoptedEngine(ClosedOnLeaving):
 
 
 def left_alone() -> Announcement | None:
-    """Find an engine that carries something out and was left alone by whoever started it."""
+    """Find an engine that carries something out and was left alone by the program that started it."""
     for told in announced_engines():
         with suppress(EngineGone), EngineClient.attach(told.address) as client:
             if client.status().is_left_alone:
@@ -55,7 +55,7 @@ def left_alone() -> Announcement | None:
 
 
 class EngineProcess(ClosedOnLeaving):
-    """An engine's process and a connection to it. An attended engine ends with whoever started it."""
+    """An engine's process and a connection to it. An attended engine ends with its starting program."""
 
     def __init__(self, process: "subprocess.Popen[str]", address: EngineAddress) -> None:
         self._process = process

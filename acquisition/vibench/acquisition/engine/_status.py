@@ -1,4 +1,4 @@
-"""What an engine tells whoever asks: where it stands, what it measures, what has happened."""
+"""Status of an engine, as its viewers receive it: state, running measurement, events."""
 
 import os
 import subprocess
@@ -63,7 +63,7 @@ VIEWER_PATIENCE_S = 0.5
 LONGEST_PATIENCE_S = 10.0
 """More cannot be granted to any drive [s]."""
 HUNG_FACTOR = 4.0
-"""A viewer that is there and says that its window stands still is given so many times the patience."""
+"""A viewer that is there and says that its window stands still is given this many times the patience."""
 
 
 def hung_patience_s(granted_s: float) -> float:
@@ -236,7 +236,7 @@ class EngineStatus(FrozenModel):
     twin: TwinStatus | None = None
     """What the live twin told last; None while there is none."""
     is_left_alone: bool = False
-    """Whoever started the engine has ended, what it carries out goes on, and nobody has taken it over."""
+    """The program that started the engine has ended, its job goes on, and nobody has taken it over."""
     messages: tuple[EngineMessage, ...] = ()
     """The newest, oldest first."""
 

@@ -1,4 +1,4 @@
-"""Stopping what drives a bench, whatever its state: the stop is put down, and an engine is told as well."""
+"""Stopping a program that drives a bench, whatever its state: by a file, and by request."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -41,8 +41,8 @@ def stop_engine(
 
     The stop is put down in the state folder, where it is obeyed within a twentieth of a second, and later
     where the process stands still. Returns when the program has confirmed that its output is off, or does
-    not. Where nothing can be put down or taken away, an engine is told over its connection. A hold is only
-    told: nobody wants one to begin unexpectedly.
+    not. Where no file can be written or removed, the stop is sent over the engine's connection. A hold is
+    only sent, never written: nobody wants one to begin unexpectedly.
 
     Parameters
     ----------

@@ -3,8 +3,8 @@
 A verb is a method of `EngineVerbs`. Its parameters are the request, checked on both sides of the wire; its
 decorator says the word on the wire, how the answer travels, and the engine's states that permit it. Client
 and server work by these declarations: a new verb is one more of them, and a method of the same name and
-parameters on `RequestHandler`. Whoever knows the engine's token may ask everything; each is answered at once
-from what the engine holds.
+parameters on `RequestHandler`. Anyone who knows the engine's token may ask everything; each is answered at
+once from what the engine holds.
 """
 
 import json
@@ -175,13 +175,13 @@ def _with_absolute_folder(request: CampaignRequest) -> CampaignRequest:
     return request.model_copy(update={"folder": request.folder.absolute()})
 
 
-# The engine's process may stand in another folder than whoever asks it.
+# The engine's process may stand in another folder than the process that asks.
 AbsolutePath = Annotated[Path, AfterValidator(Path.absolute)]
 AbsoluteRequest = Annotated[CampaignRequest, AfterValidator(_with_absolute_folder)]
 
 
 class EngineVerbs:
-    """The calls of an engine. `verb` replaces each body by one that asks; whoever inherits says how."""
+    """The calls of an engine. `verb` replaces each body by one that asks; a subclass says how."""
 
     def ask(self, verb: Verb[A], arguments: Mapping[str, object]) -> A:
         """Send a request and give its answer."""

@@ -35,7 +35,7 @@ class HeldResponse(FrequencySteps, AbstractFeedback):
     most_change: float = Field(default=1.25, gt=1, le=4)
     """The setting changes by at most this factor at once."""
     start_share: Share = 0.02
-    """Setting from which the first frequency is begun, over ``amplitude_vpp``."""
+    """Setting from which the first frequency is started, over ``amplitude_vpp``."""
     longest_wait_s: PositiveFloat = 20.0
     """Wait no longer than this; the step is then recorded and flagged [s]."""
     glide_step_hz: PositiveFloat = 0.5

@@ -92,7 +92,7 @@ _GROUPS = {Family.STEPPED: "steps"}
 
 @dataclass(frozen=True)
 class ExcitationKind:
-    """What a kind of excitation is to whoever meets its word in a file."""
+    """How files name a kind of excitation, and what they may say of it."""
 
     plan: type[AbstractExcitation]
 

@@ -66,7 +66,7 @@ class PeriodicNoise(BandNoise):
     periods: PositiveInt = 2
     """Periods recorded of each realisation; two or more show the noise of the sensors."""
     points: Annotated[int, Field(ge=FEWEST_POINTS, le=MOST_POINTS)] = USUAL_POINTS
-    """Points of one period in the generator's memory; what it takes is held against them beforehand."""
+    """Points of one period in the generator's memory; what it takes is checked against them beforehand."""
     settle_s: NonNegativeFloat = 3.0
     """Wait after each change of waveform until the transient has died out [s]."""
     seed: int = Field(default=1, ge=0)

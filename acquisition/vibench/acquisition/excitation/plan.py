@@ -296,7 +296,7 @@ class FixedSine(AbstractExcitation):
 class AbstractFeedback(AbstractExcitation):
     """An excitation whose next step depends on what was measured: `vibench.acquisition.control` conducts it.
 
-    Its ``steps`` are what it is expected to play, waits left out: for previews and for whoever lists
+    Its ``steps`` are what it is expected to play, waits left out: for previews and for code that lists
     what will be recorded. ``amplitude_vpp`` is the largest setting that it may use.
     """
 

@@ -21,19 +21,19 @@ class ResonanceTracking(AbstractFeedback):
 
     At the resonance m0 moves a quarter of a period behind the base, seen from the base or in space. The
     first level is searched for in settled motion; from there a phase-locked loop, which acts every ten
-    periods, follows the resonance from level to level, and where it loses it, the search begins anew. Other
+    periods, follows the resonance from level to level, and where it loses it, the search begins again. Other
     modes shift the phase a little; the flanks tell the natural frequency and the damping apart from them, as
     long as the motion is linear.
 
     With ``harmonic = 3`` or 2 a superharmonic resonance is tracked: the drive lies at a third or at half of
-    the mode's frequency, and that harmonic of m0 lags so many times the phase of the base by a quarter of
+    the mode's frequency, and that harmonic of m0 lags this many times the phase of the base by a quarter of
     its own period (Volvert and Kerschen, J. Sound Vib. 511 (2021) 116324; with a phase-locked loop: Zhou and
     Kerschen, arXiv 2401.01151). The phase of the second one counts from the cosine of twice the base's,
     as its square does. It lags where the spring between the masses is the stiffer at positive p and the
     mode's p goes with m0 (the paper's first and third), and leads by as much (``phase_deg = 90``) where one
-    of both is the other way round. With ``subharmonic = 2`` or 3 m0 repeats every so many drives, at half or
-    a third of their frequency: so many times its phase there lags the base by a quarter of a period, and for
-    2 counts as the phase of its square does. Natural frequency and damping are told for neither.
+    of both is the other way round. With ``subharmonic = 2`` or 3 m0 repeats every this many drives, at half
+    or a third of their frequency: this many times its phase there lags the base by a quarter of a period, and
+    for 2 counts as the phase of its square does. Neither gives natural frequency and damping.
     """
 
     family: ClassVar[Family] = Family.STEPPED

@@ -124,7 +124,7 @@ class MovingSine(AbstractExcitation):
 
     def mean_steps(self) -> Iterator[tuple[float, float]]:
         """Yield mean frequency [Hz] and duration [s] of each step, in the order of time."""
-        # 1e-9 keeps a duration that is a whole number of steps, but for rounding, from growing a sliver.
+        # 1e-9 keeps a duration that is a whole number of steps, except for rounding, from growing a sliver.
         count = ceil(self.duration_s / self.step_s * (1 - 1e-9))
         for number in range(count):
             begin_s = number * self.step_s

@@ -91,5 +91,5 @@ class SteppedLevel(FixedSine):
         return ways * self._count()
 
     def _count(self) -> int:
-        # 1e-9: a lowest level that the steps reach but for rounding belongs to them.
+        # 1e-9: a lowest level that the steps reach except for rounding belongs to them.
         return floor((self.amplitude_vpp - self.lowest_vpp) / self.step_vpp + 1e-9) + 1

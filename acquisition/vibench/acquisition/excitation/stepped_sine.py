@@ -43,7 +43,7 @@ class FrequencyGrid(FrozenModel):
     @property
     def values_hz(self) -> tuple[float, ...]:
         """The frequencies, rising [Hz]."""
-        # 1e-9: a stop that the steps reach but for rounding belongs to the grid.
+        # 1e-9: a stop that the steps reach except for rounding belongs to the grid.
         count = floor((self.stop_hz - self.start_hz) / self.step_hz + 1e-9) + 1
         return tuple(self.start_hz + number * self.step_hz for number in range(count))
 
@@ -131,7 +131,7 @@ class SteppedSine(FrequencySteps):
         """One step for every frequency, in the order of time."""
         for direction, frequencies_hz in self.passes():
             for frequency_hz in frequencies_hz:
-                # The direction keeps the turning point of a way there and back
+                # The direction keeps the turning point of a way up and down
                 # from being one segment.
                 segment = Segment(SegmentLabel.STEP, {"frequency_hz": frequency_hz, "direction": direction})
                 yield Step(Tone(frequency_hz), self.settle_s, self.record_s, segment)

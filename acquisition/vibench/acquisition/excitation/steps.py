@@ -20,7 +20,7 @@ class Tone:
 
     frequency_hz: float
     level: float = 1.0
-    """Its amplitude as a fraction of the amplitude setting: above 0, and at most 1 but for a lead-in."""
+    """Its amplitude as a fraction of the amplitude setting: above 0, and at most 1 except for a lead-in."""
 
 
 @dataclass(frozen=True)

@@ -48,7 +48,7 @@ def need_space(megabytes: int, advice: str = "") -> None:
 
 
 def naming_its_extra(found: Callable[[str], object], extra: str) -> Callable[[str], object]:
-    """Wrap the ``__getattr__`` of a face whose names need an extra: what is missing is told with its extra.
+    """Wrap the ``__getattr__`` of a face whose names need an extra: the error names the extra.
 
     ``found`` is the ``__getattr__`` that lazy_loader made, ``extra`` the word in `pyproject.toml`. What is
     returned raises MissingLibrary when a library of the extra is not installed.

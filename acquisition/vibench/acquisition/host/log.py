@@ -1,4 +1,4 @@
-"""What instruments are told and what is noted in recordings, for Python's logging; silent unless asked."""
+"""Log of the messages to instruments and of the events of recordings; off by default."""
 
 import logging
 

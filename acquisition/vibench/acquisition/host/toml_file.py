@@ -279,7 +279,7 @@ def _is_nested(value: Value) -> bool:
 def _value(value: Value) -> str:
     match value:
         case str():
-            # JSON's escapes are TOML's, but for DEL, which only TOML wants escaped.
+            # JSON's escapes are TOML's, except for DEL, which only TOML wants escaped.
             return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
         case bool():
             return "true" if value else "false"

@@ -1,4 +1,4 @@
-"""Somebody else's instrument, held to its protocol: what it raises or gives instead is told in a sentence.
+"""Guard for foreign instruments: an exception or value against the protocol becomes an error in words.
 
 Our own drivers are not guarded: what they raise beyond their promises is a mistake of ours, and its traceback
 is what mends it.

@@ -45,7 +45,7 @@ class Sweep:
 
 @dataclass(frozen=True)
 class GeneratorDescription:
-    """What a kind of generator can do, known before any is opened: plans are held against it."""
+    """What a kind of generator can do, known before any is opened: plans are checked against it."""
 
     name: str
     """For sentences: ``"AFG1022"``."""
@@ -101,7 +101,7 @@ class FunctionGenerator(Protocol):
         """Change the peak-to-peak amplitude of what is playing."""
 
     def arm_burst(self, cycles: int) -> None:
-        """Play so many periods at each `trigger` instead of playing on; 0 V before and after."""
+        """Play this many periods at each `trigger` instead of playing on; 0 V before and after."""
 
     def trigger(self) -> None:
         """Fire an armed burst, or begin a sweep."""
@@ -227,7 +227,7 @@ class RealTimeController(Protocol):
 
 
 def read_block(digitizer: Digitizer, samples: int) -> Block:
-    """Read a block that holds samples: whoever waits for more of them would wait for ever.
+    """Read a block that holds samples: a caller that waits for more of them would wait for ever.
 
     Parameters
     ----------

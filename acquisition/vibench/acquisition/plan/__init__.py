@@ -1,7 +1,7 @@
 """What to measure: excitations, measurements, campaigns, sweeps, and what they will do to the rig.
 
 A `Measurement` is one excitation with its ramps and limits while running; a `Campaign` an ordered list of
-them and of nested sweeps, read from TOML. Before anything moves, a plan is held against the limits of the
+them and of nested sweeps, read from TOML. Before anything moves, a plan is checked against the limits of the
 rig by its model (`predicted_loads`, `MeasurementPreview`) and laid out in phases of time
 (`duration_s`). All are frozen and validated. Frequencies in Hz, times in s, amplitudes peak to peak in V.
 Plans open no instrument and know no bench and no run. Chains of points:

@@ -127,7 +127,7 @@ class LimitCheck:
 
     @property
     def is_kept(self) -> bool:
-        """Whether the value is allowed; a value on the limit is, but for rounding."""
+        """Whether the value is allowed; a value on the limit is, except for rounding."""
         return self.use <= 1 + 1e-9
 
     def complaint(self) -> str:
@@ -379,7 +379,7 @@ def _inputs(rig: Rig, amplitude_vpp: float, amplifier_v: float, acceleration: fl
 
 
 TOUCH_SHARE = 0.25
-"""Of the gap that p may take while the check plays: a sine begun at once overshoots, and collisions last."""
+"""Part of the gap that p may take in a check: a sine started at once overshoots, and collisions last."""
 _KNOWN_HZ: NDArray[np.float64] = np.linspace(0.97, 1.03, 25, dtype=np.float64) * CHECK_FREQUENCY_HZ
 """A specimen's resonances are known to some per cent, and beside one the base moves by decibels."""
 

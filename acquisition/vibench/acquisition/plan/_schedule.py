@@ -141,7 +141,7 @@ class RunState(StrEnum):
                     +-> failed <- from every state            (limit, check, driver, disk)
 
     From ``armed`` to ``ramping_down`` the generator's output may be on; in every other state it is off,
-    but for the low-level part of ``checking``.
+    except for the low-level part of ``checking``.
     """
 
     IDLE = "idle"

@@ -69,7 +69,7 @@ class Range(FrozenModel):
     def _count(self) -> int:
         if self.step is None:
             return self.count or 0
-        # 1e-9: a stop that the steps reach but for rounding belongs to the range.
+        # 1e-9: a stop that the steps reach except for rounding belongs to the range.
         return floor((self.stop - self.start) / self.step + 1e-9) + 1
 
 
@@ -151,7 +151,7 @@ class Sweep(FrozenModel):
     """Time at each earlier point of a chain on the way to a point [s]."""
 
     lead_points: PositiveInt | None = Field(default=None, le=MOST_LEAD_INS)
-    """So many earlier points at most on the way to a point, the nearest ones; absent: all of its chain. A
+    """This many earlier points at most on the way to a point, the nearest ones; absent: all of its chain. A
     shorter way takes less time, and leads to the wrong branch where it begins behind the jump."""
 
     @model_validator(mode="after")
@@ -289,7 +289,7 @@ class Sweep(FrozenModel):
 
 
 def _passed(way: Direction | None, rising: list[float]) -> Iterator[tuple[str, float]]:
-    """Go through a chain's values, once or there and back; each with the word for its direction."""
+    """Go through a chain's values, once or up and down; each with the word for its direction."""
     up = [("" if way is None else "up", value) for value in rising]
     down = [("down", value) for value in reversed(rising)]
     match way:

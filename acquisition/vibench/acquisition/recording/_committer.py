@@ -245,7 +245,7 @@ Number = int | float | str
 
 @dataclass(frozen=True)
 class OpenSegment:
-    """A segment that has begun."""
+    """A segment that has started."""
 
     row: int
     label: str

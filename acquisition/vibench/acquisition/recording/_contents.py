@@ -1,4 +1,4 @@
-"""What the attributes and texts of a recording may say: held against these models once, when it is opened."""
+"""Models of a recording's attributes and texts, checked once, when it is opened."""
 
 import json
 import math

@@ -31,9 +31,9 @@ _SILENT = 6
 _QUIET_S = 2.5e-4
 """Between two runs of sharp corners, which may be edges of one drop-out or of two."""
 _MOST_RUNS = 12
-"""Close to each other; so many corners are made by the motion."""
+"""Close to each other; this many corners are made by the motion."""
 _FLANK_S = 1e-3
-"""Of motion on either side that a drop-out is told by."""
+"""Length of motion on either side by which a drop-out is recognised."""
 _LEAST_OF_FLANK = 0.25
 """Part of it that another drop-out close by must leave."""
 DROPOUTS_TOLD_AFTER_S = LONGEST_S + 2.0 * _FLANK_S
@@ -113,7 +113,7 @@ def _joined(found: Sequence[Dropout], flank: int) -> tuple[Dropout, ...]:
 
 
 def undecided_from(velocity: Samples, sample_rate_hz: float, dropouts: tuple[Dropout, ...]) -> int:
-    """Say from which sample on only what comes will tell whether a drop-out has begun; else their number.
+    """Say from which sample on only what comes will tell whether a drop-out has started; else their number.
 
     Parameters
     ----------

@@ -341,7 +341,7 @@ def _narrowest(values: np.ndarray[tuple[int], np.dtype[np.generic]]) -> np.dtype
 def recover(path: Path | str) -> Path:
     """Finish what an interrupted recording left; returns the path of ``NAME.h5``.
 
-    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. What a crash left behind is told apart by itself:
+    ``path`` is ``NAME.h5.part`` or ``NAME.h5``. What a crash left behind is distinguished by itself:
     samples that were never compressed, a compressed copy that was never completed, or a complete
     one whose ``.part`` was not yet deleted.
 

@@ -112,7 +112,7 @@ def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | N
 
 
 def bins_of(samples: int) -> int:
-    """How many bins so many samples fill, the last perhaps in part."""
+    """How many bins this many samples fill, the last perhaps in part."""
     return -(-samples // BIN_SAMPLES)
 
 

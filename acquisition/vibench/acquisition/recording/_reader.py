@@ -354,7 +354,7 @@ class Recording(RecordingDescription):
 
     @property
     def is_checked(self) -> bool:
-        """Whether this process found it intact as a whole: what is read of it is held against that since."""
+        """Whether this process found it intact as a whole; later reads are checked against that."""
         return was_checked(self.seal) and self.seal in (noted_seals(self.path) or (self.seal,))
 
     def check_result_seals(self, key: SealKey | None = None) -> dict[str, SealCheck]:

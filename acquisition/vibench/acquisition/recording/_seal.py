@@ -376,7 +376,7 @@ def noted_seals(path: Path) -> Mapping[str, str]:
 
 
 def opened(uri: str) -> sqlite3.Connection:
-    """Open a database; its transactions are begun and ended by hand.
+    """Open a database; its transactions are started and ended by hand.
 
     Parameters
     ----------
@@ -439,7 +439,7 @@ def remember(seal: str, states: ChannelStates) -> None:
 
 
 def forget_checks() -> None:
-    """Hold nothing against what was read before: all is looked at anew."""
+    """Hold nothing against what was read before: all is looked at again."""
     _KNOWN.clear()
 
 

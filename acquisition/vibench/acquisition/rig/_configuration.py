@@ -178,7 +178,7 @@ class OutputConfig(FrozenModel):
     """An analogue output that drives the amplifier with what a function generator cannot hold.
 
     It plays the voltage that the generator's terminal would have at the same setting, so that
-    ``amplitude_vpp`` means the same whoever plays. Plug one of the two into the amplifier at a time: even
+    ``amplitude_vpp`` means the same the player. Plug one of the two into the amplifier at a time: even
     at zero volts, an output of 50 ohm beside it would halve what the generator gives. The check at low
     level before every run finds the wrong one plugged in.
     """
@@ -243,7 +243,7 @@ class GeneratorConfig(FrozenModel):
     """``"@py"`` for pyvisa-py, empty for the system's VISA."""
     channel: Literal[1, 2] = 1
     load_ohm: Literal["high-z"] | PositiveFloat = HIGH_Z
-    """Load that the generator is told to expect; its panel shows volts into this load."""
+    """Load set at the generator; its panel shows volts into this load."""
     connected_ohm: PositiveFloat
     """Input impedance that really hangs on the output: the amplifier's [ohm]."""
     amplitude_limit_vpp: PositiveFloat

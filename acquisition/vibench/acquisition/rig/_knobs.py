@@ -143,7 +143,7 @@ def _channel(rig: Rig, config: ChannelConfig) -> Channel:
     )
 
 
-# Long enough for a campaign over a day and a night; whoever comes after may have turned a knob.
+# Long enough for a campaign of a day and a night; later somebody may have turned a knob.
 SHEET_VALID = timedelta(hours=36)
 _YES = frozenset({"y", "yes"})
 
@@ -192,7 +192,7 @@ def confirm_by_asking(ask: Callable[[str], str], operator: str) -> Confirm:
 
 
 def confirm_at_terminal(knobs: tuple[Knob, ...]) -> KnobSheet:
-    """Ask whoever sits at the terminal; raises CheckFailed when nobody does, CheckStopped at a Ctrl-C.
+    """Ask the person at the terminal; raises CheckFailed when there is none, CheckStopped at a Ctrl-C.
 
     An unattended program uses `confirm_by_sheet`.
     """

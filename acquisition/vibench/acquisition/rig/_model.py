@@ -53,7 +53,7 @@ class OnTable(StrEnum):
 
 @dataclass(frozen=True)
 class RigModel:
-    """A rig from the generator's terminal to table and specimen, linear but for the specimen's stops.
+    """A rig from the generator's terminal to table and specimen, linear except for the specimen's stops.
 
     Coil, table and specimen answer a voltage together (`vibench.sim.shaker`): the specimen notches and raises
     the table's motion by some decibels near its resonances. Where a sine moves p beyond the gap, the stops

@@ -55,7 +55,7 @@ class AcquisitionLoop:
         rate_hz = self._digitizer.sample_rate_hz
         self._due_s += duration_s
         longest = max(1, round(BLOCK_S * rate_hz))
-        # The goal moves when whoever takes the blocks lingers.
+        # The goal moves when the consumer of the blocks is slow.
         while self._samples < (goal := round((self._due_s - lead_s) * rate_hz)):
             yield self._next(min(longest, goal - self._samples))
 

@@ -16,7 +16,7 @@ class Drive(Protocol):
     """Plays phases, one after another, while the run reads.
 
     A drive never waits: it says how long to read before it has something to do again, and samples
-    read are the only clock. What comes next is told beforehand, since some drives write it ahead.
+    read are the only clock. What comes next is announced, since some drives write it ahead.
     """
 
     @property

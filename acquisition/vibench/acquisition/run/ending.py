@@ -15,7 +15,7 @@ from .silence_watch import DriveGuard
 
 @dataclass(frozen=True, eq=False)
 class Progress:
-    """Where a run stands after each block, for whoever watches."""
+    """State of a run after each block, for viewers."""
 
     state: RunState
     segment: Segment | None

@@ -114,7 +114,7 @@ class LimitMonitor:
     """Says when the run must end.
 
     It sits in the loop that reads the samples, with nothing between it and the generator: no window
-    and no other process has a say. Blocks must come one after the other; after a gap it begins anew.
+    and no other process has a say. Blocks must come one after the other; after a gap it begins again.
     """
 
     def __init__(

@@ -67,7 +67,7 @@ class GlideWatch:
     ) -> None:
         """Take what was recorded while a tone of the glide should have played.
 
-        ``course`` gives the cycles since its beginning, of what is a tone in the mean only.
+        ``course`` gives the cycles since its beginning, of what is a tone on average only.
         """
         if not blocks:
             return
@@ -135,7 +135,7 @@ LATEST = 0.5
 """How late a glide from step to step may be, in steps."""
 LATE_STEPS = 4
 LATE_FOR_S = 2.0
-"""So many steps in a row, their length and their lateness together, are no moment of a busy computer [s]."""
+"""Late steps in a row that last longer, with their lateness, are not just a busy moment [s]."""
 LEARNT = 0.05
 """Least share of a lateness by which the commands of a glide are given earlier from then on; of the first
 ones it is more, so that the mean is learnt."""
@@ -245,7 +245,7 @@ class PhaseRunner:
             self._glide.take(heard, phase.play.frequency_hz, phase.duration_s)
 
     def _heard(self, phase: Phase) -> Heard | None:
-        """Return what takes the blocks of a phase whose drive is held against the plan."""
+        """Return what takes the blocks of a phase whose drive is checked against the plan."""
         if not self._may_glide(phase):
             return None
         return SweepWatch(self._glide, phase.play) if isinstance(phase.play, Sweep) else []

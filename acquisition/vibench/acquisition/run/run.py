@@ -326,7 +326,7 @@ class Run(ClosedOnLeaving):
         loop.enter(None)
 
     def _before_s(self) -> float:
-        """Time before the first ramp [s]: what comes is told when the check has passed, and not before."""
+        """Time before the first ramp [s]; the signal is announced only after the check has passed."""
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
                 return CHECK_S + self._drive.pause_s
@@ -402,7 +402,7 @@ def run_measurement(
     Raises
     ------
     AcquisitionError
-        As `run.Run` says; the generator is silent then, and the recording, if it had begun, is
+        As `run.Run` says; the generator is silent then, and the recording, if it had started, is
         finished as failed.
 
     """

@@ -172,7 +172,7 @@ def _require_base(figures: CheckFigures) -> None:
 SILENT_V = 5e-3
 """Half of peak to peak at the amplifier's input: noise, hum, and the lowest setting of a generator [V]."""
 HUM_FACTOR = 2.0
-"""On a wire that hums louder than that while nothing plays, so many times the hum."""
+"""On a wire that hums louder than that while nothing plays, this many times the hum."""
 LISTEN_S = 0.02
 """A period of the mains, at once the step in which silence is looked for [s]."""
 LONGEST_S = 12.0

@@ -1,4 +1,4 @@
-"""How a run is told to end: what may cause it, how hard each cause stops, and the switch in between."""
+"""Stops of a run: their causes, the level of each cause, and the switch between threads."""
 
 import mmap
 from collections import deque

@@ -209,7 +209,7 @@ class Bridge(QObject):
     adopted = Signal(object)
     """The `CampaignRequest` that an engine carries out which another window has left alone."""
     advanced = Signal()
-    """What was wanted has come about: a bench is open, a plan armed, a run begun."""
+    """What was wanted has come about: a bench is open, a plan armed, a run started."""
     recording_ended = Signal(object)
     """Path of a recording that has just come to its end."""
 
@@ -240,7 +240,7 @@ class Bridge(QObject):
 
     @property
     def is_ordering(self) -> bool:
-        """Whether an order is on its way: a campaign may take seconds to be held against the limits."""
+        """Whether an order is on its way: a campaign may take seconds to be checked against the limits."""
         return self._orders > 0
 
     @property

@@ -98,7 +98,7 @@ class ModelForm(QWidget):
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
         """Put complaints at their fields, those of models inside further in; gives all, each with its field.
 
-        What belongs to no field, but to several together, is told with the field that was changed last.
+        What belongs to no field, but to several together, is reported at the field that was changed last.
         """
         said: list[str] = []
         for name, row in self._rows.items():

@@ -81,7 +81,7 @@ _DIGITS = 6
 MOST_WHOLE = 1 << 53
 """Larger whole numbers cannot be told from their neighbours."""
 MOST_TIMES = 1000.0
-"""A value so many times the old one, or such a part of it, is often a mistaken unit: it is asked about."""
+"""A value this many times the old one, or such a part of it, is often a mistaken unit: it is asked about."""
 STEP = 0.05
 """Share by which one step changes a quantity: small beside what matters, and never past zero."""
 

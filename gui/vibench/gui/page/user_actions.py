@@ -90,12 +90,12 @@ class UserActions(QObject):
             self._context.page_wanted.emit(RUN)
 
     def stop(self) -> None:
-        """Ramp down as planned; asked again while ramping down: as fast as the shaker bears."""
+        """Ramp down as planned; asked again while ramping down: as fast as the shaker has."""
         is_ramping = self._context.bridge.state is EngineState.RAMPING_DOWN
         self._context.bridge.stop(StopLevel.ABORT if is_ramping else StopLevel.RAMP, OPERATOR_STOP)
 
     def abort(self) -> None:
-        """Ramp down as fast as the shaker bears."""
+        """Ramp down as fast as the shaker has."""
         self._context.bridge.stop(StopLevel.ABORT, ABORT_KEY)
 
     def hold_or_resume(self) -> None:

@@ -70,7 +70,7 @@ TIME = PlotAxis("Time", "s")
 _LINE_DISTANCE = 1.25
 """From one label to that above it, in heights of the font."""
 _MINOR = 0.01
-"""Distance that is told of ticks without a number."""
+"""Distance reported for ticks without a number."""
 _WIDE = "2000"
 """A label and the room beside it, on a logarithmic axis across."""
 
@@ -236,7 +236,7 @@ def _even(low: float, high: float) -> list[float]:
     rough = (high - low) / 6
     decade = 10 ** floor(log10(rough))
     step = next(m * decade for m in (1, 2, 5, 10) if m * decade >= rough)
-    edge = 1e-9  # An end that is a round number but for rounding gets its tick.
+    edge = 1e-9  # An end that is a round number except for rounding gets its tick.
     first, last = ceil(low / step - edge), floor(high / step + edge)
     return [log10(n * step) for n in range(first, last + 1) if n > 0]
 
@@ -267,7 +267,7 @@ class Grid(pg.UIGraphicsItem):  # type: ignore[misc] # untyped library
     """Lines over the whole picture.
 
     pyqtgraph lets the axes draw them. These keep a copy of what they paint, which would be as large
-    as the picture, twice, and be laid over it in every frame.
+    as the picture, twice, and be overlaid on it in every frame.
     """
 
     def __init__(self, across: AxisItem, up: AxisItem) -> None:

@@ -1,4 +1,4 @@
-"""What lines, dots and areas of a plot are drawn with: told anew at every change of theme."""
+"""What lines, dots and areas of a plot are drawn with: told again at every change of theme."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class Dash(Enum):
 
 @dataclass(frozen=True)
 class LineStyle:
-    """Which colour of a theme, and which dash: told anew at every change of theme."""
+    """Which colour of a theme, and which dash: told again at every change of theme."""
 
     colour: Callable[[Theme], Colour]
     dash: Dash = Dash.SOLID
@@ -65,7 +65,7 @@ def dashed_pen(colour: Colour, width: float, dash: Dash) -> QPen:
 
 
 def straight_pen(line_style: LineStyle, theme: Theme, ratio: float) -> QPen:
-    """Return the pen of a straight line, as wide as a pixel of the layout: so many of the screen."""
+    """Return the pen of a straight line, as wide as a pixel of the layout: this many of the screen."""
     return dashed_pen(line_style.colour(theme), ratio, line_style.dash)
 
 
@@ -119,7 +119,7 @@ _INSIDE = "enclosed"
 
 
 class Band:
-    """An area between a lower and an upper line: one outline, there and back, filled."""
+    """An area between a lower and an upper line: one outline, up and down, filled."""
 
     def __init__(self, of: str) -> None:
         self.of = of

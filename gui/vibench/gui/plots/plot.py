@@ -75,7 +75,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         for unseen in ("top", "right"):
-            # They would write a label anew, that nobody sees, at every change of the range.
+            # They would write a label again, that nobody sees, at every change of the range.
             self.getPlotItem().getAxis(unseen).unlinkFromView()
         for axis in (self.across, self.up):
             # Before the grid, which is drawn at their ticks.
@@ -377,7 +377,7 @@ class Plot(pg.PlotWidget):  # type: ignore[misc] # untyped library
             self.reading.again()
 
     def _relegend(self) -> None:
-        """Write the legend anew: its colours follow the theme."""
+        """Write the legend again: its colours follow the theme."""
         if self._legend is None:
             return
         self._legend.show_entries(

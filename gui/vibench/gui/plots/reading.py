@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Reading:
     """Two crossed lines at the pointer, and a line of text with the place and the curve that is nearest.
 
-    A place that was marked stays; differences are told from there, and as a ratio in dB where the upright
+    A place that was marked stays; differences are shown from there, and as a ratio in dB where the upright
     axis is logarithmic.
     """
 
@@ -38,7 +38,7 @@ class Reading:
 
     @property
     def text(self) -> str:
-        """What is told; empty while nothing is read."""
+        """The reading in words; empty while nothing is read."""
         return self._label.text() if self._label is not None and self.place is not None else ""
 
     def dress(self, theme: Theme) -> None:
@@ -85,7 +85,7 @@ class Reading:
         self._tell("   ".join(said))
 
     def again(self) -> None:
-        """Read anew: the curves are others."""
+        """Read again: the curves are others."""
         if self.place is not None:
             self.show_at(self._at)
 

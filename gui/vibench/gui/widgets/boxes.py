@@ -227,7 +227,7 @@ class TimedBar(ProgressBar):
         self._begun_s = monotonic()
 
     def show_done(self, done: int, asked: int) -> None:
-        """Show how many pieces are done; 0 asked: nothing was begun."""
+        """Show how many pieces are done; 0 asked: nothing was started."""
         if asked and not self._asked:
             self.begin()
         self._asked = asked

@@ -123,7 +123,7 @@ class ReadTable(QTableWidget):
         self._later.start()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Wrap anew for another width."""
+        """Wrap again for another width."""
         super().resizeEvent(event)
         self._later.start()
 

@@ -15,7 +15,7 @@ EVERY_MS = 20
 BOUND_S = 0.1
 """A wait of this length is felt: longer ones are noted with their moment."""
 SPAN_S = 10.0
-"""The longest wait that is shown is that of so many seconds."""
+"""The longest wait that is shown is that of this many seconds."""
 MOST_NOTED = 20
 _DELAYS = "/proc/thread-self/schedstat"
 """Linux: for how long this thread could have run, and another one had the processor [ns]."""
@@ -38,7 +38,7 @@ class EventLoopMonitor(QObject):
     """A timer that notes how late it comes.
 
     Whatever keeps the thread keeps the timer: work, a file, a lock, another thread of Python.
-    What other programs take of the processor is told apart, so that a busy machine is not
+    What other programs take of the processor is distinguished, so that a busy machine is not
     blamed on the window.
     """
 

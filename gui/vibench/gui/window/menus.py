@@ -198,7 +198,7 @@ class AbortKey(QObject):
     """Receives every key press of the application before any widget does.
 
     A shortcut does not act while a modal dialog is open; a filter on the application does. The key goes
-    on to whoever has the focus, so that Esc still closes a dialog.
+    on to the focused widget, so that Esc still closes a dialog.
     """
 
     pressed = Signal()

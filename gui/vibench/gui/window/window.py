@@ -132,7 +132,7 @@ class NavigationBar(QListWidget):
 
 
 SPAN_S = 1.0
-"""Frames are counted over so many seconds."""
+"""Frames are counted over this many seconds."""
 MOST_DROPPED = 20
 """Files that are opened at once."""
 TICK_MS = 50

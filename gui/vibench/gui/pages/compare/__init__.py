@@ -1,4 +1,4 @@
-"""The Compare page: recordings and predictions laid over one another.
+"""The Compare page: recordings and predictions overlaid on one another.
 
 Curves with their bounds over frequency, peaks, markers, the difference of two curves, export.
 Analyses and exports run in another process; `_export_elsewhere` is loaded there, without widgets.

@@ -1,4 +1,4 @@
-"""Compare: recordings and predictions laid over one another, with peaks, differences and exports."""
+"""Compare: recordings and predictions overlaid on one another, with peaks, differences and exports."""
 
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -45,7 +45,7 @@ class AnalysisPanel(QGroupBox):
     """The options, the button that applies them, and a bar while it is done."""
 
     wanted = Signal()
-    """Analyse all recordings anew."""
+    """Analyse all recordings again."""
     cancelled = Signal()
 
     def __init__(self) -> None:
@@ -114,7 +114,7 @@ class ComparePage(Page):
 
     @property
     def is_done(self) -> bool:
-        """Ticked once two curves are laid over one another."""
+        """Ticked once two curves are overlaid on one another."""
         return len(self.curves.shown()) > 1
 
     @property

@@ -84,7 +84,7 @@ class CurvePlots(QWidget):
     def show_curves(
         self, curves: tuple[tuple[Curve, LineStyle], ...], difference: CurveDifference | None
     ) -> None:
-        """Draw anew."""
+        """Draw again."""
         for plot in (self.magnitudes, self.differences):
             plot.wipe()
         for curve, line_style in curves:

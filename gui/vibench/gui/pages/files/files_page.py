@@ -70,12 +70,12 @@ class FilesPage(Page):
         return {FileKind.RECORDING: self.open_path, FileKind.FOLDER: self._go_to}
 
     def entered(self) -> None:
-        """List the folder anew, for files may have come; arrows choose among them."""
+        """List the folder again, for files may have come; arrows choose among them."""
         self.list_folder()
         self.table.setFocus()
 
     def refresh(self) -> None:
-        """List anew when a listed file has gone."""
+        """List again when a listed file has gone."""
         now_s = monotonic()
         if now_s - self._looked_s > LOOK_S:
             self._looked_s = now_s
@@ -107,7 +107,7 @@ class FilesPage(Page):
         QTimer.singleShot(0, self, lambda: self._choose(path))
 
     def _choose(self, path: Path) -> None:
-        """Open a recording, anew if it is open; where it is listed, to choose it opens it."""
+        """Open a recording, again if it is open; where it is listed, to choose it opens it."""
         before = self._opened
         self.table.choose(path)
         if self._opened is before:

@@ -170,7 +170,7 @@ class RecordingModel(QAbstractTableModel):
         return self._entries
 
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
-        """List other files; pictures of those that stay are kept. The same list anew changes nothing."""
+        """List other files; pictures of those that stay are kept. The same list again changes nothing."""
         if entries == self._entries:
             return
         self.beginResetModel()

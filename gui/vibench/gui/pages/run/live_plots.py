@@ -117,7 +117,7 @@ def channel_axis(role: str, unit: str) -> PlotAxis:
 
 
 AGO = PlotAxis("Time before now", "s")
-"""An axis that stands still: one that scrolls would be painted anew in every frame."""
+"""An axis that stands still: one that scrolls would be painted again in every frame."""
 LEAST_COLUMNS, MOST_COLUMNS = 500, 3000
 """Of a plot: as many as there are lines side by side; between fewer, room would stay empty."""
 AXIS_EM, TIME_AXIS_EM = 4.0, 3

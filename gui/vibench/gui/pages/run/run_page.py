@@ -183,7 +183,7 @@ class WatchCard(QGroupBox):
         self.mark_wanted.emit(self.mark.text().strip() or "event")
 
     def show_status(self, status: EngineStatus | None, averages: int) -> None:
-        """Show where the run stands; so many averages of noise are planned, 0 for anything else."""
+        """Show where the run stands; this many averages of noise are planned, 0 for anything else."""
         run = None if status is None else status.run
         is_running = status is not None and status.state in DRIVING
         self.mark_button.setEnabled(is_running)

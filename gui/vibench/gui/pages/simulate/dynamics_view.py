@@ -44,12 +44,12 @@ class AnswerPicture(Protocol[Shown_contra]):
         """What is put into the tab."""
 
     def show_answer(self, answer: Shown_contra) -> None:
-        """Draw anew."""
+        """Draw again."""
 
 
 @dataclass(frozen=True)
 class DynamicsKind(Generic[Request, Answer]):
-    """What a tab asks, and how its answer is told."""
+    """Request of a tab, and how its answer is shown."""
 
     name: str
     request: type[Request]

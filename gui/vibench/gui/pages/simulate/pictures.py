@@ -168,7 +168,7 @@ _HEIGHT = 0.45
 
 
 class ChainPicture:
-    """Three plots above one another, drawn anew as runs come in."""
+    """Three plots above one another, drawn again as runs come in."""
 
     def __init__(self, theme: Theme) -> None:
         self.across = Plot("Transmission along the chain over frequency", FREQUENCY, ALONG_CHAIN, theme)
@@ -249,7 +249,7 @@ _SMALLEST_DIFFERENCE = 1e-6
 
 
 class AnswerPlots(QWidget):
-    """Drawn anew from the course of a simulation, as often as it grows."""
+    """Drawn again from the course of a simulation, as often as it grows."""
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()

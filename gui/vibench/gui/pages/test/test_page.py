@@ -243,7 +243,7 @@ class LimitTable(ReadTable):
         self.horizontalHeader().setMinimumSectionSize(_LEAST_LETTERS * self.fontMetrics().averageCharWidth())
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
-        """Show what was held against the rig."""
+        """Show what was checked against the rig."""
         units = [fitted_unit(check.unit, check.limit) for check in checks]
         self.show_rows(
             [
