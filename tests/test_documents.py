@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 import typer
 
+from benchmarks.sample_texts import comments, docstrings, product_sources
 from vibench.acquisition.instruments import PlugInKind
 from vibench.cli.__main__ import COMMANDS, app
 
@@ -216,8 +217,22 @@ def test_the_page_on_architecture_lists_the_rooms_in_their_order_and_in_their_ow
     assert listed == [(room, text.split("\n")[0]) for room, text in zip(rooms, first_lines, strict=True)]
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def worn_words(text):
+    """Return the words of `PLAIN` in a text, outside code."""
+    prose = re.sub(r"`[^`]*`", "", re.sub(r"^```.*?^```", "", text, flags=re.S | re.M))
+    return {word: plain for word, plain in PLAIN.items() if re.search(rf"\b{word}\b", prose, flags=re.I)}
+
+
+@every_document
 def test_documents_use_plain_words(document):
-    text = re.sub(r"`[^`]*`", "", re.sub(r"^```.*?^```", "", document.read_text("utf-8"), flags=re.S | re.M))
-    found = {word: plain for word, plain in PLAIN.items() if re.search(rf"\b{word}\b", text, flags=re.I)}
+    found = worn_words(text_of(document))
+    assert found == {}, f"write instead: {found}"
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is a copy, not a checkout")
+@pytest.mark.parametrize("read", [docstrings, comments])
+def test_docstrings_and_comments_use_plain_words(read):
+    texts = [text for path in product_sources() for text in read(path)]
+    found = {place: words for place, text in texts if (words := worn_words(text))}
+    assert len(texts) > 500
     assert found == {}, f"write instead: {found}"
