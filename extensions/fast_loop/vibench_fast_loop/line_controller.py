@@ -26,7 +26,8 @@ class LineController:
         self._link = link
         self._config = config
         self._is_open = True
-        self._facts = self._asked(LoopRequest(ask="hello"), LoopFacts)
+        self.facts = self._asked(LoopRequest(ask="hello"), LoopFacts)
+        """Rate, latency, limit and watchdog."""
 
     @classmethod
     def open(cls, config: ControllerConfig) -> Self:
@@ -56,13 +57,8 @@ class LineController:
     @property
     def identity(self) -> Identity:
         """Who answered."""
-        facts = self._facts
+        facts = self.facts
         return Identity("", facts.name, facts.serial, f"loop {facts.vibench_loop}", facts.model_dump_json())
-
-    @property
-    def facts(self) -> LoopFacts:
-        """Rate, latency, limit and watchdog."""
-        return self._facts
 
     def play(self, program: LoopProgram) -> LoopReport:
         """Go over to a program."""

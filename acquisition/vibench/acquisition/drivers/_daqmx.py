@@ -149,15 +149,18 @@ class DaqmxDigitizer:
     """
 
     def __init__(self, session: DaqmxSession, config: DaqConfig, channels: tuple[Channel, ...]) -> None:
-        self._session = session
+        self.session = session
+        """The way to the driver, for an output on the same one."""
         self._config = config
         self._channels = channels
         self._resources = ExitStack()
         self._task: Task | None = None
         self._reader: AnalogUnscaledReader | AnalogMultiChannelReader | None = None
-        self._volts_per_count: tuple[float | None, ...] = ()
+        self.volts_per_count: tuple[float | None, ...] = ()
+        """Step of the converter for each channel [V]; None where volts are no whole multiples of one step."""
         self._identity: Identity | None = None
-        self._sample_rate_hz = 0.0
+        self.sample_rate_hz = 0.0
+        """The rate that the hardware runs at, read back from it."""
         self._next_sample = 0
         self._is_running = False
         self._tells_overloads = True
@@ -188,24 +191,9 @@ class DaqmxDigitizer:
         return self._identity
 
     @property
-    def sample_rate_hz(self) -> float:
-        """The rate that the hardware runs at, read back from it."""
-        return self._sample_rate_hz
-
-    @property
     def roles(self) -> tuple[str, ...]:
         """Roles of the channels, in the order of the rows of a block."""
         return tuple(channel.role.value for channel in self._channels)
-
-    @property
-    def volts_per_count(self) -> tuple[float | None, ...]:
-        """Step of the converter for each channel [V]; None where volts are no whole multiples of one step."""
-        return self._volts_per_count
-
-    @property
-    def session(self) -> DaqmxSession:
-        """The way to the driver, for an output on the same one."""
-        return self._session
 
     def start_trigger(self) -> str:
         """Terminal on which other tasks see this one start; arm them before `start`."""
@@ -279,38 +267,38 @@ class DaqmxDigitizer:
         self._resources.close()
 
     def _reserve(self) -> None:
-        self._resources.callback(self._session.close)
+        self._resources.callback(self.session.close)
         self._identity = self._identify()
-        self._task = task = self._resources.enter_context(Task(grpc_options=self._session.options))
+        self._task = task = self._resources.enter_context(Task(grpc_options=self.session.options))
         pairs = zip(self._config.channels, self._channels, strict=True)
-        self._volts_per_count = tuple(add_input(task, config, channel) for config, channel in pairs)
+        self.volts_per_count = tuple(add_input(task, config, channel) for config, channel in pairs)
         rate_hz = self._config.sample_rate_hz
         task.timing.cfg_samp_clk_timing(
             rate_hz,
             sample_mode=AcquisitionType.CONTINUOUS,
             samps_per_chan=int(self._config.buffer_s * rate_hz),
         )
-        self._sample_rate_hz = float(task.timing.samp_clk_rate)
-        if not rate_hz * (1 - 1e-6) <= self._sample_rate_hz < _MOST_COERCED * rate_hz:
+        self.sample_rate_hz = float(task.timing.samp_clk_rate)
+        if not rate_hz * (1 - 1e-6) <= self.sample_rate_hz < _MOST_COERCED * rate_hz:
             raise SettingRefused(
                 f"{self._config.device} was asked for {rate_hz:g} samples a second and takes "
-                f"{self._sample_rate_hz:g}; the next higher rate of the device was expected. It is released; "
+                f"{self.sample_rate_hz:g}; the next higher rate of the device was expected. It is released; "
                 "set daq.sample_rate_hz to a rate that it has"
             )
         task.control(TaskMode.TASK_RESERVE)
-        if None in self._volts_per_count:
+        if None in self.volts_per_count:
             self._reader = AnalogMultiChannelReader(task.in_stream)
         else:
             self._reader = AnalogUnscaledReader(task.in_stream)
-            self._steps_v = np.array(self._volts_per_count)[:, np.newaxis]
+            self._steps_v = np.array(self.volts_per_count)[:, np.newaxis]
         # Every array is made here for the channels of this task; the check would be a call of its own.
         self._reader.verify_array_shape = False
 
     def _identify(self) -> Identity:
-        identity = daqmx_identity(self._session, self._config.device)
+        identity = daqmx_identity(self.session, self._config.device)
         if _plain(identity.model) != _plain(self._config.product):
             raise ConfigurationError(
-                f"{self._config.device} on {self._session.place} is a {identity.model}, and daq.product says "
+                f"{self._config.device} on {self.session.place} is a {identity.model}, and daq.product says "
                 f"{self._config.product!r}. Nothing was reserved; correct daq.device or daq.product"
             )
         return identity
@@ -333,12 +321,12 @@ class DaqmxDigitizer:
         return volts, None
 
     def _fill(self, rows: NDArray[Any], read: Callable[[NDArray[Any], int, float], int]) -> None:
-        piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self._sample_rate_hz))
+        piece = max(1, int(min(LONGEST_READ_S, self._config.buffer_s / 2) * self.sample_rate_hz))
         for first in range(0, rows.shape[1], piece):
             count = min(piece, rows.shape[1] - first)
             # The reader wants C order, which a slice of columns has not: only a long read is copied.
             target = rows if count == rows.shape[1] else np.empty((rows.shape[0], count), rows.dtype)
-            read(target, count, count / self._sample_rate_hz + _READ_MARGIN_S)
+            read(target, count, count / self.sample_rate_hz + _READ_MARGIN_S)
             if target is not rows:
                 rows[:, first : first + count] = target
 

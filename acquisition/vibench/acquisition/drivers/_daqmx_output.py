@@ -41,7 +41,8 @@ class DaqmxOutput:
         self._task: Task | None = None
         self._written = 0
         self._is_open = True
-        self._idle = IdleOutput.HELD
+        self.idle = IdleOutput.HELD
+        """What the device does when it runs dry: zero volts where it can be told to, and read back."""
 
     @classmethod
     def open(cls, physical: str, config: OutputConfig, digitizer: DaqmxDigitizer) -> Self:
@@ -77,11 +78,6 @@ class DaqmxOutput:
     def sample_rate_hz(self) -> float:
         """The rate that the output was asked for, and takes."""
         return self._config.sample_rate_hz
-
-    @property
-    def idle(self) -> IdleOutput:
-        """What the device does when it runs dry: zero volts where it can be told to, and read back."""
-        return self._idle
 
     @property
     def ahead_samples(self) -> int:
@@ -158,7 +154,7 @@ class DaqmxOutput:
         with ExitStack() as undo, daqmx_call(f"opening {physical}"):
             undo.callback(self._resources.close)
             task = self._resources.enter_context(Task(grpc_options=self._digitizer.session.options))
-            self._idle = _told_to_idle_at_zero(self._add_channel(task))
+            self.idle = _told_to_idle_at_zero(self._add_channel(task))
             task.timing.cfg_samp_clk_timing(
                 config.sample_rate_hz,
                 sample_mode=AcquisitionType.CONTINUOUS,

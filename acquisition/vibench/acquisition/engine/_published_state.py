@@ -53,45 +53,33 @@ class SampleBuffer:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._blocks: deque[tuple[int, NDArray[np.float32]]] = deque()
-        self._run_id = 0
+        self.run_id = 0
+        """Number of the run that the samples belong to."""
         self._channels = 0
         self._rate_hz = 1.0
-        self._end = 0
-        self._gaps = 0
-
-    @property
-    def run_id(self) -> int:
-        """Number of the run that the samples belong to."""
-        return self._run_id
-
-    @property
-    def samples(self) -> int:
+        self.samples = 0
         """Samples per channel of the run so far."""
-        return self._end
-
-    @property
-    def gaps(self) -> int:
+        self.gaps = 0
         """Places at which samples are missing."""
-        return self._gaps
 
     def begin(self, channels: int, sample_rate_hz: float) -> None:
         """Forget the last run; a new one begins."""
         with self._lock:
             self._blocks.clear()
-            self._run_id += 1
+            self.run_id += 1
             self._channels, self._rate_hz = channels, sample_rate_hz
-            self._end = self._gaps = 0
+            self.samples = self.gaps = 0
 
     def add(self, block: Block) -> None:
         """Take the next block, and forget what is older than `HELD_S`."""
         volts = block.volts.astype(np.float32)
         with self._lock:
-            if block.first_sample != self._end:
-                self._gaps += 1
+            if block.first_sample != self.samples:
+                self.gaps += 1
                 self._blocks.clear()
             self._blocks.append((block.first_sample, volts))
-            self._end = block.first_sample + volts.shape[1]
-            oldest = self._end - round(HELD_S * self._rate_hz)
+            self.samples = block.first_sample + volts.shape[1]
+            oldest = self.samples - round(HELD_S * self._rate_hz)
             while self._blocks and self._blocks[0][0] + self._blocks[0][1].shape[1] <= oldest:
                 self._blocks.popleft()
 
@@ -99,7 +87,7 @@ class SampleBuffer:
         """Return what is held from ``sample`` on, the newest ``most`` of it."""
         with self._lock:
             blocks = tuple(self._blocks)
-            end, run_id, rate_hz, channels = self._end, self._run_id, self._rate_hz, self._channels
+            end, run_id, rate_hz, channels = self.samples, self.run_id, self._rate_hz, self._channels
         first = max(sample, end - most, blocks[0][0] if blocks else end)
         parts = [
             volts[:, max(0, first - begin) :] for begin, volts in blocks if begin + volts.shape[1] > first

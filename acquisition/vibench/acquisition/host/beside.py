@@ -22,27 +22,23 @@ class Beside:
 
     def __init__(self, name: str) -> None:
         self._jobs: deque[Callable[[], None]] = deque()
-        self._is_busy = self._is_closing = False
+        self.is_busy = self._is_closing = False
+        """Whether a job is running or queued."""
         self._changed = Condition()
         with suppress(RuntimeError):  # the system gives no more threads: the jobs are left out
             Thread(target=self._run, name=name, daemon=True).start()
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether a job is running or queued."""
-        return self._is_busy
 
     def do(self, job: Callable[[], None]) -> None:
         """Queue a job and return at once. ``job`` raises nothing except MemoryError."""
         with self._changed:
             self._jobs.append(job)
-            self._is_busy = True
+            self.is_busy = True
             self._changed.notify_all()
 
     def wait(self, longest_s: float) -> None:
         """Wait until every job is done, or for ``longest_s``."""
         with self._changed:
-            self._changed.wait_for(lambda: not self._is_busy, longest_s)
+            self._changed.wait_for(lambda: not self.is_busy, longest_s)
 
     def close(self, longest_s: float) -> None:
         """End the thread after the last queued job; wait for that at most ``longest_s``."""
@@ -59,7 +55,7 @@ class Beside:
 
     def _step(self) -> bool:
         with self._changed:
-            self._is_busy = bool(self._jobs)
+            self.is_busy = bool(self._jobs)
             self._changed.notify_all()
             self._changed.wait_for(lambda: self._jobs or self._is_closing)
             if not self._jobs:

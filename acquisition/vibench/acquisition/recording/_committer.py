@@ -57,24 +57,16 @@ class Committer:
         self._waiting_samples = 0
         self._is_closing = False
         self._is_abandoned = False
-        self._failure: OSError | None = None
+        self.failure: OSError | None = None
+        """What the disk refused, if it did."""
         self._is_failure_seen = False
         self._counters: dict[int, int] = {}
         self._written_samples = 0
-        self._committed_samples = 0
+        self.committed_samples = 0
+        """Samples per channel that would survive a power cut now."""
         self._commit_due_s = time.monotonic() + interval_s
         self._thread = threading.Thread(target=self._run, name="recording committer", daemon=True)
         self._thread.start()
-
-    @property
-    def committed_samples(self) -> int:
-        """Samples per channel that would survive a power cut now."""
-        return self._committed_samples
-
-    @property
-    def failure(self) -> OSError | None:
-        """What the disk refused, if it did."""
-        return self._failure
 
     def put(self, batch: Batch) -> None:
         """Queue a batch; waits only when the queue is full.
@@ -101,29 +93,29 @@ class Committer:
         if self._is_abandoned:
             raise RecordingError(
                 f"The disk has not answered for {self._closing_patience_s:g} s (is it a network folder that"
-                f" has gone away?). The {self._committed_samples} samples committed before are kept there;"
+                f" has gone away?). The {self.committed_samples} samples committed before are kept there;"
                 " recover the recording when the disk is back."
             )
 
     def raise_unseen_failure(self) -> None:
         """Raise a failure that no call has reported yet, so that none stays unseen."""
-        if self._failure is not None and not self._is_failure_seen:
+        if self.failure is not None and not self._is_failure_seen:
             self._require_health(has_room=True)
 
     def _can_take(self) -> bool:
-        is_stopped = self._failure is not None or not self._thread.is_alive()
+        is_stopped = self.failure is not None or not self._thread.is_alive()
         return is_stopped or self._waiting_samples <= self._queue_samples
 
     def _require_health(self, has_room: bool) -> None:  # noqa: FBT001 - the answer of a wait
-        if self._failure is not None:
+        if self.failure is not None:
             self._is_failure_seen = True
-            kept = f"the {self._committed_samples} samples saved before are kept"
-            if isinstance(self._failure, FileNotFoundError):
+            kept = f"the {self.committed_samples} samples saved before are kept"
+            if isinstance(self.failure, FileNotFoundError):
                 kept = "the samples saved before are lost with the file"
             raise RecordingError(
-                f"The disk refused the recording: {self._failure}. Recording has ended; {kept}. Make room or"
+                f"The disk refused the recording: {self.failure}. Recording has ended; {kept}. Make room or"
                 " change the disk, and measure again."
-            ) from self._failure
+            ) from self.failure
         if not self._thread.is_alive():
             raise RecordingError(
                 "The recording has been closed, or its writer thread has died; the block was not recorded."
@@ -141,7 +133,7 @@ class Committer:
             while self._step():
                 pass
         except OSError as error:
-            self._failure = error
+            self.failure = error
         finally:
             with self._changed:
                 self._changed.notify_all()
@@ -189,7 +181,7 @@ class Committer:
             self._disk.write(offset, value.to_bytes(8, "little", signed=True))
         self._disk.sync()
         self._counters.clear()
-        self._committed_samples = self._written_samples
+        self.committed_samples = self._written_samples
 
 
 Cell = str | int | float
@@ -200,17 +192,13 @@ class TableWriter:
 
     def __init__(self, places: TablePlaces) -> None:
         self._places = places
-        self._rows = 0
-
-    @property
-    def rows(self) -> int:
+        self.rows = 0
         """Rows written so far."""
-        return self._rows
 
     @property
     def free_rows(self) -> int:
         """Rows that still fit."""
-        return self._places.table.capacity - self._rows
+        return self._places.table.capacity - self.rows
 
     def append(self, cells: Sequence[Cell]) -> Batch:
         """Make the writes of one more row; raises RecordingError when the table is full."""
@@ -220,8 +208,8 @@ class TableWriter:
                 f" {self._places.table.capacity} rows. Recording goes on without this row; divide the"
                 " measurement into several recordings."
             )
-        self._rows += 1
-        return self.replace(self._rows - 1, cells)
+        self.rows += 1
+        return self.replace(self.rows - 1, cells)
 
     def replace(self, row: int, cells: Sequence[Cell]) -> Batch:
         """Make the writes of a row that is already there."""
@@ -230,7 +218,7 @@ class TableWriter:
             (offset + row * np.dtype(column.dtype).itemsize, _raw(column, cell))
             for offset, column, cell in zip(self._places.columns, columns, cells, strict=True)
         ]
-        return Batch(writes=tuple(writes), counters={self._places.n_rows: self._rows})
+        return Batch(writes=tuple(writes), counters={self._places.n_rows: self.rows})
 
 
 def _raw(column: Column, cell: Cell) -> bytes:

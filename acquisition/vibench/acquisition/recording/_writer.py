@@ -159,7 +159,8 @@ class RecordingWriter:
         reserve: DescriptorReserve | None = None,
         key: SealKey | None = None,
     ) -> None:
-        self._path = path
+        self.path = path
+        """``NAME.h5``, which exists once the recording is finished."""
         self._header = header
         self._places = places
         self._disk = disk
@@ -169,19 +170,10 @@ class RecordingWriter:
         self._committer = Committer(disk, round(QUEUE_S * header.sample_rate_hz), commit_interval_s)
         self._key = key
         self._digests = {channel.role: hashlib.sha256() for channel in header.channels}
-        self._samples = 0
+        self.samples = 0
+        """Samples per channel handed over so far."""
         self._reserved = places.reserved
         self._is_finished = False
-
-    @property
-    def path(self) -> Path:
-        """``NAME.h5``, which exists once the recording is finished."""
-        return self._path
-
-    @property
-    def samples(self) -> int:
-        """Samples per channel handed over so far."""
-        return self._samples
 
     @property
     def committed_samples(self) -> int:
@@ -205,13 +197,13 @@ class RecordingWriter:
         counts = (
             self._scale.counts(block.volts) if block.counts is None else np.ascontiguousarray(block.counts)
         )
-        gap = block.first_sample - self._samples
+        gap = block.first_sample - self.samples
         end = block.first_sample + counts.shape[1]
         self._require_capacity(end)
         self._reserve_up_to(end)
         if gap:
-            self._fill_gap(self._samples, block.first_sample)
-        self._samples = end
+            self._fill_gap(self.samples, block.first_sample)
+        self.samples = end
         self._committer.put(
             Batch(
                 writes=self._channel_writes(block.first_sample, counts),
@@ -224,17 +216,17 @@ class RecordingWriter:
 
     def log(self, kind: str, text: str, sample: int | None = None) -> None:
         """Note an event, at a sample (the next one by default)."""
-        place = self._samples if sample is None else sample
+        place = self.samples if sample is None else sample
         LOG.info("%s, sample %d: %s: %s", self.path.name, place, kind, text)
         self._committer.put(self._journal.event(kind, text, place))
 
     def begin_segment(self, label: str, **numbers: Number) -> None:
         """Begin a named range at the next sample; the analysis finds it by its label and numbers."""
-        self._committer.put(self._journal.begin_segment(label, numbers, self._samples))
+        self._committer.put(self._journal.begin_segment(label, numbers, self.samples))
 
     def end_segment(self) -> None:
         """End the open segment with the last sample handed over."""
-        self._committer.put(self._journal.end_segment(self._samples - 1))
+        self._committer.put(self._journal.end_segment(self.samples - 1))
 
     def finish(self, state: RecordingState, reason: str = "") -> Path:
         """End the recording and turn it into ``NAME.h5``; calling again changes nothing.
@@ -252,7 +244,7 @@ class RecordingWriter:
                 f" {', '.join(each.value for each in ENDINGS)}."
             )
         if self._is_finished:
-            return self._path
+            return self.path
         self._is_finished = True
         if self._reserve is not None:
             self._reserve.close()
@@ -260,7 +252,7 @@ class RecordingWriter:
         failure = self._committer.failure
         if failure is not None:
             state, reason = RecordingState.FAILED, f"{reason}; the disk refused: {failure}".removeprefix("; ")
-        part = layout.part_of(self._path)
+        part = layout.part_of(self.path)
         try:
             self._write_ending(state, reason)
             finalise(part, self._key, self._written() if failure is None else None)
@@ -270,7 +262,7 @@ class RecordingWriter:
                 self._disk.close()
         discard(part)
         self._committer.raise_unseen_failure()
-        return self._path
+        return self.path
 
     def __enter__(self) -> Self:
         return self
@@ -291,7 +283,7 @@ class RecordingWriter:
     def _check(self, block: Block) -> None:
         if self._is_finished:
             raise RecordingError(
-                f"{self._path} is finished; the block was not recorded. Begin a new recording."
+                f"{self.path} is finished; the block was not recorded. Begin a new recording."
             )
         channels = len(self._header.channels)
         if block.volts.ndim != 2 or block.volts.shape[0] != channels:
@@ -299,9 +291,9 @@ class RecordingWriter:
                 f"A block of shape {block.volts.shape} was given; this recording has {channels} channels, so"
                 f" the shape must be ({channels}, samples). The block was not recorded."
             )
-        if block.first_sample < self._samples:
+        if block.first_sample < self.samples:
             raise RecordingError(
-                f"A block beginning at sample {block.first_sample} was given, but {self._samples} samples are"
+                f"A block beginning at sample {block.first_sample} was given, but {self.samples} samples are"
                 " recorded already and nothing is overwritten. The block was not recorded; hand over every"
                 " block once, in order."
             )
@@ -316,7 +308,7 @@ class RecordingWriter:
         if end > self._places.capacity:
             raise RecordingError(
                 f"The recording is full: the block ends at sample {end}, and {self._places.capacity} fit"
-                f" (planned: {self._header.expected_samples}, plus a margin). The {self._samples} samples"
+                f" (planned: {self._header.expected_samples}, plus a margin). The {self.samples} samples"
                 " before it are kept; plan a longer measurement, or leave its length open"
                 " (expected_samples=None)."
             )
@@ -369,5 +361,5 @@ class RecordingWriter:
         except OSError as error:
             raise RecordingError(
                 f"The disk refused the end of the recording: {error}."
-                f" {whereabouts(layout.part_of(self._path), error)}"
+                f" {whereabouts(layout.part_of(self.path), error)}"
             ) from error

@@ -21,30 +21,18 @@ class AcquisitionLoop:
         self._advance = advance
         self._digitizer = digitizer
         self._sink = sink
-        self._segment: Segment | None = None
-        self._samples = 0
-        self._lost = 0
-        self._due_s = 0.0
-
-    @property
-    def segment(self) -> Segment | None:
+        self.segment: Segment | None = None
         """The named range that is open."""
-        return self._segment
-
-    @property
-    def samples(self) -> int:
+        self.samples = 0
         """Samples recorded so far."""
-        return self._samples
-
-    @property
-    def lost_samples(self) -> int:
+        self.lost_samples = 0
         """Samples that the converter did not hand over; they are marked in the recording."""
-        return self._lost
+        self._due_s = 0.0
 
     @property
     def elapsed_s(self) -> float:
         """Time recorded so far [s]."""
-        return self._samples / self._digitizer.sample_rate_hz
+        return self.samples / self._digitizer.sample_rate_hz
 
     def read_for(self, duration_s: float, lead_s: float = 0.0) -> Iterator[Block]:
         """Read, keep and hand on blocks until ``duration_s`` more have passed, less a lead.
@@ -56,8 +44,8 @@ class AcquisitionLoop:
         self._due_s += duration_s
         longest = max(1, round(BLOCK_S * rate_hz))
         # The goal moves when the consumer of the blocks is slow.
-        while self._samples < (goal := round((self._due_s - lead_s) * rate_hz)):
-            yield self._next(min(longest, goal - self._samples))
+        while self.samples < (goal := round((self._due_s - lead_s) * rate_hz)):
+            yield self._next(min(longest, goal - self.samples))
 
     @property
     def waiting_s(self) -> float:
@@ -83,8 +71,8 @@ class AcquisitionLoop:
         block = read_block(self._digitizer, samples)
         self._advance()
         self._sink.append(block)
-        self._lost += block.first_sample - self._samples
-        self._samples = block.first_sample + block.volts.shape[1]
+        self.lost_samples += block.first_sample - self.samples
+        self.samples = block.first_sample + block.volts.shape[1]
         return block
 
     def cut(self) -> None:
@@ -93,17 +81,17 @@ class AcquisitionLoop:
 
     def enter(self, segment: Segment | None) -> None:
         """Be inside ``segment`` from the next sample on; an equal one goes on, another one ends."""
-        if segment == self._segment:
+        if segment == self.segment:
             return
-        if self._segment is not None:
+        if self.segment is not None:
             self._sink.end_segment()
         if segment is not None:
             self._sink.begin_segment(segment.label, **segment.numbers)
-        self._segment = segment
+        self.segment = segment
 
     def log(self, kind: str, text: str) -> None:
         """Note an event at the next sample."""
-        self._sink.log(kind, text, self._samples)
+        self._sink.log(kind, text, self.samples)
 
     def log_limit_trip(self, error: LimitExceeded) -> None:
         """Note the numbers of a limit that was passed, at the sample where it was."""

@@ -181,7 +181,8 @@ class Run(ClosedOnLeaving):
         switch: StopSwitch | None = None,
     ) -> None:
         """``switch``: what others hold or end the run by; one of its own if absent."""
-        self._switch = StopSwitch() if switch is None else switch
+        self.switch = StopSwitch() if switch is None else switch
+        """What holds or ends the run, within a block; from any thread, and from a signal handler."""
         self._bench = bench
         self._measurement = measurement
         self._path = path
@@ -210,17 +211,12 @@ class Run(ClosedOnLeaving):
         """How the run ended, once it is finished, stopped or failed."""
         return self._ending.outcome(self._path)
 
-    @property
-    def switch(self) -> StopSwitch:
-        """What holds or ends the run, within a block; from any thread, and from a signal handler."""
-        return self._switch
-
     def cancel(self, reason: str = "cancelled") -> None:
         """Ask the run to ramp down and end, as the operator would.
 
         Without effect on a run that has ended, or is ramping down for the last time.
         """
-        self._switch.ask(StopRequest.by(Cause.OPERATOR, reason))
+        self.switch.ask(StopRequest.by(Cause.OPERATOR, reason))
 
     def close(self) -> None:
         """End the run if it has not ended: ramp down, silence, finish the recording."""
@@ -238,7 +234,7 @@ class Run(ClosedOnLeaving):
             self._limit_monitor,
             self._silence,
             GlideWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz),
-            self._switch,
+            self.switch,
             self._total_s,
         )
         try:
@@ -293,7 +289,7 @@ class Run(ClosedOnLeaving):
                 self._total_s += require_time_for_commands(self._measurement, self._bench.generator)
             self._silence = SilenceWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz)
             with ExitStack() as refused:
-                self._guard = DriveGuard(self._drive, self._switch, lambda: self._silence.is_heard)
+                self._guard = DriveGuard(self._drive, self.switch, lambda: self._silence.is_heard)
                 refused.enter_context(self._guard)
                 header = run_header(self._bench, self._measurement, self._total_s)
                 sink = self._create(self._path, header)

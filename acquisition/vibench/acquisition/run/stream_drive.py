@@ -52,19 +52,15 @@ class OutputSynthesizer:
         self._stretch = _Stretch(None, 0, 0, 0.0, 0.0)
         self._sample = 0
         self._due_s = 0.0
-        self._level = 0.0
+        self.level = 0.0
+        """Level of the next sample, from 0 to 1."""
         self._cycles = 0.0
         self._streamed = 0
 
     @property
-    def level(self) -> float:
-        """Level of the next sample, from 0 to 1."""
-        return self._level
-
-    @property
     def is_over(self) -> bool:
         """Whether all that was appended has been handed out, and silence too."""
-        return self._stretch.play is None and self._level == 0.0 and self._sample == self._stretch.end
+        return self._stretch.play is None and self.level == 0.0 and self._sample == self._stretch.end
 
     def append(self, phases: Iterable[Phase]) -> None:
         """Play ``phases`` after what is there; at once when all of it has been handed out."""
@@ -85,7 +81,7 @@ class OutputSynthesizer:
             stretch = min(count - done, current.end - self._sample)
             levels = current.levels(self._sample, stretch + 1)
             taken[done : done + stretch] = self._sound(current.play, stretch) * levels[:-1]
-            self._level = float(levels[-1])
+            self.level = float(levels[-1])
             self._sample += stretch
             done += stretch
         return taken
@@ -100,7 +96,7 @@ class OutputSynthesizer:
             phase = next(self._coming, None)
             if phase is not None:
                 self._begin(phase)
-            elif self._level > 0.0:
+            elif self.level > 0.0:
                 self._fade(RELEASE_S)
             else:
                 self._rest(wanted)
@@ -108,11 +104,11 @@ class OutputSynthesizer:
     def _begin(self, phase: Phase) -> None:
         self._due_s += phase.duration_s
         end = round(self._due_s * self._rate_hz)
-        self._stretch = _Stretch(phase.play, self._sample, end, self._level, phase.end_level)
+        self._stretch = _Stretch(phase.play, self._sample, end, self.level, phase.end_level)
 
     def _fade(self, duration_s: float) -> None:
         end = self._sample + max(1, round(duration_s * self._rate_hz))
-        self._stretch = _Stretch(self._stretch.play, self._sample, end, self._level, 0.0)
+        self._stretch = _Stretch(self._stretch.play, self._sample, end, self.level, 0.0)
         self._due_s = end / self._rate_hz
 
     def _rest(self, samples: int) -> None:
@@ -167,17 +163,13 @@ class StreamDrive:
         self._sounds_until = 0
         """The first sample after the last one that is not silent."""
         self._is_playing = False
-        self._heard_vpp = 0.0
+        self.setting_vpp = 0.0
+        """What plays now, as the setting of the generator that would play the same [V]."""
 
     @property
     def pause_s(self) -> float:
         """As long as it takes to play what is written ahead [s]."""
         return self._output.ahead_samples / self._output.sample_rate_hz
-
-    @property
-    def setting_vpp(self) -> float:
-        """What plays now, as the setting of the generator that would play the same [V]."""
-        return self._heard_vpp
 
     @property
     def is_playing(self) -> bool:
@@ -205,13 +197,13 @@ class StreamDrive:
         fade_s = ramp_s if self._synthesizer.level > 0.0 else 0.0
         written_s = self._written / self._output.sample_rate_hz - self._read_s
         self._synthesizer.fade(ramp_s)
-        yield from self._listened(written_s, self._heard_vpp)
+        yield from self._listened(written_s, self.setting_vpp)
         yield from self._listened(fade_s, 0.0)
 
     def cut(self) -> None:
         """Go to zero volts at once, whatever was written."""
         self._is_playing = False
-        self._heard_vpp = 0.0
+        self.setting_vpp = 0.0
         self._output.stop()
 
     def silence(self) -> None:
@@ -240,10 +232,10 @@ class StreamDrive:
 
     def _listened(self, duration_s: float, end_vpp: float) -> Iterator[float]:
         """Yield a duration in parts, none longer than a block, and write ahead after each."""
-        begin_vpp = self._heard_vpp
+        begin_vpp = self.setting_vpp
         parts = ceil(duration_s / BLOCK_S * (1 - _ROUNDING))
         for part in range(1, parts + 1):
-            self._heard_vpp = begin_vpp + (end_vpp - begin_vpp) * half_cosine(part / parts)
+            self.setting_vpp = begin_vpp + (end_vpp - begin_vpp) * half_cosine(part / parts)
             yield duration_s / parts
             self._read_s += duration_s / parts
             self._write_ahead()

@@ -152,7 +152,8 @@ class LiveTwin:
         self._begin_anew(0)
 
     def _begin_anew(self, sample: int) -> None:
-        self._next = sample
+        self.next_sample = sample
+        """Number in the recording of the sample that comes next."""
         self._raw, self._used = np.empty((2, 0)), HALF_LENGTH
         nothing = np.empty(0)
         self._motion = PreparedMotion(
@@ -181,11 +182,6 @@ class LiveTwin:
     @property
     def _block(self) -> int:
         return round(BLOCK_S * self._rate)
-
-    @property
-    def next_sample(self) -> int:
-        """Number in the recording of the sample that comes next."""
-        return self._next
 
     @property
     def newest(self) -> LiveMotion:
@@ -217,12 +213,12 @@ class LiveTwin:
             Of the sine that is played, for a forecast; None under anything else.
 
         """
-        if first_sample != self._next:
+        if first_sample != self.next_sample:
             self._begin_anew(first_sample)
         if not np.isfinite(acceleration).all() or not np.isfinite(velocity).all():
             self._begin_anew(first_sample + acceleration.size)
             return ()
-        self._next = first_sample + acceleration.size
+        self.next_sample = first_sample + acceleration.size
         self._append(acceleration, velocity)
         said: list[str] = []
         self._follow(said)
@@ -337,7 +333,7 @@ class LiveTwin:
             # Numbers that are being found are still those of before.
             self._finding = None
             self._wait = round(_FIND_S * self._rate)
-            self._find_at = self._next + self._wait
+            self._find_at = self.next_sample + self._wait
 
     def _find(self, said: list[str]) -> None:
         """Find gaps and masses in what is held, beside the tracking."""
@@ -346,12 +342,12 @@ class LiveTwin:
             self._take_found(finding.result(), said)
         enough = self._motion.samples >= round(_FIND_S * self._rate)
         is_quiet = self._state is LiveState.WAITING
-        if self._finding is None and enough and not is_quiet and self._next >= self._find_at:
+        if self._finding is None and enough and not is_quiet and self.next_sample >= self._find_at:
             stop = self._motion.samples
             part = self._motion.part(stop - round(_FIND_S * self._rate), stop)
             self._finding = self._executor.submit(found_specimen, self._tracked, part)
             self._wait = round(_PATIENCE * self._wait)
-            self._find_at = self._next + self._wait
+            self._find_at = self.next_sample + self._wait
 
     def _take_found(self, found: FoundSpecimen, said: list[str]) -> None:
         told = {each.what: each for each in found.parameters if each.is_determined}

@@ -59,12 +59,8 @@ class ImpactCounter:
         self._most = max(1, round(_MOST_FRESH_S * sample_rate_hz))
         self._least_fresh = round(_LEAST_FRESH_S * sample_rate_hz)
         self._carry = np.empty(0)
-        self._count = 0
-
-    @property
-    def count(self) -> int:
+        self.count = 0
         """Impacts so far."""
-        return self._count
 
     def add(self, velocity: Values | Reals) -> int:
         """Take the next samples, shape (samples,), lost ones NaN; gives how many impacts were found."""
@@ -80,7 +76,7 @@ class ImpactCounter:
             return 0
         places = self._kinks(data)
         inside = places[(places >= self._reach) & (places < self._reach + fresh)]
-        self._count += inside.size
+        self.count += inside.size
         self._carry = data[fresh:].copy()
         return int(inside.size)
 

@@ -40,17 +40,13 @@ class Ring:
         self._capacity = capacity
         self._values: Values = np.full((channels, 2 * capacity), np.nan, dtype=np.float32)
         self._begun: int | None = None
-        self._next = 0
-
-    @property
-    def next_sample(self) -> int:
+        self.next_sample = 0
         """Number of the sample that has not come yet."""
-        return self._next
 
     @property
     def held(self) -> int:
         """How many samples can be handed out."""
-        return 0 if self._begun is None else min(self._next - self._begun, self._capacity)
+        return 0 if self._begun is None else min(self.next_sample - self._begun, self._capacity)
 
     def add(self, first_sample: int, values: Values) -> None:
         """Take samples, shape (channels, samples); what lies between these and the last is NaN.
@@ -58,28 +54,28 @@ class Ring:
         Samples that are already there are passed over; those of another run belong in another ring.
         """
         if self._begun is None:
-            self._begun = self._next = first_sample
-        late = self._next - first_sample
+            self._begun = self.next_sample = first_sample
+        late = self.next_sample - first_sample
         if late > 0:
-            values, first_sample = values[:, late:], self._next
+            values, first_sample = values[:, late:], self.next_sample
         if values.shape[1] == 0:
             return
-        lost = min(first_sample - self._next, self._capacity)
+        lost = min(first_sample - self.next_sample, self._capacity)
         if lost:
             self._put(first_sample - lost, np.full((values.shape[0], lost), np.nan, dtype=np.float32))
         newest = values[:, -self._capacity :]
         self._put(first_sample + values.shape[1] - newest.shape[1], newest)
-        self._next = first_sample + values.shape[1]
+        self.next_sample = first_sample + values.shape[1]
 
     def newest(self, samples: int) -> RingWindow:
         """Return this many of the newest samples, or all that there are."""
         count = min(max(samples, 0), self.held)
-        end = self._next % self._capacity + self._capacity
-        return RingWindow(self._next - count, self._values[:, end - count : end])
+        end = self.next_sample % self._capacity + self._capacity
+        return RingWindow(self.next_sample - count, self._values[:, end - count : end])
 
     def since(self, sample: int) -> RingWindow:
         """Return what came from a sample on, as far as it is still held."""
-        return self.newest(self._next - sample)
+        return self.newest(self.next_sample - sample)
 
     def _put(self, first_sample: int, values: Values) -> None:
         begin, count = first_sample % self._capacity, values.shape[1]

@@ -86,12 +86,8 @@ class LiveSpectra:
         self._power: NDArray[np.float32] = np.zeros((settings.averages, channels, lines), dtype=np.float32)
         self._is_used: Flags = np.zeros(settings.averages, dtype=np.bool_)
         self._carry = np.empty((channels, 0), dtype=np.float32)
-        self._segments = 0
-
-    @property
-    def segments(self) -> int:
+        self.segments = 0
         """How many segments became whole since the run began: changes when there is something new."""
-        return self._segments
 
     def add(self, values: Values) -> None:
         """Take the next samples, shape (channels, samples)."""
@@ -105,12 +101,12 @@ class LiveSpectra:
 
     def leave_out(self, newest_s: float) -> None:
         """Pass over the segments of the newest seconds."""
-        count = min(self._segments, self._is_used.size, int(np.ceil(newest_s * self._rate_hz / self._hop)))
-        self._is_used[(self._segments - 1 - np.arange(count)) % self._is_used.size] = False
+        count = min(self.segments, self._is_used.size, int(np.ceil(newest_s * self._rate_hz / self._hop)))
+        self._is_used[(self.segments - 1 - np.arange(count)) % self._is_used.size] = False
 
     def _take(self, segment: Values) -> None:
-        place = self._segments % self._settings.averages
-        self._segments += 1
+        place = self.segments % self._settings.averages
+        self.segments += 1
         self._is_used[place] = bool(np.isfinite(segment).all())
         if self._is_used[place]:
             found = fft.rfft(segment * self._short_taper, axis=-1)
@@ -180,7 +176,7 @@ class LiveSpectra:
         return SpectralAverages(
             products=products.astype(np.complex128),
             segments_used=chosen.shape[0],
-            segments_excluded=min(self._segments, used.size) - chosen.shape[0],
+            segments_excluded=min(self.segments, used.size) - chosen.shape[0],
             n_eff=effective_averages(self._taper, self._hop, used),
             segment_samples=self._settings.segment_samples,
             window=Window.HANN,
@@ -191,7 +187,7 @@ class LiveSpectra:
 
     def _used(self) -> Flags:
         """Which places hold a segment that counts, oldest first as far as their distances matter."""
-        known = np.arange(self._is_used.size) < self._segments
+        known = np.arange(self._is_used.size) < self.segments
         return np.asarray(self._is_used & known)
 
     def _frequency_hz(self) -> Reals:

@@ -119,7 +119,8 @@ class LiveView:
         lead_in_s: float = 0.0,
         settings: SpectrumSettings = DEFAULT_SETTINGS,
     ) -> None:
-        self._channels = tuple(channels)
+        self.channels = tuple(channels)
+        """In the order of the time histories."""
         self._rate_hz = sample_rate_hz
         self._band_hz = band_hz
         self._delay_s = delay_s
@@ -130,18 +131,15 @@ class LiveView:
         self._spectra = LiveSpectra(len(channels), sample_rate_hz, settings)
         self._impacts = ImpactCounter(sample_rate_hz)
         self._meters = LevelMeters(np.array([each.full_scale_v for each in channels]), sample_rate_hz)
-        self._levels: tuple[Level, ...] = ()
+        self.levels: tuple[Level, ...] = ()
+        """Meters, in the order of the channels; empty before the first sample."""
         self._trace = SweepTrace()
         self._pointed = 0
-        self._section = PoincareSection()
+        self.section = PoincareSection()
+        """The Poincaré points of all portraits so far."""
         self._portrait: tuple[int, Portrait | None] = (-(10**12), None)
         self._frequency_response: tuple[int, FrequencyResponse | None] = (0, None)
         self._spectrum: tuple[int, LiveSpectrum | None] = (0, None)
-
-    @property
-    def channels(self) -> tuple[LiveChannel, ...]:
-        """In the order of the time histories."""
-        return self._channels
 
     @property
     def next_sample(self) -> int:
@@ -156,7 +154,7 @@ class LiveView:
         if fresh.shape[1] == 0:
             return
         self._spectra.add(fresh)
-        self._levels = self._meters.add(fresh / self._units_per_volt)
+        self.levels = self._meters.add(fresh / self._units_per_volt)
         if RESPONSE in self._rows:
             self._impacts.add(fresh[self._rows[RESPONSE]])
         if self._has(DRIVE, BASE, RESPONSE) and self._is_point_due():
@@ -209,14 +207,9 @@ class LiveView:
             delay_s=self._delay_s,
         )
         if found is not None and np.all(found.strobe_sample >= self._lead_in):
-            self._section.add(found)
+            self.section.add(found)
         self._portrait = (self._ring.next_sample, found)
         return found
-
-    @property
-    def section(self) -> PoincareSection:
-        """The Poincaré points of all portraits so far."""
-        return self._section
 
     def history(self) -> SweepHistory:
         """Return Responses I and II and extremes against the frequency really played, so far."""
@@ -226,11 +219,6 @@ class LiveView:
     def impacts(self) -> int:
         """Kinks in m0's acceleration since the run began."""
         return self._impacts.count
-
-    @property
-    def levels(self) -> tuple[Level, ...]:
-        """Meters, in the order of the channels; empty before the first sample."""
-        return self._levels
 
     def _has(self, *roles: str) -> bool:
         return all(role in self._rows for role in roles)

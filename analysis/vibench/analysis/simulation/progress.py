@@ -387,7 +387,8 @@ class SimulationProgress:
 
     def __init__(self, amplitude_m: float, points: int, note: str) -> None:
         self._amplitude_m = amplitude_m
-        self._points = points
+        self.asked = points
+        """Points that were asked for."""
         self._note = note
         self._found: dict[str, dict[float, SimulatedPoint]] = {}
         self._signals: dict[str, SimulatedSignal] = {}
@@ -403,11 +404,6 @@ class SimulationProgress:
                     self._signals[part.model] = part
                 case Trouble():
                     self._troubles.append(part.sentence)
-
-    @property
-    def asked(self) -> int:
-        """Points that were asked for."""
-        return self._points
 
     @property
     def done(self) -> int:

@@ -114,7 +114,8 @@ class EngineLine:
         self._answers: SimpleQueue[Callable[[], None]] = SimpleQueue()
         self._numbers = count()
         self._engine: EngineProcess | AdoptedEngine | None = None
-        self._attendant: Attendant | None = None
+        self.attendant: Attendant | None = None
+        """Tells the engine that the window is alive; None before there is an engine."""
         self._thread = threading.Thread(target=self._run, name="engine line", daemon=True)
         self._thread.start()
 
@@ -122,11 +123,6 @@ class EngineLine:
     def pid(self) -> int | None:
         """The engine's process, None before it runs."""
         return None if self._engine is None else self._engine.pid
-
-    @property
-    def attendant(self) -> Attendant | None:
-        """Tells the engine that the window is alive; None before there is an engine."""
-        return self._attendant
 
     def ask(
         self,
@@ -159,8 +155,8 @@ class EngineLine:
     def _run(self) -> None:
         while (call := self._calls.get()).urgency not in (Urgency.END, Urgency.LEAVE):
             self._answer(call)
-        if self._attendant is not None:
-            self._attendant.close()
+        if self.attendant is not None:
+            self.attendant.close()
         if self._engine is None:
             return
         if call.urgency is Urgency.LEAVE:
@@ -172,7 +168,7 @@ class EngineLine:
         try:
             if self._engine is None:
                 self._engine = self._start()
-                self._attendant = Attendant(self._engine.address)
+                self.attendant = Attendant(self._engine.address)
             answer = call.question(self._engine.client)
         except AcquisitionError as error:
             refusal = error
@@ -217,11 +213,15 @@ class Bridge(QObject):
         super().__init__(parent)
         self._start = start
         self._line: EngineLine | None = None
-        self._status: EngineStatus | None = None
-        self._view: LiveView | None = None
+        self.status: EngineStatus | None = None
+        """What the engine said last; None while there is none."""
+        self.view: LiveView | None = None
+        """The newest samples of the run; None before the first one, and since another plan was armed."""
         self._view_run = 0
-        self._rig: Rig | None = None
-        self._campaign: Campaign | None = None
+        self.rig: Rig | None = None
+        """The rig whose bench was opened last."""
+        self.campaign: Campaign | None = None
+        """What was armed last."""
         self._last_message = 0
         self._ended: frozenset[str] = frozenset()
         self._is_looking = False
@@ -229,14 +229,9 @@ class Bridge(QObject):
         self._attendance = Supervision.ATTENDED
 
     @property
-    def status(self) -> EngineStatus | None:
-        """What the engine said last; None while there is none."""
-        return self._status
-
-    @property
     def state(self) -> EngineState:
         """Where the engine stands; closed while there is none."""
-        return EngineState.CLOSED if self._status is None else self._status.state
+        return EngineState.CLOSED if self.status is None else self.status.state
 
     @property
     def is_ordering(self) -> bool:
@@ -247,21 +242,6 @@ class Bridge(QObject):
     def is_driving(self) -> bool:
         """Whether the drive may be on."""
         return self.state in DRIVING
-
-    @property
-    def view(self) -> LiveView | None:
-        """The newest samples of the run; None before the first one, and since another plan was armed."""
-        return self._view
-
-    @property
-    def rig(self) -> Rig | None:
-        """The rig whose bench was opened last."""
-        return self._rig
-
-    @property
-    def campaign(self) -> Campaign | None:
-        """What was armed last."""
-        return self._campaign
 
     @property
     def engine_pid(self) -> int | None:
@@ -288,7 +268,7 @@ class Bridge(QObject):
         """Open the bench of a rig, with an engine of its own if there is none yet."""
         if self._line is None:
             self._line = EngineLine(self._start)
-        self._rig = rig
+        self.rig = rig
         self._order(lambda client: _open(client, rig, confirmations))
 
     def adopt(self, announcement: Announcement) -> None:
@@ -298,9 +278,9 @@ class Bridge(QObject):
         self._line = EngineLine(lambda: AdoptedEngine(announcement))
 
         def keep(found: tuple[Rig, CampaignRequest, EngineStatus]) -> None:
-            self._rig, request, self._status = found
-            self._campaign, self._attendance = request.campaign, Supervision.UNATTENDED
-            self._tell(self._status)  # what happened before anybody looked again
+            self.rig, request, self.status = found
+            self.campaign, self._attendance = request.campaign, Supervision.UNATTENDED
+            self._tell(self.status)  # what happened before anybody looked again
             self.adopted.emit(request)
 
         self._order(_taken_over, keep)
@@ -315,8 +295,8 @@ class Bridge(QObject):
         """Get ready to carry out a campaign; `armed` or a notice follows."""
 
         def keep(plan: ArmedPlan) -> None:
-            self._campaign, self._attendance = request.campaign, plan.attendance
-            self._view = None
+            self.campaign, self._attendance = request.campaign, plan.attendance
+            self.view = None
             self.armed.emit(plan)
 
         self._order(lambda client: client.arm_request(request), keep)
@@ -336,7 +316,7 @@ class Bridge(QObject):
         line, self._line = self._line, None
         if line is not None:
             line.close(how)
-        self._status = None
+        self.status = None
 
     def _order(
         self, question: Callable[[EngineClient], Any], on_answer: Callable[[Any], None] | None = None
@@ -366,7 +346,7 @@ class Bridge(QObject):
         line.ask(Urgency.ORDER, question, answered, refused)
 
     def _look_question(self) -> Callable[[EngineClient], Snapshot]:
-        view, run, status = self._view, self._view_run, self._status
+        view, run, status = self.view, self._view_run, self.status
         rate_hz = 0.0 if status is None or status.bench is None else status.bench.sample_rate_hz
 
         def look(client: EngineClient) -> Snapshot:
@@ -379,22 +359,22 @@ class Bridge(QObject):
         return look
 
     def _looked(self, snapshot: Snapshot) -> None:
-        before, (self._status, newest_samples) = self.state, snapshot
+        before, (self.status, newest_samples) = self.state, snapshot
         if (before, self.state) in _ADVANCES:
             self.advanced.emit()
-        if newest_samples is None or self._status.bench is None or newest_samples.volts.shape[1] == 0:
+        if newest_samples is None or self.status.bench is None or newest_samples.volts.shape[1] == 0:
             self._is_looking = False
         else:
-            self._begin_taking(self._status, self._status.bench, newest_samples)
-        self._tell(self._status)
+            self._begin_taking(self.status, self.status.bench, newest_samples)
+        self._tell(self.status)
 
     def _begin_taking(self, status: EngineStatus, bench: BenchFacts, newest_samples: SampleSlice) -> None:
-        if self._view is None or newest_samples.run_id != self._view_run:
+        if self.view is None or newest_samples.run_id != self._view_run:
             name = "" if status.run is None else status.run.name
-            self._view = live_view(bench, self._rig, self._campaign, name)
+            self.view = live_view(bench, self.rig, self.campaign, name)
             self._view_run = newest_samples.run_id
         size = max(1, round(PIECE_S * bench.sample_rate_hz))
-        self._take(self._view, newest_samples.first_sample, newest_samples.volts, size)
+        self._take(self.view, newest_samples.first_sample, newest_samples.volts, size)
 
     def _take(self, view: LiveView, first_sample: int, volts: NDArray[np.float32], size: int) -> None:
         """Take in a piece: all that comes after a pause, or from a fast simulation, is too much at once."""
@@ -433,7 +413,7 @@ class Bridge(QObject):
         if self._line is None:
             return
         line, self._line = self._line, None
-        self._status, self._last_message, self._ended = None, 0, frozenset()
+        self.status, self._last_message, self._ended = None, 0, frozenset()
         self._orders = self._view_run = 0  # another engine counts its runs from 1 again
         line.leave()
         if isinstance(error, EngineSilent):

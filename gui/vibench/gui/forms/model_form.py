@@ -166,9 +166,10 @@ class GroupEditor:
     def __init__(
         self, facts: FieldFacts, kinds: tuple[type[BaseModel], ...], changed: Callable[..., None]
     ) -> None:
-        self._box = QGroupBox(facts.label)
+        self.widget = QGroupBox(facts.label)
+        """The box around the fields."""
         self._changed = changed
-        self._layout = QVBoxLayout(self._box)
+        self._layout = QVBoxLayout(self.widget)
         self._kinds = kinds
         self._kind: ChoiceEditor | None = None
         self._memory: dict[str, Any] = {}
@@ -181,17 +182,8 @@ class GroupEditor:
             self._kind.widget.setAccessibleName(f"Kind of {facts.label.lower()}")
             self._kind.widget.setToolTip(f"What kind of {facts.label.lower()} it is")
             self._layout.addWidget(self._kind.widget)
-        self._form = self._new_form(kinds[0])
-
-    @property
-    def widget(self) -> QWidget:
-        """The box around the fields."""
-        return self._box
-
-    @property
-    def form(self) -> ModelForm:
+        self.form = self._new_form(kinds[0])
         """The fields."""
-        return self._form
 
     @property
     def kind_choice(self) -> Choice | None:
@@ -205,18 +197,18 @@ class GroupEditor:
 
     def content(self) -> Any:
         """Return what a file would say."""
-        return self._form.content()
+        return self.form.content()
 
     def show_content(self, content: Any) -> None:
         """Show what a file says, in the form of its kind."""
         values = _as_content(content) or {}
         if self._kind is not None and "kind" in values:
             self._kind.show_content(values["kind"])
-        self._form.show_content(values)
+        self.form.show_content(values)
 
     def complain(self, complaints: Mapping[Loc, str]) -> tuple[str, ...]:
         """Hand complaints on."""
-        return self._form.complain(complaints)
+        return self.form.complain(complaints)
 
     def know(
         self,
@@ -236,19 +228,19 @@ class GroupEditor:
     def _turn(self, *_: object) -> None:
         """Change the kind; fields of the same name keep their values."""
         assert self._kind is not None
-        left = self._form.content()
+        left = self.form.content()
         self._memories[left["kind"]] = left
         chosen = self._kind.content()
         known_of = self._memories.get(chosen, self._fresh.get(chosen, {}))
         self._memory = {**self._usual, **self._memory, **left}
         model = next(kind for kind in self._kinds if _kind_of(kind) == chosen)
-        self._layout.removeWidget(self._form)
-        self._form.hide()
-        self._form.deleteLater()
-        self._form = self._new_form(model)
+        self._layout.removeWidget(self.form)
+        self.form.hide()
+        self.form.deleteLater()
+        self.form = self._new_form(model)
         begun = {**self._memory, **known_of}
         known = {name: value for name, value in begun.items() if name in model.model_fields}
-        self._form.show_content({name: value for name, value in known.items() if name not in _DRAWN})
+        self.form.show_content({name: value for name, value in known.items() if name not in _DRAWN})
         self._changed()
 
     def _new_form(self, model: type[BaseModel]) -> ModelForm:
@@ -269,9 +261,9 @@ class OptionalGroupEditor(GroupEditor):
         self._there.setAccessibleName(f"Give {facts.label.lower()}")
         self._there.setToolTip(facts.tooltip)
         self._layout.insertWidget(0, self._there)
-        self._there.toggled.connect(self._form.setVisible)
+        self._there.toggled.connect(self.form.setVisible)
         self._there.toggled.connect(lambda _there: changed())
-        self._form.hide()
+        self.form.hide()
 
     def content(self) -> Any:
         """Return what a file would say, None when it is not there."""
@@ -349,7 +341,8 @@ class JudgedForm(QWidget, Generic[Model]):
     ) -> None:
         super().__init__()
         self._model = model
-        self._value: Model | None = None
+        self.value: Model | None = None
+        """What the form says; None while that is not allowed."""
         self.form = ModelForm(model, hidden)
         self._complaint = SentenceLabel(rank="complaint")
         self._complaint.setAccessibleName(f"Complaint about the {name}")
@@ -359,11 +352,6 @@ class JudgedForm(QWidget, Generic[Model]):
         self.form.changed.connect(self._take)
         UNITS.on_change(self._judge)
         self.form.show_content({})
-
-    @property
-    def value(self) -> Model | None:
-        """What the form says; None while that is not allowed."""
-        return self._value
 
     @property
     def complaint(self) -> str:
@@ -386,14 +374,14 @@ class JudgedForm(QWidget, Generic[Model]):
     def _judge(self) -> None:
         """Say what is not allowed, in the units that are shown."""
         complaints: dict[Loc, str] = {}
-        self._value = None
+        self.value = None
         with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:
             try:
                 value = self._model.model_validate(self.form.content())
             except ValidationError as error:
                 complaints = complaints_of(error)
             else:
-                self._value = value if self.form.is_read else None
+                self.value = value if self.form.is_read else None
         self._warning.setText("; ".join(f"⚠ {each.message}" for each in warned))
         self._warning.setVisible(bool(warned))
         self._complaint.setText("; ".join(self.form.complain(complaints)))

@@ -99,7 +99,8 @@ class QuantityEdit(QAbstractSpinBox):
         self._unit, self._kind, self._empty = unit, kind, empty
         self._shown_unit = ""
         self._value: float | int | None = None
-        self._complaint = ""
+        self.complaint = ""
+        """What is wrong with the text; empty when it can be read."""
         self._asked_about: float | int | None = None
         """A value that waits for a second Return."""
         self._is_confirmed = False
@@ -108,18 +109,13 @@ class QuantityEdit(QAbstractSpinBox):
         self.set_value(None)
         self.editingFinished.connect(self._take)
 
-    @property
-    def complaint(self) -> str:
-        """What is wrong with the text; empty when it can be read."""
-        return self._complaint
-
     def value(self) -> float | int | None:
         """Return the number, None when the field is empty."""
         return self._value
 
     def set_value(self, value: float | int | None) -> None:
         """Show a number."""
-        self._value, self._complaint, self._asked_about = value, "", None
+        self._value, self.complaint, self._asked_about = value, "", None
         text = "" if value is None else quantity_text(value, self._unit)
         self._shown_unit = unit_of(text, self._unit)
         in_unit = f"in {UNITS.in_field(self._unit)}" if self._unit else ""
@@ -175,18 +171,18 @@ class QuantityEdit(QAbstractSpinBox):
         self.selectAll()
 
     def _take(self) -> None:
-        before = (self._value, self._complaint)
+        before = (self._value, self.complaint)
         text = self.lineEdit().text()
         try:
             value = self._read(text)
         except ConfigurationError as error:
-            self._complaint, self._asked_about = str(error), None
+            self.complaint, self._asked_about = str(error), None
         else:
             if self._is_far(value) and not (self._is_confirmed and value == self._asked_about):
                 self._ask_about(value)
             else:
                 self.set_value(value)
-        if (self._value, self._complaint) != before:
+        if (self._value, self.complaint) != before:
             self.changed.emit()
 
     def _is_far(self, value: float | int | None) -> bool:
@@ -199,7 +195,7 @@ class QuantityEdit(QAbstractSpinBox):
         assert value is not None
         assert self._value is not None
         self._asked_about = value
-        self._complaint = (
+        self.complaint = (
             f"{quantity_text(value, self._unit)} is {abs(value / self._value):.3g} times the last value, "
             f"{quantity_text(self._value, self._unit)}; press Return again to accept it, or type another"
         )

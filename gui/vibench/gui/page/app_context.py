@@ -91,51 +91,35 @@ class Selection(QObject):
 
     def __init__(self, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._rig: Rig | None = None
-        self._measurement: Measurement | None = None
-        self._campaign: Campaign | None = None
-        self._prediction: MeasurementPrediction | None = None
-
-    @property
-    def rig(self) -> Rig | None:
+        self.rig: Rig | None = None
         """The rig that was chosen, open or not."""
-        return self._rig
-
-    @property
-    def measurement(self) -> Measurement | None:
+        self.measurement: Measurement | None = None
         """The test on the Test page; None while something in it is not allowed."""
-        return self._measurement
-
-    @property
-    def prediction(self) -> "MeasurementPrediction | None":
-        """What the specimen is predicted to do under the test; None while nobody knows."""
-        return self._prediction
-
-    @property
-    def campaign(self) -> Campaign | None:
+        self.campaign: Campaign | None = None
         """The campaign on the Queue page."""
-        return self._campaign
+        self.prediction: MeasurementPrediction | None = None
+        """What the specimen is predicted to do under the test; None while nobody knows."""
 
     def choose_rig(self, rig: Rig | None) -> None:
         """Mean another rig."""
-        if rig != self._rig:
-            self._rig = rig
+        if rig != self.rig:
+            self.rig = rig
             self.rig_changed.emit()
 
     def choose_measurement(self, measurement: Measurement | None) -> None:
         """Mean another test."""
-        if measurement != self._measurement:
-            self._measurement, self._prediction = measurement, None
+        if measurement != self.measurement:
+            self.measurement, self.prediction = measurement, None
             self.measurement_changed.emit()
 
     def keep_prediction(self, prediction: "MeasurementPrediction") -> None:
         """Keep what is predicted of the test."""
-        self._prediction = prediction
+        self.prediction = prediction
 
     def choose_campaign(self, campaign: Campaign | None) -> None:
         """Mean another campaign."""
-        if campaign != self._campaign:
-            self._campaign = campaign
+        if campaign != self.campaign:
+            self.campaign = campaign
             self.campaign_changed.emit()
 
 
@@ -184,16 +168,12 @@ class AppContext(QObject):
         self.looks = Background(1, self.background)
         """For what must come at once, whatever takes long beside it: previews."""
         UNITS.choose(dict(zip(CHOICES, settings.text(Remembered.UNITS).split(), strict=False)))
-        self._theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
-
-    @property
-    def theme(self) -> Theme:
+        self.theme = THEMES.get(settings.text(Remembered.THEME), LIGHT)
         """Colours to draw in."""
-        return self._theme
 
     def choose_theme(self, theme: Theme) -> None:
         """Draw in other colours from now on, and next time."""
-        self._theme = theme
+        self.theme = theme
         self.settings.keep_text(Remembered.THEME, theme.name)
         self.theme_changed.emit(theme)
 

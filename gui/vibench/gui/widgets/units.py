@@ -172,7 +172,7 @@ class SentenceLabel(QLabel):
 
     def __init__(self, text: str = "", rank: str = "") -> None:
         super().__init__()
-        self._sentence, self._tip = "", ""
+        self.sentence, self._tip = "", ""
         self.setWordWrap(True)
         self.setTextFormat(Qt.TextFormat.PlainText)
         if rank:
@@ -182,13 +182,8 @@ class SentenceLabel(QLabel):
 
     def setText(self, text: str) -> None:
         """Show a text as it was made: the units are seen to here."""
-        self._sentence = text
+        self.sentence = text
         self._tell()
-
-    @property
-    def sentence(self) -> str:
-        """The text as it was made."""
-        return self._sentence
 
     def setToolTip(self, text: str) -> None:
         """Say more under the pointer, in the same units."""
@@ -201,5 +196,5 @@ class SentenceLabel(QLabel):
 
     def _tell(self) -> None:
         # A path is one word to Qt: unbroken it would be as wide as a window, or cut.
-        super().setText(_LONG_WORD.sub(_with_breaks, UNITS.told(plain_lines(self._sentence))))
+        super().setText(_LONG_WORD.sub(_with_breaks, UNITS.told(plain_lines(self.sentence))))
         super().setToolTip(plain_tip(UNITS.told(self._tip)))

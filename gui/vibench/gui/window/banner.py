@@ -120,7 +120,8 @@ class Banner(QFrame):
         super().__init__()
         self.setObjectName("banner")
         self.setAccessibleName("State of the rig")
-        self._indicator = CLOSED
+        self.indicator = CLOSED
+        """What is shown."""
         self._label = QLabel()
         self._label.setObjectName("engine_state")
         self._detail = ElidedLabel()
@@ -140,11 +141,6 @@ class Banner(QFrame):
         self._fit()
         self._paint()
 
-    @property
-    def indicator(self) -> StateIndicator:
-        """What is shown."""
-        return self._indicator
-
     def changeEvent(self, event: QEvent) -> None:
         """Follow font and style sheet at once."""
         super().changeEvent(event)
@@ -162,16 +158,16 @@ class Banner(QFrame):
 
     def show_indicator(self, indicator: StateIndicator) -> None:
         """Show a state; nothing is repainted while nothing changes."""
-        if indicator == self._indicator:
+        if indicator == self.indicator:
             return
-        announced = indicator.word != self._indicator.word
-        self._indicator = indicator
+        announced = indicator.word != self.indicator.word
+        self.indicator = indicator
         self._paint()
         if announced:
             QAccessible.updateAccessibility(QAccessibleEvent(self._label, QAccessible.Event.Alert))
 
     def _paint(self) -> None:
-        indicator = self._indicator
+        indicator = self.indicator
         self._label.setText(f"{indicator.symbol}  {indicator.word}")
         self._label.setAccessibleName(f"State: {indicator.word}")
         self._detail.setText(indicator.detail)
@@ -300,7 +296,8 @@ class MessageStrip(QFrame):
         super().__init__()
         self.setAccessibleName("Messages")
         self._notices: list[Notice] = []
-        self._is_said = False
+        self.is_said = False
+        """Whether a message stands there."""
         self._hint = ""
         self._text = SentenceLabel()
         self._text.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -333,17 +330,12 @@ class MessageStrip(QFrame):
         """Every message so far, the newest last."""
         return tuple(self._notices)
 
-    @property
-    def is_said(self) -> bool:
-        """Whether a message stands there."""
-        return self._is_said
-
     def say(self, notice: Notice) -> None:
         """Show a message above the earlier ones."""
         self._notices = [*self._notices, notice][-MOST_KEPT:]
         sentences = "  ▸ ".join(part for part in (notice.what, notice.done, notice.next_step) if part)
         self._details.setPlainText("\n\n".join(each.text for each in reversed(self._notices)))
-        self._is_said = True
+        self.is_said = True
         self._show(f"{SYMBOLS[notice.kind]}  {sentences}", TONES[notice.kind].value)
         self._text.setAccessibleName(f"{notice.kind.value}: {notice.what}")
         self._text.setToolTip(notice.text)
@@ -352,7 +344,7 @@ class MessageStrip(QFrame):
         """Say what can be done next, while there is no message."""
         if text != self._hint:
             self._hint = text
-            if not self._is_said:
+            if not self.is_said:
                 self._text.setText(text)
 
     def give_way(self) -> None:
@@ -361,7 +353,7 @@ class MessageStrip(QFrame):
 
     def dismiss(self) -> None:
         """Take the message away; all messages stay in Details."""
-        self._is_said = False
+        self.is_said = False
         self._more.setChecked(False)
         self._show(self._hint, "")
         self._text.setAccessibleName("What can be done next")
@@ -389,7 +381,7 @@ class MessageStrip(QFrame):
                 widget.setProperty("tone", tone)
                 widget.style().polish(widget)
         for button in self._buttons:
-            button.setVisible(self._is_said or (button is self._more and bool(self._notices)))
+            button.setVisible(self.is_said or (button is self._more and bool(self._notices)))
 
     def _show_details(self) -> None:
         host = self.window()

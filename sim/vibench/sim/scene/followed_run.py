@@ -120,18 +120,14 @@ class FollowedRun:
         self._run = NativeRun(specimen, drive, start_motion(start), tolerance, start_time_s=time_s)
         self._scales = state_scales(specimen, drive)
         self._metric = energy_metric(specimen)
-        self._cost_s = 0.0
+        self.cost_s = 0.0
+        """What following it from its beginning has cost, by `nominal_cost_s`."""
         self._steps_left = MOST_STEPS
 
     @property
     def tolerance(self) -> float:
         """Relative error allowed in a step of a contact."""
         return self._run.tolerance
-
-    @property
-    def cost_s(self) -> float:
-        """What following it from its beginning has cost, by `nominal_cost_s`."""
-        return self._cost_s
 
     @property
     def time_s(self) -> float:
@@ -167,7 +163,7 @@ class FollowedRun:
     def _batched(self, start_s: float, motion: BatchedMotion) -> Stretch:
         """Return the stretch from an instant until now, which was followed in a batch."""
         length_s, frequency_hz, count = self.time_s - start_s, self.drive.frequency_hz, len(motion.states)
-        self._cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
+        self.cost_s += nominal_cost_s(self.specimen.contact, self.tolerance, length_s, motion.impacts, 0, 0)
         return Stretch(
             start_s=start_s,
             end_s=self.time_s,
@@ -218,7 +214,7 @@ class FollowedRun:
             self.outcome = self._run.advance(until_s, record)
         made = self._steps_left - record.steps_left
         self._steps_left -= made
-        self._cost_s += nominal_cost_s(
+        self.cost_s += nominal_cost_s(
             self.specimen.contact,
             self.tolerance,
             self.time_s - start_s,

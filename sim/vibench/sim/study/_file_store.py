@@ -236,7 +236,8 @@ class FileStore:
         try:
             _require_same(path, read_plan(path, type(plan)), plan)
             self._places = places_of(path, plan)
-            self._arrays = read_arrays(path, plan)
+            self.arrays = read_arrays(path, plan)
+            """Everything kept so far."""
         except BaseException:
             self._disk.close()
             raise
@@ -247,11 +248,6 @@ class FileStore:
         """Create the file first; refuses a name that is taken."""
         make_file(path, plan)
         return cls(path, plan)
-
-    @property
-    def arrays(self) -> Arrays:
-        """Everything kept so far."""
-        return self._arrays
 
     def begin(self, executor: str) -> None:
         """Note moment, software and executor in the next row of sessions."""
@@ -273,22 +269,22 @@ class FileStore:
         for answer in answers:
             cells = {**answer.cells, SESSION: self._session}
             kept = PointAnswer(answer.number, answer.state, cells)
-            for column, raw in put(self._arrays, self._columns, kept):
+            for column, raw in put(self.arrays, self._columns, kept):
                 self._write(self._places.columns[column.name] + answer.number * len(raw), raw)
         self._sync()
         for answer in answers:
             self._write(self._places.columns[layout.STATE] + answer.number, bytes([answer.state]))
-            self._arrays[layout.STATE][answer.number] = answer.state
+            self.arrays[layout.STATE][answer.number] = answer.state
         self._sync()
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
         """Fill in many points that are not computed: whole columns, in an order that cannot lie."""
         for name, values in cells.items():
-            self._arrays[name][numbers] = values
-            self._write(self._places.columns[name], self._arrays[name].tobytes())
+            self.arrays[name][numbers] = values
+            self._write(self._places.columns[name], self.arrays[name].tobytes())
         self._sync()
-        self._arrays[layout.STATE][numbers] = layout.PointState.FILLED
-        self._write(self._places.columns[layout.STATE], self._arrays[layout.STATE].tobytes())
+        self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
+        self._write(self._places.columns[layout.STATE], self.arrays[layout.STATE].tobytes())
         self._sync()
 
     def close(self) -> None:

@@ -82,7 +82,8 @@ class PointScheduler:
         self._costs = costs
         self._is_done = is_done.copy()
         self._is_released = np.zeros(len(after), dtype=np.bool_)
-        self._left = 0
+        self.left = 0
+        """How many released points have no answer."""
         self._is_out = np.zeros(len(after), dtype=np.bool_)
         self._is_alone = np.zeros(len(after), dtype=np.bool_)
         self._next = np.full(len(after), NOBODY, dtype=np.int64)
@@ -95,7 +96,7 @@ class PointScheduler:
         """Let these points be computed, those that have an answer excepted."""
         new = numbers[~self._is_released[numbers]]
         self._is_released[new] = True
-        self._left += int(np.count_nonzero(~self._is_done[new]))
+        self.left += int(np.count_nonzero(~self._is_done[new]))
         for number in new:
             if self._is_ready(int(number)):
                 self._push(int(number))
@@ -109,11 +110,6 @@ class PointScheduler:
     def is_missing(self) -> NDArray[np.bool_]:
         """Released points without an answer, shape (points,); those under way too."""
         return self._is_released & ~self._is_done
-
-    @property
-    def left(self) -> int:
-        """How many released points have no answer."""
-        return self._left
 
     def take(self, worth_s: float, most: int) -> tuple[int, ...]:
         """Hand out the longest point that is ready, and short ones with it until they are ``worth_s``."""
@@ -142,7 +138,7 @@ class PointScheduler:
     def finish(self, number: int) -> None:
         """Take note of an answer, good or bad: who waited for it may begin."""
         self._is_done[number] = True
-        self._left -= 1
+        self.left -= 1
         self._is_out[number] = False
         follower = int(self._next[number])
         if follower != NOBODY and self._is_ready(follower):

@@ -108,12 +108,7 @@ class MemoryStore:
     """Keeps answers as long as the process lives."""
 
     def __init__(self, plan: GridPlan) -> None:
-        self._arrays, self._columns = empty_arrays(plan), plan.columns
-
-    @property
-    def arrays(self) -> Arrays:
-        """Everything kept so far."""
-        return self._arrays
+        self.arrays, self._columns = empty_arrays(plan), plan.columns
 
     def begin(self, executor: str) -> None:
         """Nobody asks a memory when it began."""
@@ -121,15 +116,15 @@ class MemoryStore:
     def keep(self, answers: Sequence[PointAnswer]) -> None:
         """Keep answers."""
         for answer in answers:
-            for _ in put(self._arrays, self._columns, answer):
+            for _ in put(self.arrays, self._columns, answer):
                 pass
-            self._arrays[layout.STATE][answer.number] = answer.state
+            self.arrays[layout.STATE][answer.number] = answer.state
 
     def fill(self, numbers: NDArray[np.int64], cells: Arrays) -> None:
         """Fill in many points that are not computed."""
         for name, values in cells.items():
-            self._arrays[name][numbers] = values
-        self._arrays[layout.STATE][numbers] = layout.PointState.FILLED
+            self.arrays[name][numbers] = values
+        self.arrays[layout.STATE][numbers] = layout.PointState.FILLED
 
 
 def cells_of(prediction: ScenePrediction) -> dict[str, Cell]:

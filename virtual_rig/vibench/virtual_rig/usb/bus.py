@@ -119,12 +119,8 @@ class RemoteUsbDevice:
         body = answer[_ERRNO.size :]
         vendor_id, product_id, packet_bytes = _IDENTIFICATION.unpack_from(body)
         maker, product, serial = body[_IDENTIFICATION.size :].decode().split(_TEXT_SEPARATOR)
-        self._identification = Identification(vendor_id, product_id, maker, product, serial, packet_bytes)
-
-    @property
-    def identification(self) -> Identification:
+        self.identification = Identification(vendor_id, product_id, maker, product, serial, packet_bytes)
         """What the descriptors say, as of the connection."""
-        return self._identification
 
     def bulk_out(self, data: bytes) -> None:
         """Send one transfer."""

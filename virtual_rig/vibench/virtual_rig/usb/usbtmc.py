@@ -155,18 +155,14 @@ class UsbTmcInstrument:
         usb_ids: tuple[int, int] = (VENDOR_ID, PRODUCT_ID),
     ) -> None:
         self._device = device
-        self._identification = Identification(
+        self.identification = Identification(
             *usb_ids, device.maker, device.model, device.serial, packet_bytes
         )
+        """What the descriptors say."""
         self._lock = threading.RLock()
         self._is_plugged_in = True
         self._is_hung = False
         self._flight = _Flight()
-
-    @property
-    def identification(self) -> Identification:
-        """What the descriptors say."""
-        return self._identification
 
     def pull_cable(self) -> None:
         """Take the device off the bus: every transfer fails with ENODEV. The instrument itself plays on."""

@@ -159,22 +159,18 @@ class RecordingModel(QAbstractTableModel):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        self._entries: tuple[ListedRecording, ...] = ()
+        self.entries: tuple[ListedRecording, ...] = ()
+        """In the order they were found."""
         self._rows: tuple[_Row, ...] = ()
         self._thumbnails: dict[Path, Thumbnail | None] = {}
         self._pictures: dict[Path, QPixmap] = {}
 
-    @property
-    def entries(self) -> tuple[ListedRecording, ...]:
-        """In the order they were found."""
-        return self._entries
-
     def show_entries(self, entries: tuple[ListedRecording, ...]) -> None:
         """List other files; pictures of those that stay are kept. The same list again changes nothing."""
-        if entries == self._entries:
+        if entries == self.entries:
             return
         self.beginResetModel()
-        self._entries = entries
+        self.entries = entries
         self._rows = tuple(_Row(_texts(entry), _sorting(entry)) for entry in entries)
         kept = {entry.path for entry in entries}
         self._thumbnails = {path: each for path, each in self._thumbnails.items() if path in kept}
@@ -183,13 +179,13 @@ class RecordingModel(QAbstractTableModel):
 
     def missing_pictures(self) -> tuple[Path, ...]:
         """Files whose picture nobody has made yet."""
-        return tuple(e.path for e in self._entries if e.is_readable and e.path not in self._thumbnails)
+        return tuple(e.path for e in self.entries if e.is_readable and e.path not in self._thumbnails)
 
     def show_thumbnails(self, found: dict[Path, Thumbnail | None]) -> None:
         """Put pictures into the rows."""
         self._thumbnails |= found
-        if self._entries:
-            self.dataChanged.emit(self.index(0, PICTURE), self.index(len(self._entries) - 1, PICTURE))
+        if self.entries:
+            self.dataChanged.emit(self.index(0, PICTURE), self.index(len(self.entries) - 1, PICTURE))
 
     def retheme(self, theme: Theme) -> None:
         """Draw the pictures in other colours."""
@@ -199,7 +195,7 @@ class RecordingModel(QAbstractTableModel):
 
     def rowCount(self, parent: Index = _NOWHERE) -> int:
         """One for each file."""
-        return 0 if parent.isValid() else len(self._entries)
+        return 0 if parent.isValid() else len(self.entries)
 
     def columnCount(self, parent: Index = _NOWHERE) -> int:
         """One for each heading."""
@@ -215,7 +211,7 @@ class RecordingModel(QAbstractTableModel):
 
     def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
         """Text, picture, tooltip and sorting value of a cell."""
-        entry, row, column = self._entries[index.row()], self._rows[index.row()], index.column()
+        entry, row, column = self.entries[index.row()], self._rows[index.row()], index.column()
         content: Any = None
         match role:
             case Qt.ItemDataRole.DisplayRole:

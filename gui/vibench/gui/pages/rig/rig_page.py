@@ -59,7 +59,8 @@ class RigChoice(QWidget):
         super().__init__()
         self._paths: list[Path] = []
         self._rig: Rig | None = None
-        self._complaint = self._warning = ""
+        self.complaint = self.warning = ""
+        """Why the chosen file cannot be used; empty where it can."""
         self._box = Choice()
         self._box.setAccessibleName("Hardware configuration")
         self._box.setToolTip("What hangs on this computer; a simulated rig runs anywhere")
@@ -93,16 +94,6 @@ class RigChoice(QWidget):
         return self._paths[row] if 0 <= row < len(self._paths) else None
 
     @property
-    def complaint(self) -> str:
-        """Why the chosen file cannot be used; empty where it can."""
-        return self._complaint
-
-    @property
-    def warning(self) -> str:
-        """What its specimen may not be meant to be."""
-        return self._warning
-
-    @property
     def rig(self) -> Rig | None:
         """The chosen rig, at the chosen pace."""
         if self._rig is None or self._rig.virtual is None:
@@ -132,15 +123,15 @@ class RigChoice(QWidget):
 
     def _load(self) -> None:
         path = self.path
-        self._rig, self._complaint, self._warning = None, "", ""
+        self._rig, self.complaint, self.warning = None, "", ""
         if path is not None:
             with warnings.catch_warnings(record=True, action="always", category=SpecimenWarning) as warned:
                 try:
                     self._rig = load_rig(path)
                 except ConfigurationError as error:
-                    self._complaint = str(error)
+                    self.complaint = str(error)
                     self.refused.emit(error)
-            self._warning = "; ".join(str(each.message) for each in warned)
+            self.warning = "; ".join(str(each.message) for each in warned)
         is_simulated = self._rig is not None and self._rig.virtual is not None
         self._form.setRowVisible(1, is_simulated)
         self.chosen.emit()
@@ -156,28 +147,24 @@ class KnobSheetForm(QGroupBox):
         self._note = QLabel("Look at each knob, then tick it. No instrument can report these.")
         self._note.setWordWrap(True)
         self._note.setProperty("rank", "second")
-        self._operator = LineField()
-        self._operator.setAccessibleName("Who has looked")
-        self._operator.setToolTip("Your name; it goes into every recording")
-        self._operator.textChanged.connect(self.changed)
+        self.operator_field = LineField()
+        """Where the name is typed."""
+        self.operator_field.setAccessibleName("Who has looked")
+        self.operator_field.setToolTip("Your name; it goes into every recording")
+        self.operator_field.textChanged.connect(self.changed)
         label = QLabel("Seen by")
-        label.setBuddy(self._operator)
+        label.setBuddy(self.operator_field)
         self._ticks: dict[Knob, QCheckBox] = {}
         self._layout = QVBoxLayout(self)
         self._layout.addWidget(self._note)
         form = QFormLayout()
-        form.addRow(label, self._operator)
+        form.addRow(label, self.operator_field)
         self._layout.addLayout(form)
 
     @property
     def ticks(self) -> tuple[QCheckBox, ...]:
         """A tick for every knob of the rig."""
         return tuple(self._ticks.values())
-
-    @property
-    def operator_field(self) -> LineField:
-        """Where the name is typed."""
-        return self._operator
 
     def show_rig(self, rig: Rig | None) -> None:
         """Ask about the knobs of another rig; nothing is confirmed yet."""
@@ -190,7 +177,7 @@ class KnobSheetForm(QGroupBox):
 
     def sheet(self) -> KnobSheet | None:
         """Return what was confirmed; None while a knob or the name is missing."""
-        operator = self._operator.text().strip()
+        operator = self.operator_field.text().strip()
         if not self._ticks or not operator or not all(tick.isChecked() for tick in self.ticks):
             return None
         return KnobSheet(operator=operator, confirmed=datetime.now(UTC), knobs=tuple(self._ticks))

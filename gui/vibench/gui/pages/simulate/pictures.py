@@ -64,16 +64,12 @@ class _PairPicture:
     """What pictures of two plots have alike."""
 
     def __init__(self, plots: _TwoPlots) -> None:
-        self._plots = plots
-
-    @property
-    def widget(self) -> QWidget:
+        self.widget = plots
         """Both plots."""
-        return self._plots
 
     def plots(self, along: Parameter) -> tuple[Plot, Plot]:
         """Those over one parameter."""
-        return self._plots.pairs[along]
+        return self.widget.pairs[along]
 
 
 class BranchPicture(_PairPicture):
@@ -88,7 +84,7 @@ class BranchPicture(_PairPicture):
     def show_answer(self, answer: BranchDiagram) -> None:
         """Draw every branch."""
         along = answer.request.along
-        pair = self._plots.cleared(along)
+        pair = self.widget.cleared(along)
         named: set[str] = set()
         for line in answer.lines:
             for is_stable, piece in line.pieces():
@@ -122,7 +118,7 @@ class SpectrumPicture(_PairPicture):
     def show_answer(self, answer: ExponentSpectrum) -> None:
         """Draw what is there."""
         along = answer.request.along
-        upper, lower = self._plots.cleared(along)
+        upper, lower = self.widget.cleared(along)
         if not answer.points:
             return
         place = answer.column("frequency_hz" if along is Parameter.FREQUENCY else "amplitude_m")

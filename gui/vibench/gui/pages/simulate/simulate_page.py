@@ -40,7 +40,8 @@ class SimulatePage(Page):
         )
         self.plots = AnswerPlots(context.theme)
         self.simulator = Simulator(self, self._grow, self._end, self._die)
-        self._progress: SimulationProgress | None = None
+        self.progress: SimulationProgress | None = None
+        """What has been found so far."""
         self._request: SimulationRequest | None = None
         """What the curves are of."""
         self._is_stale = False
@@ -60,20 +61,15 @@ class SimulatePage(Page):
         self._say_progress("Nothing has been simulated yet.")
 
     @property
-    def progress(self) -> SimulationProgress | None:
-        """What has been found so far."""
-        return self._progress
-
-    @property
     def is_done(self) -> bool:
         """Ticked once there is a whole answer."""
-        return self._progress is not None and not self.simulator.is_busy and self._progress.done > 0
+        return self.progress is not None and not self.simulator.is_busy and self.progress.done > 0
 
     def refresh(self) -> None:
         """Draw what has come since the last time, a picture a tick."""
         if self._is_stale and not self._undrawn:
             self._is_stale = False
-            self._undrawn = self.plots.steps(self._progress)
+            self._undrawn = self.plots.steps(self.progress)
             self._show_motions()
         if self._undrawn:
             self._undrawn.pop(0)()
@@ -107,7 +103,7 @@ class SimulatePage(Page):
             f"{request.specimen_text}, A0 = {1e6 * request.amplitude_m:g} µm, "
             f"{request.duration_s:g} s from rest, {request.accuracy.value}"
         )
-        self._progress = SimulationProgress(request.amplitude_m, request.points, note)
+        self.progress = SimulationProgress(request.amplitude_m, request.points, note)
         self._is_stale = True
         self._request = request
         self.plots.setEnabled(True)
@@ -129,16 +125,16 @@ class SimulatePage(Page):
         self._say_progress("Cancelled; what had been found is shown.")
 
     def _grow(self, parts: tuple[PartialResult, ...]) -> None:
-        if self._progress is not None:
-            self._progress.add(parts)
+        if self.progress is not None:
+            self.progress.add(parts)
             self._is_stale = True
             self._say_progress("Simulating…")
 
     def _end(self) -> None:
         self._is_stale = True
-        troubles = () if self._progress is None else self._progress.troubles
+        troubles = () if self.progress is None else self.progress.troubles
         said = "Complete." if not troubles else f"Complete but for {len(troubles)} points."
-        forgotten = 0 if self._progress is None else self._progress.forgotten
+        forgotten = 0 if self.progress is None else self.progress.forgotten
         self._say_progress(f"{said} At {forgotten} points the start is forgotten." if forgotten else said)
         if troubles:
             self.context.say(Notice(NoticeKind.WARNING, troubles[0], details="\n".join(troubles[1:])))
@@ -151,7 +147,7 @@ class SimulatePage(Page):
 
     def _show_motions(self) -> None:
         """List the motions of points that came to more than one; the table is there only then."""
-        rows = () if self._progress is None else self._progress.motion_rows
+        rows = () if self.progress is None else self.progress.motion_rows
         self.motions.show_rows(rows)
         self.motions.setVisible(bool(rows))
 
@@ -166,15 +162,15 @@ class SimulatePage(Page):
 
     def _say_progress(self, text: str) -> None:
         is_busy = self.simulator.is_busy
-        done, asked = (0, 0) if self._progress is None else (self._progress.done, self._progress.asked)
+        done, asked = (0, 0) if self.progress is None else (self.progress.done, self.progress.asked)
         self._bar.show_done(done, asked)
         self._state.setText(text)
         self._cancel.setEnabled(is_busy)
-        self._compare.setEnabled(self._progress is not None and bool(self._progress.curves()))
+        self._compare.setEnabled(self.progress is not None and bool(self.progress.curves()))
 
     def _hand_to_compare(self) -> None:
-        if self._progress is not None:
-            self.context.prediction_made.emit(self._progress.curves())
+        if self.progress is not None:
+            self.context.prediction_made.emit(self.progress.curves())
             self.context.page_wanted.emit(COMPARE)
 
     def _build(self) -> None:
