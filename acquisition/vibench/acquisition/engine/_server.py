@@ -80,7 +80,10 @@ class Admission:
 
     def _run(self) -> None:
         while True:
-            self._keep_reserve()
+            # Hold a descriptor that a connection can be given when the process may open no more.
+            if self._reserve is None:
+                with suppress(OSError):
+                    self._reserve = os.open(os.devnull, os.O_RDONLY)
             ready = {key.fileobj for key, _ in self._selector.select(self._timeout_s())}
             if self._woken in ready:
                 break
@@ -168,12 +171,6 @@ class Admission:
     def _forget(self, connection: socket.socket) -> None:
         self._selector.unregister(connection)
         del self._waiting[connection]
-
-    def _keep_reserve(self) -> None:
-        """Hold a descriptor that a connection can be given when the process may open no more."""
-        if self._reserve is None:
-            with suppress(OSError):
-                self._reserve = os.open(os.devnull, os.O_RDONLY)
 
     def _give_reserve(self) -> bool:
         if self._reserve is None:

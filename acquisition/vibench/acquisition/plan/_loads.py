@@ -65,7 +65,8 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
     """
     terminal_v = terminal_volts(excitation, rig)
     model = RigModel(rig)
-    tones, waveforms, sources = plays_of(excitation)
+    # All different tones, waveforms and sources of streams of a plan, at their loudest.
+    tones, waveforms, sources = _sorted(step.play for step in excitation.loudest_steps())
     broad = [
         _BroadPlay(model, terminal_v, partial(_of_waveform, each, number), _lines_hz(each))
         for number, each in enumerate(waveforms)
@@ -82,11 +83,6 @@ def predicted_loads(excitation: Excitation, rig: Rig) -> Loads:
 def terminal_volts(excitation: Excitation, rig: Rig) -> float:
     """Peak at the generator's terminal at the largest setting of the plan [V]."""
     return 0.5 * excitation.amplitude_vpp * rig.generator.terminal_factor()
-
-
-def plays_of(excitation: Excitation) -> tuple[list[Tone], list[Waveform], list[SampleSource]]:
-    """All different tones, waveforms and sources of streams of a plan, at their loudest."""
-    return _sorted(step.play for step in excitation.loudest_steps())
 
 
 def _sorted(plays: Iterable[Play]) -> tuple[list[Tone], list[Waveform], list[SampleSource]]:

@@ -59,7 +59,8 @@ class MeasurementPreview:
 def preview_measurement(measurement: Measurement, rig: Rig) -> MeasurementPreview:
     """Look ahead at a measurement on a rig; raises ConfigurationError when it cannot be sampled."""
     excitation = measurement.excitation
-    rate_hz = _shown_rate_hz(excitation.playing_s, excitation.highest_frequency_hz, rig.daq.sample_rate_hz)
+    affordable = MOST_SAMPLES / max(excitation.playing_s, 1.0)
+    rate_hz = max(min(rig.daq.sample_rate_hz, affordable), _LOWEST_RATE * excitation.highest_frequency_hz)
     preview = excitation.preview(rate_hz)
     spectrum_hz, spectrum_v = _highest_lines(preview)
     length_s = duration_s(measurement)
@@ -87,11 +88,6 @@ def _least_growth_time_s(measurement: Measurement, rig: Rig) -> float | None:
         # What a fast loop holds follows from its gains and the plant, see `require_holdable`.
         return None
     return least_growth_time_s(loop_time_s(rig, excitation.band_hz[0]))
-
-
-def _shown_rate_hz(playing_s: float, highest_hz: float, converter_hz: float) -> float:
-    affordable = MOST_SAMPLES / max(playing_s, 1.0)
-    return max(min(converter_hz, affordable), _LOWEST_RATE * highest_hz)
 
 
 def _highest_lines(preview: SignalPreview) -> tuple[Samples, Samples]:

@@ -215,7 +215,11 @@ def discard(part: Path) -> None:
 def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str] | None) -> None:
     with h5py.File(part, "r", locking=False) as source, written_hdf5(tmp, "x", layout.LIBVER) as copy:
         samples = int(source[layout.N_VALID][0])
-        _copy_file_attributes(source, copy, samples)
+        state, reason = tables.ending(source)
+        if state is RecordingState.RECORDING:
+            state, reason = RecordingState.INTERRUPTED, INTERRUPTED_REASON
+        ending = {"state": state.value, "reason": reason, "samples": samples}
+        write_attributes(copy, {**read_attributes(source), **ending})
         source.copy(layout.CONFIGURATION, copy)
         digests: dict[str, str] = {}
         time_axis = _write_time(copy, samples, float(source.attrs["sample_rate_hz"]), digests)
@@ -238,14 +242,6 @@ def _copy(part: Path, tmp: Path, key: SealKey | None, written: Mapping[str, str]
             f"{tmp} does not read back as it was written ({found.sentence}); check disk and memory. All"
             f" committed samples are safe in {part}; recover that file."
         )
-
-
-def _copy_file_attributes(source: h5py.File, copy: h5py.File, samples: int) -> None:
-    state, reason = tables.ending(source)
-    if state is RecordingState.RECORDING:
-        state, reason = RecordingState.INTERRUPTED, INTERRUPTED_REASON
-    ending = {"state": state.value, "reason": reason, "samples": samples}
-    write_attributes(copy, {**read_attributes(source), **ending})
 
 
 def _write_time(

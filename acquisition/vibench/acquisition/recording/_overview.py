@@ -97,9 +97,10 @@ def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | N
     if not isinstance(group, h5py.Group) or read_attributes(group).get("samples_per_bin") != BIN_SAMPLES:
         return None
     extremes = [group.get(role + suffix) for suffix in (LOW_SUFFIX, HIGH_SUFFIX)]
+    # How many bins so many samples fill, the last perhaps in part.
     if any(
         not isinstance(each, h5py.Dataset)
-        or each.shape != (bins_of(samples),)
+        or each.shape != (-(-samples // BIN_SAMPLES),)
         or each.dtype != np.dtype(layout.COUNT_DTYPE)
         for each in extremes
     ):
@@ -109,11 +110,6 @@ def read_overview(file: h5py.File, role: str, samples: int) -> CountOverview | N
     except OSError:
         return None
     return CountOverview(low, high)
-
-
-def bins_of(samples: int) -> int:
-    """How many bins this many samples fill, the last perhaps in part."""
-    return -(-samples // BIN_SAMPLES)
 
 
 def _packed(bins: int) -> dict[str, object]:

@@ -175,7 +175,11 @@ class Program(BaseModel):
         """Whether its process lives, answering or not."""
         if self.place is Place.HERE:
             return is_process(self.pid, self.process_start)
-        return _is_marked(_path(self))
+        try:
+            with closing(OpenFile(_path(self))) as file:
+                return not file.is_locked_alone()
+        except OSError:  # gone by now, or on a disk without locks
+            return False
 
     @property
     def was_killed(self) -> bool:
@@ -385,14 +389,6 @@ def _marked(path: Path) -> OpenFile | None:
         pass
     file.close()
     return None
-
-
-def _is_marked(path: Path) -> bool:
-    try:
-        with closing(OpenFile(path)) as file:
-            return not file.is_locked_alone()
-    except OSError:  # gone by now, or on a disk without locks
-        return False
 
 
 def _write(program: Program) -> Path:

@@ -25,14 +25,10 @@ def write_nexus(excerpt: Excerpt, path: Path, observer: TransferObserver = unobs
         entry["title"] = f"{excerpt.name}: {excerpt.recording.plan.get('name', '')}".removesuffix(": ")
         entry["start_time"] = excerpt.recording.started_utc
         entry["program_name"] = "vibench"
-        entry.attrs["default"] = _plotted(excerpt)
+        # What opens first: the response of m0 where it was recorded.
+        entry.attrs["default"] = "m0_velocity" if "m0_velocity" in excerpt.roles else excerpt.roles[-1]
         for channel in excerpt.channels:
             _write_channel(entry, excerpt, channel, observer)
-
-
-def _plotted(excerpt: Excerpt) -> str:
-    """Choose what opens first: the response of m0 where it was recorded."""
-    return "m0_velocity" if "m0_velocity" in excerpt.roles else excerpt.roles[-1]
 
 
 def _group(parent: h5py.Group, name: str, nexus_class: str) -> h5py.Group:

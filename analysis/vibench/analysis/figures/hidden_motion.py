@@ -79,7 +79,12 @@ def _whole(axes: Axes, motion: HiddenMotion) -> None:
 
 
 def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
-    place = _zoomed(motion)
+    # The stretch that is shown closely: around the middle one of the impacts, or of the motion.
+    count = round(_ZOOM_S * motion.sample_rate_hz)
+    impacts = motion.tracked.collisions.samples
+    middle = int(np.median(impacts)) if impacts.size else motion.tracked.p.size // 2
+    start = min(max(0, middle - count // 2), max(0, motion.tracked.p.size - count))
+    place = slice(start, start + count)
     time_s, p, sd = motion.time_s[place], motion.tracked.p[place], motion.tracked.p_sd[place]
     free = motion.free.p[place]
     low, high = _MICRO * (p - _BOUND * sd), _MICRO * (p + _BOUND * sd)
@@ -99,15 +104,6 @@ def _zoom(axes: Axes, motion: HiddenMotion) -> tuple[Table, ...]:
             p_without_contact_model_m=free,
         ),
     )
-
-
-def _zoomed(motion: HiddenMotion) -> slice:
-    """Choose the stretch that is shown closely: around the middle one of the impacts, or of the motion."""
-    count = round(_ZOOM_S * motion.sample_rate_hz)
-    impacts = motion.tracked.collisions.samples
-    middle = int(np.median(impacts)) if impacts.size else motion.tracked.p.size // 2
-    start = min(max(0, middle - count // 2), max(0, motion.tracked.p.size - count))
-    return slice(start, start + count)
 
 
 def hidden_impacts_figure(motion: HiddenMotion) -> DrawnFigure:

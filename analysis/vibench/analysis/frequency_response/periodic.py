@@ -95,7 +95,12 @@ def period_spectra(samples: Reals, period_samples: float, periods: int) -> Compl
 
     """
     points = fft.next_fast_len(int(np.ceil(period_samples)), real=True)
-    start, extended = _extended(samples, period_samples, periods)
+    # Continue a periodic record by its own neighbouring periods, as far as the interpolation reaches.
+    size = samples.shape[-1]
+    missing = max(0, int(np.ceil(periods * period_samples)) - size)
+    before = interpolated(samples, np.arange(-REACH, 0, dtype=np.float64) + period_samples)
+    after = interpolated(samples, size + np.arange(REACH + missing, dtype=np.float64) - period_samples)
+    start, extended = REACH, np.concatenate((before, samples, after), axis=-1)
     positions = start + np.arange(periods * points, dtype=np.float64) * (period_samples / points)
     cut = interpolated(extended, positions).reshape(*samples.shape[:-1], periods, points)
     lines = int(TRUSTED_BAND * period_samples) + 1
@@ -110,15 +115,6 @@ def driven_lines(spectra: Complexes) -> Flags:
     if not strongest > 0:
         raise UnusableData("the drive channel is silent; check that it was recorded")
     return np.asarray(amplitude > _WEAKEST_LINE * strongest)
-
-
-def _extended(samples: Reals, period: float, periods: int) -> tuple[int, Reals]:
-    """Continue a periodic record by its own neighbouring periods, as far as the interpolation reaches."""
-    size = samples.shape[-1]
-    missing = max(0, int(np.ceil(periods * period)) - size)
-    before = interpolated(samples, np.arange(-REACH, 0, dtype=np.float64) + period)
-    after = interpolated(samples, size + np.arange(REACH + missing, dtype=np.float64) - period)
-    return REACH, np.concatenate((before, samples, after), axis=-1)
 
 
 def _phase_slope(spectra: Complexes, highest: float) -> tuple[float, float]:

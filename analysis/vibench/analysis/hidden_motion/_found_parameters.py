@@ -159,7 +159,9 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
         start = first_look.tracked
     found = _refined(described, motion, start, near)
     for shift in () if isinstance(found, FoundSpecimen) else _GAP_SHIFTS:
-        moved = _with_gaps_moved(start, near, shift)
+        # Move both gaps by so many standard deviations: without a contact model they err together.
+        gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
+        moved = with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
         looks = (estimate(moved, motion, near, *each) for each in stretches[:2])
         held = next((each for each in looks if _is_held(each, motion)), None)
         again = found if held is None else _refined(described, motion, held.tracked, near)
@@ -171,12 +173,6 @@ def found_specimen(described: TrackedSpecimen, motion: PreparedMotion) -> FoundS
         if isinstance(found, FoundSpecimen)
         else replace(_nothing(described, found, searched=True), tracked=start)
     )
-
-
-def _with_gaps_moved(start: TrackedSpecimen, near: Mapping[Hidden, float], shift: float) -> TrackedSpecimen:
-    """Move both gaps by this many standard deviations: without a contact model they err together."""
-    gaps = (each for each in (Hidden.LOWER_GAP, Hidden.UPPER_GAP) if each in near)
-    return with_values(start, {each: value_of(start, each) * (1 + shift * near[each]) for each in gaps})
 
 
 def _is_held(answer: Estimate | str, motion: PreparedMotion) -> TypeGuard[Estimate]:

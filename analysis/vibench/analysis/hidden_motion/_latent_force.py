@@ -61,7 +61,11 @@ def latent_motion(
     A larger ``closed_share`` lets the force between impacts stand for wrong numbers of the specimen.
     """
     free = model.without_stops
-    guess_n = _force_guess(model, motion, first, count)
+    # Guess the size of the force: m1 times the rms acceleration of m0.
+    velocity = motion.velocity[first : first + count + 1].astype(np.float64)
+    smooth_v = gaussian_filter1d(velocity, motion.sample_rate_hz / (2 * np.pi * _PEAK_BAND_HZ))
+    rms = float(np.std(np.diff(smooth_v))) * motion.sample_rate_hz
+    guess_n = max(model.specimen.masses[1] * 3.0 * rms, _LEAST_GUESS_N)
     variance = np.full(count, guess_n**2)
     run, smoothed = _smoothed(free, motion, first, variance)
     # Whether m1 met a stop without light nobody saw.
@@ -81,14 +85,6 @@ def latent_motion(
     squared = np.sort(squared[~np.isnan(squared)])
     misfit = float(np.mean(squared[: int(0.999 * squared.size) or 1])) if squared.size else np.inf
     return LatentMotion(run, smoothed, windows, is_dark, variance, misfit)
-
-
-def _force_guess(model: MotionModel, motion: PreparedMotion, first: int, count: int) -> float:
-    """Guess the size of the force: m1 times the rms acceleration of m0."""
-    velocity = motion.velocity[first : first + count + 1].astype(np.float64)
-    smooth_v = gaussian_filter1d(velocity, motion.sample_rate_hz / (2 * np.pi * _PEAK_BAND_HZ))
-    rms = float(np.std(np.diff(smooth_v))) * motion.sample_rate_hz
-    return max(model.specimen.masses[1] * 3.0 * rms, _LEAST_GUESS_N)
 
 
 def latent_start(first: int) -> FilterState:

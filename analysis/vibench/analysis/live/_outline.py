@@ -277,16 +277,13 @@ class RecordingOverview:
             )
         wanted = (end - begin) / columns
         if wanted < BIN_SAMPLES:
-            return self._from_samples(roles, begin, end, columns)
+            values = np.stack([self.recording.read(role, begin, end) for role in roles])
+            low, high = outline(values, columns)
+            starts = column_starts(end - begin, columns)
+            time_s = (begin + starts) / self.recording.sample_rate_hz
+            return Picture(time_s, low, high, (end - begin) / starts.size)
         fitting = [each for each in self.levels[roles[0]] if each.bin_samples <= wanted]
         return self._from_bins(roles, begin, end, columns, fitting[-1].bin_samples)
-
-    def _from_samples(self, roles: Sequence[str], begin: int, end: int, columns: int) -> Picture:
-        values = np.stack([self.recording.read(role, begin, end) for role in roles])
-        low, high = outline(values, columns)
-        starts = column_starts(end - begin, columns)
-        time_s = (begin + starts) / self.recording.sample_rate_hz
-        return Picture(time_s, low, high, (end - begin) / starts.size)
 
     def _from_bins(
         self, roles: Sequence[str], begin: int, end: int, columns: int, bin_samples: int

@@ -62,14 +62,6 @@ def drive_tone(drive: Samples, sample_rate_hz: float) -> DriveTone | None:
     )
 
 
-def amplitudes_at(frequency_hz: float, signals: Reals, sample_rate_hz: float) -> Complexes:
-    """Complex peak amplitudes of signals, shape (channels, samples), at one frequency."""
-    values = _hann(signals.shape[-1])
-    turns = np.exp(-2j * np.pi * frequency_hz / sample_rate_hz * np.arange(signals.shape[-1]))
-    found: Complexes = np.asarray(signals @ (values * turns), dtype=np.complex128)
-    return found * (2 / float(np.sum(values)))
-
-
 def drive_turns(drive: Reals, sample_rate_hz: float, frequency_hz: float) -> Reals:
     """Return the moments at which the drive, a cosine, begins a period, in samples; a slow sweep too.
 
@@ -186,7 +178,11 @@ def _point(stretch: Reals, sample_rate_hz: float, near_hz: float) -> SinePoint |
     tone = drive_tone(stretch[0], sample_rate_hz)
     frequency_hz = near_hz if tone is None else tone.frequency_hz
     omega = 2 * np.pi * frequency_hz
-    _, base, response = amplitudes_at(frequency_hz, stretch, sample_rate_hz)
+    # Complex peak amplitudes of signals, shape (channels, samples), at one frequency.
+    values = _hann(stretch.shape[-1])
+    turns = np.exp(-2j * np.pi * frequency_hz / sample_rate_hz * np.arange(stretch.shape[-1]))
+    found: Complexes = np.asarray(stretch @ (values * turns), dtype=np.complex128)
+    _, base, response = found * (2 / float(np.sum(values)))
     displacement = displacement_of(stretch[2], sample_rate_hz, frequency_hz)
     edge = (stretch.shape[1] - displacement.size) // 2
     velocity = stretch[2, edge : edge + displacement.size]

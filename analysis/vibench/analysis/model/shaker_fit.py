@@ -87,7 +87,9 @@ def fitted_shaker(
     frequency_hz = found.frequency_hz[known]
     s: Complexes = np.asarray(2j * np.pi * frequency_hz, dtype=np.complex128)
     measured = found.value[known] / s
-    carried = _carried_mass(specimen, frequency_hz)
+    # Mass that the base feels: what all masses' momentum is to the base's velocity, without contact.
+    moved = base_transmissibility(specimen, frequency_hz)[:, :3]
+    carried = np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
     # A line's scatter is the same for both parts of ln(measured / modelled).
     sd = np.maximum(found.relative_sd_magnitude[known], 1e-6)
 
@@ -134,12 +136,6 @@ def _acceleration_per_volt(logarithms: Reals, s: Complexes, carried_kg: Complexe
     dynamic = stiffness + damping * s + (mass + carried_kg) * s**2
     coupled = (resistance + inductance * s) * dynamic + s * force_constant**2
     return np.asarray(force_constant * s**2 / coupled)
-
-
-def _carried_mass(specimen: Specimen, frequency_hz: Reals) -> Complexes:
-    """Mass that the base feels: what all masses' momentum is to the base's velocity, without contact."""
-    moved = base_transmissibility(specimen, frequency_hz)[:, :3]
-    return np.asarray(moved @ np.asarray(specimen.masses, dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)

@@ -203,15 +203,11 @@ def thinned(step: float, values: Sequence[float], most: int) -> tuple[float, lis
     for every in (1, 2, 5, 10, 20, 50, 100):
         before, narrower = kept, wider
         wider = every * step
-        kept = [value for value in values if _is_multiple(value, wider)]
+        kept = [value for value in values if abs(value / wider - round(value / wider)) < 1e-6]
         if len(kept) <= most:
             break
     few = 2
     return (wider, kept) if len(kept) >= min(few, len(values)) else (narrower, [before[0], before[-1]])
-
-
-def _is_multiple(value: float, step: float) -> bool:
-    return abs(value / step - round(value / step)) < 1e-6
 
 
 def logarithmic_ticks(low: float, high: float) -> list[tuple[float, list[float]]]:

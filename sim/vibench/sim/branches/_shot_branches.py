@@ -76,13 +76,6 @@ def lies_on(found: FoundBranch, specimen: Specimen, path: DrivePath, drive: Harm
     return False
 
 
-def known_among(
-    known: Iterable[FoundBranch], specimen: Specimen, path: DrivePath, drive: Harmonic, states: Floats
-) -> bool:
-    """Return whether a motion, as one of its states or of its mirror's, lies on a known branch."""
-    return any(lies_on(each, specimen, path, drive, states) for each in known)
-
-
 M = TypeVar("M")
 """A motion, as the method knows it."""
 
@@ -115,7 +108,7 @@ def branches_from(
             fresh = [start]
             while fresh and len(known) < search.most_branches:
                 one = fresh.pop()
-                if known_among(known, specimen, path, one.drive, one.states):
+                if any(lies_on(each, specimen, path, one.drive, one.states) for each in known):
                     continue
                 found = replace(follow(one), elapsed_s=time.perf_counter() - began)
                 known.append(found)

@@ -69,7 +69,12 @@ def blocked_mean(values: ArrayLike) -> BlockedMean:
     if len(counts) == 0 or variances[0] == 0.0:
         error = 0.0 if len(series) > 1 else math.nan
         return BlockedMean(mean, error, 1, len(series), 1.0, len(series) >= FEWEST_BLOCKS)
-    level = _first_independent(variances, correlations, counts)
+    # The shortest blocks from which on no neighbours are correlated.
+    ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
+    # Of independent values the lagged correlation has the mean -1/n and the variance 1/n.
+    evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
+    passes = np.flatnonzero(evidence < _largest_by_chance(len(counts)))
+    level = int(passes[0]) if len(passes) else len(counts) - 1
     variance = variances[level] / (counts[level] - 1)
     return BlockedMean(
         mean=mean,
@@ -91,15 +96,6 @@ def _levels(centred: Floats) -> tuple[Floats, Floats, Floats]:
         pairs = len(centred) // 2
         centred = 0.5 * (centred[: 2 * pairs : 2] + centred[1 : 2 * pairs : 2])
     return np.array(variances), np.array(correlations), np.array(counts, dtype=np.float64)
-
-
-def _first_independent(variances: Floats, correlations: Floats, counts: Floats) -> int:
-    """Find the shortest blocks from which on no neighbours are correlated."""
-    ratios = np.divide(correlations, variances, out=np.zeros_like(variances), where=variances > 0.0)
-    # Of independent values the lagged correlation has the mean -1/n and the variance 1/n.
-    evidence = np.cumsum((counts * (ratios + 1.0 / counts) ** 2)[::-1])[::-1]
-    passes = np.flatnonzero(evidence < _largest_by_chance(len(counts)))
-    return int(passes[0]) if len(passes) else len(counts) - 1
 
 
 @cache

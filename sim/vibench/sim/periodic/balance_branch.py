@@ -66,13 +66,6 @@ class Guess:
     """P_k under U = A0 sin(w t), shape (m,) [m]."""
 
 
-def linear_guess(structure: LinearStructure, frequency_hz: float, amplitude_m: float) -> Guess:
-    """Start from the motion without the spring."""
-    fundamental = np.array([1])
-    seen = condense(structure, 2.0 * math.pi * frequency_hz, fundamental)
-    return Guess(fundamental, np.array([-1j * amplitude_m * seen.linear]))
-
-
 def first_guess(
     structure: LinearStructure, spring: RestoringForce, frequency_hz: float, amplitude_m: float
 ) -> Guess:
@@ -81,7 +74,10 @@ def first_guess(
         case PowerSpring():
             return first_order_guesses(structure, spring, frequency_hz, amplitude_m)[0]
         case _:
-            return linear_guess(structure, frequency_hz, amplitude_m)
+            # Start from the motion without the spring.
+            fundamental = np.array([1])
+            seen = condense(structure, 2.0 * math.pi * frequency_hz, fundamental)
+            return Guess(fundamental, np.array([-1j * amplitude_m * seen.linear]))
 
 
 def first_order_guesses(
@@ -204,7 +200,8 @@ class BalanceFamily:
 
     def report(self, point: Vector) -> OrbitReport:
         """Responses, multipliers and contacts."""
-        found = self.balance_at(point)
+        frequency, amplitude = self.drive(point)
+        found = described(self.problem, point[:-1], frequency, amplitude, self.tolerance)
         return OrbitReport(
             frequency_hz=found.frequency_hz,
             amplitude_m=found.amplitude_m,
@@ -214,11 +211,6 @@ class BalanceFamily:
             signs=orbit_signs(self.problem.structure, self.problem.spring, found, self.options.kept),
             left_out=found.left_out,
         )
-
-    def balance_at(self, point: Vector) -> Balance:
-        """Return the solution at a point."""
-        frequency, amplitude = self.drive(point)
-        return described(self.problem, point[:-1], frequency, amplitude, self.tolerance)
 
     def refined(self, point: Vector, tangent: Vector) -> "tuple[BalanceFamily, Vector, Vector] | None":
         """Twice the harmonics, the new ones of size zero."""

@@ -93,7 +93,10 @@ def linear_motion(
         + (shaker.suspension_damping_ns_per_m + shaker.force_constant_n_per_a * per_volt_n) * s
         + shaker.suspension_stiffness_n_per_m
     )
-    voltage = _amplified(amplifier, s)
+    # Output volts per input volt, shape of ``s``.
+    low_cut = 2 * np.pi * amplifier.low_cut_hz
+    below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
+    voltage = np.asarray(amplifier.gain * below / (1.0 + s / (2 * np.pi * amplifier.high_cut_hz)))
     forces: ComplexArray = np.zeros((s.size, 4, 2), dtype=np.complex128)
     forces[:, 0, 0], forces[:, 2, 1], forces[:, 3, 1] = per_volt_n * voltage, 1.0, -1.0
     if specimen is None:
@@ -122,13 +125,6 @@ def _dynamic_stiffness(table: ComplexArray, specimen: Specimen, s: ComplexArray)
     stiffness[:, 0, 0] = table + coupling
     stiffness[:, 0, 1] = stiffness[:, 1, 0] = -coupling
     return stiffness
-
-
-def _amplified(amplifier: Amplifier, s: ComplexArray) -> ComplexArray:
-    """Output volts per input volt, shape of ``s``."""
-    low_cut = 2 * np.pi * amplifier.low_cut_hz
-    below = s / (s + low_cut) if low_cut > 0 else np.ones_like(s)
-    return np.asarray(amplifier.gain * below / (1.0 + s / (2 * np.pi * amplifier.high_cut_hz)))
 
 
 def _push(p: ComplexArray, receptance: ComplexArray, gap_m: float) -> ComplexArray:

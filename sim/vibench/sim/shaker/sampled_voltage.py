@@ -170,7 +170,9 @@ class _Resampling:
         if known is None:
             frequency_hz = np.asarray(fft.rfftfreq(size, 1 / self._sample_rate_hz), dtype=np.float64)
             mean_of_step = np.sinc(frequency_hz / (self._sample_rate_hz * self._ratio)) * self._ratio
-            band = _pass_band(frequency_hz / self._sample_rate_hz)
+            # One up to 0.45 cycles per sample, a cosine edge to nothing at half a cycle.
+            edge = ((frequency_hz / self._sample_rate_hz) - _PASS_PART) / (0.5 - _PASS_PART)
+            band = np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))
             if gain is None:
                 known = band * mean_of_step / self._held(frequency_hz)
             else:
@@ -194,9 +196,3 @@ def _coupled(values: FloatArray, cut: float) -> FloatArray:
     half_turn = np.tan(np.pi * cut)
     weights = np.array([1.0, -1.0]) / (1 + half_turn)
     return np.asarray(scipy.signal.lfilter(weights, [1.0, -(1 - half_turn) / (1 + half_turn)], values))
-
-
-def _pass_band(cycles: FloatArray) -> FloatArray:
-    """One up to 0.45 cycles per sample, a cosine edge to nothing at half a cycle."""
-    edge = (cycles - _PASS_PART) / (0.5 - _PASS_PART)
-    return np.asarray(0.5 * (1 + np.cos(np.pi * np.clip(edge, 0.0, 1.0))))

@@ -220,19 +220,16 @@ class Acquisition:
         if self.awaits_trigger:
             self.position = self.acquired + count
         elif self.available + count > self.buffer_size:
-            self._overrun(count)
+            needed = self.available + count
+            if self._overflow is Overflow.GROW and self._ring.shape[0] * needed <= MOST_SAMPLES:
+                self._grow(needed)
+            else:
+                self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
         first = self.acquired % self.buffer_size
         head = min(count, self.buffer_size - first)
         self._ring[:, first : first + head] = block[:, :head]
         self._ring[:, : count - head] = block[:, head:]
         self.acquired += count
-
-    def _overrun(self, count: int) -> None:
-        needed = self.available + count
-        if self._overflow is Overflow.GROW and self._ring.shape[0] * needed <= MOST_SAMPLES:
-            self._grow(needed)
-        else:
-            self.failure = DaqmxRefusal(DAQmxErrors.SAMPLES_NO_LONGER_AVAILABLE, samples_read=0)
 
     def _grow(self, needed: int) -> None:
         unread = self._copy(self.position, self.available)

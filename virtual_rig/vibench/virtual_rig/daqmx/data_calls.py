@@ -197,13 +197,6 @@ def varint(number: int) -> bytes:
     return bytes(digits)
 
 
-def packed_response(status: int, values: NDArray[np.float64], samples: int) -> bytes:
-    """Write a ReadAnalogF64Response, ready to send: status, array, samples per channel."""
-    raw = np.ascontiguousarray(values, dtype="<f8").tobytes()
-    array = _ARRAY_TAG + varint(len(raw)) + raw
-    return b"".join((_STATUS_TAG, varint(status), array, _COUNT_TAG, varint(samples)))
-
-
 def write(task: Task, volts: NDArray[np.float64], start: StartsItself, timeout_s: float) -> int:
     """Write samples, shape (channels, samples) [V]; return samples per channel written.
 
@@ -297,7 +290,10 @@ _READ_BITS = {"I16": 16, "I32": 32}
 
 def _read_scaled(system: DaqmxSystem, request: Any) -> bytes:
     reading = _read_what_fits(task_of(system, request), request)
-    return packed_response(reading.status, _laid_out(reading.volts, request), reading.samples)
+    # Write a ReadAnalogF64Response, ready to send: status, array, samples per channel.
+    raw = np.ascontiguousarray(_laid_out(reading.volts, request), dtype="<f8").tobytes()
+    array = _ARRAY_TAG + varint(len(raw)) + raw
+    return b"".join((_STATUS_TAG, varint(reading.status), array, _COUNT_TAG, varint(reading.samples)))
 
 
 def _read_waveforms(system: DaqmxSystem, request: Any) -> Fields:

@@ -289,11 +289,6 @@ def _memory(parameter: bytes) -> str:
     return name
 
 
-def _edit_memory(parameter: bytes) -> None:
-    if _memory(parameter) != EDIT_MEMORY:
-        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
-
-
 def _load_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
     target, data = exactly(parameters, 2)
     generator.memory.load(_memory(target), block(data))
@@ -306,7 +301,8 @@ def _read_memory(generator: AFG1022, _: int, parameters: Parameters) -> bytes:
 
 def _define_memory(generator: AFG1022, _: int, parameters: Parameters) -> None:
     target, points = exactly(parameters, 2)
-    _edit_memory(target)
+    if _memory(target) != EDIT_MEMORY:
+        raise ScpiError(ErrorCode.ILLEGAL_PARAMETER_VALUE)
     generator.memory.define(integer(points))
     generator.memory_changed()
 

@@ -313,7 +313,11 @@ class ScpiInstrument:
         """Carry out one unit; return its answer, if it asks."""
         command, suffix = self._find(header)
         if command is None or (command.ask if unit.asks else command.write) is None:
-            return self._unknown(unit)
+            # Refuse a header that is not in the table, the way the firmware does.
+            if not self.quirks.unknown_is_syntax_error:
+                raise ScpiError(ErrorCode.UNDEFINED_HEADER)
+            self.status.report(ErrorCode.SYNTAX_ERROR)
+            return [b""] if unit.asks else []
         if not 1 <= suffix <= command.channels:
             raise ScpiError(ErrorCode.HEADER_SUFFIX_OUT_OF_RANGE)
         if unit.asks and command.ask is not None:
@@ -329,13 +333,6 @@ class ScpiInstrument:
             if suffix is not None:
                 return command, suffix
         return None, 1
-
-    def _unknown(self, unit: Unit) -> list[bytes]:
-        """Refuse a header that is not in the table, the way the firmware does."""
-        if not self.quirks.unknown_is_syntax_error:
-            raise ScpiError(ErrorCode.UNDEFINED_HEADER)
-        self.status.report(ErrorCode.SYNTAX_ERROR)
-        return [b""] if unit.asks else []
 
 
 def _spoiled(reply: bytes) -> bytes:

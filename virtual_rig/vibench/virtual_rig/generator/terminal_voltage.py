@@ -251,7 +251,9 @@ class Timeline:
         if count == 0:
             return volts
         noise = self._noise(count)
-        self._forget_before(edges_s[0])
+        # Drop signals that ended before a rig time.
+        ended = max(bisect_right(self._since_s, edges_s[0]) - 1, 0)
+        del self._since_s[:ended], self._signals[:ended]
         until = [*self._since_s[1:], np.inf]
         for since_s, until_s, signal in zip(self._since_s, until, self._signals, strict=True):
             if since_s < edges_s[-1] and until_s > edges_s[0] and signal.relay is Relay.CLOSED:
@@ -301,11 +303,6 @@ class Timeline:
             generator = np.random.default_rng((self.terminal.seed, block))
             self._noise_block = block, generator.standard_normal(NOISE_BLOCK)
         return self._noise_block[1]
-
-    def _forget_before(self, time_s: float) -> None:
-        """Drop signals that ended before a rig time."""
-        ended = max(bisect_right(self._since_s, time_s) - 1, 0)
-        del self._since_s[:ended], self._signals[:ended]
 
 
 def _mean_over_pieces(signal: Signal, edges_s: Samples, cuts_s: Samples) -> Samples:

@@ -103,16 +103,6 @@ class RandomDropouts:
         ]
 
 
-def overwrite(
-    values: NDArray[np.float64], first_step: int, full_scale: float, disturbances: list[Disturbance]
-) -> None:
-    """Put the disturbances into ``values``, whose first belongs to ``first_step``, in place."""
-    for disturbance in disturbances:
-        begin = max(disturbance.first_step - first_step, 0)
-        stop = max(disturbance.stop_step - first_step, 0)
-        values[begin:stop] = disturbance.level * full_scale
-
-
 _FIT_BAND = 0.2
 """The fit covers zero to this part of the grid's rate: what a converter at half the rate can pass."""
 _FIT_FLOOR = 1e-2
@@ -273,7 +263,11 @@ class Vibrometer:
         self._demanded = [one for one in self._demanded if one.stop_step > first_step]
         disturbed = self._dropouts.between(first_step, first_step + count) + self._demanded
         instead = np.full(count if disturbed else 0, np.nan)
-        overwrite(instead, first_step, self._full_scale_m_per_s, disturbed)
+        # Put the disturbances into ``values``, whose first belongs to ``first_step``, in place.
+        for disturbance in disturbed:
+            begin = max(disturbance.first_step - first_step, 0)
+            stop = max(disturbance.stop_step - first_step, 0)
+            instead[begin:stop] = disturbance.level * self._full_scale_m_per_s
         noise = self._noise_rms * self._noise.draw(first_step, count)
         scale = self._full_scale_m_per_s, self._full_scale_v
         return SensorParts(self._filter, noise, instead, *scale)

@@ -259,7 +259,9 @@ class RigPage(Page):
         self.first_steps = SentenceLabel(FIRST_STEPS, rank="second")
         self._lay_out()
         self._connect()
-        self._choose_first()
+        otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
+        remembered = Path(self.context.settings.text(Remembered.BENCH, otherwise))
+        self.choice.choose(self.context.first_bench or remembered)
 
     @property
     def is_done(self) -> bool:
@@ -355,11 +357,6 @@ class RigPage(Page):
             self.about.setText(f"{rig.name}. {kind} {' → '.join(chain)} → {rig.daq.product}{warning}")
             self.context.settings.keep_text(Remembered.BENCH, str(self.choice.path))
         self.context.selection.choose_rig(rig)
-
-    def _choose_first(self) -> None:
-        otherwise = str(shipped("hardware_configs/virtual_rig.toml"))
-        remembered = Path(self.context.settings.text(Remembered.BENCH, otherwise))
-        self.choice.choose(self.context.first_bench or remembered)
 
     def _find(self) -> None:
         rig = self.choice.rig

@@ -70,7 +70,10 @@ class SimulatePage(Page):
         if self._is_stale and not self._undrawn:
             self._is_stale = False
             self._undrawn = self.plots.steps(self.progress)
-            self._show_motions()
+            # Points that came to more than one motion; without any there is no table.
+            rows = () if self.progress is None else self.progress.motion_rows
+            self.motions.show_rows(rows)
+            self.motions.setVisible(bool(rows))
         if self._undrawn:
             self._undrawn.pop(0)()
         for view in self._views:
@@ -144,12 +147,6 @@ class SimulatePage(Page):
             Notice(NoticeKind.FAULT, what, "What had been found is shown.", "Simulate again.", "SIMULATOR")
         )
         self._say_progress("The simulation broke off.")
-
-    def _show_motions(self) -> None:
-        """List the motions of points that came to more than one; the table is there only then."""
-        rows = () if self.progress is None else self.progress.motion_rows
-        self.motions.show_rows(rows)
-        self.motions.setVisible(bool(rows))
 
     def _say_cost(self) -> None:
         request = self.form.value
