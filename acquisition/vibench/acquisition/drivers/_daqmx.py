@@ -178,7 +178,7 @@ class DaqmxDigitizer:
         digitizer = cls(daqmx_session(rig.daq.server), rig.daq, channels_of(rig))
         with ExitStack() as undo:
             undo.callback(digitizer._release)
-            with daqmx_call(f"opening {rig.daq.device} on {digitizer._session.place}"):
+            with daqmx_call(f"opening {rig.daq.device} on {digitizer.session.place}"):
                 digitizer._reserve()
             undo.pop_all()
         return digitizer
