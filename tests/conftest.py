@@ -75,6 +75,7 @@ LONG = (
     "tests/acquisition/run/test_stop_matrix.py",
     "tests/gui/test_window_dies.py",
     "tests/acquisition/run/test_run_on_virtual_rig.py",
+    "tests/acquisition/run/test_until.py",
     "tests/gui/pages/test_loop_is_free.py",
     "tests/cli/test_command_line.py",
     "tests/gui/test_accessibility.py",

@@ -23,6 +23,7 @@ class Dwell(FixedSine):
 
     family: ClassVar[Family] = Family.DWELL
     result_labels: ClassVar[tuple[SegmentLabel, ...]] = (SegmentLabel.DWELL,)
+    wishes: ClassVar[tuple[str, ...]] = ("response_i", "response_ii")
     kind: Literal["dwell"] = "dwell"
     settle_s: NonNegativeFloat = 3.0
     """Wait until the transient has died out [s]."""

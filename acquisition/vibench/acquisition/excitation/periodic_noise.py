@@ -26,6 +26,7 @@ class BandNoise(AbstractExcitation):
     """Noise between two frequencies."""
 
     family: ClassVar[Family] = Family.NOISE
+    wishes: ClassVar[tuple[str, ...]] = ("resonance_hz", "transmissibility")
     band_start_hz: FrequencyHz
     """Lower edge of the band [Hz]."""
     band_stop_hz: FrequencyHz

@@ -161,6 +161,8 @@ class AbstractExcitation(FrozenModel, ABC):
     family: ClassVar[Family]
     result_labels: ClassVar[tuple[SegmentLabel, ...]]
     """Segments of the recording that results are taken from."""
+    wishes: ClassVar[tuple[str, ...]] = ()
+    """Results that a recording of it may last until, see `vibench.acquisition.plan.Until`."""
 
     amplitude_vpp: AmplitudeVpp
     """Setting of the generator, peak to peak [V], as its panel shows it."""

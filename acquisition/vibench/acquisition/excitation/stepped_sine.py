@@ -117,6 +117,7 @@ class SteppedSine(FrequencySteps):
     keeps to its branch.
     """
 
+    wishes: ClassVar[tuple[str, ...]] = ("response_i", "response_ii")
     kind: Literal["stepped_sine"] = "stepped_sine"
     settle_s: NonNegativeFloat = 3.0
     """Wait at every frequency until the transient has died out [s]."""

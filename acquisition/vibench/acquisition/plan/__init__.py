@@ -89,6 +89,7 @@ from ._sweep import (
     RangeSpacing,
     SweepAxis,
 )
+from ._until import FEWEST_REALISATIONS, LOOK_FACTOR, Until, UntilProgress
 
 __all__ = [
     "BYTES_PER_SAMPLE",
@@ -96,8 +97,10 @@ __all__ = [
     "CHECK_QUIET_S",
     "CHECK_S",
     "EXCITATION_KINDS",
+    "FEWEST_REALISATIONS",
     "FEWEST_STAIRS",
     "HUSH_S",
+    "LOOK_FACTOR",
     "LOOK_PERIODS",
     "AbstractExcitation",
     "Approach",
@@ -142,6 +145,8 @@ __all__ = [
     "SteppedSine",
     "StreamedNoise",
     "SweepAxis",
+    "Until",
+    "UntilProgress",
     "WhiteNoise",
     "base_motion",
     "check_amplitude_vpp",

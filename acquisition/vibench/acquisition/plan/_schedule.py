@@ -18,6 +18,7 @@ from ..host.toml_file import FrozenModel
 from ..instruments import Sweep
 from ..recording import SegmentLabel
 from ..rig import OutputUse, Rig, generator_driver
+from ._until import Until
 
 # The plan of one measurement: what is played, how it is ramped, when the run must end itself.
 #
@@ -96,6 +97,20 @@ class Measurement(FrozenModel):
     """How many recordings a campaign makes of it."""
     limits: InRunLimits = InRunLimits()
     notes: str = ""
+    until: Until | None = None
+    """How well results must be known for the recording to end; without it the plan's time is recorded."""
+
+    @model_validator(mode="after")
+    def _until_fits(self) -> Self:
+        if self.until is None:
+            return self
+        allowed = () if isinstance(self.excitation, AbstractFeedback) else self.excitation.wishes
+        if unknown := [name for name in self.until.wishes if name not in allowed]:
+            known = f"it can be {' or '.join(allowed)}" if allowed else "leave until out"
+            raise ValueError(
+                f"until names {unknown[0]}, which {self.excitation.kind} does not wait for; {known}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _ramp_has_stairs(self) -> Self:

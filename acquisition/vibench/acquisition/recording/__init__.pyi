@@ -29,6 +29,7 @@ from ._feedback_note import (
     Stability as Stability,
     Steadiness as Steadiness,
     SweepNote as SweepNote,
+    UntilNote as UntilNote,
     feedback_note as feedback_note,
 )
 from ._finalise import (

@@ -312,6 +312,34 @@ class BranchEndNote(AbstractNote):
     end: BranchEnd
 
 
+class UntilNote(AbstractNote):
+    """How a stretch ended that was recorded until its results were known well enough."""
+
+    kind: Literal["until"] = "until"
+    stretch: int
+    """Number of the step; 1 where there is one stretch."""
+    is_reached: bool
+    """False where it ended at its longest time."""
+    recorded_s: SixFigures
+    looked_s: SixFigures
+    """Recorded at the last look; 0 if there was none."""
+    looks: int
+    bounds: dict[str, SixFigures | None]
+    """Of 95 % at the last look, relative, by result; None where none could be stated."""
+    hindrance: str = ""
+
+    @property
+    def sentence(self) -> str:
+        """The same in words."""
+        known = ", ".join(
+            f"{name} " + ("not determined" if bound is None else f"± {100 * bound:.2g} %")
+            for name, bound in self.bounds.items()
+        )
+        end = "known well enough" if self.is_reached else "longest time"
+        why = f" ({self.hindrance})" if self.hindrance else ""
+        return f"{end} after {self.recorded_s:.4g} s: {known or 'no look'}{why}"
+
+
 FeedbackNote: TypeAlias = (
     SettledNote
     | SegmentNote
@@ -326,11 +354,12 @@ FeedbackNote: TypeAlias = (
     | BranchPointNote
     | BranchStabilityNote
     | BranchEndNote
+    | UntilNote
 )
 _NOTES: TypeAdapter[FeedbackNote] = TypeAdapter(FeedbackNote)
 _FOUND = ("settled", "achieved", "level", "jump", "resonance", "spectrum")
 _FOLLOWED = ("held_response", "branch_point", "branch_stability", "branch_end")
-_KINDS = frozenset((*_FOUND, *_FOLLOWED))
+_KINDS = frozenset((*_FOUND, *_FOLLOWED, "until"))
 
 
 def feedback_note(event: Event) -> FeedbackNote | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from ..errors import AcquisitionError, DataLost, DriveLate, InstrumentError, LimitExceeded, RecordingError
 from ..excitation.steps import Segment
 from ..instruments import Block, Digitizer
-from ..plan import RunState
+from ..plan import RunState, UntilProgress
 from ..recording import RecordingState, RecordingWriter
 from ..stopping.stop import Cause
 from .silence_watch import DriveGuard
@@ -29,6 +29,8 @@ class Progress:
     """Setting of the generator, peak to peak [V]; 0 while its output is off."""
     frequency_hz: float | None = None
     """Of the sine that is played; None for anything else."""
+    until: UntilProgress | None = None
+    """How well results are known, of a recording that lasts until they are."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,10 @@ class Ending:
         self.reason = "the run ended without saying why"
         self._cause: Cause | None = None
 
-    def is_finished(self, lost_samples: int) -> None:
-        """Note that the plan was carried out, and what the converter has lost meanwhile."""
+    def is_finished(self, lost_samples: int, known: str) -> None:
+        """Note that the plan was carried out, how well results are known, and what the converter has lost."""
         lost = f"; the converter lost {lost_samples} samples" if lost_samples else ""
-        self.state, self.reason = RunState.FINISHED, f"the plan was carried out{lost}"
+        self.state, self.reason = RunState.FINISHED, f"the plan was carried out{known}{lost}"
 
     def is_stopped(self, reason: str, cause: Cause) -> None:
         """Note that somebody ended it."""

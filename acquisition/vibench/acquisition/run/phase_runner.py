@@ -19,6 +19,7 @@ from .drive import Drive
 from .ending import Progress
 from .limit_monitor import LimitMonitor
 from .silence_watch import LISTEN_S, LONGEST_S, SilenceWatch
+from .until import UntilWatch
 
 DELAY_SAMPLES = 40
 """A delta-sigma converter's filter delays every channel by about so much (NI 9234: 38.4): cycles, over a span
@@ -187,6 +188,7 @@ class PhaseRunner:
         glide: GlideWatch,
         switch: StopSwitch,
         total_s: float,
+        until: UntilWatch | None = None,
     ) -> None:
         self.state = RunState.CHECKING
         self.loop = loop
@@ -196,6 +198,7 @@ class PhaseRunner:
         self._glide = glide
         self._switch = switch
         self._total_s = total_s
+        self._until = until
         self._look: Callable[[Block], None] = self._go_on
         self._held_s = 0.0
         self._play: Play | None = None
@@ -409,8 +412,9 @@ class PhaseRunner:
             self._limit_monitor.note_change(text, loop.samples)
         level_vpp = self._drive.setting_vpp
         frequency_hz = self._play.frequency_hz if isinstance(self._play, Tone) else None
+        until = None if self._until is None else self._until.progress
         return Progress(
-            self.state, loop.segment, block, loop.elapsed_s, self._total_s, level_vpp, frequency_hz
+            self.state, loop.segment, block, loop.elapsed_s, self._total_s, level_vpp, frequency_hz, until
         )
 
     def _enter(self, state: RunState) -> None:

@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, tee
 from pathlib import Path
 
 from ..bench.bench import Bench
@@ -41,6 +41,7 @@ from .ending import Ending, Outcome, Progress
 from .limit_monitor import LimitMonitor
 from .phase_runner import GlideWatch, PhaseRunner, Stopped
 from .silence_watch import DriveGuard, LowLevelCheck, SilenceWatch, judged, require_checkable
+from .until import UntilWatch
 
 ROOM = 1.25
 """A step of a glide must be longer than a setting takes by this factor: not all take the same time."""
@@ -192,6 +193,8 @@ class Run(ClosedOnLeaving):
         self._silence: SilenceWatch  # made when the plan is admitted: the drive is recorded then
         self._guard: DriveGuard  # likewise
         self._controller: Controller[None] | None = None
+        self._until: UntilWatch | None = None
+        self._known = ""
         self._limit_monitor = LimitMonitor(
             bench.rig, bench.channels, measurement.limits, bench.digitizer.sample_rate_hz
         )
@@ -236,6 +239,7 @@ class Run(ClosedOnLeaving):
             GlideWatch(self._bench.channels, self._bench.digitizer.sample_rate_hz),
             self.switch,
             self._total_s,
+            self._until,
         )
         try:
             yield from self._played_or_stopped(self._runner)
@@ -255,12 +259,14 @@ class Run(ClosedOnLeaving):
                     self._ending.leave(guard, self._bench.digitizer, sink)
             finally:
                 self._runner.state = self._ending.state
+                if self._until is not None:
+                    self._until.close()
 
     def _played_or_stopped(self, runner: PhaseRunner) -> Iterator[Progress]:
         """Play the plan; where somebody or a limit ends it, ramp down as hard as the cause asks for."""
         try:
             yield from self._played(runner)
-            self._ending.is_finished(runner.loop.lost_samples)
+            self._ending.is_finished(runner.loop.lost_samples, self._known)
         except Stopped as stop:
             self._ending.is_stopped(str(stop), stop.request.cause)
             yield from self._ramped_down_early(runner, stop.request.level)
@@ -291,6 +297,10 @@ class Run(ClosedOnLeaving):
             with ExitStack() as refused:
                 self._guard = DriveGuard(self._drive, self.switch, lambda: self._silence.is_heard)
                 refused.enter_context(self._guard)
+                if self._measurement.until is not None:
+                    self._until = UntilWatch(self._measurement, self._measurement.until, self._path)
+                    refused.callback(self._until.close)
+                    self._until.wait_until_ready(self._switch)
                 header = run_header(self._bench, self._measurement, self._total_s)
                 sink = self._create(self._path, header)
                 refused.pop_all()
@@ -303,23 +313,40 @@ class Run(ClosedOnLeaving):
     def _played(self, runner: PhaseRunner) -> Iterator[Progress]:
         loop = runner.loop
         loop.log(EventKind.PLAYER, self._drive.drive_source.value)
+        playing: Iterator[Phase] = iter(())
+        if self._controller is None:
+            playing = phases(self._measurement)
+        if self._until is not None:
+            playing = self._until.phases(self._measurement)
+        # What an output plays is written ahead: it reads the same phases as the run, somewhat earlier.
+        playing, announced = tee(playing)
         match self._bench_check:
             case LowLevelCheck.AT_LOW_LEVEL:
                 self._begin(check_phases(self._measurement, self._bench.rig))
                 yield from self._checked(runner)
-                self._drive.announce(known_phases(self._measurement))
+                self._drive.announce(announced)
                 pause_s = self._drive.pause_s
             case LowLevelCheck.RECENTLY_PASSED:
-                self._begin(known_phases(self._measurement))
+                self._begin(announced)
                 loop.log(EventKind.CHECK, "left out: the bench was checked shortly before")
                 pause_s = 0.0
+        del announced  # what a drive does not read ahead need not be kept
         yield from runner.run_phase(Phase(RunState.ARMED, None, pause_s))
         if self._controller is None:
-            for phase in phases(self._measurement):
+            for phase in playing:
                 yield from runner.run_phase(phase)
+                self._note_known(loop)
+            self._note_known(loop)
         else:
             yield from _controlled(runner, self._controller)
         loop.enter(None)
+
+    def _note_known(self, loop: AcquisitionLoop) -> None:
+        """Note of each stretch how well its results are known; the reason states the last."""
+        while self._until is not None and self._until.ended:
+            note = self._until.ended.pop(0)
+            loop.log(note.kind, note.text)
+            self._known = f"; {note.sentence}"
 
     def _before_s(self) -> float:
         """Time before the first ramp [s]; the signal is announced only after the check has passed."""

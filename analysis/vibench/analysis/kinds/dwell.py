@@ -1,6 +1,7 @@
 """Dwells: both responses, the lines of the spectrum, and how the motion repeats."""
 
 from functools import partial
+from math import inf
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from ..recordings.checks import measurement_checks
 from ..recordings.facts import RecordingFacts
 from ..sine.dwell import DwellResponse
 from ..sine.dwell_analysis import (
+    WINDOW_S,
     DwellAnalysis,
     DwellPlan,
     IrregularMotion,
@@ -37,7 +39,9 @@ def _analyse(
     facts: RecordingFacts, channels: Channels, plan: DwellPlan, _: FrequencyResponseRequest
 ) -> DwellAnalysis:
     towards_hz = bound_frequencies_hz(facts)
-    found = measured_dwell(channels, plan, towards_hz)
+    # A dwell that lasts until it is known well enough is known by all of it.
+    longest_s = WINDOW_S if facts.measurement.until is None else inf
+    found = measured_dwell(channels, plan, towards_hz, longest_s)
     motion = dwell_motion(channels, found)
     if motion.verdict.kind not in {MotionKind.CHAOTIC, MotionKind.QUASI_PERIODIC}:
         found = found.with_rest_as_noise(is_known_to_repeat=motion.verdict.kind is MotionKind.PERIODIC)
@@ -62,7 +66,7 @@ def _endings(found: IrregularMotion | None) -> tuple[Ending, ...]:
 
 def _draw(analysis: DwellAnalysis, channels: SimulatedChannels) -> Draw[DwellResponse]:
     towards_hz = bound_frequencies_hz(analysis.facts)
-    found = measured_dwell(channels, analysis.excitation, towards_hz)
+    found = measured_dwell(channels, analysis.excitation, towards_hz, analysis.response.window_s)
     endings = _endings(irregular_motion(channels, found))
     impacts = channels.played_impacts(SegmentLabel.DWELL)
     return Draw(found, dwell_quantities(found, towards_hz, endings), endings, *impacts)

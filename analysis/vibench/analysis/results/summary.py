@@ -28,11 +28,13 @@ def budgets_of(result: AnyResult) -> tuple[Budget, ...]:
     Returns
     -------
     A budget each for A0 and Responses I and II of a dwell, the largest of both of a sweep or of steps,
-    and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008).
+    and for frequency, damping and transmissibility at each resonance under noise (JCGM 100:2008). Those of a
+    recording that lasted until its results were known are widened, see `Budget.widened`.
 
     """
     found: tuple[Budget, ...] = ANALYSES[result.kind].budgets(result.analysis, result.laid)
-    return found
+    has_chosen_end = result.analysis.facts.measurement.until is not None
+    return tuple(each.widened() for each in found) if has_chosen_end else found
 
 
 def budget_sentences(results: CampaignResults) -> Iterator[str]:

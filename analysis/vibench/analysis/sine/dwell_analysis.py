@@ -281,8 +281,10 @@ def bound_frequencies_hz(facts: RecordingFacts) -> tuple[float, ...]:
     return tuple(float(each) for each in specimen_of(facts.bench).bound_frequencies_hz)
 
 
-def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float, ...]) -> DwellResponse:
-    """Analyse the last 5 s of a dwell, or what there is of them."""
+def measured_dwell(
+    channels: Channels, dwell: DwellPlan, towards_hz: tuple[float, ...], longest_s: float = WINDOW_S
+) -> DwellResponse:
+    """Analyse the last ``longest_s`` of a dwell, or what there is of them."""
     stretch = only_stretch(channels, SegmentLabel.DWELL)
     drive, base, response = read_whole(channels, stretch)
     rate = channels.sample_rate_hz
@@ -298,7 +300,7 @@ def measured_dwell(channels: Channels, dwell: DwellPlan, towards_hz: tuple[float
         response,
         rate,
         near_hz=dwell.frequency_hz,
-        window_s=min(WINDOW_S, clear_s),
+        window_s=min(longest_s, clear_s),
         towards_hz=towards_hz,
         delay_s=channels.response_delay_s,
         sensors=complex(channels.response_gain(np.array([dwell.frequency_hz]))[0]),

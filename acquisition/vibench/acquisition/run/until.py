@@ -1,0 +1,195 @@
+"""Ending a recording when its results are known well enough; another process analyses the growing file."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from time import monotonic
+
+from ..errors import AcquisitionError
+from ..excitation.steps import Waveform
+from ..host.beside import Beside, ClosedOnLeaving
+from ..plan import (
+    FEWEST_REALISATIONS,
+    LOOK_FACTOR,
+    Measurement,
+    Phase,
+    RunState,
+    Until,
+    UntilProgress,
+    phases,
+)
+from ..recording import UntilNote
+from ..stopping.stop import StopSwitch
+
+PIECE_S = 0.5
+"""Time between two questions whether to go on [s]; a realisation of noise is always recorded whole."""
+_ENDING_S = 2.0
+_READY_S = 60.0
+"""How long the analysis may take to start [s]; the recording is made anyway, and looks come when they can."""
+_ASK_S = 0.05
+
+
+class UntilWatch(ClosedOnLeaving):
+    """Looks at a growing recording at times that grow by a factor, and says when the wishes are met.
+
+    Process and thread start before anything plays. The run only queues a look and reads the last result:
+    it never waits, and when the process fails the recording goes on to its longest time.
+    """
+
+    def __init__(self, measurement: Measurement, until: Until, path: Path) -> None:
+        self._until = until
+        self._path = path
+        self._beside = Beside("until")
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "vibench.analysis.results.growing_bounds"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
+                # Ctrl-C in a terminal is handled by the program that runs the measurement.
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise AcquisitionError(
+                f"{measurement.name} asks for until, and its analysis could not be started ({error}). "
+                "Nothing was played; close other programs, or leave until out"
+            ) from error
+        excitation = measurement.excitation
+        self._labels = excitation.result_labels
+        steps = [each.record_s for each in excitation.steps()]
+        self._longest_s = sum(steps) if excitation.stretches > 1 else max(steps)
+        self._stretch = 0
+        self._recorded_s = self._due_s = 0.0
+        self._begun: UntilProgress | None = None
+        """Of the stretch that is recorded, before its first look."""
+        self._found: UntilProgress | None = None
+        """Of the last look, which may belong to the stretch before; written by the thread, as a whole."""
+        self.ended: list[UntilNote] = []
+        """How each stretch ended; emptied by the run, which notes them in the recording."""
+
+    @property
+    def progress(self) -> UntilProgress | None:
+        """Give the newest of the stretch that is recorded; None between stretches."""
+        begun, found = self._begun, self._found
+        is_newer = begun is not None and found is not None and found.stretch == begun.stretch
+        return found if is_newer else begun
+
+    def wait_until_ready(self, switch: StopSwitch) -> None:
+        """Wait before anything plays until the process has loaded what it needs; a stop ends the wait."""
+        give_up_s = monotonic() + _READY_S
+        self._beside.do(self._take_greeting)
+        while self._beside.is_busy and switch.request is None and monotonic() < give_up_s:
+            self._beside.wait(_ASK_S)
+
+    def phases(self, measurement: Measurement) -> Iterator[Phase]:
+        """Lay out the measurement; what is recorded ends when its wishes are met."""
+        for phase in phases(measurement):
+            is_result = phase.segment is not None and phase.segment.label in self._labels
+            if not isinstance(phase.play, Waveform):
+                if is_result:
+                    yield from self._pieces(phase)
+                else:
+                    yield phase
+                continue
+            # Noise of waveforms: one result of all realisations, of which each has a ramp up and down.
+            if self._is_reached and phase.state is RunState.RAMPING_UP:
+                break
+            if not (self._is_reached and phase.state in (RunState.SETTLING, RunState.RECORDING)):
+                if is_result and self._begun is None:
+                    self._begin(FEWEST_REALISATIONS * phase.duration_s)
+                yield phase
+                if is_result:
+                    self._recorded(phase.duration_s)
+        self._end()
+
+    def _pieces(self, phase: Phase) -> Iterator[Phase]:
+        self._end()
+        self._longest_s = phase.duration_s
+        self._begin(self._until.shortest_s)
+        left_s = phase.duration_s
+        while left_s > 1e-9 and not self._is_reached:  # 1e-9: rounding leaves no piece
+            piece_s = min(PIECE_S, left_s)
+            yield Phase(phase.state, phase.play, piece_s, phase.segment)
+            left_s -= piece_s
+            self._recorded(piece_s)
+
+    @property
+    def _is_reached(self) -> bool:
+        return self.progress is not None and self.progress.is_reached
+
+    def _begin(self, first_s: float) -> None:
+        self._stretch += 1
+        self._recorded_s, self._due_s = 0.0, first_s
+        self._begun = UntilProgress(
+            wishes=self._until.wishes, longest_s=self._longest_s, stretch=self._stretch
+        )
+
+    def _end(self) -> None:
+        if (progress := self.progress) is not None:
+            self.ended.append(
+                UntilNote(
+                    stretch=progress.stretch,
+                    is_reached=progress.is_reached,
+                    recorded_s=self._recorded_s,
+                    looked_s=progress.looked_s,
+                    looks=progress.looks,
+                    bounds=dict(progress.bounds),
+                    hindrance=progress.hindrance[:120],
+                )
+            )
+            self._begun = None
+
+    def _recorded(self, duration_s: float) -> None:
+        """Count what was recorded, and ask for a look when one is due."""
+        self._recorded_s += duration_s
+        asked, recorded_s = self.progress, self._recorded_s
+        if asked is None or asked.is_reached or recorded_s < self._due_s * (1 - 1e-9) or self._beside.is_busy:
+            return
+        while self._due_s <= recorded_s * (1 + 1e-9):
+            self._due_s *= LOOK_FACTOR
+        self._beside.do(lambda: self._look(asked, recorded_s))
+
+    def _look(self, asked: UntilProgress, recorded_s: float) -> None:
+        """Have the file analysed up to a time of the stretch; in the thread beside the run."""
+        bounds: dict[str, float | None] = {}
+        try:
+            question = {"path": str(self._path), "stretch": asked.stretch, "recorded_s": recorded_s}
+            assert self._process.stdin is not None
+            self._process.stdin.write(json.dumps(question) + "\n")
+            self._process.stdin.flush()
+            answer = json.loads(self._read_answer())
+            bounds = {name: answer["bounds"].get(name) for name in asked.wishes}
+            hindrance = str(answer["hindrance"])
+        except (OSError, ValueError, KeyError, AttributeError):
+            hindrance = "the analysis beside the run has ended"
+        known = [(bounds.get(name), wish) for name, wish in asked.wishes.items()]
+        self._found = asked.model_copy(
+            update={
+                "bounds": bounds,
+                "looked_s": recorded_s,
+                "looks": asked.looks + 1,
+                "is_reached": all(bound is not None and bound <= wish for bound, wish in known),
+                "hindrance": hindrance,
+            }
+        )
+
+    def _take_greeting(self) -> None:
+        self._read_answer()
+
+    def _read_answer(self) -> str:
+        assert self._process.stdout is not None
+        return self._process.stdout.readline()
+
+    def close(self) -> None:
+        """End the process; what it was to say reaches nobody. Legal at any time."""
+        self._process.kill()
+        self._process.wait(_ENDING_S)
+        self._beside.close(_ENDING_S)
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError):  # half a question to a process that is gone
+                assert pipe is not None
+                pipe.close()

@@ -1,0 +1,143 @@
+"""``python -m vibench.analysis.results.growing_bounds``: bounds of a recording that is still made.
+
+A line of standard output states that it is ready; then a line of standard input asks for a look, and a
+line of standard output answers it. All are JSON objects. A run that lasts until its results are known
+starts this process (`vibench.acquisition.run.until`).
+"""
+
+import json
+import re
+import sys
+import time
+from dataclasses import dataclass
+from math import hypot
+from pathlib import Path
+
+from vibench.acquisition import RecordingError
+from vibench.acquisition.recording import Recording, SegmentLabel, open_recording
+
+from ..errors import AnalysisError
+from ..frequency_response.noise_response import DEFAULT_REQUEST
+from ..kinds.analyses import ANALYSES
+from ..kinds.analysis_kind import AnyResult, Result
+from ..recordings.channels import RecordedChannels, Stretch
+from ..recordings.facts import RecordingFacts, plan_of, recording_facts
+from ..uncertainty.budget import COVERAGE, Budget, Cause
+from .measurement_analysis import CONTRADICTIONS
+from .summary import budgets_of
+
+PATIENCE_S = 20.0
+"""How long the file may take to hold the samples of a look [s]."""
+_PAUSE_S = 0.05
+_QUANTITIES = {
+    "resonance_hz": r"^resonance at .*, frequency$",
+    "transmissibility": r"^transmissibility at ",
+    "response_i": r"\bResponse I\b",
+    "response_ii": r"\bResponse II\b",
+}
+"""Names of budgets, by the result that a plan may name."""
+
+
+@dataclass(frozen=True, eq=False)
+class _ChannelsSoFar(RecordedChannels):
+    """A recording up to a look: realisations that are whole, or one stretch as if it ended there."""
+
+    stretch: int = 1
+    samples_of_it: int = 0
+
+    def stretches(self, label: str) -> tuple[Stretch, ...]:
+        """Give what belongs to the look."""
+        found = super().stretches(label)
+        if label == SegmentLabel.REALISATION:
+            return tuple(each for each in found if each.is_complete)
+        return tuple(
+            Stretch(each.start, each.start + self.samples_of_it, each.numbers, is_complete=True)
+            for each in found[self.stretch - 1 : self.stretch]
+        )
+
+
+def bounds_of(result: AnyResult) -> dict[str, float | None]:
+    """Give the largest relative 95 % bound by noise and chance of each result that a plan may wait for.
+
+    None where it is not determined; a result that was not found at all is left out.
+    """
+    found: dict[str, float | None] = {}
+    for name, pattern in _QUANTITIES.items():
+        bounds = [_bound(each) for each in budgets_of(result) if re.search(pattern, each.quantity)]
+        if bounds:
+            known = [each for each in bounds if each is not None]
+            found[name] = max(known) if len(known) == len(bounds) else None
+    return found
+
+
+def _bound(budget: Budget) -> float | None:
+    parts = [budget.share(cause) for cause in (Cause.NOISE, Cause.CHANCE)]
+    stated = [each for each in parts if each is not None]
+    return COVERAGE * hypot(*stated) if len(stated) == len(parts) else None
+
+
+def look(
+    recording: Recording, facts: RecordingFacts, stretch: int, recorded_s: float
+) -> dict[str, float | None]:
+    """Analyse a recording up to a time of one of its stretches.
+
+    Raises AnalysisError when nothing in it is usable yet.
+
+    Parameters
+    ----------
+    recording, facts
+        Open, and what it states of plan and bench.
+    stretch
+        Number of the step, from 1; 1 where the excitation has one result.
+    recorded_s
+        Time of the stretch that is analysed [s]; realisations of noise are analysed as far as they are whole.
+
+    """
+    plan = facts.measurement.excitation
+    samples = round(recorded_s * recording.sample_rate_hz)
+    channels = _ChannelsSoFar(recording, stretch=stretch, samples_of_it=samples)
+    return bounds_of(Result(ANALYSES[plan.kind].analyse(facts, channels, plan, DEFAULT_REQUEST), None))
+
+
+def _open_when_there(path: Path, stretch: int, recorded_s: float) -> Recording:
+    """Open a recording as soon as it holds the samples of a look; raises RecordingError."""
+    give_up_s = time.monotonic() + PATIENCE_S
+    while True:
+        recording = open_recording(path.with_name(f"{path.name}.part"))
+        labels = plan_of(recording).excitation.result_labels
+        found = [each for each in recording.segments if each.label in labels]
+        if SegmentLabel.REALISATION in labels:
+            counted = [each for each in found if each.is_complete]
+        else:
+            counted = found[stretch - 1 : stretch]
+        held = sum(each.stop - each.start for each in counted)
+        if held / recording.sample_rate_hz > recorded_s * (1 - 1e-6):
+            return recording
+        recording.close()
+        if time.monotonic() > give_up_s:
+            raise RecordingError(f"the file has not held {recorded_s:g} s of the stretch in time")
+        time.sleep(_PAUSE_S)
+
+
+def main() -> None:
+    """Answer looks until standard input ends."""
+    facts: dict[str, RecordingFacts] = {}
+    sys.stdout.write("{}\n")
+    sys.stdout.flush()
+    for line in sys.stdin:
+        asked = json.loads(line)
+        bounds: dict[str, float | None] = {}
+        hindrance = ""
+        try:
+            with _open_when_there(Path(asked["path"]), asked["stretch"], asked["recorded_s"]) as recording:
+                if asked["path"] not in facts:
+                    facts[asked["path"]] = recording_facts(recording)
+                bounds = look(recording, facts[asked["path"]], asked["stretch"], asked["recorded_s"])
+        except (AnalysisError, RecordingError, *CONTRADICTIONS) as error:
+            hindrance = str(error)
+        sys.stdout.write(json.dumps({"bounds": bounds, "hindrance": hindrance}) + "\n")
+        sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()
