@@ -41,3 +41,14 @@ def test_every_table_of_the_window_offers_it(window):
     for each in tables:
         assert [action.text() for action in each.actions()] == ["Copy", "Copy the whole table"], each
         assert each.contextMenuPolicy() is Qt.ContextMenuPolicy.ActionsContextMenu
+
+
+@pytest.mark.parametrize("width", [120, 240, 900])
+def test_the_wide_column_stays_readable_in_a_narrow_table(qtbot, width):
+    made = ReadTable("Findings", ("finding", "measured", "expected"))
+    qtbot.addWidget(made)
+    made.resize(width, 200)
+    made.show()
+    made.show_rows([("calibration of the converter", "2026-02-10", "at most 730 days before")])
+    least = 12 * made.fontMetrics().averageCharWidth()
+    qtbot.waitUntil(lambda: made.columnWidth(2) >= least)

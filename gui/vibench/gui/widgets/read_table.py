@@ -49,6 +49,8 @@ def _offered(table: QTableView, text: str, said: Callable[[], str]) -> QAction:
 
 _WIDEST_LETTERS = 36
 """Of a column that takes the room it needs; longer text is wrapped."""
+_LEAST_LETTERS = 14
+"""Of the column that takes what is left; in a narrower table it is scrolled to."""
 _ROW_ROOM = 8
 """Pixels more for a row of several lines, or they would touch the next one's."""
 
@@ -90,14 +92,14 @@ class ReadTable(QTableWidget):
         header = self.horizontalHeader()
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
-        header.setSectionResizeMode(range(len(columns))[wide], QHeaderView.ResizeMode.Stretch)
+        self._wide = range(len(columns))[wide]
         header.setMaximumSectionSize(_WIDEST_LETTERS * self.fontMetrics().averageCharWidth())
         self._hint = hint
         self._shown: tuple[tuple[tuple[str, ...], ...], tuple[str, ...]] = ((), ())
         UNITS.on_change(self._write)
         # A change of width comes with many steps: rows are measured once, after them.
         self._later = QTimer(self, interval=0, singleShot=True)
-        self._later.timeout.connect(self._fit_rows)
+        self._later.timeout.connect(self._fit)
 
     def show_rows(self, rows: Sequence[Sequence[str]], tips: Sequence[str] = ()) -> None:
         """Show rows, with a tip for each or none; nothing is touched while nothing changes."""
@@ -138,7 +140,15 @@ class ReadTable(QTableWidget):
                 self.palette().placeholderText().color(),
             )
 
-    def _fit_rows(self) -> None:
+    def _fit(self) -> None:
+        header, wide = self.horizontalHeader(), self._wide
+        least = _LEAST_LETTERS * self.fontMetrics().averageCharWidth()
+        others = sum(header.sectionSize(each) for each in range(self.columnCount()) if each != wide)
+        if self.viewport().width() - others < least:
+            header.setSectionResizeMode(wide, QHeaderView.ResizeMode.Fixed)
+            header.resizeSection(wide, least)
+        else:
+            header.setSectionResizeMode(wide, QHeaderView.ResizeMode.Stretch)
         self.resizeRowsToContents()
         one_line = self.verticalHeader().defaultSectionSize()
         for row in range(self.rowCount()):

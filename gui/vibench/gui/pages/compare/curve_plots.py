@@ -158,9 +158,6 @@ PEAK_HEADINGS = (
     "Damping ratio if linear (%)",
 )
 
-_LEAST_LETTERS = 12
-"""Of a column; in a small window the others are scrolled to."""
-
 
 class NumberTable(ReadTable):
     """A table to read and to copy, with other headings each time; names take the room that is left."""
@@ -168,7 +165,6 @@ class NumberTable(ReadTable):
     def __init__(self, name: str, hint: str) -> None:
         super().__init__(name, PEAK_HEADINGS[:1], hint)
         self.setShowGrid(True)
-        self.horizontalHeader().setMinimumSectionSize(_LEAST_LETTERS * self.fontMetrics().averageCharWidth())
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectItems)
 
     def show_numbers(self, headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

@@ -229,7 +229,6 @@ class PreviewPlots(QWidget):
 
 
 _USED = 0
-_LEAST_LETTERS = 10
 _SIGNS = {LimitSide.AT_MOST: "≤", LimitSide.AT_LEAST: "≥"}
 
 
@@ -239,8 +238,6 @@ class LimitTable(ReadTable):
     def __init__(self) -> None:
         super().__init__("Predicted loads and limits", ("used", "quantity", "predicted", "limit"), wide=1)
         self.setItemDelegateForColumn(_USED, BarDelegate(self))
-        # In a small window the limits are scrolled to: what they are of must be read in any.
-        self.horizontalHeader().setMinimumSectionSize(_LEAST_LETTERS * self.fontMetrics().averageCharWidth())
 
     def show_checks(self, checks: tuple[LimitCheck, ...]) -> None:
         """Show what was checked against the rig."""
